@@ -1,0 +1,2 @@
+//! The `jtc` command.
+fn main() {}

@@ -1,0 +1,105 @@
+//! Settings and parameters of the controller.
+use jtc_dynamics::ArmModel;
+
+use crate::JOINTS;
+
+/// Settings of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointConfig {
+    /// Lowest position, rad.
+    pub position_min: f64,
+    /// Highest position, rad.
+    pub position_max: f64,
+    /// Highest speed, rad/s.
+    pub velocity_max: f64,
+    /// Highest acceleration, rad/s².
+    pub acceleration_max: f64,
+    /// Highest torque at the joint, N·m.
+    pub torque_max: f64,
+    /// Largest difference of commanded and measured position, rad.
+    pub position_error_max: f64,
+    /// Reflected inertia of the drive's rotor, kg·m² at the joint (J-40).
+    pub rotor_inertia: f64,
+}
+
+/// Settings of the device. They are not sent by the host.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Per joint, base to wrist.
+    pub joints: [JointConfig; JOINTS],
+    /// Acceleration of gravity in the base frame, m/s².
+    pub gravity: [f64; 3],
+    /// A gripper is on the bus (J-20).
+    pub gripper: bool,
+    /// Full scale of the drives' velocity, rad/s (J-11).
+    pub velocity_full_scale: f64,
+    /// Configuration bits sent to every joint (J-11).
+    pub joint_config_bits: u8,
+    /// Configuration bits sent to the gripper (J-11).
+    pub gripper_config_bits: u8,
+    /// Ticks between statuses without a response (J-04).
+    pub status_period_ms: u16,
+    /// Consecutive Moves that may stay unanswered or unacknowledged (J-14).
+    pub missed_moves_max: u8,
+    /// Longest READY→ENABLE, ms (J-16).
+    pub enable_timeout_ms: u32,
+    /// Start position tolerance, rad (J-34).
+    pub start_tolerance_rad: f64,
+    /// Time scale ramp for pause, stop and resume, ms (J-33).
+    pub ramp_ms: u16,
+    /// Blend into and out of teaching, ms (J-25).
+    pub teach_blend_ms: u16,
+    /// Joint speed above which teaching brakes, rad/s (J-25).
+    pub teach_velocity_max: f64,
+    /// Braking torque per speed in excess of the limit, N·m·s/rad (J-25).
+    pub teach_damping: f64,
+    /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
+    pub friction_sign_width: f64,
+}
+
+/// Gains of one joint (J-41).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct PidGains {
+    /// N·m/rad.
+    pub kp: f64,
+    /// N·m/(rad·s).
+    pub ki: f64,
+    /// N·m·s/rad.
+    pub kd: f64,
+    /// Lower bound of the integral of the error, rad·s.
+    pub int_min: f64,
+    /// Upper bound of the integral of the error, rad·s.
+    pub int_max: f64,
+}
+
+/// Friction table of one joint: rows are velocities.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TableOf<T> {
+    /// rad/s, strictly increasing.
+    pub velocity: [T; 20],
+    /// °C, strictly increasing.
+    pub temperature: [T; 20],
+    /// N·m, `[velocity][temperature]`.
+    pub torque: [[T; 20]; 20],
+}
+
+/// Friction compensation (J-42).
+#[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)]
+pub enum Friction {
+    /// c0..c5 per joint, ascending; c4 = 0 means no temperature factor.
+    Polynomial([[f64; 6]; JOINTS]),
+    /// One table per joint.
+    Table([TableOf<f32>; JOINTS]),
+}
+
+/// What the host sends, or the defaults (section 7).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameters {
+    /// Kinematics and masses.
+    pub model: ArmModel,
+    /// Per joint.
+    pub pid: [PidGains; JOINTS],
+    /// Friction compensation.
+    pub friction: Friction,
+}

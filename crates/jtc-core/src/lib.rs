@@ -1,0 +1,96 @@
+//! The joint trajectory controller: `tick(inputs) -> outputs`, sans-I/O, no clock, no heap.
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod config;
+mod controller;
+mod io;
+mod telemetry;
+
+pub use config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf};
+pub use controller::Controller;
+pub use io::{BusState, Inputs, Outputs};
+pub use telemetry::{JointTelemetry, Telemetry};
+
+/// Joints of the arm.
+pub const JOINTS: usize = 6;
+/// Joints and gripper.
+pub const NODES: usize = 7;
+/// Points that the trajectory store holds (J-30).
+pub const POINTS_MAX: usize = 12_000;
+/// Segments of a trajectory (J-30).
+pub const SEGMENTS_MAX: usize = 100;
+/// Points of a segment (J-30).
+pub const SEGMENT_POINTS_MAX: usize = 1_500;
+
+/// States of the controller (section 4), with their number on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum State {
+    /// Set-up is not complete.
+    #[default]
+    Start = 0,
+    /// Nodes are brought up, parameters are awaited; zero torque.
+    Init = 1,
+    /// Holds a position.
+    HoldPos = 2,
+    /// Follows the trajectory.
+    Operate = 3,
+    /// Gravity compensation only.
+    Teaching = 4,
+    /// Zero torque until the cause is gone and the host has cleared.
+    Error = 5,
+}
+
+/// Trajectory execution state (TES).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum Tes {
+    /// No trajectory.
+    #[default]
+    Null = 0,
+    /// Complete, at its start.
+    Stop = 1,
+    /// Paused on the path.
+    Pause = 2,
+    /// Being executed (until standstill).
+    Execute = 3,
+    /// Executed to its last point.
+    Finish = 4,
+}
+
+/// Bits of the controller's error words.
+pub mod error {
+    /// Safety input low.
+    pub const EMERGENCY_INPUT: u16 = 1 << 0;
+    /// Safety output held at 0 by an internal error.
+    pub const EMERGENCY_OUTPUT: u16 = 1 << 1;
+    /// Any internal error.
+    pub const INTERNAL: u16 = 1 << 2;
+    /// Any external error.
+    pub const EXTERNAL: u16 = 1 << 3;
+    /// A joint's internal error.
+    pub const INTERNAL_JOINTS: u16 = 1 << 4;
+    /// CAN timeout or bus-off.
+    pub const INTERNAL_CAN: u16 = 1 << 5;
+    /// Host link (not used by this controller: a silent host is no error).
+    pub const INTERNAL_COM: u16 = 1 << 6;
+    /// A node reports an error or misbehaves.
+    pub const EXTERNAL_JOINTS: u16 = 1 << 7;
+}
+
+/// Bits of a joint's internal error word.
+pub mod joint_error {
+    /// Set position over limit.
+    pub const POSITION: u16 = 1 << 0;
+    /// Set velocity over limit.
+    pub const VELOCITY: u16 = 1 << 1;
+    /// Set acceleration over limit.
+    pub const ACCELERATION: u16 = 1 << 2;
+    /// Computed torque over limit.
+    pub const TORQUE: u16 = 1 << 3;
+    /// Position error over limit.
+    pub const POSITION_ERROR: u16 = 1 << 4;
+    /// No friction table value.
+    pub const FRICTION_TABLE: u16 = 1 << 5;
+}

@@ -1,0 +1,59 @@
+//! What a tick computed, for recordings and tests.
+use crate::{JOINTS, State, Tes};
+
+/// One joint in one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointTelemetry {
+    /// Commanded position, rad.
+    pub set_position: f64,
+    /// Commanded velocity, rad/s.
+    pub set_velocity: f64,
+    /// Commanded acceleration, rad/s².
+    pub set_acceleration: f64,
+    /// Measured position, rad.
+    pub position: f64,
+    /// Measured velocity, rad/s.
+    pub velocity: f64,
+    /// Bearing temperature, °C.
+    pub temperature: f64,
+    /// Model torque (inverse dynamics and rotor), N·m.
+    pub torque_model: f64,
+    /// Proportional part, N·m.
+    pub torque_p: f64,
+    /// Integral part, N·m.
+    pub torque_i: f64,
+    /// Derivative part, N·m.
+    pub torque_d: f64,
+    /// Friction compensation, N·m.
+    pub torque_friction: f64,
+    /// Torque commanded on the bus, N·m.
+    pub torque: f64,
+    /// Node FSM byte.
+    pub fsm: u8,
+    /// Internal errors.
+    pub internal: u16,
+}
+
+impl JointTelemetry {
+    /// Commanded minus measured position, rad.
+    pub fn position_error(&self) -> f64 {
+        self.set_position - self.position
+    }
+}
+
+/// One tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Telemetry {
+    /// Ticks since boot.
+    pub tick: u64,
+    /// State in this tick.
+    pub state: State,
+    /// Trajectory execution state.
+    pub tes: Tes,
+    /// Index of the current 1 ms point.
+    pub point: u32,
+    /// Current error word.
+    pub errors: u16,
+    /// Per joint.
+    pub joints: [JointTelemetry; JOINTS],
+}

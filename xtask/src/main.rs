@@ -1,2 +1,64 @@
-//! Chores of the workspace.
-fn main() {}
+//! Every chore of the workspace behind one command: `cargo xtask help`.
+#![forbid(unsafe_code)]
+
+mod bench;
+mod dependencies;
+mod docs;
+mod fuzz;
+mod python;
+mod rules;
+mod shell;
+mod size;
+mod soak;
+mod tally;
+mod test;
+
+use std::process::ExitCode;
+
+const HELP: &str = "\
+Usage: cargo xtask COMMAND
+
+  test [--quick]               every check of the project; ends with `N passed, N failed, N skipped`
+                               --quick: only formatting, lints, tests and the document checks
+  bench [--json FILE] [--quick]
+                               performance and tracking figures beside their anchors, all measured in this run
+  soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)
+  fuzz [TARGET] [--runs N]     run one fuzz target, or each of them (default: 20000000 executions each)
+  docs                         write the generated parts of docs/ again: picture and fault matrix
+  size                         static memory of the controller against its limit
+  help                         this text
+";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match dispatch(&arguments) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn dispatch(arguments: &[String]) -> anyhow::Result<ExitCode> {
+    let (command, rest) = match arguments.split_first() {
+        Some((command, rest)) => (command.as_str(), rest),
+        None => ("help", arguments),
+    };
+    match command {
+        "test" => test::main(rest),
+        "bench" => bench::main(rest),
+        "soak" => soak::main(rest),
+        "fuzz" => fuzz::main(rest),
+        "docs" => docs::main(rest),
+        "size" => size::main(rest),
+        "help" | "--help" | "-h" => {
+            print!("{HELP}");
+            Ok(ExitCode::SUCCESS)
+        }
+        other => {
+            eprintln!("error: no command `{other}`\n\n{HELP}");
+            Ok(ExitCode::from(2))
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Every direct dependency of a manifest has its line in docs/dependencies.md, and no line has lost its dependency.
+use std::collections::BTreeSet;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::shell::{files, root};
+
+/// Names under the dependency tables of a manifest.
+fn direct(manifest: &str) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    let mut inside = false;
+    for line in manifest.lines() {
+        let line = line.trim();
+        if let Some(table) = line.strip_prefix('[') {
+            let table = table.trim_end_matches(']');
+            inside = table.ends_with("dependencies");
+            if let Some((_, name)) = table.split_once("dependencies.") {
+                names.insert(name.to_owned());
+            }
+        } else if inside && let Some((key, _)) = line.split_once('=') {
+            let name = key.trim().split('.').next().unwrap_or_default();
+            if !name.is_empty() && !name.starts_with('#') {
+                names.insert(name.to_owned());
+            }
+        }
+    }
+    names
+}
+
+/// Names in the first column of the page's tables (`` | `name` | … ``).
+fn documented(page: &str) -> BTreeSet<String> {
+    page.lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split_once('`'))
+        .map(|(name, _)| name.to_owned())
+        .collect()
+}
+
+/// An error that lists what the page does not have, or has too much.
+pub fn check() -> Result<()> {
+    let page =
+        std::fs::read_to_string(root().join("docs/dependencies.md")).context("docs/dependencies.md")?;
+    let documented = documented(&page);
+    let mut used = BTreeSet::new();
+    for directory in ["crates", "xtask", "fuzz"] {
+        for path in files(&root().join(directory), &["toml"]) {
+            if path.file_name().is_some_and(|name| name == "Cargo.toml") {
+                used.extend(direct(&std::fs::read_to_string(path)?));
+            }
+        }
+    }
+    for path in files(&root().join("references"), &["txt"]) {
+        let list = std::fs::read_to_string(path)?;
+        used.extend(list.lines().filter_map(|line| line.split_once("==")).map(|(name, _)| name.to_owned()));
+    }
+    let own: BTreeSet<String> = std::fs::read_dir(root().join("crates"))?
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    let used: BTreeSet<String> = used.difference(&own).cloned().collect();
+    let missing: Vec<_> = used.difference(&documented).map(String::as_str).collect();
+    ensure!(missing.is_empty(), "docs/dependencies.md says nothing about {}", missing.join(", "));
+    let unused: Vec<_> = documented.difference(&used).map(String::as_str).collect();
+    ensure!(unused.is_empty(), "docs/dependencies.md lists what nothing uses: {}", unused.join(", "));
+    println!("{} direct dependencies, each documented", used.len());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn manifests_are_read_in_every_form() {
+        let manifest = "[package]\nname = \"x\"\n[dependencies]\nserde = \"1\"\nclap.workspace = true\n# no = 1\n\
+                        [dev-dependencies.proptest]\nworkspace = true\n[features]\nsim = []\n";
+        let expected: BTreeSet<String> = ["serde", "clap", "proptest"].map(String::from).into();
+        assert_eq!(direct(manifest), expected);
+        assert_eq!(documented("| `serde` | why |\n| name | why |"), BTreeSet::from(["serde".to_owned()]));
+    }
+}

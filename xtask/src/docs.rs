@@ -1,0 +1,20 @@
+//! `cargo xtask docs`: writes the generated parts of docs/ again.
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+
+use crate::shell::{self, Scratch, cargo, root, run};
+
+/// No arguments.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    shell::nothing_left(arguments)?;
+    let scratch = Scratch::new("docs")?;
+    run(cargo(&["run", "--release", "--", "demo", "--speed", "max", "--out"]).arg(scratch.path()))?;
+    std::fs::copy(scratch.path().join("picture.svg"), root().join("docs/demo.svg"))
+        .context("docs/demo.svg")?;
+    println!("wrote docs/demo.svg");
+    let mut matrix = cargo(&["test", "--package", "jtc-sim", "--test", "fault_matrix"]);
+    run(matrix.env("UPDATE_DOCS", "1"))?;
+    println!("wrote the fault matrix of docs/safety.md");
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,201 @@
+//! Running other programs: commands printed before they run, failures named with the command that failed.
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+/// The root of the workspace.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+}
+
+/// Where cargo puts what it builds.
+pub fn target() -> PathBuf {
+    match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(directory) => root().join(directory),
+        None => root().join("target"),
+    }
+}
+
+/// `program` in the root of the workspace.
+pub fn command(program: impl AsRef<OsStr>) -> Command {
+    let mut command = Command::new(program);
+    command.current_dir(root());
+    command
+}
+
+/// Cargo of the pinned toolchain.
+pub fn cargo(arguments: &[&str]) -> Command {
+    let mut cargo = command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args(arguments);
+    cargo
+}
+
+fn shown(command: &Command) -> String {
+    let program = Path::new(command.get_program()).file_name().unwrap_or(command.get_program());
+    let mut line = program.to_string_lossy().into_owned();
+    for argument in command.get_args() {
+        line.push(' ');
+        line.push_str(&argument.to_string_lossy());
+    }
+    line
+}
+
+fn announce(command: &Command) {
+    println!("$ {}", shown(command));
+    let _ = std::io::stdout().flush();
+}
+
+/// Run with the output going to the terminal; an exit code other than 0 is an error.
+pub fn run(command: &mut Command) -> Result<()> {
+    announce(command);
+    let status = command.status().with_context(|| format!("cannot start `{}`", shown(command)))?;
+    if !status.success() {
+        bail!("`{}` ended with {status}", shown(command));
+    }
+    Ok(())
+}
+
+/// Run, show each line of its standard output as it comes and hand it to `line` too.
+pub fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
+    announce(command);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .spawn()
+        .with_context(|| format!("cannot start `{}`", shown(command)))?;
+    if let Some(output) = child.stdout.take() {
+        for text in BufReader::new(output).split(b'\n') {
+            let text = String::from_utf8_lossy(&text?).into_owned();
+            println!("{text}");
+            line(&text);
+        }
+    }
+    let status = child.wait()?;
+    if !status.success() {
+        bail!("`{}` ended with {status}", shown(command));
+    }
+    Ok(())
+}
+
+/// Run and return its standard output; progress and errors go to the terminal.
+pub fn read(command: &mut Command) -> Result<String> {
+    let output = command
+        .stderr(Stdio::inherit())
+        .output()
+        .with_context(|| format!("cannot start `{}`", shown(command)))?;
+    if !output.status.success() {
+        bail!(
+            "`{}` ended with {}\n{}",
+            shown(command),
+            output.status,
+            String::from_utf8_lossy(&output.stdout).trim_end()
+        );
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// Whether a program can be started at all; its output is dropped.
+pub fn works(command: &mut Command) -> bool {
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
+/// Install Debian packages; needs root.
+pub fn apt_install(packages: &[&str]) -> Result<()> {
+    let hint = format!("install it by hand: sudo apt-get install {}", packages.join(" "));
+    if !works(command("id").arg("-u")) || read(command("id").arg("-u"))?.trim() != "0" {
+        bail!("the package {} is missing; {hint}", packages.join(" "));
+    }
+    let install = || {
+        let mut apt = command("apt-get");
+        apt.args(["install", "-y", "-q", "--no-install-recommends"]).args(packages);
+        apt.env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null());
+        apt
+    };
+    if run(&mut install()).is_err() {
+        run(command("apt-get").args(["update", "-q"]).stdout(Stdio::null())).context(hint.clone())?;
+        run(&mut install()).context(hint)?;
+    }
+    Ok(())
+}
+
+/// A directory of its own under the temporary directory, removed when dropped.
+pub struct Scratch(PathBuf);
+
+impl Scratch {
+    /// Made fresh; `name` tells what it is for.
+    pub fn new(name: &str) -> Result<Self> {
+        let path = std::env::temp_dir().join(format!("openjtc-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;
+        Ok(Self(path))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Files below `directory` with one of these extensions, sorted; build output and hidden directories left out.
+pub fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut waiting = vec![directory.to_owned()];
+    while let Some(directory) = waiting.pop() {
+        let Ok(entries) = std::fs::read_dir(&directory) else { continue };
+        for entry in entries.flatten() {
+            let path = entry.path();
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if path.is_dir() {
+                if name != "target" && !name.starts_with('.') {
+                    waiting.push(path);
+                }
+            } else if path.extension().is_some_and(|e| extensions.iter().any(|wanted| e == *wanted)) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The value of `--name value` or `--name=value`, removed from `arguments`.
+pub fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<String>> {
+    let prefix = format!("{name}=");
+    if let Some(at) = arguments.iter().position(|a| a.starts_with(&prefix)) {
+        return Ok(Some(arguments.remove(at)[prefix.len()..].to_owned()));
+    }
+    let Some(at) = arguments.iter().position(|a| a == name) else { return Ok(None) };
+    if at + 1 >= arguments.len() {
+        bail!("{name} needs a value");
+    }
+    arguments.remove(at);
+    Ok(Some(arguments.remove(at)))
+}
+
+/// Whether `--name` is given; removed from `arguments`.
+pub fn flag(arguments: &mut Vec<String>, name: &str) -> bool {
+    let before = arguments.len();
+    arguments.retain(|a| a != name);
+    arguments.len() != before
+}
+
+/// An error when arguments are left that nobody understood.
+pub fn nothing_left(arguments: &[String]) -> Result<()> {
+    match arguments.first() {
+        Some(argument) => bail!("unknown argument `{argument}`; see `cargo xtask help`"),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,38 @@
+//! `cargo xtask size`: the controller's static memory, its trajectory included, against the limit.
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::shell::{self, cargo};
+
+/// Bytes that the controller may take with its trajectory; the receive buffer of 60 000 bytes comes beside it.
+pub const LIMIT: u64 = 448 * 1024;
+
+/// Bytes of the controller with the memory of 12 000 points, as the compiler lays it out.
+pub fn controller_bytes() -> Result<u64> {
+    let text = shell::read(&mut cargo(&["run", "--quiet", "--package", "xtask", "--example", "memory"]))?;
+    let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));
+    line.context("the example `memory` printed no controller_bytes")?
+        .trim()
+        .parse()
+        .context("controller_bytes")
+}
+
+/// An error when the limit is passed.
+pub fn check() -> Result<()> {
+    let bytes = controller_bytes()?;
+    println!(
+        "controller with its trajectory: {bytes} B = {:.1} KiB of {} KiB",
+        bytes as f64 / 1024.0,
+        LIMIT / 1024
+    );
+    ensure!(bytes <= LIMIT, "the controller takes {bytes} B; the limit is {LIMIT} B");
+    Ok(())
+}
+
+/// No arguments.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    shell::nothing_left(arguments)?;
+    check()?;
+    Ok(ExitCode::SUCCESS)
+}

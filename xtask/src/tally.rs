@@ -1,0 +1,86 @@
+//! Steps of a run: a heading each, failures collected, one closing line.
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::Result;
+
+/// What a step came to.
+pub enum Outcome {
+    /// One check, passed.
+    Passed,
+    /// Several tests of which each counts.
+    Counted(Counts),
+    /// Not run, and why.
+    Skipped(String),
+}
+
+/// Numbers of tests.
+#[derive(Clone, Copy, Default)]
+pub struct Counts {
+    /// Passed.
+    pub passed: u64,
+    /// Failed.
+    pub failed: u64,
+    /// Skipped.
+    pub skipped: u64,
+}
+
+/// The steps so far.
+#[derive(Default)]
+pub struct Tally {
+    counts: Counts,
+    failures: Vec<String>,
+    skips: Vec<String>,
+}
+
+impl Tally {
+    /// Run a step under its heading; an error is reported and counted, and the next step runs all the same.
+    pub fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
+        println!("\n== {title}");
+        let start = Instant::now();
+        let result = body();
+        let seconds = start.elapsed().as_secs_f64();
+        match result {
+            Ok(Outcome::Passed) => {
+                self.counts.passed += 1;
+                println!("-- {title}: ok ({seconds:.1} s)");
+            }
+            Ok(Outcome::Counted(counts)) => {
+                self.counts.passed += counts.passed;
+                self.counts.failed += counts.failed;
+                self.counts.skipped += counts.skipped;
+                if counts.failed > 0 {
+                    self.failures.push(format!("{title}: {} failed", counts.failed));
+                }
+                println!(
+                    "-- {title}: {} passed, {} failed, {} skipped ({seconds:.1} s)",
+                    counts.passed, counts.failed, counts.skipped
+                );
+            }
+            Ok(Outcome::Skipped(why)) => {
+                self.counts.skipped += 1;
+                println!("-- {title}: skipped: {why}");
+                self.skips.push(format!("{title}: {why}"));
+            }
+            Err(error) => {
+                self.counts.failed += 1;
+                println!("-- {title}: FAILED ({seconds:.1} s): {error:#}");
+                self.failures.push(format!("{title}: {error:#}"));
+            }
+        }
+    }
+
+    /// What failed and what was skipped once more, then the closing line.
+    pub fn finish(self) -> ExitCode {
+        println!();
+        for skip in &self.skips {
+            println!("skipped: {skip}");
+        }
+        for failure in &self.failures {
+            println!("failed: {failure}");
+        }
+        let Counts { passed, failed, skipped } = self.counts;
+        println!("{passed} passed, {failed} failed, {skipped} skipped");
+        if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    }
+}

@@ -1,0 +1,167 @@
+//! `cargo xtask test`: every check of the project, in the order in which a mistake is cheapest to find.
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
+
+use crate::shell::{self, Scratch, cargo, run};
+use crate::tally::{Counts, Outcome, Tally};
+use crate::{dependencies, python, rules, size};
+
+/// Crates that run on the board.
+const BOARD_CRATES: [&str; 4] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core"];
+const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
+/// Largest tracking error of the demo, mrad RMS of any joint.
+const RMS_LIMIT_MRAD: f64 = 2.0;
+
+/// `arguments`: `--quick`.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    let mut arguments = arguments.to_vec();
+    let quick = shell::flag(&mut arguments, "--quick");
+    shell::nothing_left(&arguments)?;
+
+    let before = tree();
+    let mut tally = Tally::default();
+    tally.step("formatting", || passed(run(&mut cargo(&["fmt", "--all", "--", "--check"]))));
+    tally.step("every rule has a test that names it", || passed(rules::check()));
+    tally.step("every dependency is documented", || passed(dependencies::check()));
+    tally.step("lints", || {
+        passed(run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"])))
+    });
+    tally.step("tests, properties and fuzz regressions", workspace_tests);
+    if !quick {
+        tally.step("builds for the board (no_std)", || passed(board_builds()));
+        tally.step("memory of the controller", || passed(size::check()));
+        tally.step("documentation", || {
+            let mut doc = cargo(&["doc", "--workspace", "--no-deps"]);
+            passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
+        });
+        tally.step("demo", || passed(demo()));
+        python::checks(&mut tally);
+    }
+    tally.step("the working tree is as it was", || {
+        let (Some(before), Some(after)) = (before, tree()) else {
+            return Ok(Outcome::Skipped("not a git checkout".into()));
+        };
+        ensure!(
+            before == after,
+            "the run left changes behind; `git status` was\n{before}and is now\n{after}"
+        );
+        Ok(Outcome::Passed)
+    });
+    Ok(tally.finish())
+}
+
+fn passed(result: Result<()>) -> Result<Outcome> {
+    result.map(|()| Outcome::Passed)
+}
+
+/// What git sees as changed; `None` outside a checkout.
+fn tree() -> Option<String> {
+    shell::read(shell::command("git").args(["status", "--porcelain"])).ok()
+}
+
+/// Tests of the workspace; cargo's own counts are summed up.
+fn workspace_tests() -> Result<Outcome> {
+    let mut counts = Counts::default();
+    let result = shell::run_lines(&mut cargo(&["test", "--workspace", "--no-fail-fast"]), |line| {
+        let Some(rest) = line.strip_prefix("test result: ") else { return };
+        counts.passed += count(rest, "passed");
+        counts.failed += count(rest, "failed");
+        counts.skipped += count(rest, "ignored");
+    });
+    if counts.failed == 0 {
+        result?;
+        ensure!(counts.passed > 0, "cargo ran no test at all");
+    }
+    Ok(Outcome::Counted(counts))
+}
+
+/// The number before `word` in cargo's result line.
+fn count(line: &str, word: &str) -> u64 {
+    let Some((before, _)) = line.split_once(&format!(" {word}")) else { return 0 };
+    before.rsplit(' ').next().and_then(|number| number.parse().ok()).unwrap_or(0)
+}
+
+fn board_builds() -> Result<()> {
+    // A toolchain that is not rustup's brings its own targets.
+    if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
+        && !installed.lines().any(|target| target == BOARD_TARGET)
+    {
+        run(shell::command("rustup").args(["target", "add", BOARD_TARGET]))?;
+    }
+    for name in BOARD_CRATES {
+        run(&mut cargo(&["build", "--package", name, "--target", BOARD_TARGET]))?;
+    }
+    Ok(())
+}
+
+/// The newcomer's command, into a directory of its own; what it wrote is looked at.
+fn demo() -> Result<()> {
+    let scratch = Scratch::new("demo")?;
+    let out = scratch.path().join("demo");
+    let text = shell::read(
+        cargo(&["run", "--release", "--quiet", "--", "demo", "--speed", "max", "--json", "--out"]).arg(&out),
+    )?;
+    let last = text.lines().rev().find(|line| line.starts_with('{')).unwrap_or(&text);
+    let report: Value = serde_json::from_str(last).context("the demo's --json output is no JSON object")?;
+    check_demo_figures(&report)?;
+    check_demo_files(&out)
+}
+
+fn check_demo_figures(report: &Value) -> Result<()> {
+    let joints = report["joints"].as_array().context("the demo's JSON has no list `joints`")?;
+    ensure!(joints.len() == 6, "the demo reports {} joints, not 6", joints.len());
+    for (number, joint) in (1..).zip(joints) {
+        let rms = joint["rms_error_mrad"].as_f64().context("a joint without `rms_error_mrad`")?;
+        println!("joint {number}: {rms:.3} mrad RMS");
+        ensure!(
+            rms <= RMS_LIMIT_MRAD,
+            "joint {number} follows to {rms} mrad RMS; the limit is {RMS_LIMIT_MRAD}"
+        );
+    }
+    Ok(())
+}
+
+fn check_demo_files(out: &Path) -> Result<()> {
+    let read = |name: &str| {
+        std::fs::read(out.join(name))
+            .with_context(|| format!("the demo did not write {name} into {}", out.display()))
+    };
+    let html = String::from_utf8(read("report.html")?).context("report.html is not UTF-8")?;
+    ensure!(html.trim_start().to_lowercase().starts_with("<!doctype html"), "report.html is no HTML page");
+    for outside in ["src=\"http", "href=\"http", "@import", "fetch("] {
+        ensure!(!html.contains(outside), "report.html needs something from outside: {outside}");
+    }
+    let mcap = read("recording.mcap")?;
+    const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+    ensure!(mcap.starts_with(MAGIC) && mcap.ends_with(MAGIC), "recording.mcap is not a complete MCAP file");
+    let csv = String::from_utf8(read("recording.csv")?).context("recording.csv is not UTF-8")?;
+    check_csv(&csv)?;
+    let svg = String::from_utf8(read("picture.svg")?).context("picture.svg is not UTF-8")?;
+    ensure!(svg.contains("<svg") && svg.trim_end().ends_with("</svg>"), "picture.svg is no complete SVG");
+    println!("report.html {} B, recording.mcap {} B, recording.csv {} B", html.len(), mcap.len(), csv.len());
+    Ok(())
+}
+
+/// A header of names, then at least one second of rows with as many finite numbers.
+fn check_csv(csv: &str) -> Result<()> {
+    let mut lines = csv.lines();
+    let header = lines.next().context("recording.csv is empty")?;
+    let columns = header.split(',').count();
+    let mut rows = 0;
+    for line in lines {
+        rows += 1;
+        ensure!(line.split(',').count() == columns, "recording.csv, row {rows}: not {columns} columns");
+        for (name, cell) in header.split(',').zip(line.split(',')) {
+            if let Ok(number) = cell.parse::<f64>()
+                && !number.is_finite()
+            {
+                bail!("recording.csv, row {rows}: {name} is {number}");
+            }
+        }
+    }
+    ensure!(rows >= 1000, "recording.csv has {rows} rows; a demo has thousands");
+    Ok(())
+}

@@ -1,0 +1,216 @@
+//! What nodes send: [`Answer`].
+
+use crate::frame::{Frame, FrameError};
+use crate::scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE, from_i16, from_i32, to_i16, to_i32};
+use crate::{GRIPPER, NODES, id};
+
+/// Places in the payloads of answers to Move.
+mod field {
+    /// i32.
+    pub const POSITION: usize = 0;
+    /// i16.
+    pub const VELOCITY: usize = 4;
+    /// i16.
+    pub const TORQUE: usize = 6;
+    pub const BEARING_TEMPERATURE: usize = 8;
+    pub const FSM: usize = 9;
+    pub const MC_CURRENT: usize = 10;
+    pub const MC_OCCURRED: usize = 11;
+    pub const ERRORS: usize = 12;
+    pub const WARNINGS: usize = 13;
+    /// Only with 20 bytes.
+    pub const MOTOR_TEMPERATURE: usize = 16;
+    pub const PUMP: usize = 0;
+    pub const PRESSURE1: usize = 1;
+    pub const PRESSURE2: usize = 2;
+    pub const SHORT_LEN: usize = 16;
+    pub const LONG_LEN: usize = 20;
+}
+
+/// A joint's answer to Move (0x200+n): 16 bytes, new drives 20.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct JointReport {
+    /// rad.
+    pub position: f64,
+    /// rad/s.
+    pub velocity: f64,
+    /// N·m; its sign is the command's (J-16).
+    pub torque: f64,
+    /// Bearing temperature, °C.
+    pub temperature: u8,
+    /// Node FSM byte as sent.
+    pub fsm: u8,
+    /// Motor-control faults now.
+    pub mc_current: u8,
+    /// Motor-control faults since acknowledged.
+    pub mc_occurred: u8,
+    /// Error bits.
+    pub errors: u8,
+    /// Warning bits.
+    pub warnings: u8,
+    /// Motor temperature, °C, when the answer has 20 bytes.
+    pub motor_temperature: Option<u8>,
+}
+
+/// The gripper's answer to Move (0x206).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct GripperReport {
+    /// Pump is running (measured).
+    pub pump: bool,
+    /// First vacuum level reached.
+    pub pressure1: bool,
+    /// Second vacuum level reached.
+    pub pressure2: bool,
+    /// Node FSM byte as sent.
+    pub fsm: u8,
+    /// Error bits.
+    pub errors: u8,
+    /// Warning bits.
+    pub warnings: u8,
+}
+
+/// What nodes answer; `parse` for the controller, `emit` for nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// 0x200+n.
+    Joint {
+        /// 0..5.
+        node: u8,
+        /// Decoded report.
+        report: JointReport,
+    },
+    /// 0x206.
+    Gripper(GripperReport),
+    /// 0x210+n.
+    Fsm {
+        /// 0..6.
+        node: u8,
+        /// FSM byte at reception of the request.
+        fsm: u8,
+    },
+    /// 0x2F0+n.
+    Mode {
+        /// 0..6.
+        node: u8,
+        /// The configuration was accepted.
+        accepted: bool,
+    },
+}
+
+impl Answer {
+    /// Node that answered, 0..6.
+    pub const fn node(&self) -> u8 {
+        match self {
+            Self::Joint { node, .. } | Self::Fsm { node, .. } | Self::Mode { node, .. } => *node,
+            Self::Gripper(_) => GRIPPER as u8,
+        }
+    }
+
+    /// Controller side.
+    pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
+        let node = id::node(frame.id);
+        if usize::from(node) >= NODES {
+            return Err(FrameError::UnknownId(frame.id));
+        }
+        match id::command(frame.id) {
+            id::MOVE_ANSWER => {
+                frame.need(field::SHORT_LEN as u8)?;
+                if usize::from(node) == GRIPPER {
+                    return Ok(Self::Gripper(gripper(frame)));
+                }
+                Ok(Self::Joint { node, report: joint(frame, scale) })
+            }
+            id::FSM_ANSWER => {
+                frame.need(1)?;
+                Ok(Self::Fsm { node, fsm: frame.byte(0) })
+            }
+            id::MODE_ANSWER => {
+                frame.need(1)?;
+                Ok(Self::Mode { node, accepted: frame.byte(0) == 1 })
+            }
+            _ => Err(FrameError::UnknownId(frame.id)),
+        }
+    }
+
+    /// Node side; joint reports with a motor temperature have 20 bytes, else 16; values saturate.
+    ///
+    /// A node number that does not exist is sent as 15, which the controller does not listen to.
+    pub fn emit(&self, scale: Scale) -> Frame {
+        match self {
+            Self::Joint { node, report } => emit_joint(*node, report, scale),
+            Self::Gripper(report) => emit_gripper(report),
+            Self::Fsm { node, fsm } => {
+                let mut frame = Frame::zeroed::<1>(id::answer(id::CHANGE_FSM, *node));
+                frame.put(0, [*fsm]);
+                frame
+            }
+            Self::Mode { node, accepted } => {
+                let mut frame = Frame::zeroed::<1>(id::answer(id::CHANGE_MODE, *node));
+                frame.put(0, [u8::from(*accepted)]);
+                frame
+            }
+        }
+    }
+}
+
+fn joint(frame: &Frame, scale: Scale) -> JointReport {
+    let long = frame.data().len() >= field::LONG_LEN;
+    JointReport {
+        position: from_i32(frame.get(field::POSITION), POSITION_FULL_SCALE),
+        velocity: from_i16(frame.get(field::VELOCITY), scale.velocity),
+        torque: from_i16(frame.get(field::TORQUE), TORQUE_FULL_SCALE),
+        temperature: frame.byte(field::BEARING_TEMPERATURE),
+        fsm: frame.byte(field::FSM),
+        mc_current: frame.byte(field::MC_CURRENT),
+        mc_occurred: frame.byte(field::MC_OCCURRED),
+        errors: frame.byte(field::ERRORS),
+        warnings: frame.byte(field::WARNINGS),
+        motor_temperature: long.then(|| frame.byte(field::MOTOR_TEMPERATURE)),
+    }
+}
+
+fn emit_joint(node: u8, report: &JointReport, scale: Scale) -> Frame {
+    // Number 6 is the gripper: a joint that claims it must not be taken for one.
+    let node = if usize::from(node) == GRIPPER { u8::MAX } else { node };
+    let id = id::answer(id::MOVE, node);
+    let mut frame = match report.motor_temperature {
+        None => Frame::zeroed::<{ field::SHORT_LEN }>(id),
+        Some(temperature) => {
+            let mut frame = Frame::zeroed::<{ field::LONG_LEN }>(id);
+            frame.put(field::MOTOR_TEMPERATURE, [temperature]);
+            frame
+        }
+    };
+    frame.put(field::POSITION, to_i32(report.position, POSITION_FULL_SCALE));
+    frame.put(field::VELOCITY, to_i16(report.velocity, scale.velocity));
+    frame.put(field::TORQUE, to_i16(report.torque, TORQUE_FULL_SCALE));
+    frame.put(field::BEARING_TEMPERATURE, [report.temperature]);
+    frame.put(field::FSM, [report.fsm]);
+    frame.put(field::MC_CURRENT, [report.mc_current]);
+    frame.put(field::MC_OCCURRED, [report.mc_occurred]);
+    frame.put(field::ERRORS, [report.errors]);
+    frame.put(field::WARNINGS, [report.warnings]);
+    frame
+}
+
+fn gripper(frame: &Frame) -> GripperReport {
+    GripperReport {
+        pump: frame.byte(field::PUMP) != 0,
+        pressure1: frame.byte(field::PRESSURE1) != 0,
+        pressure2: frame.byte(field::PRESSURE2) != 0,
+        fsm: frame.byte(field::FSM),
+        errors: frame.byte(field::ERRORS),
+        warnings: frame.byte(field::WARNINGS),
+    }
+}
+
+fn emit_gripper(report: &GripperReport) -> Frame {
+    let mut frame = Frame::zeroed::<{ field::SHORT_LEN }>(id::answer(id::MOVE, GRIPPER as u8));
+    frame.put(field::PUMP, [u8::from(report.pump)]);
+    frame.put(field::PRESSURE1, [u8::from(report.pressure1)]);
+    frame.put(field::PRESSURE2, [u8::from(report.pressure2)]);
+    frame.put(field::FSM, [report.fsm]);
+    frame.put(field::ERRORS, [report.errors]);
+    frame.put(field::WARNINGS, [report.warnings]);
+    frame
+}

@@ -1,0 +1,166 @@
+//! Frames in words.
+
+use core::fmt::{Display, Formatter, Result};
+
+use crate::{Answer, Bits, Frame, GripperReport, JointReport, Request, Scale, Target};
+use crate::{config, error, fsm, motor_control, warning};
+
+/// Any frame of the bus, decoded; one that is not understood is shown with the reason and its bytes.
+///
+/// ```
+/// use jtc_bus::{Decoded, Request, Scale};
+/// let frame = Request::ResetAll.emit();
+/// assert_eq!(Decoded { frame: &frame, scale: Scale::default() }.to_string(), "0A0 ResetAll");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Decoded<'a> {
+    /// The frame.
+    pub frame: &'a Frame,
+    /// Scale of its velocities.
+    pub scale: Scale,
+}
+
+impl Display for Decoded<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        write!(f, "{:03X} ", self.frame.id)?;
+        let error = match (Request::parse(self.frame), Answer::parse(self.frame, self.scale)) {
+            (Ok(request), _) => return request.fmt(f),
+            (_, Ok(answer)) => return answer.fmt(f),
+            (Err(request), Err(answer)) if self.frame.id & crate::id::RESPONSE == 0 => {
+                let _ = answer;
+                request
+            }
+            (_, Err(answer)) => answer,
+        };
+        write!(f, "{error}: {}", Hex(self.frame.data()))
+    }
+}
+
+impl Display for Frame {
+    /// As [`Decoded`] with the usual scale.
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        Decoded { frame: self, scale: Scale::default() }.fmt(f)
+    }
+}
+
+struct Hex<'a>(&'a [u8]);
+
+impl Display for Hex<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        if self.0.is_empty() {
+            return f.write_str("no bytes");
+        }
+        for (i, byte) in self.0.iter().enumerate() {
+            write!(f, "{}{byte:02X}", if i == 0 { "" } else { " " })?;
+        }
+        Ok(())
+    }
+}
+
+impl Display for Target {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        f.pad(match self {
+            Self::NoChange => "-",
+            Self::Init => "init",
+            Self::Ready => "ready",
+            Self::Enable => "enable",
+        })
+    }
+}
+
+const fn on(value: bool) -> &'static str {
+    if value { "on" } else { "off" }
+}
+
+impl Display for Request {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::Move { torque, pump } => {
+                f.write_str("Move")?;
+                for torque in torque {
+                    write!(f, " {torque:.2}")?;
+                }
+                write!(f, " N·m, pump {}", on(*pump))
+            }
+            Self::ChangeFsm { target } => {
+                f.write_str("ChangeFsm")?;
+                for target in target {
+                    write!(f, " {target}")?;
+                }
+                Ok(())
+            }
+            Self::ChangeMode { mode, config, gripper } => {
+                f.write_str("ChangeMode")?;
+                for (mode, bits) in mode.iter().zip(config) {
+                    match mode {
+                        0 => f.write_str(" none")?,
+                        1 => f.write_str(" torque")?,
+                        2 => f.write_str(" speed")?,
+                        other => write!(f, " mode-{other}")?,
+                    }
+                    write!(f, "/{bits:02X}")?;
+                }
+                write!(f, ", gripper {gripper:02X} ({})", Bits(*gripper, &config::NAMES))
+            }
+            Self::ResetAll => f.write_str("ResetAll"),
+            Self::Reset(node) => write!(f, "Reset {}", Node(*node)),
+        }
+    }
+}
+
+struct Node(u8);
+
+impl Display for Node {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        if usize::from(self.0) == crate::GRIPPER {
+            return f.write_str("gripper");
+        }
+        write!(f, "joint {}", self.0)
+    }
+}
+
+impl Display for Answer {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::Joint { node, report } => write!(f, "{} {report}", Node(*node)),
+            Self::Gripper(report) => write!(f, "gripper {report}"),
+            Self::Fsm { node, fsm } => write!(f, "{} state: {}", Node(*node), fsm::name(*fsm)),
+            Self::Mode { node, accepted: true } => write!(f, "{} configuration accepted", Node(*node)),
+            Self::Mode { node, accepted: false } => write!(f, "{} configuration refused", Node(*node)),
+        }
+    }
+}
+
+/// Names what is set; nothing when nothing is.
+fn report_bits(f: &mut Formatter<'_>, title: &str, bits: u8, names: &[&str; 8]) -> Result {
+    if bits == 0 {
+        return Ok(());
+    }
+    write!(f, ", {title}: {}", Bits(bits, names))
+}
+
+impl Display for JointReport {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        write!(f, "{:.4} rad, {:.4} rad/s, {:.2} N·m, ", self.position, self.velocity, self.torque)?;
+        write!(f, "{} °C", self.temperature)?;
+        if let Some(motor) = self.motor_temperature {
+            write!(f, ", motor {motor} °C")?;
+        }
+        write!(f, ", {}", fsm::name(self.fsm))?;
+        report_bits(f, "motor control", self.mc_current, &motor_control::NAMES)?;
+        report_bits(f, "motor control before", self.mc_occurred & !self.mc_current, &motor_control::NAMES)?;
+        report_bits(f, "errors", self.errors, &error::NAMES)?;
+        report_bits(f, "warnings", self.warnings, &warning::NAMES)
+    }
+}
+
+impl Display for GripperReport {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        write!(f, "pump {}, ", on(self.pump))?;
+        let level = |reached| if reached { "reached" } else { "not reached" };
+        write!(f, "level 1 {}, level 2 {}, ", level(self.pressure1), level(self.pressure2))?;
+        f.write_str(fsm::name(self.fsm))?;
+        report_bits(f, "errors", self.errors, &error::NAMES)?;
+        report_bits(f, "warnings", self.warnings, &warning::NAMES)
+    }
+}

@@ -1,0 +1,98 @@
+//! How long a frame occupies the bus.
+
+use crate::frame::Frame;
+use crate::timing::{DATA_BIT_RATE, NOMINAL_BIT_RATE};
+
+const NOMINAL_NS: u32 = 1_000_000_000 / NOMINAL_BIT_RATE;
+const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
+
+/// Acknowledge, its delimiter, end of frame and intermission: nominal bits after the data phase.
+const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
+/// Bits of the stuff count with its parity, sent before the checksum.
+const STUFF_COUNT_BITS: u32 = 4;
+/// The delimiter after the checksum. Its two halves are sent at different rates, as are those of the bit where
+/// the rate goes up; as both change over at the same share of the bit, one counts as nominal, one as data bit.
+const CRC_DELIMITER_BITS: u32 = 1;
+
+/// Nanoseconds from the start of the frame until the next may start (intermission included), with rates as in
+/// [`timing`](crate::timing).
+///
+/// This is no estimate: the stuff bits are those of this very payload. Not included are repetitions and error
+/// frames.
+pub fn duration_ns(frame: &Frame) -> u32 {
+    let mut stuffer = Stuffer::default();
+    // Start, identifier, RRS, IDE, FDF, reserved, BRS.
+    stuffer.push(0, 1);
+    stuffer.push(u32::from(frame.id), 11);
+    stuffer.push(0b00101, 5);
+    let nominal = stuffer.bits + TAIL_BITS;
+    let before = stuffer.bits;
+    // ESI and length code.
+    stuffer.push(u32::from(frame.dlc()), 5);
+    for byte in frame.data() {
+        stuffer.push(u32::from(*byte), 8);
+    }
+    let crc_bits = STUFF_COUNT_BITS + if frame.data().len() <= 16 { 17 } else { 21 };
+    // A fixed stuff bit stands before the stuff count and after every four bits from there on.
+    let fixed_stuff_bits = 1 + crc_bits / 4;
+    let data = stuffer.bits - before + crc_bits + fixed_stuff_bits + CRC_DELIMITER_BITS;
+    nominal * NOMINAL_NS + data * DATA_NS
+}
+
+/// Counts bits as sent: after five equal ones comes one of the other kind.
+#[derive(Default)]
+struct Stuffer {
+    bits: u32,
+    last: Option<bool>,
+    run: u32,
+}
+
+impl Stuffer {
+    fn push(&mut self, value: u32, width: u32) {
+        for at in (0..width).rev() {
+            // The stuff bit is due before the next bit: behind the last bit of all the fixed one takes its place.
+            if self.run == 5 {
+                self.bits += 1;
+                self.last = self.last.map(|bit| !bit);
+                self.run = 1;
+            }
+            let bit = value >> at & 1 == 1;
+            self.run = if self.last == Some(bit) { self.run + 1 } else { 1 };
+            self.last = Some(bit);
+            self.bits += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j10_a_frame_without_stuff_bits() {
+        // 17 + 12 nominal bits; ESI, length, 8 bytes, 4 + 17 checksum bits, 6 fixed stuff bits, delimiter.
+        let frame = Frame::new(0x555, &[0x55; 8]).unwrap();
+        assert_eq!(duration_ns(&frame), 29_000 + (1 + 4 + 64 + 21 + 6 + 1) * 200);
+        // 20 bytes have the longer checksum: 4 + 21 bits, 7 fixed stuff bits.
+        let frame = Frame::new(0x555, &[0x55; 20]).unwrap();
+        assert_eq!(duration_ns(&frame), 29_000 + (1 + 4 + 160 + 25 + 7 + 1) * 200);
+    }
+
+    #[test]
+    fn j10_stuff_bits_are_those_of_the_payload() {
+        // Start and id: 12 zeros with RRS and IDE make 14, two stuff bits. FDF 1, reserved 0, BRS 1. ESI 0,
+        // length 1010, then 128 zeros behind the 0 of the length: 129 zeros, 25 stuff bits.
+        let frame = Frame::new(0x000, &[0; 16]).unwrap();
+        assert_eq!(duration_ns(&frame), (29 + 2) * 1_000 + (1 + 4 + 128 + 21 + 6 + 1 + 25) * 200);
+    }
+
+    #[test]
+    fn j12_move_and_seven_answers_fit_into_a_tick() {
+        let worst = |id, len| {
+            let frame = |byte| Frame::new(id, &[byte; 24][..len]).unwrap();
+            (0..=255).map(|byte| duration_ns(&frame(byte))).max().unwrap()
+        };
+        let bus = worst(0x000, 16) + (0x200..0x207).map(|id| worst(id, 20)).sum::<u32>();
+        assert!((500_000..700_000).contains(&bus), "{bus} ns");
+    }
+}

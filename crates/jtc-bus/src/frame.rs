@@ -1,0 +1,237 @@
+//! A frame of the bus and why one is not understood.
+
+use crate::id;
+
+/// Longest payload of this bus, bytes.
+pub const MAX_LEN: usize = 24;
+
+/// A CAN FD frame of this bus: 11-bit id, bit rate switch, at most 24 bytes.
+///
+/// The payload has a length that CAN FD can send: 0..8, 12, 16, 20 or 24 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// 11-bit identifier.
+    pub id: u16,
+    len: u8,
+    data: [u8; MAX_LEN],
+}
+
+/// How a frame arrived, for drivers that hear everything on a bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Format {
+    /// 29-bit identifier.
+    pub extended: bool,
+    /// Remote frame.
+    pub remote: bool,
+    /// CAN FD, else classic.
+    pub fd: bool,
+}
+
+impl Format {
+    /// The only format of this bus: CAN FD with an 11-bit identifier.
+    pub const BUS: Self = Self { extended: false, remote: false, fd: true };
+}
+
+impl Frame {
+    /// `None` when `data` has a length that no frame of this bus can have (0..8, 12, 16, 20, 24) or `id` has
+    /// more than 11 bits.
+    pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
+        if id > 0x7FF || dlc_of(data.len()).is_none() {
+            return None;
+        }
+        let mut frame = Self { id, len: data.len() as u8, data: [0; MAX_LEN] };
+        let mut i = 0;
+        while i < data.len() {
+            frame.data[i] = data[i];
+            i += 1;
+        }
+        Some(frame)
+    }
+
+    /// A frame as heard on a bus where others may talk, too; what is not of this bus is a
+    /// [`FrameError::WrongFormat`] to be counted (J-15).
+    pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, FrameError> {
+        let wrong = FrameError::WrongFormat { id, len: data.len().min(255) as u8 };
+        if format != Format::BUS {
+            return Err(wrong);
+        }
+        let short = u16::try_from(id).map_err(|_| wrong)?;
+        Self::new(short, data).ok_or(wrong)
+    }
+
+    /// `len` must be one of CAN FD; only for the encoders of this crate.
+    pub(crate) fn zeroed<const LEN: usize>(id: u16) -> Self {
+        const { assert!(LEN <= MAX_LEN && dlc_of(LEN).is_some()) }
+        Self { id: id & 0x7FF, len: LEN as u8, data: [0; MAX_LEN] }
+    }
+
+    pub(crate) fn put<const N: usize>(&mut self, at: usize, bytes: [u8; N]) {
+        if let Some(place) = self.data.get_mut(at..at + N) {
+            place.copy_from_slice(&bytes);
+        }
+    }
+
+    /// Bytes at a place; beyond the payload they are 0, as in a node's receive buffer.
+    pub(crate) fn get<const N: usize>(&self, at: usize) -> [u8; N] {
+        let mut bytes = [0; N];
+        if let Some(place) = self.data.get(at..at + N) {
+            bytes.copy_from_slice(place);
+        }
+        bytes
+    }
+
+    pub(crate) fn byte(&self, at: usize) -> u8 {
+        self.get::<1>(at)[0]
+    }
+
+    /// The payload.
+    pub fn data(&self) -> &[u8] {
+        self.data.get(..usize::from(self.len)).unwrap_or(&[])
+    }
+
+    /// The length code of the frame, 0..12.
+    pub fn dlc(&self) -> u8 {
+        dlc_of(usize::from(self.len)).unwrap_or(0)
+    }
+
+    /// The node number in the id, 0..15.
+    pub fn node(&self) -> u8 {
+        id::node(self.id)
+    }
+
+    /// A frame from a length code as a CAN controller reports it; `None` when the code stands for more than
+    /// 24 bytes or for more than `data` has.
+    pub fn from_dlc(id: u16, dlc: u8, data: &[u8]) -> Option<Self> {
+        Self::new(id, data.get(..len_of(dlc)?)?)
+    }
+
+    pub(crate) fn need(&self, need: u8) -> Result<(), FrameError> {
+        if self.len < need {
+            return Err(FrameError::TooShort { id: self.id, len: self.len, need });
+        }
+        Ok(())
+    }
+}
+
+/// Length code of a payload; `None` for a length that this bus has not.
+const fn dlc_of(len: usize) -> Option<u8> {
+    match len {
+        0..=8 => Some(len as u8),
+        12 => Some(9),
+        16 => Some(10),
+        20 => Some(11),
+        24 => Some(12),
+        _ => None,
+    }
+}
+
+/// Payload length of a length code; `None` above 24 bytes.
+const fn len_of(dlc: u8) -> Option<usize> {
+    match dlc {
+        0..=8 => Some(dlc as usize),
+        9 => Some(12),
+        10 => Some(16),
+        11 => Some(20),
+        12 => Some(24),
+        _ => None,
+    }
+}
+
+/// Why a frame was not understood; it is counted and ignored (J-15).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// No frame of this protocol has this id.
+    UnknownId(u16),
+    /// Fewer bytes than the frame needs.
+    TooShort {
+        /// Identifier.
+        id: u16,
+        /// Bytes received.
+        len: u8,
+        /// Bytes needed.
+        need: u8,
+    },
+    /// A byte has a value that its frame cannot have.
+    BadValue {
+        /// Identifier.
+        id: u16,
+        /// Offset of the byte in the payload.
+        at: u8,
+        /// Its value.
+        value: u8,
+    },
+    /// Not a CAN FD data frame with an 11-bit id and at most 24 bytes.
+    WrongFormat {
+        /// Identifier as heard, up to 29 bits.
+        id: u32,
+        /// Bytes received.
+        len: u8,
+    },
+}
+
+impl core::error::Error for FrameError {}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::UnknownId(id) => write!(f, "no frame of the joint bus has id 0x{id:03X}"),
+            Self::TooShort { id, len, need } => {
+                write!(f, "frame 0x{id:03X} has {len} bytes and needs {need}")
+            }
+            Self::BadValue { id, at, value } => {
+                write!(f, "frame 0x{id:03X} cannot have the value {value} in byte {at}")
+            }
+            Self::WrongFormat { id, len } => write!(
+                f,
+                "frame 0x{id:X} of {len} bytes is not a CAN FD data frame with an 11-bit id and at most \
+                 {MAX_LEN} bytes"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j11_lengths_are_those_of_can_fd() {
+        let bytes = [0xAA; 64];
+        let codes = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24];
+        for len in 0..=64 {
+            let frame = Frame::new(0x7FF, &bytes[..len]);
+            assert_eq!(frame.is_some(), codes.contains(&len), "{len} bytes");
+            if let Some(frame) = frame {
+                assert_eq!(frame.data(), &bytes[..len]);
+                assert_eq!(codes[usize::from(frame.dlc())], len);
+                assert_eq!(Frame::from_dlc(0x7FF, frame.dlc(), &bytes), Some(frame));
+            }
+        }
+        for dlc in 13..=255 {
+            assert_eq!(Frame::from_dlc(0, dlc, &bytes), None);
+        }
+        assert_eq!(Frame::from_dlc(0, 9, &bytes[..11]), None);
+    }
+
+    #[test]
+    fn j11_ids_have_eleven_bits() {
+        assert!(Frame::new(0x7FF, &[]).is_some());
+        assert!(Frame::new(0x800, &[]).is_none());
+    }
+
+    #[test]
+    fn j15_frames_of_another_format_are_errors() {
+        assert!(Frame::received(0x200, Format::BUS, &[0; 16]).is_ok());
+        for format in [
+            Format { extended: true, ..Format::BUS },
+            Format { remote: true, ..Format::BUS },
+            Format { fd: false, ..Format::BUS },
+        ] {
+            let error = Frame::received(0x200, format, &[0; 8]);
+            assert_eq!(error, Err(FrameError::WrongFormat { id: 0x200, len: 8 }));
+        }
+        let long_id = Frame::received(0x1_0200, Format::BUS, &[0; 16]);
+        assert_eq!(long_id, Err(FrameError::WrongFormat { id: 0x1_0200, len: 16 }));
+        assert!(Frame::received(0x200, Format::BUS, &[0; 64]).is_err());
+    }
+}

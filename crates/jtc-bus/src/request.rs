@@ -1,0 +1,156 @@
+//! What the controller sends: [`Request`].
+
+use crate::frame::{Frame, FrameError};
+use crate::scale::{TORQUE_FULL_SCALE, from_i16, to_i16};
+use crate::{GRIPPER, JOINTS, NODES, fsm, id};
+
+/// Places in the payloads of requests.
+mod field {
+    /// Move: two bytes per joint from here.
+    pub const TORQUE: usize = 0;
+    /// Move: pump.
+    pub const PUMP: usize = 12;
+    /// ChangeMode: mode and configuration bits per joint from here.
+    pub const MODE: usize = 0;
+    /// ChangeMode: configuration bits of the gripper.
+    pub const GRIPPER_CONFIG: usize = 13;
+    pub const MOVE_LEN: usize = 16;
+    pub const FSM_LEN: usize = 7;
+    pub const MODE_LEN: usize = 16;
+}
+
+/// A state that can be asked of a node. There are no others (J-16): some drives take any other byte, such as
+/// their own state echoed, as a command to move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum Target {
+    /// Stay as you are.
+    #[default]
+    NoChange = 0,
+    /// Init; from Fault this acknowledges the faults.
+    Init = fsm::INIT,
+    /// Ready to operate, motor off.
+    Ready = fsm::READY,
+    /// Operation enabled.
+    Enable = fsm::ENABLED,
+}
+
+impl Target {
+    /// The state asked for by a byte of the wire.
+    pub const fn from_byte(byte: u8) -> Option<Self> {
+        match byte {
+            0 => Some(Self::NoChange),
+            fsm::INIT => Some(Self::Init),
+            fsm::READY => Some(Self::Ready),
+            fsm::ENABLED => Some(Self::Enable),
+            _ => None,
+        }
+    }
+}
+
+/// What the controller sends; `emit` for the controller, `parse` for nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// 0x000: torque per joint (N·m, saturated when encoded, J-13; NaN is encoded as 0) and the pump.
+    Move {
+        /// N·m at the joint.
+        torque: [f64; JOINTS],
+        /// Vacuum pump on.
+        pump: bool,
+    },
+    /// 0x010: target per node (J-16).
+    ChangeFsm {
+        /// State asked of each node.
+        target: [Target; NODES],
+    },
+    /// 0x0F0: mode (1 torque) and configuration bits per joint, configuration bits of the gripper.
+    ChangeMode {
+        /// 0 none, 1 torque, 2 speed.
+        mode: [u8; JOINTS],
+        /// Configuration bits per joint, see [`config`](crate::config).
+        config: [u8; JOINTS],
+        /// Configuration bits of the gripper.
+        gripper: u8,
+    },
+    /// 0x0A0.
+    ResetAll,
+    /// 0x1A0 + node, 0..6. A node that does not exist is sent as 15, which nobody has.
+    Reset(u8),
+}
+
+impl Request {
+    /// All torques zero, pump as given: the first frame after an error (J-12).
+    pub const fn zero_torque(pump: bool) -> Self {
+        Self::Move { torque: [0.0; JOINTS], pump }
+    }
+
+    /// The frame on the bus.
+    pub fn emit(&self) -> Frame {
+        match self {
+            Self::Move { torque, pump } => {
+                let mut frame = Frame::zeroed::<{ field::MOVE_LEN }>(id::MOVE);
+                for (joint, torque) in torque.iter().enumerate() {
+                    frame.put(field::TORQUE + 2 * joint, to_i16(*torque, TORQUE_FULL_SCALE));
+                }
+                frame.put(field::PUMP, [u8::from(*pump)]);
+                frame
+            }
+            Self::ChangeFsm { target } => {
+                let mut frame = Frame::zeroed::<{ field::FSM_LEN }>(id::CHANGE_FSM);
+                frame.put(0, target.map(|target| target as u8));
+                frame
+            }
+            Self::ChangeMode { mode, config, gripper } => {
+                let mut frame = Frame::zeroed::<{ field::MODE_LEN }>(id::CHANGE_MODE);
+                for (joint, (mode, config)) in mode.iter().zip(config).enumerate() {
+                    frame.put(field::MODE + 2 * joint, [*mode, *config]);
+                }
+                frame.put(field::GRIPPER_CONFIG, [*gripper]);
+                frame
+            }
+            Self::ResetAll => Frame::zeroed::<0>(id::RESET_ALL),
+            Self::Reset(node) => Frame::zeroed::<0>(id::RESET | id::on_wire(*node)),
+        }
+    }
+
+    /// Node side (also used by bus monitors).
+    pub fn parse(frame: &Frame) -> Result<Request, FrameError> {
+        match frame.id {
+            id::MOVE => {
+                frame.need(field::MOVE_LEN as u8)?;
+                let torque = core::array::from_fn(|joint| {
+                    from_i16(frame.get(field::TORQUE + 2 * joint), TORQUE_FULL_SCALE)
+                });
+                Ok(Self::Move { torque, pump: frame.byte(field::PUMP) != 0 })
+            }
+            id::CHANGE_FSM => {
+                frame.need(field::FSM_LEN as u8)?;
+                let mut target = [Target::NoChange; NODES];
+                for (at, target) in target.iter_mut().enumerate() {
+                    let value = frame.byte(at);
+                    let bad = FrameError::BadValue { id: frame.id, at: at as u8, value };
+                    *target = Target::from_byte(value).ok_or(bad)?;
+                }
+                Ok(Self::ChangeFsm { target })
+            }
+            id::CHANGE_MODE => {
+                frame.need(field::MODE_LEN as u8)?;
+                Ok(Self::ChangeMode {
+                    mode: core::array::from_fn(|joint| frame.byte(field::MODE + 2 * joint)),
+                    config: core::array::from_fn(|joint| frame.byte(field::MODE + 2 * joint + 1)),
+                    gripper: frame.byte(field::GRIPPER_CONFIG),
+                })
+            }
+            id::RESET_ALL => Ok(Self::ResetAll),
+            other if id::command(other) == id::RESET && usize::from(id::node(other)) <= GRIPPER => {
+                Ok(Self::Reset(id::node(other)))
+            }
+            other => Err(FrameError::UnknownId(other)),
+        }
+    }
+
+    /// Nodes answer this request; resets are not answered.
+    pub const fn is_answered(&self) -> bool {
+        !matches!(self, Self::ResetAll | Self::Reset(_))
+    }
+}

@@ -1,0 +1,131 @@
+//! Scaling between physical values and the drives' integers; every encoder saturates (J-13).
+
+/// rad at the largest 32-bit position.
+pub const POSITION_FULL_SCALE: f64 = 3.141592;
+/// N·m at the largest 16-bit torque.
+pub const TORQUE_FULL_SCALE: f64 = 360.0;
+
+/// Full scales of the drives' numbers (J-11). Position (3.141592) and torque (360) are protocol constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// rad/s at 32767: 2.0, on older drives 6.283185.
+    pub velocity: f64,
+}
+
+impl Default for Scale {
+    fn default() -> Self {
+        Self { velocity: 2.0 }
+    }
+}
+
+/// Nearest 16-bit value, within ±32767; NaN is 0.
+pub(crate) fn to_i16(value: f64, full_scale: f64) -> [u8; 2] {
+    (nearest(value, full_scale, f64::from(i16::MAX)) as i16).to_be_bytes()
+}
+
+/// Nearest 32-bit value, within ±2147483647; NaN is 0.
+pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
+    (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
+}
+
+pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
+    f64::from(i16::from_be_bytes(bytes)) * full_scale / f64::from(i16::MAX)
+}
+
+pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
+    f64::from(i32::from_be_bytes(bytes)) * full_scale / f64::from(i32::MAX)
+}
+
+/// `value` in units of the last bit, moved by half a unit so that the cast (which truncates, saturates and makes
+/// NaN 0) rounds; a nonsensical full scale (0, NaN) gives a saturated value or 0, never one of the other sign.
+fn nearest(value: f64, full_scale: f64, max: f64) -> f64 {
+    let raw = value * (max / full_scale.abs());
+    (raw + 0.5_f64.copysign(raw)).clamp(-max, max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::num::f64::ANY;
+    use proptest::prelude::*;
+
+    const EDGES: [f64; 14] = [
+        0.0,
+        -0.0,
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::MIN_POSITIVE,
+        -5e-324,
+        f64::MAX,
+        f64::MIN,
+        360.0,
+        360.000001,
+        720.0,
+        -720.0,
+        1080.01,
+    ];
+
+    fn check(value: f64) {
+        let raw = i16::from_be_bytes(to_i16(value, TORQUE_FULL_SCALE));
+        let long = i32::from_be_bytes(to_i32(value, POSITION_FULL_SCALE));
+        assert!(raw != i16::MIN && long != i32::MIN, "{value}: outside the scale");
+        if value.is_nan() {
+            assert_eq!((raw, long), (0, 0));
+            return;
+        }
+        // Never another sign; a value below half a unit may be 0.
+        assert!(f64::from(raw) * value >= 0.0, "{value} became {raw}");
+        assert!(f64::from(long) * value >= 0.0, "{value} became {long}");
+        if value.abs() >= TORQUE_FULL_SCALE {
+            assert_eq!(raw.unsigned_abs(), 32767, "{value}");
+        } else {
+            let back = from_i16(raw.to_be_bytes(), TORQUE_FULL_SCALE);
+            assert!((back - value).abs() <= 0.500001 * TORQUE_FULL_SCALE / 32767.0, "{value} became {back}");
+        }
+        if value.abs() >= POSITION_FULL_SCALE {
+            assert_eq!(long.unsigned_abs(), i32::MAX as u32, "{value}");
+        } else {
+            let back = from_i32(long.to_be_bytes(), POSITION_FULL_SCALE);
+            assert!((back - value).abs() <= 0.500001 * POSITION_FULL_SCALE / 2147483647.0, "{value}");
+        }
+    }
+
+    #[test]
+    fn j13_edges_saturate() {
+        EDGES.into_iter().for_each(check);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..Default::default() })]
+        #[test]
+        fn j13_no_value_wraps_or_changes_sign(value in ANY) {
+            check(value);
+        }
+
+        #[test]
+        fn j13_values_near_the_scale_do_not_wrap(value in -1500.0..1500.0) {
+            check(value);
+        }
+
+        #[test]
+        fn j13_encoding_is_monotonic(a in -1000.0..1000.0, b in -1000.0..1000.0) {
+            let raw = |v| i16::from_be_bytes(to_i16(v, TORQUE_FULL_SCALE));
+            prop_assert_eq!(a < b && raw(a) > raw(b), false);
+        }
+
+        #[test]
+        fn j13_a_nonsensical_scale_turns_no_sign(value in ANY, scale in ANY) {
+            let raw = i16::from_be_bytes(to_i16(value, scale));
+            prop_assert!(value.is_nan() || f64::from(raw) * value.signum() >= 0.0);
+        }
+    }
+
+    #[test]
+    fn j13_every_16_bit_number_survives() {
+        for raw in -32767..=32767_i16 {
+            let torque = from_i16(raw.to_be_bytes(), TORQUE_FULL_SCALE);
+            assert_eq!(to_i16(torque, TORQUE_FULL_SCALE), raw.to_be_bytes());
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Bit timing of the bus (J-10), in the terms of a Bosch M_CAN (the FDCAN of the STM32).
+//!
+//! Both phases have 17 time quanta with the sample point after the 13th, from a kernel clock of 85 MHz.
+
+/// Kernel clock of the CAN controller, Hz.
+pub const KERNEL_CLOCK_HZ: u32 = 85_000_000;
+
+/// How a bit is made from the kernel clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BitTiming {
+    /// Kernel clock periods in a time quantum.
+    pub prescaler: u16,
+    /// Quanta from the end of the synchronisation quantum to the sample point (propagation included).
+    pub segment1: u8,
+    /// Quanta after the sample point.
+    pub segment2: u8,
+    /// Most quanta that a resynchronisation may move.
+    pub jump_width: u8,
+}
+
+impl BitTiming {
+    /// Time quanta in a bit: the synchronisation quantum and both segments.
+    pub const fn quanta(&self) -> u32 {
+        1 + self.segment1 as u32 + self.segment2 as u32
+    }
+
+    /// bit/s at a kernel clock in Hz.
+    pub const fn bit_rate(&self, clock_hz: u32) -> u32 {
+        clock_hz / (self.prescaler as u32 * self.quanta())
+    }
+
+    /// Quanta up to the sample point.
+    pub const fn sample_point(&self) -> u32 {
+        1 + self.segment1 as u32
+    }
+
+    /// The timing for a bit rate with 17 quanta, sample point 13/17.
+    const fn at(bit_rate: u32) -> Self {
+        let prescaler = KERNEL_CLOCK_HZ / (17 * bit_rate);
+        assert!(prescaler * 17 * bit_rate == KERNEL_CLOCK_HZ, "the clock is no multiple of this bit rate");
+        assert!(prescaler >= 1 && prescaler <= 512);
+        Self { prescaler: prescaler as u16, segment1: 12, segment2: 4, jump_width: 2 }
+    }
+}
+
+/// bit/s outside the data phase.
+pub const NOMINAL_BIT_RATE: u32 = 1_000_000;
+/// bit/s in the data phase.
+pub const DATA_BIT_RATE: u32 = 5_000_000;
+/// Timing outside the data phase.
+pub const NOMINAL: BitTiming = BitTiming::at(NOMINAL_BIT_RATE);
+/// Timing in the data phase.
+pub const DATA: BitTiming = BitTiming::at(DATA_BIT_RATE);
+/// Transmitter delay compensation: distance from the measured loop delay to the secondary sample point, in
+/// kernel clock periods. It puts that point where every receiver has its sample point.
+pub const TDC_OFFSET: u8 = {
+    // The hardware compensates with prescalers 1 and 2 only.
+    assert!(DATA.prescaler <= 2);
+    let offset = DATA.prescaler as u32 * DATA.sample_point();
+    assert!(offset <= 127);
+    offset as u8
+};
+/// Window of the filter of the measured delay: 0, off.
+pub const TDC_FILTER: u8 = 0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j10_prescalers_and_segments() {
+        assert_eq!(NOMINAL, BitTiming { prescaler: 5, segment1: 12, segment2: 4, jump_width: 2 });
+        assert_eq!(DATA, BitTiming { prescaler: 1, segment1: 12, segment2: 4, jump_width: 2 });
+    }
+
+    #[test]
+    fn j10_rates_and_sample_points() {
+        for (timing, rate) in [(NOMINAL, 1_000_000), (DATA, 5_000_000)] {
+            assert_eq!(timing.bit_rate(85_000_000), rate);
+            assert_eq!((timing.sample_point(), timing.quanta()), (13, 17));
+        }
+        assert_eq!(TDC_OFFSET, 13);
+    }
+}

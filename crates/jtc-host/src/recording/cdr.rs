@@ -1,0 +1,149 @@
+//! Little-endian CDR, the encoding of ROS 2 messages: each value aligned to its size, counted after the 4-byte header.
+
+/// Writes one message.
+#[derive(Default)]
+pub(super) struct Encoder {
+    bytes: Vec<u8>,
+}
+
+const HEADER: [u8; 4] = [0, 1, 0, 0];
+
+impl Encoder {
+    /// Starts a message, reusing the memory of the last one.
+    pub(super) fn start(&mut self) -> &mut Self {
+        self.bytes.clear();
+        self.bytes.extend(HEADER);
+        self
+    }
+
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    fn align(&mut self, to: usize) {
+        while (self.bytes.len() - HEADER.len()) % to != 0 {
+            self.bytes.push(0);
+        }
+    }
+
+    pub(super) fn u8(&mut self, v: u8) -> &mut Self {
+        self.bytes.push(v);
+        self
+    }
+
+    pub(super) fn u16(&mut self, v: u16) -> &mut Self {
+        self.align(2);
+        self.bytes.extend(v.to_le_bytes());
+        self
+    }
+
+    pub(super) fn u32(&mut self, v: u32) -> &mut Self {
+        self.align(4);
+        self.bytes.extend(v.to_le_bytes());
+        self
+    }
+
+    pub(super) fn f64(&mut self, v: f64) -> &mut Self {
+        self.align(8);
+        self.bytes.extend(v.to_le_bytes());
+        self
+    }
+
+    pub(super) fn string(&mut self, v: &str) -> &mut Self {
+        self.u32(v.len() as u32 + 1);
+        self.bytes.extend(v.as_bytes());
+        self.u8(0)
+    }
+
+    /// A sequence: its length, then its values.
+    pub(super) fn f64s(&mut self, values: [f64; 6]) -> &mut Self {
+        self.u32(6);
+        self.array(values)
+    }
+
+    /// A fixed array: values only.
+    pub(super) fn array(&mut self, values: [f64; 6]) -> &mut Self {
+        for v in values {
+            self.f64(v);
+        }
+        self
+    }
+
+    /// `std_msgs/Header` with a time stamp in ns since 1970.
+    pub(super) fn header(&mut self, stamp_ns: u64, frame: &str) -> &mut Self {
+        self.u32((stamp_ns / 1_000_000_000) as u32).u32((stamp_ns % 1_000_000_000) as u32).string(frame)
+    }
+}
+
+/// Reads one message; every method is `None` past its end.
+pub(super) struct Decoder<'a> {
+    body: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Decoder<'a> {
+    /// `None` unless the message is little-endian CDR.
+    pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
+        let body = bytes.strip_prefix(&HEADER[..2])?.get(2..)?;
+        Some(Self { body, at: 0 })
+    }
+
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let start = self.at.next_multiple_of(N);
+        let value = self.body.get(start..start + N)?.try_into().ok()?;
+        self.at = start + N;
+        Some(value)
+    }
+
+    pub(super) fn u8(&mut self) -> Option<u8> {
+        self.take().map(u8::from_le_bytes)
+    }
+
+    pub(super) fn u16(&mut self) -> Option<u16> {
+        self.take().map(u16::from_le_bytes)
+    }
+
+    pub(super) fn u32(&mut self) -> Option<u32> {
+        self.take().map(u32::from_le_bytes)
+    }
+
+    pub(super) fn f64(&mut self) -> Option<f64> {
+        self.take().map(f64::from_le_bytes)
+    }
+
+    pub(super) fn skip_string(&mut self) -> Option<()> {
+        let len = self.u32()? as usize;
+        self.at = self.at.checked_add(len).filter(|&end| end <= self.body.len())?;
+        Some(())
+    }
+
+    pub(super) fn array(&mut self) -> Option<[f64; 6]> {
+        let mut values = [0.0; 6];
+        for v in &mut values {
+            *v = self.f64()?;
+        }
+        Some(values)
+    }
+
+    /// A sequence: its first six values, NaN where it has fewer.
+    pub(super) fn f64s(&mut self) -> Option<[f64; 6]> {
+        let mut values = [f64::NAN; 6];
+        let len = self.u32()? as usize;
+        if len > self.body.len() / 8 {
+            return None;
+        }
+        for i in 0..len {
+            let v = self.f64()?;
+            if let Some(slot) = values.get_mut(i) {
+                *slot = v;
+            }
+        }
+        Some(values)
+    }
+
+    pub(super) fn skip_header(&mut self) -> Option<()> {
+        self.u32()?;
+        self.u32()?;
+        self.skip_string()
+    }
+}

@@ -1,0 +1,133 @@
+//! CSV files: a header with units, then one row a sample; an unknown value is an empty field.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use super::RecordingError;
+use super::mcap::unknown;
+use crate::sample::{JointSample, Sample};
+
+/// A number of a joint: column name after `q1_`…, and how to reach it.
+type Column = (&'static str, fn(&mut JointSample) -> &mut f64);
+
+const COLUMNS: [Column; 12] = [
+    ("set_position_rad", |j| &mut j.set_position),
+    ("set_velocity_rad_s", |j| &mut j.set_velocity),
+    ("set_acceleration_rad_s2", |j| &mut j.set_acceleration),
+    ("position_rad", |j| &mut j.position),
+    ("velocity_rad_s", |j| &mut j.velocity),
+    ("torque_model_nm", |j| &mut j.torque_model),
+    ("torque_p_nm", |j| &mut j.torque_p),
+    ("torque_i_nm", |j| &mut j.torque_i),
+    ("torque_d_nm", |j| &mut j.torque_d),
+    ("torque_friction_nm", |j| &mut j.torque_friction),
+    ("torque_nm", |j| &mut j.torque),
+    ("temperature_c", |j| &mut j.temperature),
+];
+
+const SAMPLE_COLUMNS: [&str; 6] = ["time_s", "state", "tes", "point", "errors", "can_current"];
+
+/// Writes samples as rows.
+pub(super) struct CsvWriter<W: Write> {
+    out: W,
+    row: String,
+}
+
+impl<W: Write> CsvWriter<W> {
+    pub(super) fn new(mut out: W) -> Result<Self, RecordingError> {
+        let mut header: Vec<String> = SAMPLE_COLUMNS.map(String::from).to_vec();
+        for j in 1..=6 {
+            header.extend(COLUMNS.map(|(name, _)| format!("q{j}_{name}")));
+            header.extend([format!("q{j}_fsm"), format!("q{j}_internal")]);
+        }
+        writeln!(out, "{}", header.join(","))?;
+        Ok(Self { out, row: String::new() })
+    }
+
+    pub(super) fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
+        use std::fmt::Write as _;
+        let row = &mut self.row;
+        row.clear();
+        number(row, s.time_s);
+        let _ = write!(row, ",{},{},{},{},{}", s.state, s.tes, s.point, s.errors, s.can_current);
+        for mut joint in s.joints {
+            for (_, field) in COLUMNS {
+                row.push(',');
+                number(row, *field(&mut joint));
+            }
+            let _ = write!(row, ",{},{}", joint.fsm, joint.internal);
+        }
+        row.push('\n');
+        self.out.write_all(row.as_bytes())?;
+        Ok(())
+    }
+
+    pub(super) fn finish(mut self) -> Result<(), RecordingError> {
+        Ok(self.out.flush()?)
+    }
+}
+
+/// To the ninth decimal: 1 nrad, far below what any sensor resolves, at half the size of all digits.
+fn number(row: &mut String, value: f64) {
+    use std::fmt::Write as _;
+    if value.is_finite() {
+        let rounded = (value * 1e9).round() / 1e9;
+        let _ = write!(row, "{}", rounded + 0.0);
+    }
+}
+
+/// Reads rows back; columns may stand in any order, unknown ones are passed over, missing ones leave values unknown.
+pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, RecordingError> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut lines = text.lines().enumerate();
+    let fail = |line, column: Option<&str>, problem| RecordingError::Line {
+        path: PathBuf::new(),
+        line,
+        column: column.map(str::to_owned),
+        problem,
+    };
+    let Some((_, header)) = lines.next() else {
+        return Err(fail(1, None, "the file is empty"));
+    };
+    let names: Vec<&str> = header.split(',').map(str::trim).collect();
+    if !names.contains(&"time_s") {
+        return Err(fail(1, None, "no recording: its header has no column time_s"));
+    }
+    let mut samples = Vec::new();
+    for (i, row) in lines.filter(|(_, row)| !row.trim().is_empty()) {
+        let mut sample = unknown();
+        let mut fields = row.split(',');
+        for name in &names {
+            let field = fields.next().ok_or_else(|| fail(i + 1, Some(name), "the row ends before this column"))?;
+            put(&mut sample, name, field.trim()).ok_or_else(|| fail(i + 1, Some(name), "not a number"))?;
+        }
+        samples.push(sample);
+    }
+    Ok(samples)
+}
+
+fn put(sample: &mut Sample, name: &str, field: &str) -> Option<()> {
+    match name {
+        "time_s" => sample.time_s = field.parse().ok()?,
+        "state" => sample.state = field.parse().ok()?,
+        "tes" => sample.tes = field.parse().ok()?,
+        "point" => sample.point = field.parse().ok()?,
+        "errors" => sample.errors = field.parse().ok()?,
+        "can_current" => sample.can_current = field.parse().ok()?,
+        _ => {
+            let joint = name.strip_prefix('q').and_then(|n| n.split_once('_'));
+            let Some((number, column)) = joint else { return Some(()) };
+            let index = number.parse::<usize>().ok().and_then(|n| n.checked_sub(1));
+            let Some(joint) = index.and_then(|i| sample.joints.get_mut(i)) else { return Some(()) };
+            match column {
+                "fsm" => joint.fsm = field.parse().ok()?,
+                "internal" => joint.internal = field.parse().ok()?,
+                _ => {
+                    let Some((_, value)) = COLUMNS.iter().find(|(c, _)| *c == column) else { return Some(()) };
+                    *value(joint) = if field.is_empty() { f64::NAN } else { field.parse().ok()? };
+                }
+            }
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,102 @@
+//! What can go wrong with a recording.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Why a recording could not be written or read.
+#[derive(Debug)]
+pub enum RecordingError {
+    /// The ending of the file name is neither `.mcap` nor `.csv`.
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: std::io::Error,
+    },
+    /// A CSV line that cannot be understood.
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Line number from 1.
+        line: usize,
+        /// Column name, where one is to blame.
+        column: Option<String>,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// Not a sound MCAP file.
+    Mcap {
+        /// The file.
+        path: PathBuf,
+        /// What the reader found.
+        problem: String,
+    },
+    /// A message of a known topic that is shorter than its schema.
+    Message {
+        /// The file.
+        path: PathBuf,
+        /// Its topic.
+        topic: String,
+        /// Its log time, s.
+        time_s: f64,
+    },
+}
+
+impl RecordingError {
+    pub(super) fn io(path: &Path, source: std::io::Error) -> Self {
+        RecordingError::Io { path: path.to_owned(), source }
+    }
+
+    /// The same error with the file it is about.
+    pub(super) fn at(mut self, file: &Path) -> Self {
+        let (RecordingError::UnknownFormat { path }
+        | RecordingError::Io { path, .. }
+        | RecordingError::Line { path, .. }
+        | RecordingError::Mcap { path, .. }
+        | RecordingError::Message { path, .. }) = &mut self;
+        *path = file.to_owned();
+        self
+    }
+}
+
+impl fmt::Display for RecordingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RecordingError::UnknownFormat { path } => {
+                write!(f, "{}: recordings are .mcap or .csv files; choose one of these endings", path.display())
+            }
+            RecordingError::Io { path, source } => write!(f, "{}: {source}", path.display()),
+            RecordingError::Line { path, line, column, problem } => {
+                write!(f, "{}: line {line}", path.display())?;
+                if let Some(column) = column {
+                    write!(f, ", column {column}")?;
+                }
+                write!(f, ": {problem}")
+            }
+            RecordingError::Mcap { path, problem } => write!(f, "{}: {problem}", path.display()),
+            RecordingError::Message { path, topic, time_s } => {
+                write!(f, "{}: the message on {topic} at {time_s:.3} s is shorter than its schema", path.display())
+            }
+        }
+    }
+}
+
+impl std::error::Error for RecordingError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            RecordingError::Io { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}
+
+impl From<std::io::Error> for RecordingError {
+    fn from(source: std::io::Error) -> Self {
+        RecordingError::Io { path: PathBuf::new(), source }
+    }
+}

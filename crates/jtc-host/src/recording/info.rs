@@ -1,0 +1,124 @@
+//! What a recording says about itself: the arm, its limits, where the samples come from.
+
+use std::collections::BTreeMap;
+
+/// One joint's name and limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointInfo {
+    /// As in the arm file.
+    pub name: String,
+    /// Lowest position, rad.
+    pub position_min_rad: f64,
+    /// Highest position, rad.
+    pub position_max_rad: f64,
+    /// Highest speed, rad/s.
+    pub velocity_max_rad_s: f64,
+    /// Highest torque, N·m.
+    pub torque_max_nm: f64,
+    /// Largest tracking error, rad.
+    pub position_error_max_rad: f64,
+    /// Origin of the joint in its parent's frame: x, y, z in m, then roll, pitch, yaw in rad.
+    pub origin: [f64; 6],
+}
+
+impl Default for JointInfo {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            position_min_rad: f64::NAN,
+            position_max_rad: f64::NAN,
+            velocity_max_rad_s: f64::NAN,
+            torque_max_nm: f64::NAN,
+            position_error_max_rad: f64::NAN,
+            origin: [0.0; 6],
+        }
+    }
+}
+
+/// Where samples come from and what they belong to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordingInfo {
+    /// Name of the arm.
+    pub arm: String,
+    /// "simulator", or the serial port.
+    pub source: String,
+    /// Name of the trajectory.
+    pub trajectory: String,
+    /// Wall-clock time of sample time 0, ns since 1970; 0 when virtual time was recorded.
+    pub start_unix_ns: u64,
+    /// Base to wrist.
+    pub joints: [JointInfo; 6],
+    /// Origin of the flange in the last joint's frame, as in [`JointInfo::origin`].
+    pub flange: [f64; 6],
+}
+
+impl RecordingInfo {
+    /// The name of joint `j`, `joint_1` and so on when it has none.
+    pub fn joint_name(&self, j: usize) -> String {
+        match self.joints.get(j) {
+            Some(joint) if !joint.name.is_empty() => joint.name.clone(),
+            _ => format!("joint_{}", j + 1),
+        }
+    }
+
+    /// As the key-value pairs of an MCAP metadata record.
+    pub(super) fn to_map(&self) -> BTreeMap<String, String> {
+        let mut map = BTreeMap::new();
+        let mut put = |key: String, value: String| drop(map.insert(key, value));
+        put("arm".into(), self.arm.clone());
+        put("source".into(), self.source.clone());
+        put("trajectory".into(), self.trajectory.clone());
+        put("start_unix_ns".into(), self.start_unix_ns.to_string());
+        put("flange_origin".into(), join(&self.flange));
+        for (i, joint) in self.joints.iter().enumerate() {
+            let n = i + 1;
+            put(format!("joint{n}_name"), self.joint_name(i));
+            put(format!("joint{n}_origin"), join(&joint.origin));
+            for (key, value) in [
+                ("position_min_rad", joint.position_min_rad),
+                ("position_max_rad", joint.position_max_rad),
+                ("velocity_max_rad_s", joint.velocity_max_rad_s),
+                ("torque_max_nm", joint.torque_max_nm),
+                ("position_error_max_rad", joint.position_error_max_rad),
+            ] {
+                put(format!("joint{n}_{key}"), value.to_string());
+            }
+        }
+        map
+    }
+
+    /// The reverse of `to_map`; what is missing or unreadable stays at its default.
+    pub(super) fn from_map(map: &BTreeMap<String, String>) -> Self {
+        let text = |key: &str| map.get(key).cloned().unwrap_or_default();
+        let number = |key: String| map.get(&key).and_then(|v| v.parse().ok()).unwrap_or(f64::NAN);
+        let joints = std::array::from_fn(|i| {
+            let n = i + 1;
+            JointInfo {
+                name: text(&format!("joint{n}_name")),
+                position_min_rad: number(format!("joint{n}_position_min_rad")),
+                position_max_rad: number(format!("joint{n}_position_max_rad")),
+                velocity_max_rad_s: number(format!("joint{n}_velocity_max_rad_s")),
+                torque_max_nm: number(format!("joint{n}_torque_max_nm")),
+                position_error_max_rad: number(format!("joint{n}_position_error_max_rad")),
+                origin: split(&text(&format!("joint{n}_origin"))),
+            }
+        });
+        Self {
+            arm: text("arm"),
+            source: text("source"),
+            trajectory: text("trajectory"),
+            start_unix_ns: text("start_unix_ns").parse().unwrap_or(0),
+            joints,
+            flange: split(&text("flange_origin")),
+        }
+    }
+}
+
+fn join(values: &[f64; 6]) -> String {
+    values.map(|v| v.to_string()).join(" ")
+}
+
+fn split(text: &str) -> [f64; 6] {
+    let mut values = text.split_whitespace().map(|v| v.parse().unwrap_or(0.0));
+    std::array::from_fn(|_| values.next().unwrap_or(0.0))
+}

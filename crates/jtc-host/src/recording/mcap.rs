@@ -1,0 +1,225 @@
+//! MCAP files with ROS 2 schemas, in CDR.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+use std::path::PathBuf;
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Compression, MessageStream, Summary, WriteOptions};
+
+use super::cdr::{Decoder, Encoder};
+use super::{Recording, RecordingError, RecordingInfo, schema};
+use crate::sample::Sample;
+
+/// Name of the metadata record with the [`RecordingInfo`].
+const METADATA: &str = "openjtc";
+const STATES_TOPIC: &str = "/joint_states";
+const COMMANDS_TOPIC: &str = "/joint_commands";
+const CONTROL_TOPIC: &str = "/jtc/control";
+const STATE_TOPIC: &str = "/jtc/state";
+
+impl From<mcap::McapError> for RecordingError {
+    fn from(e: mcap::McapError) -> Self {
+        match e {
+            mcap::McapError::Io(e) => e.into(),
+            e => RecordingError::Mcap { path: PathBuf::new(), problem: e.to_string() },
+        }
+    }
+}
+
+/// Writes samples as four messages each.
+pub(super) struct McapWriter<W: Write + Seek> {
+    out: mcap::Writer<W>,
+    states: u16,
+    commands: u16,
+    control: u16,
+    state: u16,
+    names: Vec<String>,
+    start_ns: u64,
+    sequence: u32,
+    cdr: Encoder,
+}
+
+impl<W: Write + Seek> McapWriter<W> {
+    pub(super) fn new(out: W, info: &RecordingInfo) -> Result<Self, RecordingError> {
+        let mut out = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("openjtc ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Lz4))
+            .create(out)?;
+        out.write_metadata(&Metadata { name: METADATA.into(), metadata: info.to_map() })?;
+        let none = BTreeMap::new();
+        let joint = out.add_schema(schema::JOINT_STATE, "ros2msg", schema::JOINT_STATE_TEXT.as_bytes())?;
+        let control = out.add_schema(schema::CONTROL, "ros2msg", schema::CONTROL_TEXT.as_bytes())?;
+        let state = out.add_schema(schema::STATE, "ros2msg", schema::STATE_TEXT.as_bytes())?;
+        Ok(Self {
+            states: out.add_channel(joint, STATES_TOPIC, "cdr", &none)?,
+            commands: out.add_channel(joint, COMMANDS_TOPIC, "cdr", &none)?,
+            control: out.add_channel(control, CONTROL_TOPIC, "cdr", &none)?,
+            state: out.add_channel(state, STATE_TOPIC, "cdr", &none)?,
+            out,
+            names: (0..6).map(|j| info.joint_name(j)).collect(),
+            start_ns: info.start_unix_ns,
+            sequence: 0,
+            cdr: Encoder::default(),
+        })
+    }
+
+    pub(super) fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
+        let j = &s.joints;
+        let stamp = self.start_ns + (s.time_s * 1e9).round().max(0.0) as u64;
+        let header = |channel_id| MessageHeader {
+            channel_id,
+            sequence: self.sequence,
+            log_time: stamp,
+            publish_time: stamp,
+        };
+        let joint_message = |cdr: &mut Encoder, position, velocity, effort| {
+            cdr.start().header(stamp, "").u32(6);
+            for name in &self.names {
+                cdr.string(name);
+            }
+            cdr.f64s(position).f64s(velocity).f64s(effort);
+        };
+
+        joint_message(&mut self.cdr, j.map(|j| j.position), j.map(|j| j.velocity), j.map(|j| j.torque));
+        self.out.write_to_known_channel(&header(self.states), self.cdr.bytes())?;
+
+        // The effort commanded is the model's share: what remains of the torque is feedback and friction.
+        let model = j.map(|j| j.torque_model);
+        joint_message(&mut self.cdr, j.map(|j| j.set_position), j.map(|j| j.set_velocity), model);
+        self.out.write_to_known_channel(&header(self.commands), self.cdr.bytes())?;
+
+        self.cdr
+            .start()
+            .header(stamp, "")
+            .array(j.map(|j| j.set_position - j.position))
+            .array(j.map(|j| j.set_acceleration))
+            .array(model)
+            .array(j.map(|j| j.torque_p))
+            .array(j.map(|j| j.torque_i))
+            .array(j.map(|j| j.torque_d))
+            .array(j.map(|j| j.torque_friction))
+            .array(j.map(|j| j.torque))
+            .array(j.map(|j| j.temperature));
+        self.out.write_to_known_channel(&header(self.control), self.cdr.bytes())?;
+
+        self.cdr.start().header(stamp, "").u8(s.state).u8(s.tes).u32(s.point).u16(s.errors).u32(s.can_current);
+        for joint in j {
+            self.cdr.u8(joint.fsm);
+        }
+        for joint in j {
+            self.cdr.u16(joint.internal);
+        }
+        self.out.write_to_known_channel(&header(self.state), self.cdr.bytes())?;
+        self.sequence = self.sequence.wrapping_add(1);
+        Ok(())
+    }
+
+    pub(super) fn finish(mut self) -> Result<(), RecordingError> {
+        self.out.finish()?;
+        self.out.into_inner().flush()?;
+        Ok(())
+    }
+}
+
+/// Reads what [`McapWriter`] wrote; messages of other topics are passed over.
+pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
+    let mut info = None;
+    // A file that was cut off has no summary; its messages are still read.
+    if let Ok(Some(summary)) = Summary::read(bytes) {
+        for index in summary.metadata_indexes.iter().filter(|i| i.name == METADATA) {
+            info = Some(RecordingInfo::from_map(&mcap::read::metadata(bytes, index)?.metadata));
+        }
+    }
+    let start_ns = info.as_ref().map_or(0, |i| i.start_unix_ns);
+    let mut samples: BTreeMap<u64, Sample> = BTreeMap::new();
+    for message in MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())? {
+        let message = message?;
+        let time_s = message.log_time.saturating_sub(start_ns) as f64 * 1e-9;
+        let sample = samples.entry(message.log_time).or_insert_with(|| Sample { time_s, ..unknown() });
+        let topic = message.channel.topic.as_str();
+        decode(topic, &message.data, sample).ok_or_else(|| RecordingError::Message {
+            path: PathBuf::new(),
+            topic: topic.to_owned(),
+            time_s,
+        })?;
+    }
+    Ok(Recording { info, samples: samples.into_values().collect() })
+}
+
+fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {
+    let mut cdr = Decoder::new(data)?;
+    let joints = &mut sample.joints;
+    match topic {
+        STATES_TOPIC | COMMANDS_TOPIC => {
+            cdr.skip_header()?;
+            for _ in 0..cdr.u32()? {
+                cdr.skip_string()?;
+            }
+            let (position, velocity, effort) = (cdr.f64s()?, cdr.f64s()?, cdr.f64s()?);
+            for (i, joint) in joints.iter_mut().enumerate() {
+                if topic == STATES_TOPIC {
+                    (joint.position, joint.velocity, joint.torque) = (position[i], velocity[i], effort[i]);
+                } else {
+                    (joint.set_position, joint.set_velocity) = (position[i], velocity[i]);
+                }
+            }
+        }
+        CONTROL_TOPIC => {
+            cdr.skip_header()?;
+            cdr.array()?;
+            let mut columns = [[0.0; 6]; 8];
+            for column in &mut columns {
+                *column = cdr.array()?;
+            }
+            for (i, joint) in joints.iter_mut().enumerate() {
+                [
+                    joint.set_acceleration,
+                    joint.torque_model,
+                    joint.torque_p,
+                    joint.torque_i,
+                    joint.torque_d,
+                    joint.torque_friction,
+                    joint.torque,
+                    joint.temperature,
+                ] = columns.map(|column| column[i]);
+            }
+        }
+        STATE_TOPIC => {
+            cdr.skip_header()?;
+            (sample.state, sample.tes) = (cdr.u8()?, cdr.u8()?);
+            (sample.point, sample.errors, sample.can_current) = (cdr.u32()?, cdr.u16()?, cdr.u32()?);
+            for joint in joints.iter_mut() {
+                joint.fsm = cdr.u8()?;
+            }
+            for joint in joints.iter_mut() {
+                joint.internal = cdr.u16()?;
+            }
+        }
+        _ => {}
+    }
+    Some(())
+}
+
+/// A sample of which nothing is known yet.
+pub(super) fn unknown() -> Sample {
+    use crate::sample::JointSample;
+    let joint = JointSample {
+        set_position: f64::NAN,
+        set_velocity: f64::NAN,
+        set_acceleration: f64::NAN,
+        position: f64::NAN,
+        velocity: f64::NAN,
+        torque_model: f64::NAN,
+        torque_p: f64::NAN,
+        torque_i: f64::NAN,
+        torque_d: f64::NAN,
+        torque_friction: f64::NAN,
+        torque: f64::NAN,
+        temperature: f64::NAN,
+        fsm: 0,
+        internal: 0,
+    };
+    Sample { time_s: 0.0, state: 0, tes: 0, point: 0, errors: 0, can_current: 0, joints: [joint; 6] }
+}

@@ -1,0 +1,124 @@
+//! Recordings of a run: written as MCAP or CSV by the ending of the file name, and read back for reports.
+//!
+//! An MCAP file holds `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so that
+//! Foxglove, PlotJuggler and Rerun plot it at once, the torque split on `/jtc/control` and states on `/jtc/state`. A CSV file
+//! has one row a sample and a header that names the units.
+
+mod cdr;
+mod csv;
+mod error;
+mod info;
+mod mcap;
+mod schema;
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+pub use error::RecordingError;
+pub use info::{JointInfo, RecordingInfo};
+
+use crate::sample::Sample;
+
+/// File formats of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Chunked, lz4-compressed MCAP with ROS 2 schemas.
+    Mcap,
+    /// Comma-separated values with a header line.
+    Csv,
+}
+
+impl Format {
+    /// By the ending of the file name: `.mcap` or `.csv`.
+    pub fn of(path: &Path) -> Result<Self, RecordingError> {
+        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            Some("mcap") => Ok(Format::Mcap),
+            Some("csv") => Ok(Format::Csv),
+            _ => Err(RecordingError::UnknownFormat { path: path.to_owned() }),
+        }
+    }
+}
+
+enum Writer {
+    Mcap(Box<mcap::McapWriter<BufWriter<File>>>),
+    Csv(csv::CsvWriter<BufWriter<File>>),
+}
+
+/// Writes samples into a file as they come.
+pub struct Recorder {
+    writer: Writer,
+    path: PathBuf,
+    samples: u64,
+}
+
+impl Recorder {
+    /// Makes (or replaces) the file; its ending chooses the format.
+    pub fn create(path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
+        let format = Format::of(path)?;
+        let file = File::create(path).map_err(|e| RecordingError::io(path, e))?;
+        let file = BufWriter::with_capacity(1 << 16, file);
+        let writer = match format {
+            Format::Mcap => mcap::McapWriter::new(file, info).map(|w| Writer::Mcap(Box::new(w))),
+            Format::Csv => csv::CsvWriter::new(file).map(Writer::Csv),
+        };
+        Ok(Self { writer: writer.map_err(|e| e.at(path))?, path: path.to_owned(), samples: 0 })
+    }
+
+    /// Appends one sample.
+    pub fn write(&mut self, sample: &Sample) -> Result<(), RecordingError> {
+        let done = match &mut self.writer {
+            Writer::Mcap(w) => w.write(sample),
+            Writer::Csv(w) => w.write(sample),
+        };
+        self.samples += 1;
+        done.map_err(|e| e.at(&self.path))
+    }
+
+    /// Samples written so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Completes the file (index and summary of an MCAP file) and says how many samples it holds.
+    pub fn finish(self) -> Result<u64, RecordingError> {
+        let done = match self.writer {
+            Writer::Mcap(w) => w.finish(),
+            Writer::Csv(w) => w.finish(),
+        };
+        done.map(|()| self.samples).map_err(|e| e.at(&self.path))
+    }
+}
+
+/// Writes a whole recording at once.
+pub fn write_all(path: &Path, info: &RecordingInfo, samples: &[Sample]) -> Result<u64, RecordingError> {
+    let mut recorder = Recorder::create(path, info)?;
+    for sample in samples {
+        recorder.write(sample)?;
+    }
+    recorder.finish()
+}
+
+/// A recording that was read back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Arm, limits and origin; defaults for a CSV file, which does not carry them.
+    pub info: Option<RecordingInfo>,
+    /// Oldest first.
+    pub samples: Vec<Sample>,
+}
+
+impl Recording {
+    /// Reads a file that [`Recorder`] wrote.
+    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let format = Format::of(path)?;
+        let bytes = std::fs::read(path).map_err(|e| RecordingError::io(path, e))?;
+        match format {
+            Format::Mcap => mcap::read(&bytes),
+            Format::Csv => csv::read(&bytes).map(|samples| Recording { info: None, samples }),
+        }
+        .map_err(|e| e.at(path))
+    }
+}

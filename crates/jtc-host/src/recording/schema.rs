@@ -1,0 +1,81 @@
+//! ROS 2 message definitions that the MCAP file carries.
+
+/// Name of the standard joint message.
+pub(super) const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
+/// Its definition with the definitions it needs.
+pub(super) const JOINT_STATE_TEXT: &str = "\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+";
+
+/// Name of the control law's message.
+pub(super) const CONTROL: &str = "openjtc_msgs/msg/JointControl";
+/// Per joint, base to wrist; NaN where the source does not know a value.
+pub(super) const CONTROL_TEXT: &str = "\
+std_msgs/Header header
+# rad, commanded minus measured
+float64[6] position_error
+# rad/s^2
+float64[6] set_acceleration
+# N m
+float64[6] torque_model
+float64[6] torque_p
+float64[6] torque_i
+float64[6] torque_d
+float64[6] torque_friction
+float64[6] torque
+# degrees Celsius, bearing
+float64[6] temperature
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+";
+
+/// Name of the state message.
+pub(super) const STATE: &str = "openjtc_msgs/msg/ControllerState";
+/// States, error words and the point index.
+pub(super) const STATE_TEXT: &str = "\
+uint8 STATE_START=0
+uint8 STATE_INIT=1
+uint8 STATE_HOLD_POS=2
+uint8 STATE_OPERATE=3
+uint8 STATE_TEACHING=4
+uint8 STATE_ERROR=5
+uint8 TES_NULL=0
+uint8 TES_STOP=1
+uint8 TES_PAUSE=2
+uint8 TES_EXECUTE=3
+uint8 TES_FINISH=4
+std_msgs/Header header
+uint8 state
+uint8 trajectory_state
+uint32 point
+uint16 errors
+uint32 can_current
+uint8[6] joint_fsm
+uint16[6] joint_internal
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+";

@@ -1,0 +1,104 @@
+//! Round trips through both formats, and files that are no recordings.
+
+use super::*;
+use crate::sample::Sample;
+
+fn samples(n: usize) -> Vec<Sample> {
+    (0..n)
+        .map(|i| {
+            let t = i as f64 * 1e-3;
+            let mut s = mcap::unknown();
+            (s.time_s, s.state, s.tes, s.point, s.errors, s.can_current) = (t, 3, 3, i as u32, 0x8001, 1 << 8);
+            for (j, joint) in s.joints.iter_mut().enumerate() {
+                joint.set_position = (t + j as f64).sin();
+                joint.position = joint.set_position - 1e-3;
+                joint.torque = -12.5 * j as f64;
+                joint.temperature = 31.0;
+                (joint.fsm, joint.internal) = (3, 1 << j);
+            }
+            s
+        })
+        .collect()
+}
+
+fn same(a: f64, b: f64) -> bool {
+    (a.is_nan() && b.is_nan()) || (a - b).abs() < 1e-9
+}
+
+fn check(name: &str) -> Recording {
+    let dir = std::env::temp_dir().join(format!("openjtc-recording-{}", std::process::id()));
+    std::fs::create_dir_all(&dir).unwrap();
+    let path = dir.join(name);
+    let mut info = RecordingInfo { arm: "avena".into(), source: "simulator".into(), ..Default::default() };
+    for (j, joint) in info.joints.iter_mut().enumerate() {
+        *joint = JointInfo {
+            name: format!("joint_{}", j + 1),
+            position_min_rad: -3.0,
+            position_max_rad: 3.0,
+            velocity_max_rad_s: 1.5,
+            torque_max_nm: 40.5,
+            position_error_max_rad: 0.09,
+            origin: [0.1, 0.2, 0.3, 0.0, 1.570796, 0.0],
+        };
+    }
+    let written = samples(1500);
+    assert_eq!(write_all(&path, &info, &written).unwrap(), 1500);
+    let read = Recording::read(&path).unwrap();
+    assert_eq!(read.samples.len(), written.len());
+    for (a, b) in read.samples.iter().zip(&written) {
+        assert!(same(a.time_s, b.time_s));
+        assert_eq!((a.state, a.tes, a.point, a.errors, a.can_current), (3, 3, b.point, b.errors, b.can_current));
+        for (a, b) in a.joints.iter().zip(&b.joints) {
+            for (x, y) in [
+                (a.set_position, b.set_position),
+                (a.position, b.position),
+                (a.velocity, b.velocity),
+                (a.torque_p, b.torque_p),
+                (a.torque, b.torque),
+                (a.temperature, b.temperature),
+            ] {
+                assert!(same(x, y), "{x} is not {y}");
+            }
+            assert_eq!((a.fsm, a.internal), (b.fsm, b.internal));
+        }
+    }
+    if let Some(read) = &read.info {
+        assert_eq!(*read, info);
+    }
+    std::fs::remove_dir_all(&dir).ok();
+    read
+}
+
+#[test]
+fn mcap_comes_back_with_its_limits() {
+    assert!(check("run.mcap").info.is_some());
+}
+
+#[test]
+fn csv_comes_back() {
+    check("run.csv");
+}
+
+#[test]
+fn what_is_no_recording_is_refused_by_name() {
+    assert!(matches!(Format::of(Path::new("x.txt")), Err(RecordingError::UnknownFormat { .. })));
+    assert!(csv::read(b"t,q1\n0,1\n").unwrap_err().to_string().contains("time_s"));
+    let error = csv::read(b"time_s,q2_position_rad\n0,1\n0.1,abc\n").unwrap_err().to_string();
+    assert!(error.contains("line 3") && error.contains("q2_position_rad"), "{error}");
+    assert!(mcap::read(b"not an mcap file").is_err());
+}
+
+#[test]
+fn a_cut_off_mcap_file_still_gives_its_whole_chunks_or_an_error() {
+    let mut bytes = Vec::new();
+    let mut writer = mcap::McapWriter::new(std::io::Cursor::new(&mut bytes), &RecordingInfo::default()).unwrap();
+    for s in samples(3000) {
+        writer.write(&s).unwrap();
+    }
+    writer.finish().unwrap();
+    for cut in [0, 1, 8, 40, 400, bytes.len() / 2, bytes.len() - 20] {
+        if let Ok(recording) = mcap::read(&bytes[..cut]) {
+            assert!(recording.samples.len() <= 3000);
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use core::fmt::{Display, Formatter, Result};
 
 use crate::{Answer, Bits, Frame, GripperReport, JointReport, Request, Scale, Target};
-use crate::{config, error, fsm, motor_control, warning};
+use crate::{config, error, fsm, id, motor_control, warning};
 
 /// Any frame of the bus, decoded; one that is not understood is shown with the reason and its bytes.
 ///
@@ -26,11 +26,8 @@ impl Display for Decoded<'_> {
         let error = match (Request::parse(self.frame), Answer::parse(self.frame, self.scale)) {
             (Ok(request), _) => return request.fmt(f),
             (_, Ok(answer)) => return answer.fmt(f),
-            (Err(request), Err(answer)) if self.frame.id & crate::id::RESPONSE == 0 => {
-                let _ = answer;
-                request
-            }
-            (_, Err(answer)) => answer,
+            (Err(error), _) if self.frame.id & id::RESPONSE == 0 => error,
+            (_, Err(error)) => error,
         };
         write!(f, "{error}: {}", Hex(self.frame.data()))
     }
@@ -78,7 +75,7 @@ impl Display for Request {
             Self::Move { torque, pump } => {
                 f.write_str("Move")?;
                 for torque in torque {
-                    write!(f, " {torque:.2}")?;
+                    write!(f, " {torque:.1}")?;
                 }
                 write!(f, " N·m, pump {}", on(*pump))
             }
@@ -141,7 +138,7 @@ fn report_bits(f: &mut Formatter<'_>, title: &str, bits: u8, names: &[&str; 8]) 
 
 impl Display for JointReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        write!(f, "{:.4} rad, {:.4} rad/s, {:.2} N·m, ", self.position, self.velocity, self.torque)?;
+        write!(f, "{:.4} rad, {:.4} rad/s, {:.1} N·m, ", self.position, self.velocity, self.torque)?;
         write!(f, "{} °C", self.temperature)?;
         if let Some(motor) = self.motor_temperature {
             write!(f, ", motor {motor} °C")?;

@@ -1,6 +1,7 @@
 //! Scaling between physical values and the drives' integers; every encoder saturates (J-13).
 
 /// rad at the largest 32-bit position.
+#[expect(clippy::approx_constant, reason = "the drives' number, which is not π")]
 pub const POSITION_FULL_SCALE: f64 = 3.141592;
 /// N·m at the largest 16-bit torque.
 pub const TORQUE_FULL_SCALE: f64 = 360.0;
@@ -12,9 +13,17 @@ pub struct Scale {
     pub velocity: f64,
 }
 
+impl Scale {
+    /// Drives of today.
+    pub const CURRENT: Self = Self { velocity: 2.0 };
+    /// Older drives.
+    #[expect(clippy::approx_constant, reason = "the drives' number, which is not 2π")]
+    pub const OLDER: Self = Self { velocity: 6.283185 };
+}
+
 impl Default for Scale {
     fn default() -> Self {
-        Self { velocity: 2.0 }
+        Self::CURRENT
     }
 }
 

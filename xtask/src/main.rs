@@ -12,6 +12,7 @@ mod size;
 mod soak;
 mod tally;
 mod test;
+mod worked_bytes;
 
 use std::process::ExitCode;
 

@@ -1,0 +1,40 @@
+//! Forward kinematics: where the joint frames and the flange are.
+
+use crate::chain::Chain;
+use crate::model::JointVec;
+use crate::rotation::{Mat3, apply};
+use crate::trig::sin_cos;
+
+/// A pose in the base frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Rotation matrix, row major: columns are the frame's axes in the base frame.
+    pub rotation: [[f64; 3]; 3],
+    /// Origin in the base frame, m.
+    pub position: [f64; 3],
+}
+
+pub(crate) fn forward_kinematics(chain: &Chain, q: &JointVec) -> [Pose; 7] {
+    let mut pose = Pose { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], position: [0.0; 3] };
+    let mut poses = [pose; 7];
+    for (k, (out, place)) in poses.iter_mut().zip(&chain.placements).enumerate() {
+        let step = apply(&pose.rotation, &place.xyz);
+        for (x, d) in pose.position.iter_mut().zip(step) {
+            *x += d;
+        }
+        // The flange is the seventh frame: it does not turn.
+        let (s, c) = q.get(k).map_or((0.0, 1.0), |&q| sin_cos(q));
+        pose.rotation = pose.rotation.map(|row| {
+            let r = turned(&row, &place.rotation);
+            [c * r[0] + s * r[1], c * r[1] - s * r[0], r[2]]
+        });
+        *out = pose;
+    }
+    poses
+}
+
+/// A row of a rotation times a rotation.
+fn turned(row: &[f64; 3], m: &Mat3) -> [f64; 3] {
+    let column = |k: usize| row[0] * m[0][k] + row[1] * m[1][k] + row[2] * m[2][k];
+    [column(0), column(1), column(2)]
+}

@@ -1,0 +1,233 @@
+//! The arm as it is described from outside (joint origins, link masses and inertias), and what makes it physical.
+
+use core::fmt;
+
+use crate::rotation::{Mat3, principal_moments};
+
+/// Number of actuated joints.
+pub const JOINTS: usize = 6;
+
+/// One value per joint, base to wrist.
+pub type JointVec = [f64; JOINTS];
+
+/// A frame placed in its parent as URDF does: translate by `xyz` (m), then rotate by
+/// Rz(yaw)·Ry(pitch)·Rx(roll) (rad).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Origin {
+    /// Translation in the parent frame, m.
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw, rad.
+    pub rpy: [f64; 3],
+}
+
+/// A rigid link: mass, centre of mass and inertia about it.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Link {
+    /// Centre of mass (xyz) and orientation of the inertia frame (rpy) in the link frame.
+    pub origin: Origin,
+    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass in the frame of `origin`, kg·m².
+    pub inertia: [f64; 6],
+    /// Mass, kg.
+    pub mass: f64,
+}
+
+/// The arm as rule J-40 and the ArmModel frame describe it.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct ArmModel {
+    /// Joint i places link i+1 on link i; joint 6 is the fixed flange.
+    pub joints: [Origin; 7],
+    /// Link 0 is the base.
+    pub links: [Link; 7],
+}
+
+/// Where a number stands in an [`ArmModel`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Field {
+    /// Joint origin, translation, 0..3.
+    JointXyz(usize),
+    /// Joint origin, roll, pitch, yaw, 0..3.
+    JointRpy(usize),
+    /// Centre of mass of a link, 0..3.
+    LinkXyz(usize),
+    /// Orientation of a link's inertia frame, 0..3.
+    LinkRpy(usize),
+    /// Inertia of a link: Ixx, Ixy, Ixz, Iyy, Iyz, Izz, 0..6.
+    Inertia(usize),
+    /// Mass of a link.
+    Mass,
+}
+
+/// Why a model is not physical (J-06).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// A number is NaN or infinite.
+    NotFinite {
+        /// Joint or link (as `field` says), 0..7.
+        index: usize,
+        /// Which number of it.
+        field: Field,
+        /// What stands there.
+        value: f64,
+    },
+    /// An angle is too large to have a meaning.
+    AngleTooLarge {
+        /// Joint or link (as `field` says), 0..7.
+        index: usize,
+        /// Which number of it.
+        field: Field,
+        /// What stands there, rad.
+        value: f64,
+        /// Largest magnitude, rad.
+        limit: f64,
+    },
+    /// A mass is negative.
+    MassNegative {
+        /// Link, 0..7.
+        link: usize,
+        /// Mass, kg.
+        mass: f64,
+    },
+    /// One of the links 1..=5 has no mass.
+    MassZero {
+        /// Link, 1..=5.
+        link: usize,
+    },
+    /// The inertia of a link with mass has a negative principal moment.
+    InertiaNegative {
+        /// Link, 0..7.
+        link: usize,
+        /// The smallest principal moment, kg·m²; at least 0 is asked for.
+        moment: f64,
+    },
+    /// A principal moment of a link with mass is larger than the two others together: no body has that.
+    InertiaTriangle {
+        /// Link, 0..7.
+        link: usize,
+        /// The largest principal moment, kg·m².
+        moment: f64,
+        /// The sum of the others, kg·m²: the limit.
+        limit: f64,
+    },
+}
+
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let pick = |names: &[&'static str], i: usize| names.get(i).copied().unwrap_or("?");
+        let xyz = ["x", "y", "z"];
+        let rpy = ["roll", "pitch", "yaw"];
+        match *self {
+            Self::JointXyz(i) => write!(f, "origin {}", pick(&xyz, i)),
+            Self::JointRpy(i) => write!(f, "origin {}", pick(&rpy, i)),
+            Self::LinkXyz(i) => write!(f, "centre of mass {}", pick(&xyz, i)),
+            Self::LinkRpy(i) => write!(f, "inertia frame {}", pick(&rpy, i)),
+            Self::Inertia(i) => f.write_str(pick(&["ixx", "ixy", "ixz", "iyy", "iyz", "izz"], i)),
+            Self::Mass => f.write_str("mass"),
+        }
+    }
+}
+
+impl Field {
+    fn owner(&self) -> &'static str {
+        match self {
+            Self::JointXyz(_) | Self::JointRpy(_) => "joint",
+            _ => "link",
+        }
+    }
+}
+
+impl fmt::Display for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NotFinite { index, field, value } => {
+                write!(f, "{} {index}: {field} is {value}, not a finite number", field.owner())
+            }
+            Self::AngleTooLarge { index, field, value, limit } => {
+                write!(f, "{} {index}: {field} is {value} rad, limit {limit} rad; degrees?", field.owner())
+            }
+            Self::MassNegative { link, mass } => {
+                write!(f, "link {link}: mass is {mass} kg, must not be negative")
+            }
+            Self::MassZero { link } => write!(f, "link {link}: mass is 0, only links 0 and 6 may be without"),
+            Self::InertiaNegative { link, moment } => write!(
+                f,
+                "link {link}: smallest principal moment of inertia is {moment} kg m2, must not be negative; \
+                 sign of the products of inertia?"
+            ),
+            Self::InertiaTriangle { link, moment, limit } => write!(
+                f,
+                "link {link}: largest principal moment of inertia is {moment} kg m2, more than the sum of the \
+                 others, {limit} kg m2; wrong unit or order of ixx ixy ixz iyy iyz izz?"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ModelError {}
+
+/// Largest angle of a model, rad: far beyond any sense, and well inside what the sine takes.
+const ANGLE_MAX: f64 = 1.0e6;
+/// How far beyond the limit an inertia may be, relative to its largest moment: models come rounded to f32.
+const INERTIA_TOLERANCE: f64 = 1.0e-6;
+
+impl ArmModel {
+    /// Physical checks of rule J-06: all numbers finite, no negative mass, links 1 to 5 have a mass, and the inertia
+    /// of every link with mass is one that a body can have (up to the rounding of f32).
+    pub fn check(&self) -> Result<(), ModelError> {
+        for (index, joint) in self.joints.iter().enumerate() {
+            finite(index, &joint.xyz, Field::JointXyz)?;
+            angles(index, &joint.rpy, Field::JointRpy)?;
+        }
+        for (index, link) in self.links.iter().enumerate() {
+            finite(index, &link.origin.xyz, Field::LinkXyz)?;
+            angles(index, &link.origin.rpy, Field::LinkRpy)?;
+            finite(index, &link.inertia, Field::Inertia)?;
+            finite(index, &[link.mass], |_| Field::Mass)?;
+            link.check_mass(index)?;
+        }
+        Ok(())
+    }
+}
+
+impl Link {
+    fn check_mass(&self, link: usize) -> Result<(), ModelError> {
+        if self.mass < 0.0 {
+            return Err(ModelError::MassNegative { link, mass: self.mass });
+        }
+        if self.mass == 0.0 {
+            return if (1..=5).contains(&link) { Err(ModelError::MassZero { link }) } else { Ok(()) };
+        }
+        let [small, middle, large] = principal_moments(&symmetric(&self.inertia));
+        let tolerance = INERTIA_TOLERANCE * large.abs().max(small.abs());
+        if small < -tolerance {
+            return Err(ModelError::InertiaNegative { link, moment: small });
+        }
+        if large > small + middle + tolerance {
+            return Err(ModelError::InertiaTriangle { link, moment: large, limit: small + middle });
+        }
+        Ok(())
+    }
+}
+
+/// The inertia as a matrix.
+pub(crate) fn symmetric(&[xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> Mat3 {
+    [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+}
+
+fn finite(index: usize, values: &[f64], field: fn(usize) -> Field) -> Result<(), ModelError> {
+    match values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        Some((i, &value)) => Err(ModelError::NotFinite { index, field: field(i), value }),
+        None => Ok(()),
+    }
+}
+
+fn angles(index: usize, values: &[f64; 3], field: fn(usize) -> Field) -> Result<(), ModelError> {
+    finite(index, values, field)?;
+    match values.iter().enumerate().find(|(_, v)| v.abs() > ANGLE_MAX) {
+        Some((i, &value)) => {
+            Err(ModelError::AngleTooLarge { index, field: field(i), value, limit: ANGLE_MAX })
+        }
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,90 @@
+//! Rotation matrices, and the principal moments of a symmetric one: what set-up and kinematics need of 3×3 algebra.
+
+use crate::trig::{sin_cos, sqrt};
+
+/// A 3×3 matrix, row major.
+pub(crate) type Mat3 = [[f64; 3]; 3];
+
+/// Rz(yaw)·Ry(pitch)·Rx(roll).
+pub(crate) fn from_rpy(&[roll, pitch, yaw]: &[f64; 3]) -> Mat3 {
+    let ((sr, cr), (sp, cp), (sy, cy)) = (sin_cos(roll), sin_cos(pitch), sin_cos(yaw));
+    [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+}
+
+pub(crate) fn transpose(m: &Mat3) -> Mat3 {
+    let [[a, b, c], [d, e, f], [g, h, i]] = *m;
+    [[a, d, g], [b, e, h], [c, f, i]]
+}
+
+#[inline(always)]
+pub(crate) fn apply(m: &Mat3, v: &[f64; 3]) -> [f64; 3] {
+    let row = |r: &[f64; 3]| r[0] * v[0] + r[1] * v[1] + r[2] * v[2];
+    [row(&m[0]), row(&m[1]), row(&m[2])]
+}
+
+pub(crate) fn product(a: &Mat3, b: &Mat3) -> Mat3 {
+    let columns = transpose(b);
+    transpose(&[apply(a, &columns[0]), apply(a, &columns[1]), apply(a, &columns[2])])
+}
+
+/// m·s·mᵀ.
+pub(crate) fn congruent(m: &Mat3, s: &Mat3) -> Mat3 {
+    product(&product(m, s), &transpose(m))
+}
+
+/// Rz(s, c) as a matrix.
+pub(crate) fn about_z(s: f64, c: f64) -> Mat3 {
+    [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+}
+
+/// Rx(s, c) as a matrix.
+pub(crate) fn about_x(s: f64, c: f64) -> Mat3 {
+    [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]
+}
+
+/// `(x, y)` made a unit vector; `(1, 0)` if there is no direction.
+pub(crate) fn unit(x: f64, y: f64) -> (f64, f64) {
+    let largest = x.abs().max(y.abs());
+    if largest == 0.0 || !largest.is_finite() {
+        return (1.0, 0.0);
+    }
+    let (x, y) = (x / largest, y / largest);
+    let length = sqrt(x * x + y * y);
+    (x / length, y / length)
+}
+
+/// Eigenvalues of a symmetric matrix in rising order, by Jacobi's rotations (8 sweeps: far past convergence).
+pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
+    let [[mut xx, mut xy, mut xz], [_, mut yy, mut yz], [_, _, mut zz]] = *m;
+    let scale = [xx, xy, xz, yy, yz, zz].iter().fold(0.0f64, |a, v| a.max(v.abs()));
+    if scale == 0.0 || !scale.is_finite() {
+        return [0.0; 3];
+    }
+    for v in [&mut xx, &mut xy, &mut xz, &mut yy, &mut yz, &mut zz] {
+        *v /= scale;
+    }
+    for _ in 0..8 {
+        (xx, yy, xy, xz, yz) = eliminate(xx, yy, xy, xz, yz);
+        (xx, zz, xz, xy, yz) = eliminate(xx, zz, xz, xy, yz);
+        (yy, zz, yz, xy, xz) = eliminate(yy, zz, yz, xy, xz);
+    }
+    let (low, high) = (xx.min(yy), xx.max(yy));
+    [low.min(zz) * scale, low.max(high.min(zz)) * scale, high.max(zz) * scale]
+}
+
+/// One rotation in the plane of `a` and `b` that makes their product `ab` vanish; `ac` and `bc` turn with it.
+fn eliminate(a: f64, b: f64, ab: f64, ac: f64, bc: f64) -> (f64, f64, f64, f64, f64) {
+    if ab.abs() < 1.0e-100 {
+        return (a, b, 0.0, ac, bc);
+    }
+    let half = 0.5 * (b - a);
+    let root = sqrt(half * half + ab * ab);
+    let t = if half < 0.0 { -ab / (root - half) } else { ab / (root + half) };
+    let c = 1.0 / sqrt(1.0 + t * t);
+    let s = t * c;
+    (a - t * ab, b + t * ab, 0.0, c * ac - s * bc, s * ac + c * bc)
+}

@@ -31,6 +31,8 @@ pub struct Config {
     pub gravity: [f64; 3],
     /// A gripper is on the bus (J-20).
     pub gripper: bool,
+    /// Switch the pump off, until the host switches it on again, when an error occurs.
+    pub pump_off_on_error: bool,
     /// Full scale of the drives' velocity, rad/s (J-11).
     pub velocity_full_scale: f64,
     /// Configuration bits sent to every joint (J-11).
@@ -41,14 +43,20 @@ pub struct Config {
     pub status_period_ms: u16,
     /// Consecutive Moves that may stay unanswered or unacknowledged (J-14).
     pub missed_moves_max: u8,
+    /// Silence of a node after its reset that is no error yet, ms.
+    pub node_boot_ms: u32,
     /// Longest READY→ENABLE, ms (J-16).
     pub enable_timeout_ms: u32,
+    /// Change of a measured position in one tick that no arm can make, rad: an external joint error.
+    pub position_jump_max: f64,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
-    /// Time scale ramp for pause, stop and resume, ms (J-33).
+    /// Time scale ramp for pause, stop and resume, ms (J-33); made longer where acceleration or torque limits ask for it.
     pub ramp_ms: u16,
-    /// Blend into and out of teaching, ms (J-25).
-    pub teach_blend_ms: u16,
+    /// How long a computed torque may stay beyond its limit, saturated there, before it is an error, ms; 0: at once (J-43).
+    pub torque_over_ms: u16,
+    /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).
+    pub blend_ms: u16,
     /// Joint speed above which teaching brakes, rad/s (J-25).
     pub teach_velocity_max: f64,
     /// Braking torque per speed in excess of the limit, N·m·s/rad (J-25).

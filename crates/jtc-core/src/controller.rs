@@ -1,42 +1,481 @@
-//! The controller.
-use jtc_wire::RawPoint;
+//! The controller: state machine and tick (section 4).
+use jtc_dynamics::Dynamics;
+use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, STATUS_LEN, Status};
 
-use crate::{Config, Inputs, Outputs, Telemetry};
+use crate::config::{Config, PidGains, TableOf};
+use crate::defaults;
+use crate::errors::Errors;
+use crate::host::{Records, Work};
+use crate::io::{Inputs, Outputs};
+use crate::motion::{Gains, Law, Motion};
+use crate::nodes::{GRIPPER, Goal, Nodes};
+use crate::path::PathClock;
+use crate::store::Store;
+use crate::telemetry::{JointTelemetry, Telemetry};
+use crate::{JOINTS, State, Tes};
 
-/// The joint trajectory controller. `M` is the memory of its trajectory: at least [`crate::POINTS_MAX`] points.
+/// Which parameters the host has given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Given(u8);
+
+impl Given {
+    pub const FRICTION: u8 = 1 << 0;
+    pub const PID: u8 = 1 << 1;
+    pub const MODEL: u8 = 1 << 2;
+
+    pub fn set(&mut self, bit: u8) {
+        self.0 |= bit;
+    }
+
+    /// The byte of the status: 1 = missing.
+    fn missing(self) -> u8 {
+        !self.0 & (Self::FRICTION | Self::PID | Self::MODEL)
+    }
+}
+
+/// Where in Operate the controller is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Path {
+    /// Waits until every joint is enabled.
+    Waiting,
+    /// On the way from where the arm is held to the first point.
+    Gliding { from: [f64; JOINTS], elapsed_ms: f64 },
+    /// At point 0, which the next tick commands.
+    AtStart,
+    /// On the path; `leave` says where to when it stands.
+    Running { leave: Option<Tes> },
+}
+
+/// The joint trajectory controller. `M` is the memory of its trajectory: [`crate::POINTS_MAX`] points.
+///
+/// Parts that differ in what they know live in modules of their own: `nodes` (the bus), `host` (commands), `store` (trajectory),
+/// `motion` (control law), `errors`. This type connects them; [`Controller::tick`] is the figure of the manual, top to bottom.
+#[derive(Debug)]
 pub struct Controller<M> {
-    _points: M,
+    pub(crate) config: Config,
+    pub(crate) state: State,
+    pub(crate) errors: Errors,
+    pub(crate) nodes: Nodes,
+    // What the host gave.
+    pub(crate) given: Given,
+    pub(crate) dynamics: Dynamics,
+    pub(crate) pid: [PidGains; JOINTS],
+    pub(crate) polynomial: [[f64; 6]; JOINTS],
+    pub(crate) tables: [TableOf<f32>; JOINTS],
+    pub(crate) friction_is_table: bool,
+    pub(crate) teaching: bool,
+    pub(crate) pump: bool,
+    // The trajectory and its execution.
+    pub(crate) store: Store<M>,
+    pub(crate) tes: Tes,
+    clock: PathClock,
+    path: Path,
+    pub(crate) motion: Motion,
+    // The link to the host.
+    pub(crate) work: Work,
+    pub(crate) records: Records,
+    since_status_ms: u16,
+    telemetry: Telemetry,
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// A controller in Start.
-    pub fn new(_config: Config, _points: M) -> Self {
-        unimplemented!()
+    /// A controller in Start. The first tick takes it to Init.
+    pub fn new(config: Config, points: M) -> Self {
+        Self {
+            state: State::Start,
+            errors: Errors::default(),
+            nodes: Nodes::new(&config),
+            given: Given::default(),
+            dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
+            pid: defaults::PID,
+            polynomial: defaults::POLYNOMIAL,
+            tables: core::array::from_fn(|j| *defaults::friction_table(j)),
+            friction_is_table: false,
+            teaching: false,
+            pump: false,
+            store: Store::new(points),
+            tes: Tes::Null,
+            clock: PathClock::default(),
+            path: Path::Waiting,
+            motion: Motion::default(),
+            work: Work::Begin,
+            records: Records::default(),
+            since_status_ms: 0,
+            telemetry: Telemetry::default(),
+            config,
+        }
     }
-    /// One millisecond.
-    pub fn tick(&mut self, _inputs: &Inputs<'_>) -> Outputs {
-        unimplemented!()
+
+    /// One millisecond, with a bounded amount of work whatever the inputs.
+    pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
+        // What has come in.
+        let had_errors = self.state == State::Error;
+        self.nodes.take(inputs, &self.config, self.goal());
+        let host_done = self.serve_host(inputs.host);
+
+        // What state that makes.
+        self.check_errors(inputs);
+        self.select_state();
+
+        // What to do in it.
+        match self.state {
+            State::Start | State::Init | State::Error => self.motion.release(&self.nodes),
+            State::Teaching => self.teach(),
+            State::HoldPos => self.hold(),
+            State::Operate => self.operate(),
+        }
+
+        // An error found now zeroes the torque of this same tick.
+        let mut torque = self.check_limits();
+        if self.errors.any() {
+            self.enter(State::Error);
+            torque = [0.0; JOINTS];
+        }
+
+        // What goes out.
+        let new_error = self.state == State::Error && !had_errors;
+        let bus = self.nodes.frame(&self.config, self.goal(), torque, self.pump, new_error);
+        self.observe(&torque);
+        Outputs {
+            bus: Some(bus),
+            // J-22: 0 in Start and while an internal error is latched.
+            safety_output: self.state != State::Start && !self.errors.internal(),
+            status: self.status(inputs.status_free),
+            host_done,
+        }
     }
+
     /// What the last tick computed.
     pub fn telemetry(&self) -> &Telemetry {
-        unimplemented!()
+        &self.telemetry
     }
+
     /// The settings.
     pub fn config(&self) -> &Config {
-        unimplemented!()
+        &self.config
     }
-}
 
-impl Config {
-    /// The default arm's settings (rules, section 7).
-    pub fn avena() -> Self {
-        unimplemented!()
+    /// Frames of the joint bus that were ignored because they were not understood (J-15).
+    pub fn ignored_frames(&self) -> u32 {
+        self.nodes.ignored
     }
-}
 
-impl crate::Parameters {
-    /// The default arm's parameters (rules, section 7).
-    pub fn avena() -> Self {
-        unimplemented!()
+    /// Where the nodes are wanted in the present state.
+    fn goal(&self) -> Goal {
+        match self.state {
+            State::Start | State::Init => Goal::Ready,
+            State::HoldPos | State::Operate | State::Teaching => Goal::Enabled,
+            State::Error => Goal::Down,
+        }
+    }
+
+    /// Errors from outside the control law; they latch (J-21).
+    fn check_errors(&mut self, inputs: &Inputs<'_>) {
+        if !inputs.safety_input {
+            self.errors.raise_emergency_input();
+        }
+        let flags = self.nodes.can_flags(inputs, &self.config);
+        if flags != 0 {
+            self.errors.raise_can(flags);
+        }
+        if self.nodes.external_error() {
+            self.errors.raise_external_joints();
+        }
+    }
+
+    /// Priority: Error, Init, Teaching, HoldPos, Operate.
+    fn select_state(&mut self) {
+        // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
+        let initialised = self.given.missing() == 0
+            && match self.state {
+                State::HoldPos | State::Operate | State::Teaching => self.nodes.init_word() == 0,
+                State::Start | State::Init | State::Error => self.nodes.all_ready(),
+            };
+        let next = if self.errors.any() || (self.state == State::Error && self.nodes.clearing()) {
+            State::Error
+        } else if !initialised {
+            State::Init
+        } else if self.teaching {
+            State::Teaching
+        } else if self.tes == Tes::Execute {
+            State::Operate
+        } else {
+            State::HoldPos
+        };
+        self.enter(next);
+    }
+
+    fn enter(&mut self, next: State) {
+        let last = core::mem::replace(&mut self.state, next);
+        if last == next {
+            return;
+        }
+        if matches!(next, State::Error | State::Init | State::Teaching) {
+            // J-24: a trajectory is never resumed after these; it has to be sent again.
+            self.store.clear();
+            self.set_tes(Tes::Null);
+        }
+        match next {
+            State::Error | State::Init | State::Start => {
+                self.teaching = false;
+                self.motion.release(&self.nodes);
+                self.pump &= !(next == State::Error && self.config.pump_off_on_error);
+            }
+            State::HoldPos if last == State::Teaching => self.motion.hold_measured(&self.nodes, &self.config),
+            State::HoldPos | State::Operate | State::Teaching => {}
+        }
+        self.motion.change_law();
+    }
+
+    pub(crate) fn set_tes(&mut self, tes: Tes) {
+        self.tes = tes;
+        if matches!(tes, Tes::Null | Tes::Stop) {
+            self.clock = PathClock::default();
+        }
+    }
+
+    /// Execute from Stop or Finish.
+    pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
+        let first = self.store.at(0.0).ok_or(DataStatus::NotAllowed)?;
+        if !self.near(&first.position) {
+            return Err(DataStatus::StartPositionMismatch);
+        }
+        self.clock = PathClock::default();
+        self.path = Path::Waiting;
+        self.set_tes(Tes::Execute);
+        Ok(())
+    }
+
+    /// Every measured position is within the start tolerance of `position`.
+    fn near(&self, position: &[f64; JOINTS]) -> bool {
+        let tolerance = self.config.start_tolerance_rad;
+        self.nodes.positions().iter().zip(position).all(|(q, p)| (q - p).abs() <= tolerance)
+    }
+
+    /// Execute from Pause.
+    pub(crate) fn resume_path(&mut self) {
+        if self.clock.time > 0.0 {
+            let ramp = self.ramp_ms();
+            self.clock.ramp_to(1.0, ramp);
+            self.path = Path::Running { leave: None };
+        } else {
+            self.path = Path::Waiting;
+        }
+        self.set_tes(Tes::Execute);
+    }
+
+    /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
+    pub(crate) fn leave_path(&mut self, command: ExecCommand) {
+        let to = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
+        match &mut self.path {
+            Path::Running { leave } => {
+                let ramping = leave.replace(to).is_some();
+                if !ramping {
+                    let ramp = self.ramp_ms();
+                    self.clock.ramp_to(0.0, ramp);
+                }
+            }
+            // Not on the path yet: nothing to slow down.
+            Path::Waiting | Path::Gliding { .. } | Path::AtStart => self.set_tes(to),
+        }
+    }
+
+    fn ramp_ms(&self) -> f64 {
+        match self.store.at(self.clock.time) {
+            Some(at) => self.motion.ramp_ms(&at, &self.nodes, &self.config, &self.dynamics),
+            None => f64::from(self.config.ramp_ms),
+        }
+    }
+
+    fn hold(&mut self) {
+        self.motion.latch(&self.nodes);
+        self.motion.hold(&self.config);
+        self.compute(Law::Hold);
+    }
+
+    fn teach(&mut self) {
+        self.motion.set = crate::SetPoint::still(self.nodes.positions());
+        self.compute(Law::Teach);
+    }
+
+    fn operate(&mut self) {
+        self.motion.latch(&self.nodes);
+        self.walk();
+        self.compute(Law::Follow);
+    }
+
+    /// Set values of Operate.
+    fn walk(&mut self) {
+        let Some(first) = self.store.at(0.0) else { return };
+        match self.path {
+            Path::Waiting => {
+                // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
+                self.motion.hold(&self.config);
+                if self.motion.all_holding() {
+                    if self.near(&first.position) {
+                        self.path = Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0 };
+                    } else {
+                        self.set_tes(Tes::Stop);
+                    }
+                }
+            }
+            Path::Gliding { from, elapsed_ms } => {
+                let length = f64::from(self.config.ramp_ms.max(1));
+                let elapsed_ms = elapsed_ms + 1.0;
+                self.motion.glide(&from, &first.position, (elapsed_ms / length).min(1.0), length);
+                self.path =
+                    if elapsed_ms < length { Path::Gliding { from, elapsed_ms } } else { Path::AtStart };
+            }
+            Path::AtStart => {
+                self.clock = PathClock::start();
+                self.path = Path::Running { leave: None };
+                self.motion.follow(&first, 1.0, 0.0);
+                self.finish_at_end();
+            }
+            Path::Running { leave } => {
+                self.clock.advance();
+                let end = f64::from(self.store.duration_ms());
+                self.clock.time = self.clock.time.min(end);
+                if let Some(at) = self.store.at(self.clock.time) {
+                    self.motion.follow(&at, self.clock.rate, self.clock.slope);
+                }
+                match leave {
+                    Some(tes) if self.clock.standing() => self.set_tes(tes),
+                    _ => self.finish_at_end(),
+                }
+            }
+        }
+    }
+
+    /// The last point was commanded in this tick (J-31).
+    fn finish_at_end(&mut self) {
+        if self.clock.time >= f64::from(self.store.duration_ms()) {
+            self.set_tes(Tes::Finish);
+        }
+    }
+
+    fn compute(&mut self, law: Law) {
+        let gains = Gains {
+            dynamics: &self.dynamics,
+            pid: &self.pid,
+            polynomial: &self.polynomial,
+            table: self.friction_is_table.then_some(&self.tables),
+        };
+        let errors = self.motion.compute(law, &self.nodes, &self.config, &gains);
+        for (j, &bits) in errors.iter().enumerate() {
+            if bits != 0 && self.nodes.node(j).enabled() {
+                self.errors.raise_joint(j, bits);
+            }
+        }
+    }
+
+    /// J-43; returns the torque to command.
+    fn check_limits(&mut self) -> [f64; JOINTS] {
+        let mut torque = [0.0; JOINTS];
+        if !matches!(self.state, State::HoldPos | State::Operate | State::Teaching) {
+            return torque;
+        }
+        let measured = self.nodes.positions();
+        for (j, torque) in torque.iter_mut().enumerate() {
+            let mut errors = if self.state == State::Teaching {
+                0
+            } else {
+                self.motion.check_set(j, measured[j], &self.config)
+            };
+            match self.motion.limit_torque(j, &self.config) {
+                Ok(limited) => *torque = limited,
+                Err(bit) => errors |= bit,
+            }
+            if errors != 0 {
+                self.errors.raise_joint(j, errors);
+            }
+        }
+        torque
+    }
+
+    /// Index of the current 1 ms point.
+    fn point(&self) -> u32 {
+        self.clock.time as u32
+    }
+
+    fn observe(&mut self, torque: &[f64; JOINTS]) {
+        let (q, v) = (self.nodes.positions(), self.nodes.velocities());
+        let t = &mut self.telemetry;
+        t.tick += 1;
+        (t.state, t.tes, t.errors) = (self.state, self.tes, self.errors.word());
+        t.point = self.clock.time as u32;
+        for (j, out) in t.joints.iter_mut().enumerate() {
+            let (set, parts, report) = (&self.motion.set, &self.motion.torque[j], &self.nodes.node(j).report);
+            *out = JointTelemetry {
+                set_position: set.position[j],
+                set_velocity: set.velocity[j],
+                set_acceleration: set.acceleration[j],
+                position: q[j],
+                velocity: v[j],
+                temperature: f64::from(report.temperature),
+                torque_model: parts.model,
+                torque_p: parts.pid.p,
+                torque_i: parts.pid.i,
+                torque_d: parts.pid.d,
+                torque_friction: parts.friction,
+                torque_other: parts.brake + parts.blend,
+                torque: torque[j],
+                fsm: report.fsm,
+                internal: self.errors.joint(j).0,
+            };
+        }
+    }
+
+    /// A JtcStatus when one is due: at once for a response, else every period (J-04).
+    fn status(&mut self, free: bool) -> Option<[u8; STATUS_LEN]> {
+        self.since_status_ms = self.since_status_ms.saturating_add(1);
+        if !free || (self.records.is_empty() && self.since_status_ms < self.config.status_period_ms) {
+            return None;
+        }
+        self.since_status_ms = 0;
+        let (can_current, can_occurred) = self.errors.can();
+        let (q, v) = (self.nodes.positions(), self.nodes.velocities());
+        let joints = core::array::from_fn(|j| {
+            let report = &self.nodes.node(j).report;
+            let (internal, internal_occurred) = self.errors.joint(j);
+            JointStatus {
+                fsm: report.fsm,
+                mc_current: report.mc_current,
+                mc_occurred: report.mc_occurred,
+                errors: report.errors,
+                warnings: report.warnings,
+                internal,
+                internal_occurred,
+                position: q[j] as f32,
+                velocity: v[j] as f32,
+                torque: report.torque as f32,
+                temperature: report.temperature,
+            }
+        });
+        let gripper = &self.nodes.node(GRIPPER).report;
+        let status = Status {
+            response: self.records.pop().unwrap_or_default(),
+            fsm: self.state as u8,
+            errors: self.errors.word(),
+            occurred: self.errors.occurred(),
+            jtc_init: self.given.missing(),
+            node_init: self.nodes.init_word(),
+            tes: self.tes as u8,
+            point: self.point(),
+            friction_type: u8::from(self.friction_is_table),
+            can_error: u8::from(can_current != 0),
+            can_current,
+            can_occurred,
+            joints,
+            gripper: Some(GripperStatus {
+                fsm: gripper.fsm,
+                pump: u8::from(self.nodes.pump),
+                pressure1: u8::from(self.nodes.pressure[0]),
+                pressure2: u8::from(self.nodes.pressure[1]),
+                errors: gripper.errors,
+                warnings: gripper.warnings,
+            }),
+        };
+        Some(status.emit())
     }
 }

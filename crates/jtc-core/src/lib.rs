@@ -4,11 +4,22 @@
 
 mod config;
 mod controller;
+mod defaults;
+mod errors;
+pub mod friction;
+mod host;
+mod interpolation;
 mod io;
+mod motion;
+mod nodes;
+mod path;
+mod pid;
+mod store;
 mod telemetry;
 
 pub use config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf};
 pub use controller::Controller;
+pub use interpolation::{SetPoint, interpolate};
 pub use io::{BusState, Inputs, Outputs};
 pub use telemetry::{JointTelemetry, Telemetry};
 

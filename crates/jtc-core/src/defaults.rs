@@ -1,0 +1,64 @@
+//! What the device starts with (rules, section 7): made from `arms/avena.toml` at build time.
+use jtc_dynamics::{ArmModel, Link, Origin};
+
+use crate::config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf};
+
+/// The constants as the build script wrote them.
+#[allow(clippy::excessive_precision, clippy::approx_constant)]
+mod arm {
+    use super::*;
+    include!(concat!(env!("OUT_DIR"), "/default_arm.rs"));
+}
+
+pub(crate) use arm::{MODEL, PID, POLYNOMIAL};
+
+/// The default friction table of joint `j`.
+pub(crate) fn friction_table(j: usize) -> &'static TableOf<f32> {
+    // One table may stand for all joints.
+    arm::TABLES.get(j).unwrap_or(&arm::TABLES[0])
+}
+
+impl Config {
+    /// The default arm's settings.
+    pub const fn avena() -> Self {
+        Self {
+            joints: arm::JOINT_CONFIG,
+            gravity: arm::GRAVITY,
+            gripper: true,
+            pump_off_on_error: true,
+            velocity_full_scale: 2.0,
+            joint_config_bits: 0x17,
+            gripper_config_bits: 0x04,
+            status_period_ms: 40,
+            missed_moves_max: 5,
+            node_boot_ms: 2_000,
+            enable_timeout_ms: 10_000,
+            position_jump_max: 0.1,
+            start_tolerance_rad: 0.02,
+            ramp_ms: 200,
+            torque_over_ms: 0,
+            blend_ms: 100,
+            teach_velocity_max: 1.0,
+            teach_damping: 40.0,
+            friction_sign_width: 0.02,
+        }
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::avena()
+    }
+}
+
+impl Parameters {
+    /// The default arm's parameters, with the friction polynomial.
+    pub const fn avena() -> Self {
+        Self { model: MODEL, pid: PID, friction: Friction::Polynomial(POLYNOMIAL) }
+    }
+
+    /// The default friction tables.
+    pub fn avena_friction_table() -> Friction {
+        Friction::Table(core::array::from_fn(|j| *friction_table(j)))
+    }
+}

@@ -1,0 +1,92 @@
+//! Errors latch (J-21): what has occurred, and what holds the controller in Error.
+use crate::{JOINTS, error};
+
+/// Latched and occurred errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Errors {
+    /// The safety input was low.
+    emergency_input: bool,
+    /// A node reported an error or misbehaved.
+    external_joints: bool,
+    /// Internal error word per joint.
+    joints: [u16; JOINTS],
+    joints_occurred: [u16; JOINTS],
+    /// CAN flags.
+    can: u32,
+    can_occurred: u32,
+    occurred: u16,
+}
+
+impl Errors {
+    pub fn raise_emergency_input(&mut self) {
+        self.emergency_input = true;
+        self.occurred |= self.word();
+    }
+
+    pub fn raise_external_joints(&mut self) {
+        self.external_joints = true;
+        self.occurred |= self.word();
+    }
+
+    pub fn raise_joint(&mut self, joint: usize, bits: u16) {
+        if let (Some(now), Some(occurred)) = (self.joints.get_mut(joint), self.joints_occurred.get_mut(joint))
+        {
+            *now |= bits;
+            *occurred |= bits;
+        }
+        self.occurred |= self.word();
+    }
+
+    pub fn raise_can(&mut self, flags: u32) {
+        self.can |= flags;
+        self.can_occurred |= flags;
+        self.occurred |= self.word();
+    }
+
+    /// ClearCurrentErrors: what still persists is raised again in the same tick.
+    pub fn clear_current(&mut self) {
+        self.emergency_input = false;
+        self.external_joints = false;
+        self.joints = [0; JOINTS];
+        self.can = 0;
+    }
+
+    /// ClearOccurredErrors clears both.
+    pub fn clear_occurred(&mut self) {
+        *self = Self::default();
+    }
+
+    /// An internal error is latched: it holds the safety output at 0 (J-22).
+    pub fn internal(&self) -> bool {
+        self.can != 0 || self.joints.iter().any(|&bits| bits != 0)
+    }
+
+    pub fn any(&self) -> bool {
+        self.internal() || self.emergency_input || self.external_joints
+    }
+
+    /// Current error word.
+    pub fn word(&self) -> u16 {
+        let bit = |on: bool, bit: u16| if on { bit } else { 0 };
+        bit(self.emergency_input, error::EMERGENCY_INPUT)
+            | bit(self.internal(), error::EMERGENCY_OUTPUT | error::INTERNAL)
+            | bit(self.emergency_input || self.external_joints, error::EXTERNAL)
+            | bit(self.joints.iter().any(|&bits| bits != 0), error::INTERNAL_JOINTS)
+            | bit(self.can != 0, error::INTERNAL_CAN)
+            | bit(self.external_joints, error::EXTERNAL_JOINTS)
+    }
+
+    pub fn occurred(&self) -> u16 {
+        self.occurred
+    }
+
+    /// Current and occurred word of a joint.
+    pub fn joint(&self, joint: usize) -> (u16, u16) {
+        (self.joints.get(joint).copied().unwrap_or(0), self.joints_occurred.get(joint).copied().unwrap_or(0))
+    }
+
+    /// Current and occurred CAN flags.
+    pub fn can(&self) -> (u32, u32) {
+        (self.can, self.can_occurred)
+    }
+}

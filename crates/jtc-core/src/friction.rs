@@ -1,0 +1,109 @@
+//! Friction compensation of one joint (J-42).
+use crate::config::TableOf;
+
+/// Sign of a speed, smoothed: a straight line between −`width` and `width` (rad/s).
+fn smooth_sign(v: f64, width: f64) -> f64 {
+    (v / width).clamp(-1.0, 1.0)
+}
+
+/// Torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
+///
+/// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³); the temperature factor is kept within 0.2..2, because the straight line of
+/// the measured drives changes its sign near 60 °C and compensation would become drag.
+pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
+    let s = smooth_sign(v, sign_width);
+    let factor = (1.0 + c[4] * (t - c[5])).clamp(0.2, 2.0);
+    factor * (c[0] * s + v * (c[1] + v * (c[2] * s + c[3] * v)))
+}
+
+/// Bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m; both axes with their ends, `None` outside.
+pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
+    let (row, x) = locate(&table.velocity, v)?;
+    let (column, y) = locate(&table.temperature, t)?;
+    let at = |r: usize, c: usize| f64::from(table.torque[r][c]);
+    let low = at(row, column) + x * (at(row + 1, column) - at(row, column));
+    let high = at(row, column + 1) + x * (at(row + 1, column + 1) - at(row, column + 1));
+    Some(low + y * (high - low))
+}
+
+/// The cell of an axis that holds `value`, and where in it (0..1).
+fn locate(axis: &[f32; 20], value: f64) -> Option<(usize, f64)> {
+    if !(value >= f64::from(axis[0]) && value <= f64::from(axis[19])) {
+        return None;
+    }
+    let mut cell = 0;
+    // No early exit: the same number of instructions for every value.
+    for (i, &start) in axis.iter().enumerate().take(19).skip(1) {
+        if value >= f64::from(start) {
+            cell = i;
+        }
+    }
+    let (a, b) = (f64::from(axis[cell]), f64::from(axis[cell + 1]));
+    Some((cell, (value - a) / (b - a)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sample() -> TableOf<f32> {
+        let velocity = core::array::from_fn(|i| -1.0 + i as f32 * 0.125);
+        let temperature = core::array::from_fn(|i| 20.0 + i as f32 * 2.0);
+        // Bilinear in both axes: a correct interpolation reproduces it everywhere.
+        let torque = core::array::from_fn(|r| {
+            core::array::from_fn(|c| {
+                3.0 + 2.0 * velocity[r] - 0.5 * temperature[c] + 0.25 * velocity[r] * temperature[c]
+            })
+        });
+        TableOf { velocity, temperature, torque }
+    }
+
+    #[test]
+    fn j42_table_includes_the_ends_of_both_axes() {
+        let t = sample();
+        for (v, temp) in [(-1.0, 20.0), (1.375, 58.0), (-1.0, 58.0), (0.125, 30.0)] {
+            assert!(
+                (table(&t, v, temp).unwrap() - (3.0 + 2.0 * v - 0.5 * temp + 0.25 * v * temp)).abs() < 1e-5
+            );
+        }
+        for (v, temp) in [(-1.001, 30.0), (1.376, 30.0), (0.0, 19.99), (0.0, 58.01), (f64::NAN, 30.0)] {
+            assert_eq!(table(&t, v, temp), None);
+        }
+    }
+
+    #[test]
+    fn j42_temperature_factor_never_turns_compensation_into_drag() {
+        let c = [6.5, 46.5, -38.0, 21.0, -0.0272, 19.9];
+        assert!(polynomial(&c, 0.5, 100.0, 0.02) > 0.0);
+        let cold = polynomial(&c, 0.5, -200.0, 0.02);
+        assert!(
+            (cold - 2.0 * polynomial(&[c[0], c[1], c[2], c[3], 0.0, 0.0], 0.5, 25.0, 0.02)).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn j42_four_coefficients_do_not_depend_on_temperature() {
+        let c = [8.0, 49.0, -34.0, 14.5, 0.0, 0.0];
+        assert_eq!(polynomial(&c, 0.3, 10.0, 0.02), polynomial(&c, 0.3, 70.0, 0.02));
+        let v: f64 = 0.3;
+        let expected = 8.0 + 49.0 * v - 34.0 * v * v + 14.5 * v * v * v;
+        assert!((polynomial(&c, v, 10.0, 0.02) - expected).abs() < 1e-12);
+    }
+
+    proptest! {
+        #[test]
+        fn j42_table_is_bilinear(v in -1.0..1.375f64, temp in 20.0..58.0f64) {
+            let expected = 3.0 + 2.0 * v - 0.5 * temp + 0.25 * v * temp;
+            prop_assert!((table(&sample(), v, temp).unwrap() - expected).abs() < 1e-4);
+        }
+
+        #[test]
+        fn j42_polynomial_is_odd_and_continuous(c in prop::array::uniform6(-5.0..5.0f64), v in -1.5..1.5f64, t in 0.0..80.0f64) {
+            let at = |v| polynomial(&c, v, t, 0.02);
+            prop_assert!((at(v) + at(-v)).abs() < 1e-9);
+            prop_assert!((at(v + 1e-9) - at(v)).abs() < 1e-5);
+            prop_assert_eq!(at(0.0), 0.0);
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! The host's commands: worked off in bounded slices, answered by one record each (J-04, J-06).
+use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
+use jtc_wire::{
+    Command, DataStatus, ExecCommand, Floats, FrameStatus, LinkEvent, RawPoint, Response, Segment,
+};
+
+use crate::config::{PidGains, TableOf};
+use crate::controller::{Controller, Given};
+use crate::defaults;
+use crate::{JOINTS, State, Tes};
+
+/// Trajectory points copied in one tick.
+const POINTS_PER_TICK: usize = 64;
+/// Floats of one joint's friction table; a tick checks or copies one joint.
+const TABLE_FLOATS: usize = 20 + 20 + 400;
+
+/// How far a long frame is worked off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Work {
+    #[default]
+    Begin,
+    /// Points copied.
+    Points(usize),
+    /// Joints whose table is checked.
+    TableCheck(usize),
+    /// Joints whose table is copied.
+    TableCopy(usize),
+}
+
+/// Response records that wait for their status frame, oldest first.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Records {
+    ring: [Response; 16],
+    first: usize,
+    len: usize,
+}
+
+impl Records {
+    pub fn is_full(&self) -> bool {
+        self.len == self.ring.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    pub fn push(&mut self, response: Response) {
+        let end = (self.first + self.len) % self.ring.len();
+        if let Some(slot) = self.ring.get_mut(end).filter(|_| self.len < 16) {
+            *slot = response;
+            self.len += 1;
+        }
+    }
+
+    pub fn pop(&mut self) -> Option<Response> {
+        let response = *self.ring.get(self.first).filter(|_| self.len > 0)?;
+        self.first = (self.first + 1) % self.ring.len();
+        self.len -= 1;
+        Some(response)
+    }
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// Works on the oldest event of the host link; true when it is done with.
+    pub(crate) fn serve_host(&mut self, event: Option<LinkEvent<'_>>) -> bool {
+        let Some(event) = event else { return false };
+        if self.records.is_full() {
+            // Nothing is lost: the event is offered again.
+            return false;
+        }
+        let response = match event {
+            LinkEvent::Bad(response) => response,
+            LinkEvent::Frame(frame) => {
+                let data = match Command::parse(frame) {
+                    Err(status) => status,
+                    Ok(command) => match self.obey(command) {
+                        Progress::Done => DataStatus::NoError,
+                        Progress::Refused(status) => status,
+                        Progress::Working(work) => {
+                            self.work = work;
+                            return false;
+                        }
+                    },
+                };
+                Response {
+                    frame_type: frame.frame_type as u8,
+                    status: FrameStatus::NoError,
+                    data,
+                    length: frame.bytes.len() as u16,
+                }
+            }
+        };
+        self.work = Work::Begin;
+        self.records.push(response);
+        true
+    }
+
+    fn obey(&mut self, command: Command<'_>) -> Progress {
+        // Parameters would change the torque under a moving arm.
+        let settable = matches!(self.state, State::Init | State::HoldPos | State::Error);
+        match command {
+            Command::ClearCurrentErrors { jtc, nodes } => {
+                if jtc {
+                    self.errors.clear_current();
+                }
+                self.nodes.clear(nodes);
+                Progress::Done
+            }
+            Command::ClearOccurredErrors => {
+                self.errors.clear_occurred();
+                Progress::Done
+            }
+            Command::Trajectory(segment) => self.take_segment(&segment),
+            Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
+            Command::TeachingModeEnable if self.state == State::HoldPos => {
+                self.teaching = true;
+                Progress::Done
+            }
+            Command::TeachingModeEnable => Progress::Refused(DataStatus::NotAllowed),
+            Command::TeachingModeDisable => {
+                self.teaching = false;
+                Progress::Done
+            }
+            Command::ResetCanDevices { nodes } => {
+                self.nodes.reset(nodes);
+                Progress::Done
+            }
+            Command::GripperControl { pump }
+                if self.config.gripper && (self.state != State::Error || !pump) =>
+            {
+                self.pump = pump;
+                Progress::Done
+            }
+            Command::GripperControl { .. } => Progress::Refused(DataStatus::NotAllowed),
+            _ if !settable => Progress::Refused(DataStatus::NotAllowed),
+            Command::PidParam(floats) => self.take_pid(&floats).into(),
+            Command::PidParamUseDefault => {
+                self.set_pid(defaults::PID);
+                Progress::Done
+            }
+            Command::ArmModel(floats) => self.take_model(&floats).into(),
+            Command::ArmModelUseDefault => self.set_model(&defaults::MODEL).into(),
+            Command::FrictionPolynomial(floats) => self.take_polynomial(&floats).into(),
+            Command::FrictionPolynomialUseDefault => {
+                self.polynomial = defaults::POLYNOMIAL;
+                self.friction_given(false);
+                Progress::Done
+            }
+            Command::FrictionTable(floats) => self.take_table(&floats),
+            Command::FrictionTableUseDefault => {
+                self.tables = core::array::from_fn(|j| *defaults::friction_table(j));
+                self.friction_given(true);
+                Progress::Done
+            }
+        }
+    }
+
+    /// J-30, a slice of points a tick.
+    fn take_segment(&mut self, segment: &Segment<'_>) -> Progress {
+        if self.state != State::HoldPos {
+            // Also in the middle of a segment: the change of state has cleared the trajectory.
+            return Progress::Refused(DataStatus::NotAllowed);
+        }
+        let from = match self.work {
+            Work::Points(copied) => copied,
+            _ => {
+                if let Err(status) = self.store.check(segment) {
+                    return Progress::Refused(status);
+                }
+                self.store.begin(segment);
+                if segment.segment == 0 {
+                    self.set_tes(Tes::Null);
+                }
+                0
+            }
+        };
+        let to = (from + POINTS_PER_TICK).min(segment.len());
+        self.store.copy(segment, from, to);
+        if to < segment.len() {
+            return Progress::Working(Work::Points(to));
+        }
+        self.store.commit(segment);
+        if self.store.complete() {
+            self.set_tes(Tes::Stop);
+        }
+        Progress::Done
+    }
+
+    /// J-34.
+    fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
+        match (self.tes, command) {
+            (Tes::Stop | Tes::Finish, ExecCommand::Execute) => self.start_path(),
+            (Tes::Pause, ExecCommand::Execute) => {
+                self.resume_path();
+                Ok(())
+            }
+            (Tes::Execute, ExecCommand::Pause | ExecCommand::Stop) => {
+                self.leave_path(command);
+                Ok(())
+            }
+            (Tes::Pause | Tes::Finish, ExecCommand::Stop) => {
+                self.set_tes(Tes::Stop);
+                Ok(())
+            }
+            _ => Err(DataStatus::NotAllowed),
+        }
+    }
+
+    fn take_pid(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
+        let mut gains = [PidGains::default(); JOINTS];
+        for (j, gain) in gains.iter_mut().enumerate() {
+            let at = |i: usize| finite(floats, 5 * j + i);
+            *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
+            if gain.int_min > gain.int_max {
+                return Err(DataStatus::IncorrectValue);
+            }
+        }
+        self.set_pid(gains);
+        Ok(())
+    }
+
+    fn set_pid(&mut self, gains: [PidGains; JOINTS]) {
+        self.pid = gains;
+        self.given.set(Given::PID);
+        self.motion.change_law();
+    }
+
+    fn take_model(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
+        let mut next = Reader { floats, next: 0 };
+        let mut model = ArmModel::default();
+        for joint in &mut model.joints {
+            *joint = next.origin()?;
+        }
+        for link in &mut model.links {
+            *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
+        }
+        self.set_model(&model)
+    }
+
+    fn set_model(&mut self, model: &ArmModel) -> Result<(), DataStatus> {
+        model.check().map_err(|_| DataStatus::IncorrectValue)?;
+        self.dynamics = Dynamics::new(model, self.config.gravity);
+        self.given.set(Given::MODEL);
+        self.motion.change_model();
+        Ok(())
+    }
+
+    fn take_polynomial(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
+        // 4 or 6 per joint, highest index first.
+        let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
+        let mut polynomial = [[0.0; 6]; JOINTS];
+        for (j, coefficients) in polynomial.iter_mut().enumerate() {
+            for (i, c) in coefficients.iter_mut().take(count).rev().enumerate() {
+                *c = finite(floats, count * j + i)?;
+            }
+        }
+        self.polynomial = polynomial;
+        self.friction_given(false);
+        Ok(())
+    }
+
+    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
+    fn take_table(&mut self, floats: &Floats<'_>) -> Progress {
+        match self.work {
+            Work::TableCopy(j) => {
+                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), read_table(floats, j)) {
+                    *slot = table;
+                }
+                if j + 1 < JOINTS {
+                    return Progress::Working(Work::TableCopy(j + 1));
+                }
+                self.friction_given(true);
+                Progress::Done
+            }
+            work => {
+                let j = if let Work::TableCheck(j) = work { j } else { 0 };
+                match read_table(floats, j) {
+                    Err(status) => Progress::Refused(status),
+                    Ok(_) if j + 1 < JOINTS => Progress::Working(Work::TableCheck(j + 1)),
+                    Ok(_) => Progress::Working(Work::TableCopy(0)),
+                }
+            }
+        }
+    }
+
+    fn friction_given(&mut self, table: bool) {
+        self.friction_is_table = table;
+        self.given.set(Given::FRICTION);
+    }
+}
+
+/// Outcome of a slice of work.
+enum Progress {
+    Done,
+    Refused(DataStatus),
+    Working(Work),
+}
+
+impl From<Result<(), DataStatus>> for Progress {
+    fn from(result: Result<(), DataStatus>) -> Self {
+        match result {
+            Ok(()) => Self::Done,
+            Err(status) => Self::Refused(status),
+        }
+    }
+}
+
+/// Float `i`, refused when it is NaN, infinite or not there (J-06).
+fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
+    floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
+}
+
+/// Takes finite floats one after the other.
+struct Reader<'a> {
+    floats: &'a Floats<'a>,
+    next: usize,
+}
+
+impl Reader<'_> {
+    fn float(&mut self) -> Result<f64, DataStatus> {
+        self.next += 1;
+        finite(self.floats, self.next - 1)
+    }
+
+    fn take<const N: usize>(&mut self) -> Result<[f64; N], DataStatus> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.float()?;
+        }
+        Ok(values)
+    }
+
+    fn origin(&mut self) -> Result<Origin, DataStatus> {
+        Ok(Origin { xyz: self.take()?, rpy: self.take()? })
+    }
+}
+
+fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataStatus> {
+    let mut table = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
+    let start = joint * TABLE_FLOATS;
+    let slots =
+        table.velocity.iter_mut().chain(&mut table.temperature).chain(table.torque.iter_mut().flatten());
+    for (i, slot) in slots.enumerate() {
+        *slot = floats.get(start + i).filter(|f| f.is_finite()).ok_or(DataStatus::IncorrectValue)?;
+    }
+    for axis in [&table.velocity, &table.temperature] {
+        if axis.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err(DataStatus::IncorrectValue);
+        }
+    }
+    Ok(table)
+}

@@ -1,0 +1,123 @@
+//! Set values between two trajectory points (J-32).
+//!
+//! Each channel comes from its own samples: the position from the quintic through both points' position, velocity and
+//! acceleration, the velocity from the cubic through their velocity and acceleration, the acceleration from the line. No
+//! channel is the derivative of another, because the int16 grid of the positions (96 µrad) would turn into tens of rad/s².
+use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
+
+use crate::JOINTS;
+
+/// Position (rad), velocity (rad/s) and acceleration (rad/s²) of every joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SetPoint {
+    /// rad.
+    pub position: [f64; JOINTS],
+    /// rad/s.
+    pub velocity: [f64; JOINTS],
+    /// rad/s².
+    pub acceleration: [f64; JOINTS],
+}
+
+impl SetPoint {
+    /// Standing still at `position`.
+    pub fn still(position: [f64; JOINTS]) -> Self {
+        Self { position, ..Self::default() }
+    }
+}
+
+impl From<&RawPoint> for SetPoint {
+    fn from(raw: &RawPoint) -> Self {
+        let scaled = |v: &[i16; JOINTS], scale: f64| v.map(|x| f64::from(x) * scale / 32767.0);
+        Self {
+            position: scaled(&raw.position, POSITION_SCALE),
+            velocity: scaled(&raw.velocity, VELOCITY_SCALE),
+            acceleration: scaled(&raw.acceleration, ACCELERATION_SCALE),
+        }
+    }
+}
+
+/// Set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
+pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
+    let mut out = SetPoint::default();
+    let u2 = u * u;
+    let u3 = u2 * u;
+    for j in 0..JOINTS {
+        // Velocities and accelerations per step instead of per second: all in rad.
+        let (v0, v1) = (a.velocity[j] * h, b.velocity[j] * h);
+        let (a0, a1) = (a.acceleration[j] * h * h, b.acceleration[j] * h * h);
+        let d = b.position[j] - a.position[j];
+        let c3 = 10.0 * d - (4.0 * v1 + 6.0 * v0) - 0.5 * (3.0 * a0 - a1);
+        let c4 = -15.0 * d + (7.0 * v1 + 8.0 * v0) + 0.5 * (3.0 * a0 - 2.0 * a1);
+        let c5 = 6.0 * d - 3.0 * (v1 + v0) + 0.5 * (a1 - a0);
+        out.position[j] = a.position[j] + u * v0 + u2 * (0.5 * a0) + u3 * (c3 + u * c4 + u2 * c5);
+
+        let (va, vb) = (a.velocity[j], b.velocity[j]);
+        let (ah, bh) = (a.acceleration[j] * h, b.acceleration[j] * h);
+        out.velocity[j] =
+            va + u * ah + u2 * (3.0 * (vb - va) - 2.0 * ah - bh) + u3 * (2.0 * (va - vb) + ah + bh);
+        out.acceleration[j] = a.acceleration[j] + u * (b.acceleration[j] - a.acceleration[j]);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = SetPoint> {
+        (
+            prop::array::uniform6(-3.0..3.0),
+            prop::array::uniform6(-1.5..1.5),
+            prop::array::uniform6(-12.0..12.0),
+        )
+            .prop_map(|(position, velocity, acceleration)| SetPoint {
+                position,
+                velocity,
+                acceleration,
+            })
+    }
+
+    proptest! {
+        #[test]
+        fn j32_both_ends_are_met_in_every_channel(a in point(), b in point(), h in 0.001..0.1f64) {
+            let (start, end) = (interpolate(&a, &b, h, 0.0), interpolate(&a, &b, h, 1.0));
+            prop_assert_eq!(start, a);
+            for j in 0..JOINTS {
+                prop_assert!((end.position[j] - b.position[j]).abs() < 1e-12);
+                prop_assert!((end.velocity[j] - b.velocity[j]).abs() < 1e-12);
+                prop_assert!((end.acceleration[j] - b.acceleration[j]).abs() < 1e-12);
+            }
+        }
+
+        /// A motion that is itself a quintic in position is reproduced in position; one that is a cubic in velocity, in velocity.
+        #[test]
+        fn j32_reproduces_polynomials(c in prop::array::uniform6(-1.0..1.0f64), h in 0.005..0.5f64, u in 0.0..1.0f64) {
+            let at = |t: f64| {
+                let p = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))));
+                let v = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
+                let a = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
+                (p, v, a)
+            };
+            let knot = |t: f64| { let (p, v, a) = at(t); SetPoint { position: [p; 6], velocity: [v; 6], acceleration: [a; 6] } };
+            let got = interpolate(&knot(0.0), &knot(h), h, u);
+            prop_assert!((got.position[3] - at(u * h).0).abs() < 1e-12);
+            // Velocity: compare with the cubic of a motion whose velocity is one.
+            let cubic = |t: f64| (c[1] + t * (c[2] + t * (c[3] + t * c[4])), c[2] + t * (2.0 * c[3] + t * 3.0 * c[4]));
+            let knot = |t: f64| SetPoint { position: [0.0; 6], velocity: [cubic(t).0; 6], acceleration: [cubic(t).1; 6] };
+            let got = interpolate(&knot(0.0), &knot(h), h, u);
+            prop_assert!((got.velocity[0] - cubic(u * h).0).abs() < 1e-12);
+            prop_assert!((got.acceleration[0] - (cubic(0.0).1 + u * (cubic(h).1 - cubic(0.0).1))).abs() < 1e-12);
+        }
+
+        /// Rounding the positions to the int16 grid must not leak into velocity and acceleration.
+        #[test]
+        fn j32_position_grid_leaves_the_other_channels_alone(a in point(), b in point(), u in 0.0..1.0f64) {
+            let mut rounded = b;
+            rounded.position[0] += 96e-6;
+            let (x, y) = (interpolate(&a, &b, 0.01, u), interpolate(&a, &rounded, 0.01, u));
+            prop_assert_eq!(x.velocity, y.velocity);
+            prop_assert_eq!(x.acceleration, y.acceleration);
+        }
+    }
+}

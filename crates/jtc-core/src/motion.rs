@@ -1,0 +1,319 @@
+//! The control law: set values of each state, τ = τ_id + τ_pid + τ_fric (section 6), and torque without steps (J-44).
+use jtc_dynamics::Dynamics;
+
+use crate::config::{Config, PidGains, TableOf};
+use crate::friction;
+use crate::interpolation::SetPoint;
+use crate::nodes::Nodes;
+use crate::pid::{Pid, PidTorque};
+use crate::{JOINTS, joint_error};
+
+/// Share of a limit that a pause or a stop may use; the rest is for the controller.
+const RAMP_SHARE: f64 = 0.9;
+/// Longest ramp, ms.
+const RAMP_MAX_MS: f64 = 2_000.0;
+/// Speed below which a joint counts as standing, rad/s.
+const STANDING: f64 = 0.02;
+/// Length of a tick, s.
+const DT: f64 = 0.001;
+
+/// Which parts of the control law act.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Law {
+    /// Gravity and PID.
+    Hold,
+    /// Everything, with commanded velocity and acceleration.
+    Follow,
+    /// Gravity and a brake above the speed limit.
+    Teach,
+}
+
+/// Parameters that the law uses.
+pub(crate) struct Gains<'a> {
+    pub dynamics: &'a Dynamics,
+    pub pid: &'a [PidGains; JOINTS],
+    pub polynomial: &'a [[f64; 6]; JOINTS],
+    pub table: Option<&'a [TableOf<f32>; JOINTS]>,
+}
+
+/// Parts of one joint's torque, N·m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct JointTorque {
+    pub model: f64,
+    pub pid: PidTorque,
+    pub friction: f64,
+    /// Brake of teaching.
+    pub brake: f64,
+    /// What is left of a step that is being blended out.
+    pub blend: f64,
+}
+
+impl JointTorque {
+    /// All but the model.
+    fn correction(&self) -> f64 {
+        self.pid.sum() + self.friction + self.brake + self.blend
+    }
+
+    pub fn sum(&self) -> f64 {
+        self.model + self.correction()
+    }
+}
+
+/// A motion that comes to rest: leaving teaching while somebody still moves the arm.
+#[derive(Clone, Copy, Debug)]
+struct Coast {
+    from: [f64; JOINTS],
+    velocity: [f64; JOINTS],
+    elapsed_ms: f64,
+}
+
+/// What the control law remembers.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Motion {
+    /// Set values.
+    pub set: SetPoint,
+    /// The joint is enabled and its set position latched.
+    holding: [bool; JOINTS],
+    pid: [Pid; JOINTS],
+    /// Torque of the last tick.
+    pub torque: [JointTorque; JOINTS],
+    saturated: [bool; JOINTS],
+    /// Ticks for which the computed torque has been beyond its limit.
+    over_limit: [u16; JOINTS],
+    /// Step to blend out, N·m, and how long that has gone on.
+    step: [f64; JOINTS],
+    step_ms: u16,
+    /// The next torque has to continue the last one: all of it, or all but the model.
+    rebase: Option<Rebase>,
+    coast: Option<Coast>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Rebase {
+    Correction,
+    Everything,
+}
+
+/// Rises from 0 to 1 without a corner.
+fn smooth(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u * u * (3.0 - 2.0 * u)
+}
+
+impl Motion {
+    /// Limp: nothing is held, no torque is remembered.
+    pub fn release(&mut self, nodes: &Nodes) {
+        *self = Self { set: SetPoint::still(nodes.positions()), ..Self::default() };
+    }
+
+    /// The state changes among HoldPos, Operate and Teaching: continue without a step but that of the model (J-44).
+    pub fn change_law(&mut self) {
+        self.rebase = Some(Rebase::Correction);
+    }
+
+    /// The model changes under the holding arm: continue without any step.
+    pub fn change_model(&mut self) {
+        self.rebase = Some(Rebase::Everything);
+    }
+
+    /// Begin to hold where the arm is, coming to rest first if it moves.
+    pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
+        let (from, mut velocity) = (nodes.positions(), nodes.velocities());
+        for (v, limit) in velocity.iter_mut().zip(&config.joints) {
+            *v = v.max(-limit.velocity_max).min(limit.velocity_max);
+        }
+        self.set = SetPoint::still(from);
+        for pid in &mut self.pid {
+            pid.reset(0.0);
+        }
+        let moves = velocity.iter().any(|v| v.abs() > STANDING);
+        self.coast = moves.then_some(Coast { from, velocity, elapsed_ms: 0.0 });
+    }
+
+    /// Every joint is enabled and held.
+    pub fn all_holding(&self) -> bool {
+        self.holding.iter().all(|&h| h)
+    }
+
+    /// Latches the set position of joints that have just been enabled; joints that are not are followed, without torque.
+    pub fn latch(&mut self, nodes: &Nodes) {
+        let measured = nodes.positions();
+        for j in 0..JOINTS {
+            let enabled = nodes.node(j).enabled();
+            if !(enabled && self.holding[j]) {
+                self.set.position[j] = measured[j];
+                self.pid[j].reset(0.0);
+            }
+            self.holding[j] = enabled;
+        }
+    }
+
+    /// Set values of HoldPos: the held position.
+    pub fn hold(&mut self, config: &Config) {
+        (self.set.velocity, self.set.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
+        let length = f64::from(config.ramp_ms.max(1));
+        if let Some(coast) = &mut self.coast {
+            coast.elapsed_ms += 1.0;
+            let u = (coast.elapsed_ms / length).min(1.0);
+            // Integral of the falling velocity v·(1 − smooth(u)).
+            let way = (u - u * u * u + 0.5 * u * u * u * u) * length * DT;
+            for j in 0..JOINTS {
+                let limit = &config.joints[j];
+                let position = coast.from[j] + coast.velocity[j] * way;
+                // Coasting never leads out of the limits; where the arm already is outside, it stays.
+                self.set.position[j] = position
+                    .max(limit.position_min.min(coast.from[j]))
+                    .min(limit.position_max.max(coast.from[j]));
+                self.set.velocity[j] = coast.velocity[j] * (1.0 - smooth(u));
+            }
+            if u >= 1.0 {
+                self.coast = None;
+            }
+        }
+    }
+
+    /// Set values on the way from a held position to the first point, at `u` (0..1) of `length_ms`.
+    pub fn glide(&mut self, from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) {
+        let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
+        let speed = 30.0 * u * u * (1.0 - u) * (1.0 - u) / (length_ms * DT);
+        for j in 0..JOINTS {
+            self.set.position[j] = from[j] + (to[j] - from[j]) * rise;
+            self.set.velocity[j] = (to[j] - from[j]) * speed;
+            self.set.acceleration[j] = 0.0;
+        }
+    }
+
+    /// Set values on the path: full-speed values `at`, scaled by the rate of path time and its slope (1/s) (J-33).
+    pub fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
+        self.set.position = at.position;
+        for j in 0..JOINTS {
+            self.set.velocity[j] = at.velocity[j] * rate;
+            self.set.acceleration[j] = at.acceleration[j] * rate * rate + at.velocity[j] * slope;
+        }
+    }
+
+    /// Length of a ramp of path time at `at`, ms: that of the configuration, longer where it would take more acceleration or
+    /// torque than the limits leave.
+    pub fn ramp_ms(&self, at: &SetPoint, nodes: &Nodes, config: &Config, dynamics: &Dynamics) -> f64 {
+        // Steepest slope of a ramp of length 1 s.
+        const STEEPEST: f64 = 1.5;
+        let q = nodes.positions();
+        let gravity = dynamics.gravity_torque(&q);
+        let push = dynamics.inverse(&q, &[0.0; JOINTS], &at.velocity);
+        let mut seconds = f64::from(config.ramp_ms) / 1000.0;
+        for j in 0..JOINTS {
+            let limit = &config.joints[j];
+            let acceleration = (RAMP_SHARE * limit.acceleration_max - at.acceleration[j].abs())
+                .max(0.1 * limit.acceleration_max);
+            let torque =
+                (RAMP_SHARE * limit.torque_max - self.torque[j].sum().abs()).max(0.1 * limit.torque_max);
+            let inertial = push[j] - gravity[j] + limit.rotor_inertia * at.velocity[j];
+            seconds = seconds
+                .max(STEEPEST * at.velocity[j].abs() / acceleration)
+                .max(STEEPEST * inertial.abs() / torque);
+        }
+        (seconds * 1000.0).min(RAMP_MAX_MS)
+    }
+
+    /// Computes the torque of this tick into `self.torque`; returns joint errors found on the way (friction table).
+    pub fn compute(&mut self, law: Law, nodes: &Nodes, config: &Config, gains: &Gains<'_>) -> [u16; JOINTS] {
+        let mut errors = [0; JOINTS];
+        let before = self.torque;
+        let q = nodes.positions();
+        let v = nodes.velocities();
+        // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere.
+        let zero = [0.0; JOINTS];
+        let (qd, qdd) =
+            if law == Law::Follow { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
+        let model = gains.dynamics.inverse(&q, &qd, &qdd);
+        for j in 0..JOINTS {
+            let limit = &config.joints[j];
+            let mut torque =
+                JointTorque { model: model[j] + limit.rotor_inertia * qdd[j], ..JointTorque::default() };
+            if law != Law::Teach {
+                let error = self.set.position[j] - q[j];
+                torque.pid = self.pid[j].step(&gains.pid[j], error, self.saturated[j]);
+            } else {
+                torque.brake = brake(v[j], torque.model, config, limit.torque_max);
+            }
+            if law == Law::Follow {
+                let t = f64::from(nodes.node(j).report.temperature);
+                torque.friction = match gains.table {
+                    None => friction::polynomial(&gains.polynomial[j], qd[j], t, config.friction_sign_width),
+                    Some(tables) => friction::table(&tables[j], qd[j], t).unwrap_or_else(|| {
+                        errors[j] |= joint_error::FRICTION_TABLE;
+                        0.0
+                    }),
+                };
+            }
+            self.torque[j] = torque;
+        }
+        self.blend(&before, nodes, config);
+        errors
+    }
+
+    /// Adds what is left of torque steps, and forgets the torque of joints that are not enabled.
+    fn blend(&mut self, before: &[JointTorque; JOINTS], nodes: &Nodes, config: &Config) {
+        if let Some(rebase) = self.rebase.take() {
+            for j in 0..JOINTS {
+                self.step[j] = match rebase {
+                    Rebase::Correction => before[j].correction() - self.torque[j].correction(),
+                    Rebase::Everything => before[j].sum() - self.torque[j].sum(),
+                };
+            }
+            self.step_ms = 0;
+        }
+        let left = 1.0 - smooth(f64::from(self.step_ms) / f64::from(config.blend_ms.max(1)));
+        self.step_ms = self.step_ms.saturating_add(1);
+        for j in 0..JOINTS {
+            if nodes.node(j).enabled() {
+                self.torque[j].blend = self.step[j] * left;
+            } else {
+                self.torque[j] = JointTorque::default();
+                self.step[j] = 0.0;
+            }
+        }
+    }
+
+    /// Set values outside the limits, as joint errors (J-43).
+    pub fn check_set(&self, j: usize, measured: f64, config: &Config) -> u16 {
+        let limit = &config.joints[j];
+        if !self.holding[j] {
+            return 0;
+        }
+        // Written so that NaN is outside.
+        let within = |x: f64, low: f64, high: f64| x >= low && x <= high;
+        let bit = |ok: bool, bit: u16| if ok { 0 } else { bit };
+        let (v, a, e) = (limit.velocity_max, limit.acceleration_max, limit.position_error_max);
+        bit(within(self.set.position[j], limit.position_min, limit.position_max), joint_error::POSITION)
+            | bit(within(self.set.velocity[j], -v, v), joint_error::VELOCITY)
+            | bit(within(self.set.acceleration[j], -a, a), joint_error::ACCELERATION)
+            | bit(within(self.set.position[j] - measured, -e, e), joint_error::POSITION_ERROR)
+    }
+
+    /// The torque to command, within its limit; a computed torque beyond it is a joint error (J-43), at once or, if the
+    /// configuration allows it some time, after that. While it saturates the integral is held (J-41).
+    pub fn limit_torque(&mut self, j: usize, config: &Config) -> Result<f64, u16> {
+        let limit = config.joints[j].torque_max;
+        let torque = self.torque[j].sum();
+        if torque.abs() <= limit {
+            (self.saturated[j], self.over_limit[j]) = (false, 0);
+            return Ok(torque);
+        }
+        self.saturated[j] = true;
+        self.over_limit[j] = self.over_limit[j].saturating_add(1);
+        if torque.is_nan() || self.over_limit[j] > config.torque_over_ms {
+            return Err(joint_error::TORQUE);
+        }
+        Ok(torque.max(-limit).min(limit))
+    }
+}
+
+/// Teaching brakes a joint above the speed limit, with what torque the model leaves (J-25).
+fn brake(velocity: f64, model: f64, config: &Config, torque_max: f64) -> f64 {
+    let limit = config.teach_velocity_max;
+    let excess = velocity - velocity.max(-limit).min(limit);
+    let wanted = -config.teach_damping * excess;
+    let (low, high) = ((-torque_max - model).min(0.0), (torque_max - model).max(0.0));
+    wanted.max(low).min(high)
+}

@@ -1,0 +1,400 @@
+//! The seven nodes on the joint bus: what they report, how they are brought up (J-20), what of them is an error (J-14, J-16), and
+//! which frame each tick sends (J-12).
+use jtc_bus::{Answer, Frame, JointReport, Request, Scale, Target, fsm, warning};
+
+use crate::config::Config;
+use crate::io::Inputs;
+use crate::{JOINTS, NODES};
+
+/// Node number of the gripper.
+pub(crate) const GRIPPER: usize = 6;
+/// Frames looked at in one tick.
+const FRAMES_MAX: usize = 32;
+/// Ticks between two frames that take the place of Move (J-12: at most one tick of four).
+const MOVES_BETWEEN: u8 = 3;
+/// Ticks after a reset in which a late answer does not count as sign of life.
+const DEAF_AFTER_RESET: u8 = 20;
+/// Ticks after which a node that does not follow ClearCurrentErrors is given up.
+const CLEAR_TIMEOUT: u16 = 3_000;
+
+/// Where the nodes are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Goal {
+    /// Configured and ready to operate: Init.
+    Ready,
+    /// Operation enabled: HoldPos, Operate, Teaching.
+    Enabled,
+    /// Not enabled, otherwise left alone: Error.
+    Down,
+}
+
+/// One node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Node {
+    pub report: JointReport,
+    /// Answered a Move since boot or reset.
+    seen: bool,
+    /// Accepted its configuration.
+    configured: bool,
+    /// Answered a Move after that: position and velocity count.
+    valid: bool,
+    /// Refused its configuration in the state it is in.
+    refused: bool,
+    /// Consecutive Moves left unanswered.
+    missed: u8,
+    /// Ticks of silence that are no error yet.
+    boot_left: u32,
+    deaf_left: u8,
+    /// Ticks left in which the node is commanded to Init to clear its errors.
+    clear_left: u16,
+    /// A reset frame is to be sent.
+    reset: bool,
+    /// Reported OperationEnable while that was wanted.
+    enabled: bool,
+    enable_wait: u32,
+    /// Misbehaved in this tick: left OperationEnable, did not enable in time, or its position jumped.
+    misbehaved: bool,
+}
+
+impl Node {
+    pub fn enabled(&self) -> bool {
+        self.valid && self.report.fsm == fsm::ENABLED
+    }
+
+    fn starting(&self) -> bool {
+        // 10 is the transition from Start to Init.
+        matches!(self.report.fsm, fsm::START | fsm::INIT | 10)
+    }
+
+    fn faulty(&self, joint: bool) -> bool {
+        let r = &self.report;
+        self.seen
+            && (fsm::is_fault(r.fsm)
+                || r.errors != 0
+                || r.mc_current != 0
+                || (joint && r.warnings & warning::SAFETY_LINE != 0))
+    }
+
+    /// The node has restarted: nothing of what was known of it holds.
+    fn restart(&mut self, config: &Config) {
+        *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
+    }
+
+    /// State that the node is asked for (J-16).
+    fn request(&self, goal: Goal) -> Target {
+        let state = self.report.fsm;
+        if !self.seen {
+            return Target::NoChange;
+        }
+        if self.clear_left > 0 {
+            // A drive ignores Init while it is enabled.
+            return if state == fsm::ENABLED { Target::Ready } else { Target::Init };
+        }
+        let moving = fsm::is_transition(state);
+        match goal {
+            Goal::Down if state == fsm::ENABLED || moving => Target::Ready,
+            Goal::Ready if state == fsm::START => Target::Init,
+            Goal::Ready if state == fsm::READY && !self.configured && self.refused => Target::Init,
+            Goal::Ready if state == fsm::ENABLED || ((state == fsm::INIT || moving) && self.configured) => {
+                Target::Ready
+            }
+            Goal::Enabled if state == fsm::READY || moving => Target::Enable,
+            _ => Target::NoChange,
+        }
+    }
+
+    fn wants_configuration(&self) -> bool {
+        self.seen
+            && !self.configured
+            && self.clear_left == 0
+            && matches!(self.report.fsm, fsm::INIT | fsm::READY)
+    }
+}
+
+/// All nodes and the order of frames to them.
+#[derive(Clone, Debug)]
+pub(crate) struct Nodes {
+    nodes: [Node; NODES],
+    gripper: bool,
+    /// Measured state of the gripper.
+    pub pump: bool,
+    pub pressure: [bool; 2],
+    /// Frames that were ignored (J-15).
+    pub ignored: u32,
+    /// Consecutive Moves without acknowledge.
+    unacknowledged: u8,
+    sent_move: bool,
+    /// Moves since the last frame that took the place of one.
+    moves: u8,
+    configured_last: bool,
+}
+
+impl Nodes {
+    /// Every node is to be reset once (J-20).
+    pub fn new(config: &Config) -> Self {
+        let mut node = Node::default();
+        node.restart(config);
+        node.reset = true;
+        Self {
+            nodes: [node; NODES],
+            gripper: config.gripper,
+            pump: false,
+            pressure: [false; 2],
+            ignored: 0,
+            unacknowledged: 0,
+            sent_move: false,
+            moves: 0,
+            configured_last: false,
+        }
+    }
+
+    /// Nodes that are there: the gripper can be configured as absent.
+    fn present(&self) -> usize {
+        if self.gripper { NODES } else { JOINTS }
+    }
+
+    pub fn node(&self, n: usize) -> &Node {
+        // An index of this crate's own; node 0 stands in rather than a panic.
+        self.nodes.get(n).unwrap_or(&self.nodes[0])
+    }
+
+    /// Measured positions, rad; those that do not count yet are 0.
+    pub fn positions(&self) -> [f64; JOINTS] {
+        core::array::from_fn(|j| if self.node(j).valid { self.node(j).report.position } else { 0.0 })
+    }
+
+    /// Measured velocities, rad/s; those that do not count yet are 0.
+    pub fn velocities(&self) -> [f64; JOINTS] {
+        core::array::from_fn(|j| if self.node(j).valid { self.node(j).report.velocity } else { 0.0 })
+    }
+
+    /// Takes in what came over the bus since the last tick.
+    pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal) {
+        let mut answered = [false; NODES];
+        // A configuration accepted in this very tick is followed by its Move answer in a later one.
+        let configured_before: [bool; NODES] = core::array::from_fn(|n| self.node(n).configured);
+        for node in &mut self.nodes {
+            node.misbehaved = false;
+            node.deaf_left = node.deaf_left.saturating_sub(1);
+        }
+        let scale = Scale { velocity: config.velocity_full_scale };
+        for frame in inputs.bus.iter().take(FRAMES_MAX) {
+            match Answer::parse(frame, scale) {
+                Ok(Answer::Joint { node, report }) => {
+                    self.report(node.into(), report, config, &configured_before, &mut answered)
+                }
+                Ok(Answer::Gripper(g)) => {
+                    (self.pump, self.pressure) = (g.pump, [g.pressure1, g.pressure2]);
+                    let report = JointReport {
+                        fsm: g.fsm,
+                        errors: g.errors,
+                        warnings: g.warnings,
+                        ..JointReport::default()
+                    };
+                    self.report(GRIPPER, report, config, &configured_before, &mut answered);
+                }
+                Ok(Answer::Mode { node, accepted }) => {
+                    if let Some(node) =
+                        self.nodes.get_mut(usize::from(node)).filter(|node| node.deaf_left == 0)
+                    {
+                        node.configured |= accepted;
+                        node.refused = !accepted;
+                    }
+                }
+                // The byte is the state before or after the change, depending on the drive: Move answers tell it surely.
+                Ok(Answer::Fsm { .. }) => {}
+                Err(_) => self.ignored = self.ignored.saturating_add(1),
+            }
+        }
+        self.count_silence(inputs, config, &answered);
+        self.watch(config, goal);
+    }
+
+    fn report(
+        &mut self,
+        n: usize,
+        report: JointReport,
+        config: &Config,
+        configured_before: &[bool; NODES],
+        answered: &mut [bool; NODES],
+    ) {
+        let (Some(node), Some(answered), Some(configured_before)) =
+            (self.nodes.get_mut(n), answered.get_mut(n), configured_before.get(n))
+        else {
+            return;
+        };
+        if node.deaf_left > 0 {
+            return;
+        }
+        *answered = true;
+        let was_starting = node.starting();
+        let jump = (report.position - node.report.position).abs();
+        if node.valid && jump > config.position_jump_max {
+            node.misbehaved = true;
+        }
+        node.report = report;
+        node.seen = true;
+        if node.starting() {
+            if !was_starting || report.fsm == fsm::START {
+                // Fallen back: the configuration is lost and has to be accepted again.
+                (node.configured, node.valid, node.refused) = (false, false, false);
+            }
+            if report.fsm != 10 {
+                node.clear_left = 0;
+            }
+        }
+        if node.configured && *configured_before {
+            node.valid = true;
+        }
+    }
+
+    /// Counts Moves without answer and without acknowledge (J-14).
+    fn count_silence(&mut self, inputs: &Inputs<'_>, config: &Config, answered: &[bool; NODES]) {
+        let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
+        if self.sent_move {
+            self.unacknowledged = if on_the_bus { 0 } else { self.unacknowledged.saturating_add(1) };
+        }
+        for (node, &answered) in self.nodes.iter_mut().zip(answered) {
+            node.boot_left = node.boot_left.saturating_sub(1);
+            if answered {
+                node.missed = 0;
+                node.boot_left = 0;
+            } else if self.sent_move && on_the_bus && node.boot_left == 0 {
+                node.missed = node.missed.saturating_add(1).min(config.missed_moves_max);
+            }
+        }
+    }
+
+    /// Sees nodes that leave OperationEnable unasked or do not reach it in time (J-16).
+    fn watch(&mut self, config: &Config, goal: Goal) {
+        for node in &mut self.nodes {
+            node.clear_left = node.clear_left.saturating_sub(1);
+            if goal != Goal::Enabled {
+                (node.enabled, node.enable_wait) = (false, 0);
+                continue;
+            }
+            if node.report.fsm == fsm::ENABLED {
+                (node.enabled, node.enable_wait) = (true, 0);
+                continue;
+            }
+            if node.enabled && !node.starting() {
+                node.misbehaved = true;
+            }
+            node.enabled = false;
+            node.enable_wait = node.enable_wait.saturating_add(1);
+            if node.enable_wait > config.enable_timeout_ms {
+                (node.misbehaved, node.enable_wait) = (true, 0);
+            }
+        }
+    }
+
+    /// CAN flags of this tick: bit 0 transmit timeout or bus-off, bit 8+n receive timeout of node n.
+    pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
+        let mut flags = u32::from(inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max);
+        for n in 0..self.present() {
+            if self.node(n).missed >= config.missed_moves_max {
+                flags |= 1 << (8 + n);
+            }
+        }
+        flags
+    }
+
+    /// A node has an error that is not being cleared, or misbehaved in this tick.
+    pub fn external_error(&self) -> bool {
+        (0..self.present()).any(|n| {
+            let node = self.node(n);
+            node.misbehaved || (node.clear_left == 0 && node.faulty(n < JOINTS))
+        })
+    }
+
+    /// A node is still being cleared: the cause of its error is not gone.
+    pub fn clearing(&self) -> bool {
+        (0..self.present()).any(|n| self.node(n).clear_left > 0)
+    }
+
+    /// Node init word: bit n set while node n is not initialised.
+    pub fn init_word(&self) -> u8 {
+        let mut word = 0;
+        for n in 0..self.present() {
+            let node = self.node(n);
+            let accurate = n == GRIPPER || node.report.warnings & warning::POSITION_NOT_ACCURATE == 0;
+            if !(node.valid && accurate) || node.starting() {
+                word |= 1 << n;
+            }
+        }
+        word
+    }
+
+    /// Init is done: every node is initialised and reports ReadyToOperate.
+    pub fn all_ready(&self) -> bool {
+        self.init_word() == 0 && (0..self.present()).all(|n| self.node(n).report.fsm == fsm::READY)
+    }
+
+    /// ClearCurrentErrors for the nodes in `mask`: those that have something to clear are commanded to Init until they follow.
+    pub fn clear(&mut self, mask: u8) {
+        for n in 0..self.present() {
+            let joint = n < JOINTS;
+            if let Some(node) = self.nodes.get_mut(n)
+                && mask & (1 << n) != 0
+                && (node.faulty(joint) || (joint && node.report.mc_occurred != 0))
+            {
+                node.clear_left = CLEAR_TIMEOUT;
+            }
+        }
+    }
+
+    /// ResetCanDevices for the nodes in `mask` (J-23).
+    pub fn reset(&mut self, mask: u8) {
+        for n in 0..self.present() {
+            if let Some(node) = self.nodes.get_mut(n) {
+                node.reset |= mask & (1 << n) != 0;
+            }
+        }
+    }
+
+    /// The frame of this tick (J-12). `must_move`: the first frame after an error is Move.
+    pub fn frame(
+        &mut self,
+        config: &Config,
+        goal: Goal,
+        torque: [f64; JOINTS],
+        pump: bool,
+        must_move: bool,
+    ) -> Frame {
+        let instead =
+            if must_move || self.moves < MOVES_BETWEEN { None } else { self.instead_of_move(config, goal) };
+        self.sent_move = instead.is_none();
+        self.moves = if self.sent_move { self.moves.saturating_add(1) } else { 0 };
+        instead.unwrap_or(Request::Move { torque, pump }).emit()
+    }
+
+    fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
+        let present = self.present();
+        let to_reset = (0..present).filter(|&n| self.node(n).reset).count();
+        if to_reset == present {
+            for node in &mut self.nodes {
+                node.restart(config);
+            }
+            return Some(Request::ResetAll);
+        }
+        if let Some((n, node)) = self.nodes.iter_mut().enumerate().take(present).find(|(_, node)| node.reset)
+        {
+            node.restart(config);
+            return Some(Request::Reset(n as u8));
+        }
+        let target: [Target; NODES] =
+            core::array::from_fn(|n| if n < present { self.node(n).request(goal) } else { Target::NoChange });
+        let change = target.iter().any(|&t| t != Target::NoChange);
+        let configure = goal == Goal::Ready && (0..present).any(|n| self.node(n).wants_configuration());
+        if configure && !(change && self.configured_last) {
+            self.configured_last = true;
+            return Some(Request::ChangeMode {
+                mode: [1; JOINTS],
+                config: [config.joint_config_bits; JOINTS],
+                gripper: config.gripper_config_bits,
+            });
+        }
+        self.configured_last = false;
+        change.then_some(Request::ChangeFsm { target })
+    }
+}

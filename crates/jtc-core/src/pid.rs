@@ -1,0 +1,110 @@
+//! PID controller of one joint (J-41).
+use crate::config::PidGains;
+
+/// Length of a tick, s.
+const DT: f64 = 0.001;
+/// Ticks over which the derivative is taken.
+const WINDOW: usize = 5;
+
+/// What the controller remembers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pid {
+    /// Integral of the error, rad·s.
+    integral: f64,
+    /// The last errors, rad, a ring.
+    errors: [f64; WINDOW],
+    oldest: usize,
+}
+
+/// The three parts, N·m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PidTorque {
+    /// Kp·e.
+    pub p: f64,
+    /// Ki·∫e.
+    pub i: f64,
+    /// Kd·ė.
+    pub d: f64,
+}
+
+impl PidTorque {
+    /// Sum, N·m.
+    pub fn sum(&self) -> f64 {
+        self.p + self.i + self.d
+    }
+}
+
+impl Pid {
+    /// Forget everything; `error` is taken as having stood for long, so that the derivative starts at 0.
+    pub fn reset(&mut self, error: f64) {
+        *self = Self { integral: 0.0, errors: [error; WINDOW], oldest: 0 };
+    }
+
+    /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held.
+    pub fn step(&mut self, gains: &PidGains, error: f64, saturated: bool) -> PidTorque {
+        if !saturated {
+            self.integral += error * DT;
+        }
+        // Also while held: new gains may have brought narrower bounds.
+        self.integral = self.integral.max(gains.int_min).min(gains.int_max);
+        let rate = (error - self.errors[self.oldest]) / (WINDOW as f64 * DT);
+        self.errors[self.oldest] = error;
+        self.oldest = (self.oldest + 1) % WINDOW;
+        PidTorque { p: gains.kp * error, i: gains.ki * self.integral, d: gains.kd * rate }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const GAINS: PidGains = PidGains { kp: 100.0, ki: 10.0, kd: 5.0, int_min: -0.002, int_max: 0.003 };
+
+    #[test]
+    fn j41_no_kick_after_reset() {
+        let mut pid = Pid::default();
+        pid.reset(0.05);
+        for _ in 0..20 {
+            assert_eq!(pid.step(&GAINS, 0.05, false).d, 0.0);
+        }
+    }
+
+    #[test]
+    fn j41_derivative_is_the_slope_over_five_ticks() {
+        let mut pid = Pid::default();
+        pid.reset(0.0);
+        let slope = 0.3;
+        let mut d = 0.0;
+        for k in 1..=5 {
+            d = pid.step(&GAINS, slope * f64::from(k) * DT, false).d;
+        }
+        assert!((d - GAINS.kd * slope).abs() < 1e-12);
+        // A step is spread over five ticks, none of them larger than Kd·step/(5 ms).
+        pid.reset(0.0);
+        let first = pid.step(&GAINS, 0.01, false).d;
+        assert!((first - GAINS.kd * 0.01 / 0.005).abs() < 1e-12);
+    }
+
+    #[test]
+    fn j41_integral_is_held_while_saturated() {
+        let mut pid = Pid::default();
+        pid.reset(0.0);
+        let before = pid.step(&GAINS, 0.01, false).i;
+        for _ in 0..100 {
+            assert_eq!(pid.step(&GAINS, 0.01, true).i, before);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn j41_integral_stays_in_its_bounds(errors in prop::collection::vec(-1.0..1.0f64, 1..200)) {
+            let mut pid = Pid::default();
+            pid.reset(0.0);
+            for e in errors {
+                let i = pid.step(&GAINS, e, false).i / GAINS.ki;
+                prop_assert!((GAINS.int_min..=GAINS.int_max).contains(&i));
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The trajectory store: which segments are accepted (J-30), and the points.
+use jtc_wire::{DataStatus, RawPoint, Segment};
+
+use crate::interpolation::{SetPoint, interpolate};
+use crate::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
+
+/// What was received of the current trajectory. `M` is the memory of its points.
+#[derive(Debug)]
+pub(crate) struct Store<M> {
+    points: M,
+    /// Points of the accepted segments.
+    received: usize,
+    /// Number of the next segment; equal to `segments` when the trajectory is complete.
+    next_segment: u16,
+    segments: u16,
+    number: u16,
+    step_ms: u16,
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
+    pub fn new(points: M) -> Self {
+        Self { points, received: 0, next_segment: 0, segments: 0, number: 0, step_ms: 1 }
+    }
+
+    /// Points that fit: never more than the protocol allows, never more than the memory holds.
+    fn capacity(&self) -> usize {
+        self.points.as_ref().len().min(POINTS_MAX)
+    }
+
+    pub fn clear(&mut self) {
+        self.received = 0;
+        self.next_segment = 0;
+        self.segments = 0;
+    }
+
+    /// All segments are here.
+    pub fn complete(&self) -> bool {
+        self.segments > 0 && self.next_segment == self.segments
+    }
+
+    /// Time of the last point, ms.
+    pub fn duration_ms(&self) -> u32 {
+        // At most 11 999 · 65 535, which fits.
+        (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step_ms))
+    }
+
+    /// Whether the segment may follow what was received. Changes nothing.
+    pub fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
+        let first = segment.segment == 0;
+        let before = if first { 0 } else { self.received };
+        if segment.is_empty() {
+            return Err(DataStatus::IncorrectValue);
+        }
+        if segment.len() > SEGMENT_POINTS_MAX || before + segment.len() > self.capacity() {
+            return Err(DataStatus::TooManyPoints);
+        }
+        if usize::from(segment.segments) > SEGMENTS_MAX || usize::from(segment.segment) >= SEGMENTS_MAX {
+            return Err(DataStatus::TooManySegments);
+        }
+        if segment.segment >= segment.segments {
+            return Err(DataStatus::IncorrectSegmentOrder);
+        }
+        let in_order = segment.segment == self.next_segment
+            && segment.segments == self.segments
+            && segment.trajectory == self.number;
+        if !first && !in_order {
+            return Err(DataStatus::IncorrectSegmentOrder);
+        }
+        if segment.step_time == 0 || (!first && segment.step_time != self.step_ms) {
+            return Err(DataStatus::IncorrectStepTime);
+        }
+        Ok(())
+    }
+
+    /// Begins to take a segment that passed `check`; segment 0 replaces what was there.
+    pub fn begin(&mut self, segment: &Segment<'_>) {
+        if segment.segment == 0 {
+            self.clear();
+            self.segments = segment.segments;
+            self.number = segment.trajectory;
+            self.step_ms = segment.step_time;
+        }
+    }
+
+    /// Copies points `from..to` of the segment behind those received; they count from `commit` on.
+    pub fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
+        let received = self.received;
+        for i in from..to {
+            if let (Some(slot), Some(point)) = (self.points.as_mut().get_mut(received + i), segment.point(i))
+            {
+                *slot = point;
+            }
+        }
+    }
+
+    /// All points of the segment are copied.
+    pub fn commit(&mut self, segment: &Segment<'_>) {
+        self.received = (self.received + segment.len()).min(self.capacity());
+        self.next_segment = segment.segment + 1;
+    }
+
+    /// Set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
+    pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
+        let points = self.points.as_ref().get(..self.received)?;
+        let step = f64::from(self.step_ms);
+        // `as` saturates: a negative or NaN time is point 0.
+        let index = (time_ms / step) as usize;
+        let start = SetPoint::from(points.get(index).or(points.last())?);
+        let offset = time_ms - index as f64 * step;
+        match points.get(index + 1) {
+            Some(end) if offset > 0.0 => {
+                Some(interpolate(&start, &SetPoint::from(end), step / 1000.0, offset / step))
+            }
+            _ => Some(start),
+        }
+    }
+}

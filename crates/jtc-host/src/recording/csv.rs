@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use super::RecordingError;
-use super::mcap::unknown;
 use crate::sample::{JointSample, Sample};
 
 /// A number of a joint: column name after `q1_`…, and how to reach it.
@@ -95,7 +94,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, RecordingError> {
     }
     let mut samples = Vec::new();
     for (i, row) in lines.filter(|(_, row)| !row.trim().is_empty()) {
-        let mut sample = unknown();
+        let mut sample = Sample::default();
         let mut fields = row.split(',');
         for name in &names {
             let field = fields.next().ok_or_else(|| fail(i + 1, Some(name), "the row ends before this column"))?;

@@ -137,7 +137,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     for message in MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())? {
         let message = message?;
         let time_s = message.log_time.saturating_sub(start_ns) as f64 * 1e-9;
-        let sample = samples.entry(message.log_time).or_insert_with(|| Sample { time_s, ..unknown() });
+        let sample = samples.entry(message.log_time).or_insert_with(|| Sample { time_s, ..Sample::default() });
         let topic = message.channel.topic.as_str();
         decode(topic, &message.data, sample).ok_or_else(|| RecordingError::Message {
             path: PathBuf::new(),
@@ -200,26 +200,4 @@ fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {
         _ => {}
     }
     Some(())
-}
-
-/// A sample of which nothing is known yet.
-pub(super) fn unknown() -> Sample {
-    use crate::sample::JointSample;
-    let joint = JointSample {
-        set_position: f64::NAN,
-        set_velocity: f64::NAN,
-        set_acceleration: f64::NAN,
-        position: f64::NAN,
-        velocity: f64::NAN,
-        torque_model: f64::NAN,
-        torque_p: f64::NAN,
-        torque_i: f64::NAN,
-        torque_d: f64::NAN,
-        torque_friction: f64::NAN,
-        torque: f64::NAN,
-        temperature: f64::NAN,
-        fsm: 0,
-        internal: 0,
-    };
-    Sample { time_s: 0.0, state: 0, tes: 0, point: 0, errors: 0, can_current: 0, joints: [joint; 6] }
 }

@@ -7,7 +7,7 @@ fn samples(n: usize) -> Vec<Sample> {
     (0..n)
         .map(|i| {
             let t = i as f64 * 1e-3;
-            let mut s = mcap::unknown();
+            let mut s = Sample::default();
             (s.time_s, s.state, s.tes, s.point, s.errors, s.can_current) = (t, 3, 3, i as u32, 0x8001, 1 << 8);
             for (j, joint) in s.joints.iter_mut().enumerate() {
                 joint.set_position = (t + j as f64).sin();

@@ -1,0 +1,38 @@
+//! The report of a run: figures per joint, one self-contained HTML page with interactive plots, and a small picture.
+//!
+//! [`Summary::of`] reduces samples to the figures that matter, [`html`] makes the page (it opens offline: plots, styles and
+//! data are inside), [`picture_svg`] draws commanded and measured positions and the tracking error as one SVG.
+
+mod pack;
+mod page;
+mod picture;
+mod summary;
+#[cfg(test)]
+mod tests;
+
+pub use page::html;
+pub use picture::picture_svg;
+pub use summary::{JointSummary, Summary};
+
+use crate::recording::RecordingInfo;
+use crate::sample::Sample;
+
+/// A titled list of facts that the page shows as a table: link statistics, settings of the run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Facts {
+    /// Heading of the table.
+    pub title: String,
+    /// Name and value, units included.
+    pub rows: Vec<(String, String)>,
+}
+
+/// What a report is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct ReportInput<'a> {
+    /// Arm, limits and origin of the samples.
+    pub info: &'a RecordingInfo,
+    /// Oldest first.
+    pub samples: &'a [Sample],
+    /// Tables to show beside the plots.
+    pub facts: &'a [Facts],
+}

@@ -1,0 +1,106 @@
+//! The page is whole, offline and of bounded size; the figures are right.
+
+use super::*;
+use crate::sample::JointSample;
+
+fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
+    let mut info = RecordingInfo { arm: "avena".into(), trajectory: "</script> & Co".into(), ..Default::default() };
+    for joint in &mut info.joints {
+        joint.torque_max_nm = 50.0;
+    }
+    let sample = |i: usize| {
+        let t = i as f64 * 1e-3;
+        let joint = |j: usize| JointSample {
+            set_position: (t * 0.5).sin() * (j + 1) as f64 * 0.3,
+            set_velocity: (t * 0.5).cos() * (j + 1) as f64 * 0.15,
+            set_acceleration: 0.0,
+            position: (t * 0.5).sin() * (j + 1) as f64 * 0.3 - 1e-3 * if i % 2 == 0 { 1.0 } else { -1.0 },
+            velocity: (t * 0.5).cos() * (j + 1) as f64 * 0.15,
+            torque_model: 20.0,
+            torque_p: 1.0,
+            torque_i: 0.5,
+            torque_d: -0.5,
+            torque_friction: 4.0,
+            torque: 25.0,
+            temperature: 30.0,
+            fsm: 3,
+            internal: 0,
+        };
+        let state = if i < samples / 10 { 2 } else { 3 };
+        Sample {
+            time_s: t,
+            state,
+            tes: if state == 3 { 3 } else { 1 },
+            point: i as u32,
+            errors: 0,
+            can_current: 0,
+            joints: std::array::from_fn(joint),
+        }
+    };
+    (info, (0..samples).map(sample).collect())
+}
+
+#[test]
+fn figures_are_those_of_the_execution() {
+    let (info, mut samples) = run(1000);
+    samples[3].joints[0].position = 9.0; // before the execution: not counted
+    let summary = Summary::of(&info, &samples);
+    let joint = &summary.joints[0];
+    assert!((joint.rms_error_mrad.unwrap() - 1.0).abs() < 1e-9);
+    assert!((joint.max_error_mrad.unwrap() - 1.0).abs() < 1e-9);
+    assert_eq!(joint.torque_share, Some(0.5));
+    assert_eq!(summary.samples, 900);
+    assert!((summary.executed_s - 0.899).abs() < 1e-9);
+}
+
+#[test]
+fn what_is_not_known_is_none() {
+    let (_, mut samples) = run(10);
+    for s in &mut samples {
+        for j in &mut s.joints {
+            j.set_position = f64::NAN;
+        }
+    }
+    let summary = Summary::of(&RecordingInfo::default(), &samples);
+    assert_eq!(summary.joints[5].rms_error_mrad, None);
+    assert_eq!(summary.joints[5].torque_share, None);
+    assert_eq!(Summary::of(&RecordingInfo::default(), &[]).joints[0].peak_torque_nm, None);
+}
+
+#[test]
+fn the_page_is_whole_and_needs_no_network() {
+    let (info, samples) = run(10_530);
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[] });
+    assert!(!page.contains("{{"), "a mark was left");
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+    assert!(!page.contains("</script> & Co"), "a name ends the script");
+    for outside in ["src=\"http", "href=\"http", "url(http", "@import", "fetch("] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+}
+
+#[test]
+fn an_hour_is_thinned_without_losing_its_peak() {
+    let (info, mut samples) = run(400_000);
+    samples[123_457].joints[2].position -= 0.05;
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[] });
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+    let error = |s: &Sample| s.joints[2].set_position - s.joints[2].position;
+    let peak = pack::Thinner::new(&samples).values(error).into_iter().fold(0.0, f64::max);
+    assert!(peak > 0.049);
+}
+
+#[test]
+fn a_run_without_samples_is_still_a_page() {
+    let info = RecordingInfo::default();
+    assert!(html(&ReportInput { info: &info, samples: &[], facts: &[] }).contains("</html>"));
+    assert!(picture_svg(&ReportInput { info: &info, samples: &[], facts: &[] }).ends_with("</svg>\n"));
+}
+
+#[test]
+fn the_picture_is_small() {
+    let (info, samples) = run(10_530);
+    let picture = picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[] });
+    assert!(picture.len() < 150_000, "{} bytes", picture.len());
+    assert!(!picture.contains("NaN"));
+}

@@ -1,1 +1,42 @@
-//! can-link
+//! One trait for a CAN bus, [`CanBus`], and its transports, opened by URL.
+//!
+//! | URL | what | CAN FD |
+//! |---|---|---|
+//! | `virtual:NAME` | a bus inside this process | yes |
+//! | `multicast:ADDR:PORT` | UDP multicast as python-can's `udp_multicast` speaks it; stays on this host | yes |
+//!
+//! `socketcan:`, `slcan:` and `socketcand:` are understood as [URLs](CanUrl) and refused by [`open`] with an error
+//! that says what can be opened.
+//!
+//! ```
+//! use std::time::Duration;
+//! use can_link::{CanBus, CanFrame, Id, open};
+//!
+//! let mut tool = open("virtual:readme")?;
+//! let mut node = open("virtual:readme")?;
+//! tool.send(&CanFrame::fd(Id::standard(0x123)?, &[1, 2, 3])?)?;
+//! let heard = node.receive(Duration::ZERO)?.expect("members hear each other");
+//! assert_eq!(heard.to_string(), "123 ## 01 02 03");
+//! assert_eq!(tool.receive(Duration::ZERO)?, None, "and not themselves");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A bus that loses, corrupts, delays, doubles or reorders frames is any bus in a [`Faulty`] wrapper.
+#![forbid(unsafe_code)]
+
+mod bus;
+mod datagram;
+mod error;
+mod faulty;
+mod frame;
+mod multicast;
+mod url;
+mod virtual_bus;
+
+pub use bus::{CanBus, open, open_url};
+pub use error::CanError;
+pub use faulty::{Counts, Faults, Faulty, Plan};
+pub use frame::{CanFrame, Id, InvalidFrame};
+pub use multicast::MulticastBus;
+pub use url::{CanUrl, UrlError};
+pub use virtual_bus::{VirtualBus, VirtualHub};

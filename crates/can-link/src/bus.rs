@@ -1,0 +1,66 @@
+//! The trait of all buses, and how to open one.
+
+use std::time::Duration;
+
+use crate::{CanError, CanFrame, CanUrl, MulticastBus, VirtualBus};
+
+/// A member of a CAN bus.
+///
+/// Implementations deliver frames of every other member in the order of the bus, and none of their own.
+pub trait CanBus {
+    /// Puts a frame on the bus. A full transmit queue is waited for; it is no error.
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
+
+    /// The next frame of another member; `None` when none came within `timeout`. Zero does not wait.
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
+}
+
+impl<B: CanBus + ?Sized> CanBus for &mut B {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        (**self).send(frame)
+    }
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        (**self).receive(timeout)
+    }
+}
+
+impl<B: CanBus + ?Sized> CanBus for Box<B> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        (**self).send(frame)
+    }
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        (**self).receive(timeout)
+    }
+}
+
+/// Opens the bus of a URL such as `multicast:239.74.163.2:43113` or `virtual:bench`.
+pub fn open(url: &str) -> Result<Box<dyn CanBus + Send>, CanError> {
+    open_url(&url.parse()?)
+}
+
+/// Opens the bus of a parsed URL.
+pub fn open_url(url: &CanUrl) -> Result<Box<dyn CanBus + Send>, CanError> {
+    match url {
+        CanUrl::Virtual { name } => Ok(Box::new(VirtualBus::join(name))),
+        CanUrl::Multicast { group, port, ttl } => Ok(Box::new(MulticastBus::join(*group, *port, *ttl)?)),
+        CanUrl::SocketCan { .. } | CanUrl::Slcan { .. } | CanUrl::Socketcand { .. } => {
+            Err(CanError::Unsupported { url: url.to_string(), kind: url.scheme() })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_opened_says_what_can() {
+        for url in ["socketcan:can0", "slcan:/dev/ttyACM0@1000000", "socketcand:localhost:29536/can0"] {
+            let message = open(url).err().expect("not in this version").to_string();
+            for part in [url, "this version", "multicast:ADDR:PORT", "virtual:NAME"] {
+                assert!(message.contains(part), "{message}");
+            }
+        }
+        assert!(open("can0").is_err());
+    }
+}

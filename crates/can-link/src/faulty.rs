@@ -1,0 +1,376 @@
+//! A bus with faults: loss, corruption, delay, duplication and reordering, from a seed.
+
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{CanBus, CanError, CanFrame};
+
+/// What happens to frames in one direction. Probabilities are shares of 1 per frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Faults {
+    /// Probability that a frame is lost.
+    pub loss: f64,
+    /// Probability that one bit of the payload is turned over.
+    pub corruption: f64,
+    /// Probability that a frame comes twice.
+    pub duplication: f64,
+    /// Probability that a frame is held back while others go past it.
+    pub reordering: f64,
+    /// How long such a frame is held back, s.
+    pub reordering_hold_s: f64,
+    /// Shortest delay of every frame, s; the order is kept.
+    pub delay_min_s: f64,
+    /// Longest delay of every frame, s.
+    pub delay_max_s: f64,
+}
+
+/// Faults of both directions of one member.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Plan {
+    /// The same seed gives the same faults for the same frames.
+    pub seed: u64,
+    /// What the member sends.
+    pub send: Faults,
+    /// What the member hears.
+    pub receive: Faults,
+}
+
+/// How often each fault happened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Frames that came in.
+    pub frames: u64,
+    /// Lost ones.
+    pub lost: u64,
+    /// Corrupted ones.
+    pub corrupted: u64,
+    /// Doubled ones.
+    pub doubled: u64,
+    /// Held back ones.
+    pub reordered: u64,
+}
+
+/// One direction: frames that are under way.
+struct Line {
+    faults: Faults,
+    random: fastrand::Rng,
+    /// Sorted by the time when they are due; equal times in order of arrival.
+    under_way: Vec<(Duration, CanFrame)>,
+    /// Frames that are not held back do not overtake each other.
+    last_due: Duration,
+    counts: Counts,
+}
+
+/// Seconds from a setting; rubbish is no delay.
+fn seconds(value: f64) -> Duration {
+    Duration::try_from_secs_f64(value).unwrap_or_default()
+}
+
+impl Line {
+    fn new(faults: Faults, seed: u64) -> Self {
+        let random = fastrand::Rng::with_seed(seed);
+        Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, counts: Counts::default() }
+    }
+
+    /// Draws in the same number and order whatever happens, so that one setting does not change the others' faults.
+    fn put(&mut self, now: Duration, mut frame: CanFrame) {
+        let Faults { loss, corruption, duplication, reordering, .. } = self.faults;
+        let [lose, corrupt, double, hold] =
+            [loss, corruption, duplication, reordering].map(|share| self.random.f64() < share);
+        let (place, jitter) = (self.random.f64(), self.random.f64());
+        self.counts.frames += 1;
+        if lose {
+            self.counts.lost += 1;
+            return;
+        }
+        if corrupt && !frame.data().is_empty() {
+            let bit = (place * (frame.data().len() * 8) as f64) as usize;
+            frame.data_mut()[bit / 8] ^= 1 << (bit % 8);
+            self.counts.corrupted += 1;
+        }
+        let (shortest, longest) = (seconds(self.faults.delay_min_s), seconds(self.faults.delay_max_s));
+        let spread = longest.saturating_sub(shortest).mul_f64(jitter);
+        let mut due = now.saturating_add(shortest).saturating_add(spread).max(self.last_due);
+        if hold {
+            due = due.saturating_add(seconds(self.faults.reordering_hold_s));
+            self.counts.reordered += 1;
+        } else {
+            self.last_due = due;
+        }
+        self.insert(due, frame);
+        if double {
+            self.insert(due, frame);
+            self.counts.doubled += 1;
+        }
+    }
+
+    fn insert(&mut self, due: Duration, frame: CanFrame) {
+        let at = self.under_way.partition_point(|(other, _)| *other <= due);
+        self.under_way.insert(at, (due, frame));
+    }
+
+    fn take(&mut self, now: Duration) -> Option<CanFrame> {
+        let (due, frame) = *self.under_way.first()?;
+        (due <= now).then(|| {
+            self.under_way.remove(0);
+            frame
+        })
+    }
+
+    fn next_due(&self) -> Option<Duration> {
+        self.under_way.first().map(|(due, _)| *due)
+    }
+}
+
+/// A bus whose frames suffer faults on their way from and to this member.
+///
+/// ```
+/// use can_link::{Faults, Faulty, Plan, VirtualBus};
+/// let plan = Plan { seed: 1, receive: Faults { loss: 0.01, ..Faults::default() }, ..Plan::default() };
+/// let bus = Faulty::new(VirtualBus::join("lossy"), plan);
+/// ```
+///
+/// Frames under way to others leave while this member sends or receives.
+pub struct Faulty<B> {
+    bus: B,
+    out: Line,
+    heard: Line,
+    clock: Box<dyn FnMut() -> Duration + Send>,
+}
+
+impl<B: CanBus> Faulty<B> {
+    /// Delays by the clock on the wall.
+    pub fn new(bus: B, plan: Plan) -> Self {
+        let start = Instant::now();
+        Self::with_clock(bus, plan, move || start.elapsed())
+    }
+
+    /// Delays by a clock of your own, which must not run backwards: virtual time makes delays exactly repeatable.
+    pub fn with_clock(bus: B, plan: Plan, clock: impl FnMut() -> Duration + Send + 'static) -> Self {
+        let mut seeds = fastrand::Rng::with_seed(plan.seed);
+        let out = Line::new(plan.send, seeds.u64(..));
+        let heard = Line::new(plan.receive, seeds.u64(..));
+        Self { bus, out, heard, clock: Box::new(clock) }
+    }
+
+    /// What happened so far to frames sent.
+    pub fn sent_counts(&self) -> Counts {
+        self.out.counts
+    }
+
+    /// What happened so far to frames heard.
+    pub fn received_counts(&self) -> Counts {
+        self.heard.counts
+    }
+
+    /// The bus without faults; frames under way are gone.
+    pub fn into_inner(self) -> B {
+        self.bus
+    }
+
+    fn send_due(&mut self, now: Duration) -> Result<(), CanError> {
+        while let Some(frame) = self.out.take(now) {
+            self.bus.send(&frame)?;
+        }
+        Ok(())
+    }
+}
+
+impl<B: CanBus> CanBus for Faulty<B> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        let now = (self.clock)();
+        self.out.put(now, *frame);
+        self.send_due(now)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        let start = (self.clock)();
+        // Waiting is counted as well as measured: a clock of virtual time may stand still meanwhile.
+        let mut waited = Duration::ZERO;
+        loop {
+            let now = (self.clock)();
+            self.send_due(now)?;
+            // All that has arrived takes its place in the order before the first is handed out.
+            while let Some(frame) = self.bus.receive(Duration::ZERO)? {
+                self.heard.put(now, frame);
+            }
+            if let Some(frame) = self.heard.take(now) {
+                return Ok(Some(frame));
+            }
+            let left = timeout.saturating_sub(now.saturating_sub(start).max(waited));
+            if left.is_zero() {
+                return Ok(None);
+            }
+            let due = [self.heard.next_due(), self.out.next_due()].into_iter().flatten().min();
+            let until_due = due.map_or(left, |due| due.saturating_sub(now));
+            let wait = left.min(until_due).max(Duration::from_micros(50));
+            match self.bus.receive(wait)? {
+                Some(frame) => {
+                    let now = (self.clock)();
+                    self.heard.put(now, frame);
+                }
+                None => waited += wait,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Id, VirtualBus, VirtualHub};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    /// A bench with a clock that only moves by hand, in ms.
+    struct Bench {
+        faulty: Faulty<VirtualBus>,
+        peer: VirtualBus,
+        now_ms: Arc<AtomicU64>,
+    }
+
+    fn bench(send: Faults, receive: Faults, seed: u64) -> Bench {
+        let hub = VirtualHub::new();
+        let now_ms = Arc::new(AtomicU64::new(0));
+        let clock = Arc::clone(&now_ms);
+        let faulty = Faulty::with_clock(hub.join(), Plan { seed, send, receive }, move || {
+            Duration::from_millis(clock.load(Ordering::Relaxed))
+        });
+        Bench { faulty, peer: hub.join(), now_ms }
+    }
+
+    fn frame(number: u32) -> CanFrame {
+        CanFrame::classic(Id::standard(0x100).unwrap(), &number.to_be_bytes()).unwrap()
+    }
+
+    fn numbers(bus: &mut impl CanBus) -> Vec<u32> {
+        std::iter::from_fn(|| bus.receive(Duration::ZERO).unwrap())
+            .map(|frame| u32::from_be_bytes(frame.data().try_into().unwrap()))
+            .collect()
+    }
+
+    #[test]
+    fn without_faults_it_is_the_bus() {
+        let mut bench = bench(Faults::default(), Faults::default(), 1);
+        for number in 0..100 {
+            bench.faulty.send(&frame(number)).unwrap();
+            bench.peer.send(&frame(number)).unwrap();
+        }
+        let all: Vec<u32> = (0..100).collect();
+        assert_eq!(numbers(&mut bench.peer), all);
+        assert_eq!(numbers(&mut bench.faulty), all);
+        assert_eq!(bench.faulty.receive(Duration::from_millis(1)).unwrap(), None);
+    }
+
+    #[test]
+    fn faults_come_as_often_as_asked_for() {
+        let receive = Faults { loss: 0.1, corruption: 0.2, duplication: 0.3, ..Faults::default() };
+        let mut bench = bench(Faults::default(), receive, 2);
+        let mut heard = Vec::new();
+        for number in 0..4000 {
+            bench.peer.send(&frame(number)).unwrap();
+            heard.extend(numbers(&mut bench.faulty));
+        }
+        let counts = bench.faulty.received_counts();
+        assert_eq!(counts.frames, 4000);
+        assert_eq!(heard.len() as u64, 4000 - counts.lost + counts.doubled);
+        // Six standard deviations and more.
+        for (count, share) in [(counts.lost, 0.1), (counts.corrupted, 0.18), (counts.doubled, 0.27)] {
+            assert!((count as f64 / 4000.0 - share).abs() < 0.05, "{counts:?}");
+        }
+    }
+
+    #[test]
+    fn corruption_turns_exactly_one_bit() {
+        let send = Faults { corruption: 1.0, ..Faults::default() };
+        let mut bench = bench(send, Faults::default(), 3);
+        for number in 0..500 {
+            bench.faulty.send(&frame(number)).unwrap();
+            assert_eq!((numbers(&mut bench.peer)[0] ^ number).count_ones(), 1);
+        }
+        // Nothing to corrupt in an empty frame.
+        let empty = CanFrame::classic(Id::standard(1).unwrap(), &[]).unwrap();
+        bench.faulty.send(&empty).unwrap();
+        assert_eq!(bench.peer.receive(Duration::ZERO).unwrap(), Some(empty));
+    }
+
+    #[test]
+    fn delays_keep_the_order() {
+        let send = Faults { delay_min_s: 0.002, delay_max_s: 0.010, ..Faults::default() };
+        let mut bench = bench(send, Faults::default(), 4);
+        for number in 0..20 {
+            bench.faulty.send(&frame(number)).unwrap();
+        }
+        bench.now_ms.store(1, Ordering::Relaxed);
+        assert_eq!(numbers(&mut bench.faulty), []);
+        assert_eq!(numbers(&mut bench.peer), [], "the shortest delay is 2 ms");
+        bench.now_ms.store(10, Ordering::Relaxed);
+        assert_eq!(numbers(&mut bench.faulty), []);
+        assert_eq!(numbers(&mut bench.peer), (0..20).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn reordered_frames_are_overtaken() {
+        let receive = Faults { reordering: 0.3, reordering_hold_s: 0.005, ..Faults::default() };
+        let mut bench = bench(Faults::default(), receive, 5);
+        for number in 0..100 {
+            bench.peer.send(&frame(number)).unwrap();
+        }
+        let mut heard = numbers(&mut bench.faulty);
+        let first = heard.len();
+        bench.now_ms.store(5, Ordering::Relaxed);
+        heard.extend(numbers(&mut bench.faulty));
+        assert_eq!(bench.faulty.received_counts().reordered as usize, 100 - first);
+        assert!((40..100).contains(&first) && !heard.is_sorted());
+        heard.sort();
+        assert_eq!(heard, (0..100).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_faults() {
+        let faults = Faults {
+            loss: 0.2,
+            corruption: 0.2,
+            duplication: 0.2,
+            reordering: 0.2,
+            reordering_hold_s: 0.003,
+            delay_min_s: 0.001,
+            delay_max_s: 0.004,
+        };
+        let run = |seed| {
+            let mut bench = bench(faults, faults, seed);
+            let mut heard = Vec::new();
+            for number in 0..300 {
+                bench.now_ms.store(number.into(), Ordering::Relaxed);
+                bench.faulty.send(&frame(number)).unwrap();
+                bench.peer.send(&frame(number)).unwrap();
+                heard.push((numbers(&mut bench.faulty), numbers(&mut bench.peer)));
+            }
+            heard
+        };
+        assert_eq!(run(7), run(7));
+        assert_ne!(run(7), run(8));
+    }
+
+    #[test]
+    fn rubbish_in_the_plan_is_no_panic() {
+        for bad in [f64::NAN, f64::INFINITY, -1.0, 1.8e19, f64::MAX] {
+            let faults = Faults {
+                loss: 0.0,
+                corruption: bad,
+                duplication: bad,
+                reordering: bad,
+                reordering_hold_s: bad,
+                delay_min_s: bad,
+                delay_max_s: bad,
+            };
+            let mut bench = bench(faults, faults, 9);
+            bench.faulty.send(&frame(1)).unwrap();
+            bench.peer.send(&frame(1)).unwrap();
+            assert!(numbers(&mut bench.faulty).len() <= 2);
+        }
+    }
+}

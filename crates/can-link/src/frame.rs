@@ -1,0 +1,257 @@
+//! A CAN frame of any kind, always valid.
+
+use std::fmt;
+
+/// An identifier of 11 or 29 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Id {
+    value: u32,
+    extended: bool,
+}
+
+impl Id {
+    /// 11 bits.
+    pub const fn standard(value: u32) -> Result<Self, InvalidFrame> {
+        if value > 0x7FF {
+            return Err(InvalidFrame::StandardId { value });
+        }
+        Ok(Self { value, extended: false })
+    }
+
+    /// 29 bits.
+    pub const fn extended(value: u32) -> Result<Self, InvalidFrame> {
+        if value > 0x1FFF_FFFF {
+            return Err(InvalidFrame::ExtendedId { value });
+        }
+        Ok(Self { value, extended: true })
+    }
+
+    /// The number.
+    pub const fn value(self) -> u32 {
+        self.value
+    }
+
+    /// 29 bits.
+    pub const fn is_extended(self) -> bool {
+        self.extended
+    }
+}
+
+impl fmt::Display for Id {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.extended { write!(f, "{:08X}", self.value) } else { write!(f, "{:03X}", self.value) }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Kind {
+    Classic,
+    Remote,
+    Fd { brs: bool },
+}
+
+/// A classic, remote or CAN FD frame. Its length is one that its kind can have: whoever has a frame can send it.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct CanFrame {
+    id: Id,
+    kind: Kind,
+    len: u8,
+    /// Zero beyond `len`, so that equality is that of the frames.
+    data: [u8; Self::MAX_LEN],
+}
+
+impl CanFrame {
+    /// Most bytes of a CAN FD frame.
+    pub const MAX_LEN: usize = 64;
+
+    /// A classic frame of at most 8 bytes.
+    pub fn classic(id: Id, data: &[u8]) -> Result<Self, InvalidFrame> {
+        if data.len() > 8 {
+            return Err(InvalidFrame::ClassicLength { id, len: data.len() });
+        }
+        Ok(Self::made(id, Kind::Classic, data))
+    }
+
+    /// A CAN FD frame with bit rate switch; 0..8, 12, 16, 20, 24, 32, 48 or 64 bytes.
+    pub fn fd(id: Id, data: &[u8]) -> Result<Self, InvalidFrame> {
+        if Self::fd_len(data.len()) != Some(data.len()) {
+            return Err(InvalidFrame::FdLength { id, len: data.len() });
+        }
+        Ok(Self::made(id, Kind::Fd { brs: true }, data))
+    }
+
+    /// A CAN FD frame with bit rate switch; payloads between two lengths get zeros up to the next, as on the wire.
+    pub fn fd_padded(id: Id, data: &[u8]) -> Result<Self, InvalidFrame> {
+        let len = Self::fd_len(data.len()).ok_or(InvalidFrame::FdLength { id, len: data.len() })?;
+        Ok(Self { len: len as u8, ..Self::made(id, Kind::Fd { brs: true }, data) })
+    }
+
+    /// A remote frame that asks for `len` bytes, 0..8.
+    pub fn remote(id: Id, len: usize) -> Result<Self, InvalidFrame> {
+        if len > 8 {
+            return Err(InvalidFrame::ClassicLength { id, len });
+        }
+        Ok(Self { len: len as u8, ..Self::made(id, Kind::Remote, &[]) })
+    }
+
+    /// The same CAN FD frame with or without bit rate switch; other frames have none and stay as they are.
+    pub fn with_brs(mut self, brs: bool) -> Self {
+        if let Kind::Fd { .. } = self.kind {
+            self.kind = Kind::Fd { brs };
+        }
+        self
+    }
+
+    /// The shortest CAN FD length that holds `len` bytes; `None` above 64.
+    pub const fn fd_len(len: usize) -> Option<usize> {
+        match len {
+            0..=8 => Some(len),
+            9..=24 => Some(len.div_ceil(4) * 4),
+            25..=32 => Some(32),
+            33..=48 => Some(48),
+            49..=64 => Some(64),
+            _ => None,
+        }
+    }
+
+    fn made(id: Id, kind: Kind, bytes: &[u8]) -> Self {
+        let mut data = [0; Self::MAX_LEN];
+        data[..bytes.len()].copy_from_slice(bytes);
+        Self { id, kind, len: bytes.len() as u8, data }
+    }
+
+    /// Identifier with its width.
+    pub const fn id(&self) -> Id {
+        self.id
+    }
+
+    /// 29-bit identifier.
+    pub const fn is_extended(&self) -> bool {
+        self.id.extended
+    }
+
+    /// CAN FD.
+    pub const fn is_fd(&self) -> bool {
+        matches!(self.kind, Kind::Fd { .. })
+    }
+
+    /// The data phase has its own bit rate.
+    pub const fn is_brs(&self) -> bool {
+        matches!(self.kind, Kind::Fd { brs: true })
+    }
+
+    /// Remote frame: no payload.
+    pub const fn is_remote(&self) -> bool {
+        matches!(self.kind, Kind::Remote)
+    }
+
+    /// Bytes of the payload; of a remote frame the bytes that it asks for.
+    pub const fn len(&self) -> usize {
+        self.len as usize
+    }
+
+    /// No bytes.
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The payload; of a remote frame nothing.
+    pub fn data(&self) -> &[u8] {
+        if self.is_remote() { &[] } else { &self.data[..self.len()] }
+    }
+
+    pub(crate) fn data_mut(&mut self) -> &mut [u8] {
+        let len = if self.is_remote() { 0 } else { self.len() };
+        &mut self.data[..len]
+    }
+}
+
+/// As `candump` writes: `123 # 11 22`, CAN FD with `##`, remote frames with `# R2`.
+impl fmt::Display for CanFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.id, if self.is_fd() { "##" } else { "#" })?;
+        if self.is_remote() {
+            return write!(f, " R{}", self.len);
+        }
+        self.data().iter().try_for_each(|byte| write!(f, " {byte:02X}"))
+    }
+}
+
+impl fmt::Debug for CanFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "CanFrame({self}{})", if self.is_brs() { ", brs" } else { "" })
+    }
+}
+
+/// Why there is no such frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidFrame {
+    /// More than 11 bits.
+    #[error("identifier 0x{value:X} has more than 11 bits (0x7FF); is it an extended one?")]
+    StandardId {
+        /// The number.
+        value: u32,
+    },
+    /// More than 29 bits.
+    #[error("identifier 0x{value:X} has more than 29 bits (0x1FFFFFFF)")]
+    ExtendedId {
+        /// The number.
+        value: u32,
+    },
+    /// More than 8 bytes.
+    #[error("frame {id}: {len} bytes, but a classic frame has at most 8; use CAN FD")]
+    ClassicLength {
+        /// Identifier.
+        id: Id,
+        /// Bytes.
+        len: usize,
+    },
+    /// Not a length of CAN FD.
+    #[error("frame {id}: {len} bytes, but a CAN FD frame has 0..8, 12, 16, 20, 24, 32, 48 or 64")]
+    FdLength {
+        /// Identifier.
+        id: Id,
+        /// Bytes.
+        len: usize,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_those_of_the_kind() {
+        let id = Id::standard(1).unwrap();
+        let bytes = [7; 100];
+        let fd = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
+        for len in 0..100 {
+            assert_eq!(CanFrame::classic(id, &bytes[..len]).is_ok(), len <= 8);
+            assert_eq!(CanFrame::remote(id, len).is_ok(), len <= 8);
+            assert_eq!(CanFrame::fd(id, &bytes[..len]).is_ok(), fd.contains(&len));
+            let padded = CanFrame::fd_padded(id, &bytes[..len]).ok();
+            let next = fd.into_iter().find(|next| *next >= len);
+            assert_eq!(padded.map(|frame| frame.len()), next);
+            if let Some(frame) = padded {
+                assert_eq!(&frame.data()[..len], &bytes[..len]);
+                assert!(frame.data()[len..].iter().all(|byte| *byte == 0));
+            }
+        }
+    }
+
+    #[test]
+    fn ids_have_11_or_29_bits() {
+        assert!(Id::standard(0x7FF).is_ok() && Id::standard(0x800).is_err());
+        assert!(Id::extended(0x1FFF_FFFF).is_ok() && Id::extended(0x2000_0000).is_err());
+        assert_ne!(Id::standard(5), Id::extended(5));
+    }
+
+    #[test]
+    fn frames_read_like_candump() {
+        let id = Id::extended(0x123).unwrap();
+        assert_eq!(CanFrame::remote(id, 2).unwrap().to_string(), "00000123 # R2");
+        let frame = CanFrame::classic(Id::standard(0x7).unwrap(), &[0xAB, 1]).unwrap();
+        assert_eq!(frame.to_string(), "007 # AB 01");
+        assert!(!frame.with_brs(true).is_brs());
+    }
+}

@@ -1,0 +1,275 @@
+//! CAN over UDP multicast, as python-can's `udp_multicast` interface speaks it.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+
+use socket2::{Domain, Protocol, Socket, Type};
+
+use crate::datagram::{MAX_DATAGRAM, decode, encode};
+use crate::{CanBus, CanError, CanFrame, CanUrl};
+
+/// Bytes that may wait in the system for this member: some 4,000 frames.
+const RECEIVE_BUFFER: usize = 2 << 20;
+
+/// How long sending waits for the system to have room again.
+const SEND_PATIENCE: Duration = Duration::from_secs(1);
+
+/// A member of a multicast group.
+///
+/// UDP loses frames when a member is too slow; this suits simulators and tools on one host.
+pub struct MulticastBus {
+    url: String,
+    /// Listens at the group's port, which all members share.
+    listener: UdpSocket,
+    /// Sends from a port of its own, so that its datagrams can be told from those of others.
+    sender: UdpSocket,
+    own: SocketAddr,
+    /// What the listener is set to: `None` does not wait.
+    timeout: Option<Duration>,
+    ignored: u64,
+}
+
+impl MulticastBus {
+    /// Joins a group. With `ttl` 0 frames stay on this host; 1 lets them into the local network.
+    pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, CanError> {
+        let failed = |(step, source)| CanError::Join { group, port, step, source };
+        let here = open_sockets(group, port, ttl, Interface::Default);
+        // A host without a network has no default interface, but may still talk to itself.
+        let (listener, sender) = here
+            .or_else(|first| open_sockets(group, port, ttl, Interface::Loopback).map_err(|_| first))
+            .map_err(failed)?;
+        let own = sender.local_addr().map_err(|source| failed(("asking for the own address", source)))?;
+        let url = CanUrl::Multicast { group, port, ttl }.to_string();
+        Ok(Self { url, listener, sender, own, timeout: None, ignored: 0 })
+    }
+
+    /// Datagrams so far that were no frames.
+    pub fn ignored(&self) -> u64 {
+        self.ignored
+    }
+
+    fn failed(&self, step: &'static str) -> impl FnOnce(io::Error) -> CanError {
+        let url = self.url.clone();
+        move |source| CanError::Io { url, step, source }
+    }
+
+    /// Makes the listener wait that long; nothing to do most of the time.
+    fn set_timeout(&mut self, timeout: Option<Duration>) -> io::Result<()> {
+        if timeout == self.timeout {
+            return Ok(());
+        }
+        if timeout.is_none() || self.timeout.is_none() {
+            self.listener.set_nonblocking(timeout.is_none())?;
+        }
+        if timeout.is_some() {
+            self.listener.set_read_timeout(timeout)?;
+        }
+        self.timeout = timeout;
+        Ok(())
+    }
+
+    /// The next datagram of somebody else.
+    fn next(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
+        loop {
+            match self.listener.recv_from(buffer) {
+                Ok((_, from)) if from == self.own => {}
+                Ok((len, _)) => return Ok(Some(len)),
+                Err(error) if is_no_data(&error) => return Ok(None),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+fn is_no_data(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
+}
+
+#[derive(Clone, Copy)]
+enum Interface {
+    Default,
+    Loopback,
+}
+
+type Step<T> = Result<T, (&'static str, io::Error)>;
+
+fn step<T>(what: &'static str, result: io::Result<T>) -> Step<T> {
+    result.map_err(|error| (what, error))
+}
+
+/// The listener and the sender.
+fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Interface) -> Step<(UdpSocket, UdpSocket)> {
+    let listener = step("opening a socket", udp(group))?;
+    step("sharing the port", share_port(&listener))?;
+    // More is better but not needed.
+    let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
+    // Bound to the group, the listener hears nothing of other groups; Windows binds to addresses of its own alone.
+    let address = if cfg!(windows) { unspecified(group) } else { group };
+    step("binding the port", listener.bind(&SocketAddr::new(address, port).into()))?;
+
+    let sender = step("opening a socket", udp(group))?;
+    let joined = match (group, interface) {
+        (IpAddr::V4(group), Interface::Default) => listener.join_multicast_v4(&group, &Ipv4Addr::UNSPECIFIED),
+        (IpAddr::V4(group), Interface::Loopback) => listener
+            .join_multicast_v4(&group, &Ipv4Addr::LOCALHOST)
+            .and_then(|()| sender.set_multicast_if_v4(&Ipv4Addr::LOCALHOST)),
+        (IpAddr::V6(group), Interface::Default) => listener.join_multicast_v6(&group, 0),
+        // The loopback interface has number 1 everywhere.
+        (IpAddr::V6(group), Interface::Loopback) => {
+            listener.join_multicast_v6(&group, 1).and_then(|()| sender.set_multicast_if_v6(1))
+        }
+    };
+    step("joining", joined)?;
+    step("setting the time to live", set_ttl(&sender, group, ttl))?;
+    step("connecting", sender.connect(&SocketAddr::new(group, port).into()))?;
+    step("setting the socket", listener.set_nonblocking(true))?;
+    Ok((listener.into(), sender.into()))
+}
+
+fn udp(group: IpAddr) -> io::Result<Socket> {
+    let socket =
+        Socket::new(Domain::for_address(SocketAddr::new(group, 0)), Type::DGRAM, Some(Protocol::UDP))?;
+    if group.is_ipv6() {
+        socket.set_only_v6(true)?;
+    }
+    Ok(socket)
+}
+
+fn share_port(socket: &Socket) -> io::Result<()> {
+    socket.set_reuse_address(true)?;
+    #[cfg(unix)]
+    socket.set_reuse_port(true)?;
+    Ok(())
+}
+
+fn set_ttl(socket: &Socket, group: IpAddr, ttl: u8) -> io::Result<()> {
+    match group {
+        IpAddr::V4(_) => {
+            socket.set_multicast_ttl_v4(ttl.into())?;
+            socket.set_multicast_loop_v4(true)
+        }
+        IpAddr::V6(_) => {
+            socket.set_multicast_hops_v6(ttl.into())?;
+            socket.set_multicast_loop_v6(true)
+        }
+    }
+}
+
+fn unspecified(group: IpAddr) -> IpAddr {
+    match group {
+        IpAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
+        IpAddr::V6(_) => Ipv6Addr::UNSPECIFIED.into(),
+    }
+}
+
+impl CanBus for MulticastBus {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        let datagram = encode(frame);
+        let give_up = Instant::now() + SEND_PATIENCE;
+        loop {
+            match self.sender.send(&datagram) {
+                Ok(_) => return Ok(()),
+                Err(error) if is_queue_full(&error) && Instant::now() < give_up => {
+                    std::thread::sleep(Duration::from_micros(200));
+                }
+                Err(error) => return Err(self.failed("sending")(error)),
+            }
+        }
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        let mut buffer = [0; MAX_DATAGRAM];
+        let deadline = Instant::now().checked_add(timeout);
+        // What is there already costs no change of the socket's settings.
+        let mut wait = None;
+        loop {
+            self.set_timeout(wait).map_err(self.failed("setting the timeout"))?;
+            match self.next(&mut buffer).map_err(self.failed("receiving"))? {
+                Some(len) => match decode(&buffer[..len]) {
+                    Some(frame) => return Ok(Some(frame)),
+                    None => self.ignored += 1,
+                },
+                None if timeout.is_zero() => return Ok(None),
+                None => {}
+            }
+            let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));
+            if left.is_zero() && !timeout.is_zero() {
+                return Ok(None);
+            }
+            wait = (!left.is_zero()).then_some(left);
+        }
+    }
+}
+
+/// Room will come: the queue of the interface or of the socket is full.
+fn is_queue_full(error: &io::Error) -> bool {
+    // ENOBUFS has no kind of its own; 105 is Linux, 55 the BSDs and macOS, 10055 Windows.
+    let code = if cfg!(windows) {
+        10055
+    } else if cfg!(target_os = "linux") {
+        105
+    } else {
+        55
+    };
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
+        || error.raw_os_error() == Some(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Id;
+
+    /// Frames with a timeout that only a broken transport reaches.
+    fn heard(bus: &mut MulticastBus) -> Option<CanFrame> {
+        bus.receive(Duration::from_secs(60)).unwrap()
+    }
+
+    fn check(group: IpAddr, port: u16) {
+        let (mut a, mut b) = match (MulticastBus::join(group, port, 0), MulticastBus::join(group, port, 0)) {
+            (Ok(a), Ok(b)) => (a, b),
+            (Err(error), _) | (_, Err(error)) => {
+                println!("skipped: {error}");
+                return;
+            }
+        };
+        let id = Id::extended(0x1234_5678).unwrap();
+        let frames = [
+            CanFrame::fd(id, &[0xA5; 64]).unwrap(),
+            CanFrame::classic(id, &[1, 2]).unwrap(),
+            CanFrame::remote(id, 3).unwrap(),
+        ];
+        for frame in frames {
+            if let Err(error) = a.send(&frame) {
+                println!("skipped: {error}");
+                return;
+            }
+        }
+        b.sender.send(b"rubbish").unwrap();
+        b.send(&frames[1]).unwrap();
+        for frame in frames {
+            assert_eq!(heard(&mut b), Some(frame));
+        }
+        assert_eq!(heard(&mut a), Some(frames[1]), "of its own frames and of rubbish it hears nothing");
+        assert_eq!((a.ignored(), b.ignored()), (1, 0));
+        assert_eq!(a.receive(Duration::ZERO).unwrap(), None);
+        assert_eq!(b.receive(Duration::from_millis(2)).unwrap(), None);
+    }
+
+    // Each test has ports of its own, different from run to run, so that runs side by side do not meet.
+    fn port(number: u16) -> u16 {
+        20_000 + (std::process::id() % 10_000) as u16 * 4 + number
+    }
+
+    #[test]
+    fn members_of_an_ipv4_group_hear_each_other() {
+        check(Ipv4Addr::new(239, 74, 163, 7).into(), port(0));
+    }
+
+    #[test]
+    fn members_of_an_ipv6_group_hear_each_other() {
+        check("ff15::7079:7468:7".parse().unwrap(), port(1));
+    }
+}

@@ -1,0 +1,257 @@
+//! CAN URLs: which bus, in one word of a command line.
+
+use std::fmt;
+use std::net::{IpAddr, SocketAddr};
+use std::str::FromStr;
+
+/// What this version opens, for error messages.
+pub(crate) const OPENABLE: &str = "multicast:ADDR:PORT and virtual:NAME";
+
+/// Default port of the socketcand protocol.
+const SOCKETCAND_PORT: u16 = 29536;
+/// Default port of python-can's `udp_multicast`.
+const MULTICAST_PORT: u16 = 43113;
+
+/// A parsed CAN URL. `Display` gives the URL again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CanUrl {
+    /// `socketcan:can0`.
+    SocketCan {
+        /// Network interface.
+        interface: String,
+    },
+    /// `slcan:/dev/ttyACM0@1000000`.
+    Slcan {
+        /// Serial port.
+        device: String,
+        /// The number behind the `@`, bit/s.
+        rate: Option<u32>,
+    },
+    /// `socketcand:HOST:PORT/can0`; the port may be left out.
+    Socketcand {
+        /// Name or address; an IPv6 address without its brackets.
+        host: String,
+        /// TCP port.
+        port: u16,
+        /// The server's bus.
+        channel: String,
+    },
+    /// `multicast:ADDR:PORT`, IPv6 addresses in brackets; `?ttl=N` lets it leave this host.
+    Multicast {
+        /// Multicast group.
+        group: IpAddr,
+        /// UDP port.
+        port: u16,
+        /// Routers it may pass, plus one; 0 stays on this host.
+        ttl: u8,
+    },
+    /// `virtual:NAME`.
+    Virtual {
+        /// Name of the bus in this process.
+        name: String,
+    },
+}
+
+impl CanUrl {
+    /// The part before the first colon.
+    pub const fn scheme(&self) -> &'static str {
+        match self {
+            Self::SocketCan { .. } => "socketcan",
+            Self::Slcan { .. } => "slcan",
+            Self::Socketcand { .. } => "socketcand",
+            Self::Multicast { .. } => "multicast",
+            Self::Virtual { .. } => "virtual",
+        }
+    }
+}
+
+/// Why a text is no CAN URL.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UrlError {
+    /// No scheme, or none of ours.
+    #[error(
+        "`{url}` is no CAN URL; there are socketcan:can0, slcan:/dev/ttyACM0@1000000, \
+         socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME"
+    )]
+    Scheme {
+        /// The text.
+        url: String,
+    },
+    /// A part is missing or is not what it must be.
+    #[error("`{url}`: {what}; the form is {form}")]
+    Part {
+        /// The text.
+        url: String,
+        /// What is wrong.
+        what: &'static str,
+        /// How it must look.
+        form: &'static str,
+    },
+}
+
+impl FromStr for CanUrl {
+    type Err = UrlError;
+
+    fn from_str(url: &str) -> Result<Self, UrlError> {
+        let unknown = || UrlError::Scheme { url: url.to_owned() };
+        let (scheme, rest) = url.split_once(':').ok_or_else(unknown)?;
+        let wrong = |what, form| UrlError::Part { url: url.to_owned(), what, form };
+        match scheme {
+            "socketcan" => match rest {
+                "" => Err(wrong("no interface", "socketcan:can0")),
+                interface => Ok(Self::SocketCan { interface: interface.to_owned() }),
+            },
+            "slcan" => slcan(rest).map_err(|what| wrong(what, "slcan:/dev/ttyACM0@1000000")),
+            "socketcand" => socketcand(rest).map_err(|what| wrong(what, "socketcand:HOST:PORT/can0")),
+            "multicast" => multicast(rest).map_err(|what| {
+                wrong(
+                    what,
+                    "multicast:239.74.163.2:43113 or multicast:[ff15::1]:43113, then ?ttl=1 if it may leave",
+                )
+            }),
+            "virtual" => match rest {
+                "" => Err(wrong("no name", "virtual:NAME")),
+                name => Ok(Self::Virtual { name: name.to_owned() }),
+            },
+            _ => Err(unknown()),
+        }
+    }
+}
+
+fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
+    let (device, rate) = match rest.rsplit_once('@') {
+        Some((device, rate)) => (device, Some(rate.parse().map_err(|_| "the rate is no number")?)),
+        None => (rest, None),
+    };
+    if device.is_empty() {
+        return Err("no serial port");
+    }
+    if rate == Some(0) {
+        return Err("the rate is 0");
+    }
+    Ok(CanUrl::Slcan { device: device.to_owned(), rate })
+}
+
+/// Host or bracketed IPv6 address, and its port if there is one.
+fn host_and_port(text: &str, default: u16) -> Result<(&str, u16), &'static str> {
+    let port = |text: &str| match text.parse() {
+        Ok(0) | Err(_) => Err("the port is none of 1..65535"),
+        Ok(port) => Ok(port),
+    };
+    if let Some(rest) = text.strip_prefix('[') {
+        let (host, rest) = rest.split_once(']').ok_or("a bracket is not closed")?;
+        return match rest.strip_prefix(':') {
+            Some(text) => Ok((host, port(text)?)),
+            None if rest.is_empty() => Ok((host, default)),
+            None => Err("something follows the bracket"),
+        };
+    }
+    match text.split_once(':') {
+        Some((_, rest)) if rest.contains(':') => Err("an IPv6 address must be in brackets"),
+        Some((host, text)) => Ok((host, port(text)?)),
+        None => Ok((text, default)),
+    }
+}
+
+fn socketcand(rest: &str) -> Result<CanUrl, &'static str> {
+    let (address, channel) = rest.split_once('/').ok_or("no bus behind a slash")?;
+    let (host, port) = host_and_port(address, SOCKETCAND_PORT)?;
+    if host.is_empty() {
+        return Err("no host");
+    }
+    if channel.is_empty() {
+        return Err("no bus behind the slash");
+    }
+    Ok(CanUrl::Socketcand { host: host.to_owned(), port, channel: channel.to_owned() })
+}
+
+fn multicast(rest: &str) -> Result<CanUrl, &'static str> {
+    let (address, ttl) = match rest.split_once('?') {
+        Some((address, query)) => {
+            let ttl = query.strip_prefix("ttl=").ok_or("the only setting is ttl")?;
+            (address, ttl.parse().map_err(|_| "the ttl is none of 0..255")?)
+        }
+        None => (rest, 0),
+    };
+    let (host, port) = host_and_port(address, MULTICAST_PORT)?;
+    let group: IpAddr = host.parse().map_err(|_| "the group is no IP address")?;
+    if !group.is_multicast() {
+        return Err("the address is none of multicast (224.0.0.0/4 or ff00::/8)");
+    }
+    Ok(CanUrl::Multicast { group, port, ttl })
+}
+
+impl fmt::Display for CanUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:", self.scheme())?;
+        match self {
+            Self::SocketCan { interface } => f.write_str(interface),
+            Self::Slcan { device, rate: Some(rate) } => write!(f, "{device}@{rate}"),
+            Self::Slcan { device, rate: None } => f.write_str(device),
+            Self::Socketcand { host, port, channel } if host.contains(':') => {
+                write!(f, "[{host}]:{port}/{channel}")
+            }
+            Self::Socketcand { host, port, channel } => write!(f, "{host}:{port}/{channel}"),
+            Self::Multicast { group, port, ttl } => {
+                write!(f, "{}", SocketAddr::new(*group, *port))?;
+                if *ttl > 0 { write!(f, "?ttl={ttl}") } else { Ok(()) }
+            }
+            Self::Virtual { name } => f.write_str(name),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn urls_are_understood_and_written_again() {
+        let parsed = |url: &str| url.parse::<CanUrl>().unwrap();
+        for url in [
+            "socketcan:can0",
+            "slcan:/dev/ttyACM0@1000000",
+            "slcan:COM7",
+            "socketcand:localhost:29536/can0",
+            "socketcand:[::1]:5/vcan1",
+            "multicast:239.74.163.2:43113",
+            "multicast:239.74.163.2:43113?ttl=2",
+            "multicast:[ff15::7079]:43113",
+            "virtual:bench",
+        ] {
+            assert_eq!(parsed(url).to_string(), url);
+        }
+        assert_eq!(parsed("socketcand:h/can0"), parsed("socketcand:h:29536/can0"));
+        assert_eq!(parsed("multicast:[ff15::1]"), parsed("multicast:[ff15::1]:43113?ttl=0"));
+        let slcan = CanUrl::Slcan { device: "/dev/ttyACM0".into(), rate: Some(1_000_000) };
+        assert_eq!(parsed("slcan:/dev/ttyACM0@1000000"), slcan);
+    }
+
+    #[test]
+    fn other_texts_say_what_is_wrong() {
+        for (url, part) in [
+            ("can0", "there are socketcan:can0"),
+            ("usb:can0", "there are socketcan:can0"),
+            ("socketcan:", "no interface"),
+            ("slcan:@5", "no serial port"),
+            ("slcan:/dev/x@fast", "the rate is no number"),
+            ("slcan:/dev/x@0", "the rate is 0"),
+            ("socketcand:host:1", "no bus"),
+            ("socketcand:host:1/", "no bus"),
+            ("socketcand::1/can0", "no host"),
+            ("socketcand:host:0/can0", "the port"),
+            ("multicast:10.0.0.1:5", "none of multicast"),
+            ("multicast:nowhere:5", "no IP address"),
+            ("multicast:ff15::1:5", "in brackets"),
+            ("multicast:[ff15::1:5", "not closed"),
+            ("multicast:[ff15::1]5", "follows the bracket"),
+            ("multicast:239.1.1.1:70000", "the port"),
+            ("multicast:239.1.1.1:5?hops=1", "the only setting is ttl"),
+            ("multicast:239.1.1.1:5?ttl=256", "the ttl"),
+            ("virtual:", "no name"),
+        ] {
+            let message = url.parse::<CanUrl>().unwrap_err().to_string();
+            assert!(message.contains(part) && message.contains(url), "{message}");
+        }
+    }
+}

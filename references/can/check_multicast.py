@@ -1,0 +1,133 @@
+"""python-can's udp_multicast interface against can-link's: every frame is echoed as it was sent.
+
+Needs python-can and msgpack. The example `echo` is taken from $JTC_EXAMPLES, else built with cargo. Frames stay on
+this host (hop limit 0). Exit code 0: all agreed.
+"""
+
+import os
+import pathlib
+import random
+import socket
+import subprocess
+import sys
+import time
+
+import can
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+GROUPS = ["239.74.163.9", "ff15::7079:7468:9"]
+FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
+PATIENCE_S = 10.0
+
+
+def echo_program() -> list[str]:
+    built = os.environ.get("JTC_EXAMPLES")
+    if built and (pathlib.Path(built) / "echo").exists():
+        return [str(pathlib.Path(built) / "echo")]
+    cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", "echo"]
+    return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml"), "--"]
+
+
+def messages(rng: random.Random) -> list[can.Message]:
+    """One of each kind and length. Ids are even, those of the echoes odd."""
+    found = []
+    for extended in (False, True):
+        top = 0x1FFFFFFF if extended else 0x7FF
+
+        def message(**fields) -> can.Message:
+            number = rng.randrange(0, top) & ~1
+            return can.Message(arbitration_id=number, is_extended_id=extended, check=True, **fields)
+
+        for length in range(9):
+            found.append(message(data=rng.randbytes(length)))
+            found.append(message(is_remote_frame=True, dlc=length))
+        for length in FD_LENGTHS:
+            for switch in (False, True):
+                found.append(message(is_fd=True, bitrate_switch=switch, data=rng.randbytes(length)))
+    return found
+
+
+def echoed(bus: can.BusABC) -> can.Message:
+    """The next message that is not our own (python-can hears itself)."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        try:
+            message = bus.recv(PATIENCE_S)
+        except can.CanOperationError:
+            continue  # the rubbish, which python-can reports
+        if message is not None and message.arbitration_id & 1:
+            return message
+    raise AssertionError("no echo came")
+
+
+def differences(sent: can.Message, heard: can.Message) -> list[str]:
+    pairs = {
+        "id": (sent.arbitration_id + 1, heard.arbitration_id),
+        "data": (bytes(sent.data), bytes(heard.data)),
+    }
+    for field in ("is_extended_id", "is_remote_frame", "is_fd", "bitrate_switch", "dlc", "is_error_frame"):
+        pairs[field] = (getattr(sent, field), getattr(heard, field))
+    return [f"{name}: {a!r} became {b!r}" for name, (a, b) in pairs.items() if a != b]
+
+
+def send_rubbish(group: str, port: int) -> None:
+    family, option = (socket.AF_INET6, (socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_HOPS)) if ":" in group else (
+        socket.AF_INET, (socket.IPPROTO_IP, socket.IP_MULTICAST_TTL))
+    with socket.socket(family, socket.SOCK_DGRAM) as sender:
+        sender.setsockopt(*option, 0)
+        sender.sendto(b"rubbish", (group, port))
+
+
+def check(group: str, port: int, seed: int) -> None:
+    host = f"[{group}]" if ":" in group else group
+    echo = subprocess.Popen([*echo_program(), f"multicast:{host}:{port}"], stdout=subprocess.PIPE, text=True)
+    try:
+        assert echo.stdout.readline().startswith("ready:"), "the example did not start"
+        with can.Bus(interface="udp_multicast", channel=group, port=port, hop_limit=0) as bus:
+            count = 0
+            for message in messages(random.Random(seed)):
+                bus.send(message)
+                wrong = differences(message, echoed(bus))
+                assert not wrong, f"{message}: {wrong}"
+                count += 1
+            # Rubbish is passed over: what follows is echoed.
+            send_rubbish(group, port)
+            # A burst stays in order and complete as long as it fits into the receive buffers.
+            burst = [can.Message(arbitration_id=0x100, is_extended_id=False, is_fd=True, bitrate_switch=True,
+                                 data=number.to_bytes(2, "big")) for number in range(50)]
+            for message in burst:
+                bus.send(message)
+            for message in burst:
+                wrong = differences(message, echoed(bus))
+                assert not wrong, f"burst: {message}: {wrong}"
+    finally:
+        echo.terminate()
+        echo.wait()
+    print(f"{group}: {count} kinds of frames and a burst of {len(burst)} echoed alike")
+
+
+def has_multicast(group: str, port: int) -> bool:
+    try:
+        with can.Bus(interface="udp_multicast", channel=group, port=port, hop_limit=0) as bus:
+            bus.send(can.Message(arbitration_id=0, is_extended_id=False))
+            return bus.recv(2.0) is not None
+    except (can.CanError, OSError) as error:
+        print(f"{group}: {error}")
+        return False
+
+
+def main() -> int:
+    seed = int(os.environ.get("SEED", random.randrange(2**32)))
+    print(f"seed {seed}")
+    port = random.randrange(20_000, 60_000)
+    usable = [group for group in GROUPS if has_multicast(group, port)]
+    for group in GROUPS:
+        if group in usable:
+            check(group, port, seed)
+        else:
+            print(f"skipped: this host has no multicast for {group}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

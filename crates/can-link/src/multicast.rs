@@ -34,10 +34,9 @@ impl MulticastBus {
     /// Joins a group. With `ttl` 0 frames stay on this host; 1 lets them into the local network.
     pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, CanError> {
         let failed = |(step, source)| CanError::Join { group, port, step, source };
-        let here = open_sockets(group, port, ttl, Interface::Default);
-        // A host without a network has no default interface, but may still talk to itself.
-        let (listener, sender) = here
-            .or_else(|first| open_sockets(group, port, ttl, Interface::Loopback).map_err(|_| first))
+        // A host without a network has no default interface, but may still talk to itself by IPv4.
+        let (listener, sender) = open_sockets(group, port, ttl, Ipv4Addr::UNSPECIFIED)
+            .or_else(|first| open_sockets(group, port, ttl, Ipv4Addr::LOCALHOST).map_err(|_| first))
             .map_err(failed)?;
         let own = sender.local_addr().map_err(|source| failed(("asking for the own address", source)))?;
         let url = CanUrl::Multicast { group, port, ttl }.to_string();
@@ -73,7 +72,8 @@ impl MulticastBus {
     fn next(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
             match self.listener.recv_from(buffer) {
-                Ok((_, from)) if from == self.own => {}
+                // The scope of an IPv6 address is not always told.
+                Ok((_, from)) if (from.ip(), from.port()) == (self.own.ip(), self.own.port()) => {}
                 Ok((len, _)) => return Ok(Some(len)),
                 Err(error) if is_no_data(&error) => return Ok(None),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -87,20 +87,14 @@ fn is_no_data(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
 }
 
-#[derive(Clone, Copy)]
-enum Interface {
-    Default,
-    Loopback,
-}
-
 type Step<T> = Result<T, (&'static str, io::Error)>;
 
 fn step<T>(what: &'static str, result: io::Result<T>) -> Step<T> {
     result.map_err(|error| (what, error))
 }
 
-/// The listener and the sender.
-fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Interface) -> Step<(UdpSocket, UdpSocket)> {
+/// The listener and the sender; IPv4 groups on an interface of choice, IPv6 groups on the default one.
+fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<(UdpSocket, UdpSocket)> {
     let listener = step("opening a socket", udp(group))?;
     step("sharing the port", share_port(&listener))?;
     // More is better but not needed.
@@ -110,16 +104,11 @@ fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Interface) -> Step
     step("binding the port", listener.bind(&SocketAddr::new(address, port).into()))?;
 
     let sender = step("opening a socket", udp(group))?;
-    let joined = match (group, interface) {
-        (IpAddr::V4(group), Interface::Default) => listener.join_multicast_v4(&group, &Ipv4Addr::UNSPECIFIED),
-        (IpAddr::V4(group), Interface::Loopback) => listener
-            .join_multicast_v4(&group, &Ipv4Addr::LOCALHOST)
-            .and_then(|()| sender.set_multicast_if_v4(&Ipv4Addr::LOCALHOST)),
-        (IpAddr::V6(group), Interface::Default) => listener.join_multicast_v6(&group, 0),
-        // The loopback interface has number 1 everywhere.
-        (IpAddr::V6(group), Interface::Loopback) => {
-            listener.join_multicast_v6(&group, 1).and_then(|()| sender.set_multicast_if_v6(1))
-        }
+    let joined = match group {
+        IpAddr::V4(group) => listener
+            .join_multicast_v4(&group, &interface)
+            .and_then(|()| sender.set_multicast_if_v4(&interface)),
+        IpAddr::V6(group) => listener.join_multicast_v6(&group, 0),
     };
     step("joining", joined)?;
     step("setting the time to live", set_ttl(&sender, group, ttl))?;

@@ -1,1 +1,40 @@
-//! jtc-sim
+//! The physical world around the controller, in virtual time: a six-axis arm with friction, drives, gripper, joint bus, serial line, and
+//! everything that can go wrong with them. The controller inside is the very code of the board.
+//!
+//! One [`World::step`] is one millisecond of everything, always in the same order: host bytes reach the parser, the controller ticks, its
+//! frame goes over the bus and is answered, drives do their millisecond, the arm moves. The same seed gives the same bytes.
+//!
+//! ```no_run
+//! use jtc_sim::{SimConfig, World};
+//!
+//! let mut world = World::new(SimConfig::default());
+//! world.host_write(&[0x9B, 0x02, 0x00, 0x06, 0xD6, 0x26]);
+//! for _ in 0..1000 {
+//!     world.step();
+//! }
+//! println!("{:?} after {} µs", world.telemetry().state, world.now_us());
+//! ```
+#![forbid(unsafe_code)]
+
+mod arm;
+mod board;
+mod bus;
+mod config;
+mod drive;
+mod event;
+mod faults;
+mod gripper;
+mod inbox;
+mod serial;
+mod world;
+
+pub use arm::{Arm, SimArm, SimFriction};
+pub use board::Worked;
+pub use bus::{BusFault, BusStatistics, TimedFrame, frame_us};
+pub use config::{ModelError, SimConfig, Support};
+pub use drive::{Drive, DriveConfig, DriveFault};
+pub use event::{Event, Log, LogEntry};
+pub use faults::{Fault, FaultKind, FaultPlan, Trigger};
+pub use gripper::Gripper;
+pub use serial::{Line, LineFault};
+pub use world::{Statistics, Truth, World};

@@ -1,0 +1,312 @@
+//! The joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors and bus-off.
+use jtc_bus::{Answer, Frame, JOINTS, NODES, Request, Scale};
+use jtc_core::BusState;
+
+use crate::drive::Drive;
+use crate::gripper::Gripper;
+
+/// A tick, µs.
+const TICK_US: u32 = 1000;
+/// Time from the end of a request to the first answer that is ready, µs; the others follow by this much each.
+const ANSWER_US: (u32, u32) = (38, 6);
+/// An error frame and the pause before the repetition, µs.
+const ERROR_FRAME_US: u32 = 23;
+/// Transmit error counter above which a controller leaves the bus (ISO 11898-1).
+const BUS_OFF: u16 = 255;
+/// 128 times 11 recessive bits: what a controller waits before it comes back, µs.
+const RECOVERY_US: u32 = 1408;
+
+/// Time of a CAN FD frame with `len` bytes at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
+pub fn frame_us(len: usize) -> u32 {
+    // 31 bits at the nominal rate; the rest at five times that: ESI, DLC and data with stuff bits, then stuff count and CRC.
+    let fast = (5 + 8 * len) as f64 * 1.1 + if len > 16 { 31.0 } else { 27.0 };
+    (31.0 + fast / 5.0).round() as u32
+}
+
+/// What is wrong with the bus at the moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BusFault {
+    /// Share of receptions that fail, each receiver on its own, 0..1.
+    pub lost: f64,
+    /// Share of frames that are destroyed on the wire and repeated, 0..1.
+    pub corrupted: f64,
+    /// Share of answers that reach the controller with other contents than were sent, 0..1.
+    pub garbled: f64,
+    /// The controller's line is cut: it hears nothing, nobody hears it.
+    pub cut: bool,
+    /// The controller is kept off the bus.
+    pub bus_off: bool,
+}
+
+/// What was on the bus since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BusStatistics {
+    /// Frames carried.
+    pub frames: u64,
+    /// Time in which the bus was busy, µs.
+    pub busy_us: u64,
+    /// Frames that a receiver lost.
+    pub lost: u64,
+    /// Frames that were repeated after an error.
+    pub repeated: u64,
+    /// Answers garbled by a fault.
+    pub garbled: u64,
+    /// Requests that nobody acknowledged.
+    pub unacknowledged: u64,
+    /// Times that the controller went bus-off.
+    pub bus_offs: u64,
+}
+
+/// A frame and when it ended, µs after the start of the tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedFrame {
+    /// µs after the start of the tick.
+    pub end_us: u32,
+    /// The frame.
+    pub frame: Frame,
+}
+
+/// The seven nodes.
+#[derive(Clone, Debug)]
+pub struct Nodes {
+    /// Base to wrist.
+    pub drives: [Drive; JOINTS],
+    /// Node 6; `None`: not there at all.
+    pub gripper: Option<Gripper>,
+}
+
+impl Nodes {
+    /// Any node acknowledges frames.
+    fn any_on_bus(&self) -> bool {
+        self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
+    }
+
+    /// Node states as their bytes; 255 for no gripper.
+    pub fn states(&self) -> [u8; NODES] {
+        let gripper = self.gripper.as_ref().map_or(255, Gripper::state);
+        core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
+    }
+
+    fn receive(&mut self, node: usize, now_us: u64, request: &Request) -> Option<Answer> {
+        match self.drives.get_mut(node) {
+            Some(drive) => drive.receive(now_us, request),
+            None => self.gripper.as_mut()?.receive(now_us, request),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    ready_us: u32,
+    frame: Frame,
+}
+
+/// The bus and the controller's part of it.
+#[derive(Clone, Debug)]
+pub struct Bus {
+    scales: [Scale; JOINTS],
+    pending: Vec<Pending>,
+    /// Transmit error counter of the controller.
+    errors: u16,
+    off_us: Option<u32>,
+    rng: fastrand::Rng,
+    log: Vec<TimedFrame>,
+    /// What is wrong with it.
+    pub fault: BusFault,
+    /// Counted since the start.
+    pub statistics: BusStatistics,
+}
+
+impl Bus {
+    /// A bus whose drives have these scales.
+    pub fn new(scales: [Scale; JOINTS], seed: u64) -> Self {
+        Self {
+            scales,
+            pending: Vec::new(),
+            errors: 0,
+            off_us: None,
+            rng: fastrand::Rng::with_seed(seed),
+            log: Vec::new(),
+            fault: BusFault::default(),
+            statistics: BusStatistics::default(),
+        }
+    }
+
+    /// Frames of the last tick with their times.
+    pub fn frames(&self) -> &[TimedFrame] {
+        &self.log
+    }
+
+    /// One millisecond: `out` goes to the nodes, answers that are through by its end go to `received`.
+    pub fn tick(
+        &mut self,
+        now_us: u64,
+        out: Option<&Frame>,
+        nodes: &mut Nodes,
+        received: &mut Vec<Frame>,
+    ) -> BusState {
+        self.log.clear();
+        received.clear();
+        if self.recovering() {
+            self.pending.clear();
+            return BusState { acknowledged: false, bus_off: true };
+        }
+        let mut time = 0;
+        let acknowledged = match out {
+            Some(frame) => self.send(now_us, frame, nodes, &mut time),
+            None => true,
+        };
+        if self.off_us.is_none() {
+            self.answers(&mut time, received);
+        }
+        BusState { acknowledged, bus_off: self.off_us.is_some() }
+    }
+
+    /// Count the time off the bus down; true while it lasts.
+    fn recovering(&mut self) -> bool {
+        if self.fault.bus_off {
+            if self.off_us.is_none() {
+                self.statistics.bus_offs += 1;
+            }
+            self.off_us = Some(RECOVERY_US);
+            return true;
+        }
+        let Some(left) = self.off_us else { return false };
+        if left > TICK_US {
+            self.off_us = Some(left - TICK_US);
+            return true;
+        }
+        self.off_us = None;
+        self.errors = 0;
+        false
+    }
+
+    /// The controller's request; true when somebody acknowledged it.
+    fn send(&mut self, now_us: u64, frame: &Frame, nodes: &mut Nodes, time: &mut u32) -> bool {
+        if self.fault.cut || !nodes.any_on_bus() {
+            // Repeated until the next tick replaces it; such errors alone make no bus-off.
+            self.statistics.unacknowledged += 1;
+            self.statistics.busy_us += u64::from(TICK_US);
+            self.pending.clear();
+            *time = TICK_US;
+            return false;
+        }
+        if !self.carry(frame, time, true) {
+            return false;
+        }
+        let Ok(request) = Request::parse(frame) else { return true };
+        for node in 0..NODES {
+            if self.fault.lost > 0.0 && self.rng.f64() < self.fault.lost {
+                self.statistics.lost += 1;
+                continue;
+            }
+            if let Some(answer) = nodes.receive(node, now_us + u64::from(*time), &request) {
+                let frame = answer.emit(*self.scales.get(node).unwrap_or(&self.scales[0]));
+                let ready_us = *time + ANSWER_US.0 + ANSWER_US.1 * node as u32;
+                self.pending.push(Pending { ready_us, frame });
+            }
+        }
+        true
+    }
+
+    /// Put a frame on the wire, again after each error; false when there was no time left for it.
+    fn carry(&mut self, frame: &Frame, time: &mut u32, from_controller: bool) -> bool {
+        let length = frame_us(frame.data().len());
+        while self.fault.corrupted > 0.0 && self.rng.f64() < self.fault.corrupted {
+            let wasted = length / 2 + ERROR_FRAME_US;
+            *time += wasted;
+            self.statistics.busy_us += u64::from(wasted);
+            self.statistics.repeated += 1;
+            if from_controller {
+                self.errors += 8;
+                if self.errors > BUS_OFF {
+                    self.statistics.bus_offs += 1;
+                    self.off_us = Some(RECOVERY_US);
+                    return false;
+                }
+            }
+            if *time + length > TICK_US {
+                return false;
+            }
+        }
+        *time += length;
+        if *time > TICK_US {
+            return false;
+        }
+        if from_controller {
+            self.errors = self.errors.saturating_sub(1);
+        }
+        self.statistics.frames += 1;
+        self.statistics.busy_us += u64::from(length);
+        self.log.push(TimedFrame { end_us: *time, frame: *frame });
+        true
+    }
+
+    /// Answers in the order of arbitration: of those that are ready when the bus is free, the lowest id.
+    fn answers(&mut self, time: &mut u32, received: &mut Vec<Frame>) {
+        while !self.pending.is_empty() && *time < TICK_US {
+            let ready = |p: &Pending| p.ready_us <= *time;
+            let Some(next) = (0..self.pending.len())
+                .filter(|&i| ready(&self.pending[i]))
+                .min_by_key(|&i| self.pending[i].frame.id)
+            else {
+                *time = self.pending.iter().map(|p| p.ready_us).min().unwrap_or(TICK_US);
+                continue;
+            };
+            let frame = self.pending[next].frame;
+            if !self.carry(&frame, time, false) {
+                break;
+            }
+            self.pending.swap_remove(next);
+            if self.fault.lost > 0.0 && self.rng.f64() < self.fault.lost {
+                self.statistics.lost += 1;
+            } else {
+                received.push(self.garble(frame));
+            }
+        }
+        // What did not get through competes again in the next tick.
+        for p in &mut self.pending {
+            p.ready_us = 0;
+        }
+    }
+
+    /// A frame as a receiver with broken memory sees it.
+    fn garble(&mut self, frame: Frame) -> Frame {
+        if self.fault.garbled == 0.0 || self.rng.f64() >= self.fault.garbled {
+            return frame;
+        }
+        self.statistics.garbled += 1;
+        let mut data = frame.data().to_vec();
+        if self.rng.bool() {
+            data.truncate(self.rng.usize(0..=data.len()));
+        }
+        for byte in &mut data {
+            if self.rng.u8(0..4) == 0 {
+                *byte = self.rng.u8(..);
+            }
+        }
+        let id = if self.rng.u8(0..4) == 0 { self.rng.u16(0..0x800) } else { frame.id };
+        Frame::new(id, &data).unwrap_or(frame)
+    }
+
+    /// Drop what waits: the controller was reset.
+    pub fn clear(&mut self) {
+        self.errors = 0;
+        self.off_us = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j12_a_round_of_seven_nodes_takes_what_was_measured() {
+        let request = frame_us(16);
+        let answer = frame_us(20);
+        assert!((65..=74).contains(&request), "{request}");
+        assert!((72..=83).contains(&answer), "{answer}");
+        let round = request + ANSWER_US.0 + 6 * answer + frame_us(16);
+        assert!((570..=660).contains(&round), "{round}");
+    }
+}

@@ -1,0 +1,123 @@
+//! Settings of the simulated world.
+use jtc_core::{Config, Parameters};
+use jtc_dynamics::{JOINTS, JointVec};
+
+use crate::arm::SimArm;
+use crate::drive::DriveConfig;
+use crate::faults::FaultPlan;
+
+/// How far the true arm is from the one that it was made from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModelError {
+    /// Each link's mass (and inertia with it) times 1 ± up to this, drawn from the seed.
+    pub mass: f64,
+    /// Each joint's friction times 1 ± up to this, drawn from the seed.
+    pub friction: f64,
+    /// Factors of the link masses, instead of drawn ones.
+    pub mass_factors: Option<[f64; 7]>,
+    /// Factors of the joint frictions, instead of drawn ones.
+    pub friction_factors: Option<JointVec>,
+}
+
+impl ModelError {
+    /// The controller's model is the truth.
+    pub const NONE: Self = Self { mass: 0.0, friction: 0.0, mass_factors: None, friction_factors: None };
+}
+
+impl Default for ModelError {
+    fn default() -> Self {
+        Self { mass: 0.10, friction: 0.20, mass_factors: None, friction_factors: None }
+    }
+}
+
+impl ModelError {
+    /// The true arm and the factor of each joint's friction.
+    pub(crate) fn apply(&self, arm: &SimArm, seed: u64) -> (SimArm, JointVec) {
+        let mut rng = fastrand::Rng::with_seed(seed ^ 0x6D6F_6465_6C00);
+        let mut factor = |size: f64| 1.0 + size * (2.0 * rng.f64() - 1.0);
+        let mass: [f64; 7] = core::array::from_fn(|_| factor(self.mass));
+        let friction: JointVec = core::array::from_fn(|_| factor(self.friction));
+        let mass = self.mass_factors.unwrap_or(mass);
+        let mut arm = arm.clone();
+        for (link, factor) in arm.model.links.iter_mut().zip(mass) {
+            link.mass *= factor;
+            link.inertia = link.inertia.map(|i| i * factor);
+        }
+        (arm, self.friction_factors.unwrap_or(friction))
+    }
+}
+
+/// What carries the arm while drives are not enabled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Support {
+    /// Nothing: a joint without torque is limp and the arm falls.
+    Limp,
+    /// A stand, until every joint has been enabled once; afterwards nothing.
+    Stand,
+    /// Holding brakes, open only while their drive is enabled. The known drives have none; with brakes the simulated arm stays where it
+    /// can be used again after an error.
+    Brakes,
+}
+
+/// The world to simulate.
+#[derive(Clone, Debug)]
+pub struct SimConfig {
+    /// The arm before model errors.
+    pub arm: SimArm,
+    /// Settings of the controller.
+    pub controller: Config,
+    /// How far the true arm is from `arm`.
+    pub model_error: ModelError,
+    /// Pose at the start, rad.
+    pub start: JointVec,
+    /// What carries the arm while drives are not enabled.
+    pub support: Support,
+    /// Habits of the drives.
+    pub drives: [DriveConfig; JOINTS],
+    /// A gripper is on the bus.
+    pub gripper: bool,
+    /// Rate of the serial line, bit/s; `None`: bytes take no time.
+    pub baud: Option<u32>,
+    /// Gap that ends a frame, µs (J-03).
+    pub gap_us: u32,
+    /// Ticks that may fail to come before the controller's watchdog resets it (J-12).
+    pub watchdog_ms: u32,
+    /// The controller's safety output is wired to the drives' safety line.
+    pub safety_wired: bool,
+    /// Seed of everything that is drawn by chance.
+    pub seed: u64,
+    /// What goes wrong, and when.
+    pub faults: FaultPlan,
+    /// Entries that the event log holds; what comes later is counted only.
+    pub log_entries: usize,
+}
+
+impl Default for SimConfig {
+    fn default() -> Self {
+        Self::new(Config::avena(), &Parameters::avena())
+    }
+}
+
+impl SimConfig {
+    /// A world around a controller with these settings, whose arm is made from these parameters.
+    pub fn new(controller: Config, parameters: &Parameters) -> Self {
+        let drive =
+            DriveConfig { velocity_full_scale: controller.velocity_full_scale, ..DriveConfig::default() };
+        Self {
+            arm: SimArm::new(&controller, parameters),
+            gripper: controller.gripper,
+            controller,
+            model_error: ModelError::default(),
+            start: [0.0; JOINTS],
+            support: Support::Brakes,
+            drives: [drive; JOINTS],
+            baud: Some(115_200),
+            gap_us: 5_000,
+            watchdog_ms: 10,
+            safety_wired: false,
+            seed: 1,
+            faults: FaultPlan::default(),
+            log_entries: 10_000,
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! The habits of drives, one test each.
+use jtc_bus::Target;
+
+use super::*;
+
+fn change(drive: &mut Drive, target: u8) -> u8 {
+    let target = Target::from_byte(target).expect("the controller can ask for it");
+    match drive.receive(0, &Request::ChangeFsm { target: [target; 7] }) {
+        Some(Answer::Fsm { fsm, .. }) => fsm,
+        answer => panic!("{answer:?}"),
+    }
+}
+
+fn configure(drive: &mut Drive, bits: u8) -> bool {
+    match drive.receive(0, &Request::ChangeMode { mode: [1; 6], config: [bits; 6], gripper: 0 }) {
+        Some(Answer::Mode { accepted, .. }) => accepted,
+        answer => panic!("{answer:?}"),
+    }
+}
+
+fn command(drive: &mut Drive, torque: f64) -> JointReport {
+    match drive.receive(0, &Request::Move { torque: [torque; 6], pump: false }) {
+        Some(Answer::Joint { report, .. }) => report,
+        answer => panic!("{answer:?}"),
+    }
+}
+
+fn run(drive: &mut Drive, ms: u32, q: f64) {
+    (0..ms).for_each(|_| drive.tick(q, 25.0));
+}
+
+fn booted() -> Drive {
+    let mut drive = Drive::new(0, DriveConfig::default(), 364.0);
+    run(&mut drive, 253, 0.5);
+    assert_eq!(drive.state(), fsm::INIT);
+    drive
+}
+
+fn enabled() -> Drive {
+    let mut drive = booted();
+    assert!(configure(&mut drive, 0x17));
+    change(&mut drive, fsm::READY);
+    run(&mut drive, 2, 0.5);
+    assert_eq!(drive.state(), fsm::READY);
+    change(&mut drive, fsm::ENABLED);
+    run(&mut drive, 4010, 0.5);
+    assert_eq!(drive.state(), fsm::ENABLED);
+    drive
+}
+
+#[test]
+fn boot_is_silent_for_a_quarter_of_a_second() {
+    let mut drive = Drive::new(3, DriveConfig::default(), 79.0);
+    run(&mut drive, 249, 0.0);
+    assert_eq!(drive.receive(0, &Request::Move { torque: [0.0; 6], pump: false }), None);
+    run(&mut drive, 1, 0.0);
+    assert!(drive.on_bus());
+}
+
+#[test]
+fn j16_position_is_zero_until_the_encoder_is_configured() {
+    let mut drive = booted();
+    assert_eq!(command(&mut drive, 0.0).position, 0.0);
+    assert!(configure(&mut drive, 0x17));
+    run(&mut drive, 1, 0.5);
+    let step = core::f64::consts::TAU / 65_536.0;
+    assert!((command(&mut drive, 0.0).position - 0.5).abs() <= step / 2.0 + 1e-6);
+}
+
+#[test]
+fn j16_first_enable_takes_four_seconds_later_ones_a_rest() {
+    let mut drive = booted();
+    configure(&mut drive, 0x17);
+    change(&mut drive, fsm::READY);
+    run(&mut drive, 2, 0.5);
+    assert_eq!(change(&mut drive, fsm::ENABLED), fsm::READY, "the answer is the state before the change");
+    run(&mut drive, 3999, 0.5);
+    assert_eq!(drive.state(), 12);
+    run(&mut drive, 3, 0.5);
+    assert_eq!(drive.state(), fsm::ENABLED);
+    change(&mut drive, fsm::READY);
+    run(&mut drive, 2, 0.5);
+    assert_eq!(drive.state(), fsm::READY);
+    change(&mut drive, fsm::ENABLED);
+    run(&mut drive, 390, 0.5);
+    assert_eq!(drive.state(), 12);
+    run(&mut drive, 20, 0.5);
+    assert_eq!(drive.state(), fsm::ENABLED);
+}
+
+#[test]
+fn j12_the_last_torque_stays_for_ever() {
+    let mut drive = enabled();
+    command(&mut drive, 12.0);
+    assert_eq!(drive.torque(), 0.0, "it acts with the next tick");
+    run(&mut drive, 60_000, 0.5);
+    assert_eq!(drive.torque(), 12.0);
+}
+
+#[test]
+fn j16_reported_torque_has_the_sign_of_the_command() {
+    let mut drive = enabled();
+    command(&mut drive, 12.0);
+    run(&mut drive, 1, 0.5);
+    assert_eq!(command(&mut drive, -1.0).torque, -12.0);
+}
+
+#[test]
+fn torque_is_clamped_silently() {
+    let mut drive = enabled();
+    command(&mut drive, -1000.0);
+    run(&mut drive, 1, 0.5);
+    assert_eq!((drive.torque(), drive.state()), (-364.0, fsm::ENABLED));
+}
+
+#[test]
+fn speed_is_late_and_coarse() {
+    let mut drive = enabled();
+    for k in 1..=100 {
+        drive.tick(0.5 + 0.3e-3 * f64::from(k), 25.0);
+        let v = command(&mut drive, 0.0).velocity;
+        if k == 5 {
+            assert!((v - 0.15).abs() < 0.001, "half of the window: {v}");
+        } else if k >= 10 {
+            assert!((v - 0.3).abs() < 6e-4, "{v}");
+        }
+    }
+}
+
+#[test]
+fn over_speed_trips_only_when_configured() {
+    for (bits, state) in [(0x17, fsm::FAULT), (0x07, fsm::ENABLED)] {
+        let mut drive = enabled();
+        drive.bits = bits;
+        (0..30).for_each(|k| drive.tick(0.5 + 2.0e-3 * f64::from(k), 25.0));
+        assert_eq!(drive.state(), state);
+        assert_eq!(drive.errors, if state == fsm::FAULT { error_bit::OVER_SPEED } else { 0 });
+    }
+}
+
+#[test]
+fn outside_the_working_area_only_inward_torque_acts() {
+    let mut drive = enabled();
+    run(&mut drive, 20, 2.995);
+    // The move there was too fast for the trip in this test: start anew.
+    let mut drive = Drive { errors: 0, state: fsm::ENABLED, ..drive };
+    command(&mut drive, 5.0);
+    run(&mut drive, 1, 2.995);
+    assert_eq!((drive.torque(), drive.state()), (0.0, fsm::ENABLED));
+    assert_eq!(command(&mut drive, -5.0).warnings, warning::OUTSIDE_WORKING_AREA);
+    run(&mut drive, 1, 2.995);
+    assert_eq!(drive.torque(), -5.0);
+}
+
+#[test]
+fn j16_safety_line_drops_to_ready_without_an_error() {
+    let mut drive = enabled();
+    drive.fault.safety_line = true;
+    run(&mut drive, 2, 0.5);
+    assert_eq!(drive.state(), fsm::READY);
+    let report = command(&mut drive, 0.0);
+    assert_eq!((report.errors, report.warnings), (0, warning::SAFETY_LINE));
+}
+
+#[test]
+fn j21_fault_is_left_by_init_only_and_comes_back_while_the_cause_stands() {
+    let mut drive = enabled();
+    drive.fault.motor_control = 0x40;
+    run(&mut drive, 1, 0.5);
+    assert_eq!(drive.state(), fsm::FAULT_REACTION);
+    assert_eq!(drive.torque(), 0.0);
+    run(&mut drive, 2, 0.5);
+    assert_eq!(drive.state(), fsm::FAULT);
+    change(&mut drive, fsm::READY);
+    run(&mut drive, 5, 0.5);
+    assert_eq!(drive.state(), fsm::FAULT);
+    change(&mut drive, fsm::INIT);
+    run(&mut drive, 10, 0.5);
+    assert_eq!(drive.state(), fsm::FAULT, "the cause stands");
+    drive.fault.motor_control = 0;
+    assert_eq!(command(&mut drive, 0.0).mc_occurred, 0x40);
+    change(&mut drive, fsm::INIT);
+    run(&mut drive, 3, 0.5);
+    let report = command(&mut drive, 0.0);
+    assert_eq!((report.fsm, report.mc_occurred, report.errors), (fsm::INIT, 0, 0));
+}
+
+#[test]
+fn j16_an_echoed_fault_byte_is_a_command_to_move() {
+    let mut drive = booted();
+    change(&mut drive, fsm::READY);
+    run(&mut drive, 2, 0.5);
+    // The protocol crate cannot send it: put it where a wire would have.
+    drive.pending = 255;
+    run(&mut drive, 1, 0.5);
+    assert_eq!(drive.state(), 12);
+}
+
+#[test]
+fn a_request_of_zero_cancels_a_pending_one() {
+    let mut drive = booted();
+    change(&mut drive, fsm::ENABLED);
+    run(&mut drive, 1, 0.5);
+    change(&mut drive, 0);
+    assert_eq!(drive.pending, 0);
+    // A completed transition erases what is pending too.
+    change(&mut drive, fsm::READY);
+    run(&mut drive, 1, 0.5);
+    drive.pending = fsm::ENABLED;
+    run(&mut drive, 5, 0.5);
+    assert_eq!(drive.state(), fsm::READY);
+}
+
+#[test]
+fn configuration_is_refused_when_enabled_and_lost_by_a_reset() {
+    let mut drive = enabled();
+    assert!(!configure(&mut drive, 0x17));
+    assert_eq!(drive.receive(0, &Request::Reset(1)), None);
+    assert_eq!(drive.state(), fsm::ENABLED);
+    assert_eq!(drive.receive(0, &Request::ResetAll), None);
+    run(&mut drive, 260, 0.5);
+    assert_eq!(command(&mut drive, 0.0).position, 0.0);
+}

@@ -1,0 +1,125 @@
+//! What happened in the world, for reports and for people who read along.
+use core::fmt;
+
+use jtc_core::{State, Tes};
+use jtc_wire::FrameStatus;
+
+use crate::faults::FaultKind;
+
+/// Something that happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// The controller changed its state.
+    State {
+        /// Before.
+        from: State,
+        /// Now.
+        to: State,
+    },
+    /// The trajectory execution state changed.
+    Execution {
+        /// Before.
+        from: Tes,
+        /// Now.
+        to: Tes,
+    },
+    /// The controller's error word changed.
+    Errors {
+        /// Before.
+        from: u16,
+        /// Now.
+        to: u16,
+    },
+    /// A node changed its state.
+    Node {
+        /// 0..5 joints, 6 gripper.
+        node: u8,
+        /// State byte before.
+        from: u8,
+        /// State byte now.
+        to: u8,
+    },
+    /// A host frame was worked off.
+    Frame {
+        /// Type byte.
+        frame_type: u8,
+    },
+    /// The line brought something that is no good frame.
+    BadFrame {
+        /// Why.
+        status: FrameStatus,
+    },
+    /// A fault begins.
+    FaultBegins(FaultKind),
+    /// A fault is over.
+    FaultEnds(FaultKind),
+    /// The watchdog reset the controller.
+    WatchdogReset,
+    /// The host switched the controller off and on.
+    PowerCycle,
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::State { from, to } => write!(f, "controller: {from:?} → {to:?}"),
+            Self::Execution { from, to } => write!(f, "trajectory: {from:?} → {to:?}"),
+            Self::Errors { from, to } => write!(f, "errors: 0x{from:04X} → 0x{to:04X}"),
+            Self::Node { node, from, to } => write!(f, "node {node}: state {from} → {to}"),
+            Self::Frame { frame_type } => write!(f, "host frame 0x{frame_type:02X}"),
+            Self::BadFrame { status } => write!(f, "bad host frame: {status:?}"),
+            Self::FaultBegins(kind) => write!(f, "fault begins: {kind}"),
+            Self::FaultEnds(kind) => write!(f, "fault ends: {kind}"),
+            Self::WatchdogReset => f.write_str("the watchdog resets the controller"),
+            Self::PowerCycle => f.write_str("the controller's power is cycled"),
+        }
+    }
+}
+
+/// An event and its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogEntry {
+    /// µs since the start.
+    pub time_us: u64,
+    /// What happened.
+    pub event: Event,
+}
+
+impl fmt::Display for LogEntry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:10.3} s  {}", self.time_us as f64 * 1e-6, self.event)
+    }
+}
+
+/// The events so far.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    entries: Vec<LogEntry>,
+    most: usize,
+    dropped: u64,
+}
+
+impl Log {
+    /// A log that keeps the first `most` entries and counts the others.
+    pub fn new(most: usize) -> Self {
+        Self { entries: Vec::new(), most, dropped: 0 }
+    }
+
+    pub(crate) fn push(&mut self, time_us: u64, event: Event) {
+        if self.entries.len() < self.most {
+            self.entries.push(LogEntry { time_us, event });
+        } else {
+            self.dropped += 1;
+        }
+    }
+
+    /// Oldest first.
+    pub fn entries(&self) -> &[LogEntry] {
+        &self.entries
+    }
+
+    /// Entries that found no room.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}

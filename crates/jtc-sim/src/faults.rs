@@ -1,0 +1,266 @@
+//! What can go wrong in the simulated world, and when.
+use core::fmt;
+
+use jtc_core::State;
+
+/// A kind of fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultKind {
+    /// A node is off the bus; a joint's motor goes on with its last torque.
+    NodeSilent {
+        /// 0..5 joints, 6 gripper.
+        node: u8,
+    },
+    /// A node's processor restarts, once.
+    NodeReboot {
+        /// 0..5 joints, 6 gripper.
+        node: u8,
+    },
+    /// The motor control reports faults.
+    MotorFault {
+        /// 0..5.
+        joint: u8,
+        /// Bits of the fault byte.
+        bits: u8,
+    },
+    /// The gate driver reports a fault.
+    HardwareFault {
+        /// 0..5.
+        joint: u8,
+    },
+    /// A drive goes to its fault state with no error bit set, once.
+    FaultState {
+        /// 0..5.
+        joint: u8,
+    },
+    /// The encoder reads something else.
+    EncoderJump {
+        /// 0..5.
+        joint: u8,
+        /// Added to the position, rad.
+        rad: f64,
+    },
+    /// A drive says that its position is not accurate.
+    NotAccurate {
+        /// 0..5.
+        joint: u8,
+    },
+    /// Friction is multiplied.
+    Friction {
+        /// 0..5.
+        joint: u8,
+        /// Times the true one.
+        factor: f64,
+    },
+    /// A bearing is at this temperature.
+    Temperature {
+        /// 0..5.
+        joint: u8,
+        /// °C.
+        celsius: f64,
+    },
+    /// Receptions fail.
+    FramesLost {
+        /// 0..1.
+        probability: f64,
+    },
+    /// Frames are destroyed on the wire and repeated.
+    FramesCorrupted {
+        /// 0..1.
+        probability: f64,
+    },
+    /// Answers reach the controller with other contents.
+    FramesGarbled {
+        /// 0..1.
+        probability: f64,
+    },
+    /// The controller is kept off the bus.
+    BusOff,
+    /// The controller's bus line is cut.
+    NoAcknowledge,
+    /// The controller's safety input is low.
+    SafetyInput,
+    /// The safety line of a drive says danger.
+    SafetyLine {
+        /// 0..5 joints, 6 gripper.
+        node: u8,
+    },
+    /// Bytes from the host vanish.
+    SerialLost {
+        /// 0..1.
+        probability: f64,
+    },
+    /// Bits of bytes from the host are flipped.
+    SerialFlipped {
+        /// 0..1, of the bytes.
+        probability: f64,
+    },
+    /// Bytes from the host are held back until the fault is over.
+    SerialDelayed,
+    /// The controller's tick does not come.
+    TickOverrun,
+}
+
+impl FaultKind {
+    /// Name in fault files and tables.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NodeSilent { .. } => "node-silent",
+            Self::NodeReboot { .. } => "node-reboot",
+            Self::MotorFault { .. } => "motor-fault",
+            Self::HardwareFault { .. } => "hardware-fault",
+            Self::FaultState { .. } => "fault-state",
+            Self::EncoderJump { .. } => "encoder-jump",
+            Self::NotAccurate { .. } => "not-accurate",
+            Self::Friction { .. } => "friction",
+            Self::Temperature { .. } => "temperature",
+            Self::FramesLost { .. } => "frames-lost",
+            Self::FramesCorrupted { .. } => "frames-corrupted",
+            Self::FramesGarbled { .. } => "frames-garbled",
+            Self::BusOff => "bus-off",
+            Self::NoAcknowledge => "no-acknowledge",
+            Self::SafetyInput => "safety-input",
+            Self::SafetyLine { .. } => "safety-line",
+            Self::SerialLost { .. } => "serial-lost",
+            Self::SerialFlipped { .. } => "serial-flipped",
+            Self::SerialDelayed => "serial-delayed",
+            Self::TickOverrun => "tick-overrun",
+        }
+    }
+}
+
+impl fmt::Display for FaultKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        match self {
+            Self::NodeSilent { node } | Self::NodeReboot { node } | Self::SafetyLine { node } => {
+                write!(f, " node {node}")
+            }
+            Self::MotorFault { joint, bits } => write!(f, " joint {joint} bits 0x{bits:02X}"),
+            Self::HardwareFault { joint } | Self::FaultState { joint } | Self::NotAccurate { joint } => {
+                write!(f, " joint {joint}")
+            }
+            Self::EncoderJump { joint, rad } => write!(f, " joint {joint} by {rad} rad"),
+            Self::Friction { joint, factor } => write!(f, " joint {joint} times {factor}"),
+            Self::Temperature { joint, celsius } => write!(f, " joint {joint} at {celsius} °C"),
+            Self::FramesLost { probability }
+            | Self::FramesCorrupted { probability }
+            | Self::FramesGarbled { probability }
+            | Self::SerialLost { probability }
+            | Self::SerialFlipped { probability } => write!(f, " {:.3} %", probability * 100.0),
+            Self::BusOff
+            | Self::NoAcknowledge
+            | Self::SafetyInput
+            | Self::SerialDelayed
+            | Self::TickOverrun => Ok(()),
+        }
+    }
+}
+
+/// When a fault begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trigger {
+    /// At this time, ms after the start.
+    At(u64),
+    /// This long (ms) after the controller has first entered a state.
+    InState(State, u64),
+    /// When the trajectory's point index first reaches this value in Operate.
+    AtPoint(u32),
+}
+
+/// One fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What.
+    pub kind: FaultKind,
+    /// When it begins.
+    pub trigger: Trigger,
+    /// How long it lasts, ms; `None`: for good.
+    pub duration_ms: Option<u64>,
+}
+
+/// All that goes wrong.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FaultPlan {
+    /// In any order.
+    pub faults: Vec<Fault>,
+}
+
+/// Where a fault is in its life.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Waiting,
+    /// Its state was entered: begins at this ms.
+    Armed(u64),
+    /// Ends at this ms.
+    Active(u64),
+    Over,
+}
+
+/// A change that a fault makes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Change {
+    Begin(FaultKind),
+    End(FaultKind),
+}
+
+/// The plan while it runs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Running {
+    faults: Vec<(Fault, Phase)>,
+    /// Faults that are not over.
+    open: usize,
+}
+
+impl Running {
+    pub fn new(plan: &FaultPlan) -> Self {
+        let faults: Vec<_> = plan.faults.iter().map(|f| (*f, Phase::Waiting)).collect();
+        Self { open: faults.len(), faults }
+    }
+
+    /// One more fault.
+    pub fn add(&mut self, fault: Fault) {
+        // A soak adds without end: what is over is forgotten.
+        self.faults.retain(|(_, phase)| *phase != Phase::Over);
+        self.faults.push((fault, Phase::Waiting));
+        self.open += 1;
+    }
+
+    /// Kinds that are at work.
+    pub fn active(&self) -> impl Iterator<Item = FaultKind> + '_ {
+        self.faults.iter().filter(|(_, phase)| matches!(phase, Phase::Active(_))).map(|(fault, _)| fault.kind)
+    }
+
+    /// Let faults begin and end at `now` (ms), given the controller's state and point index.
+    pub fn step(&mut self, now: u64, state: State, point: u32, mut change: impl FnMut(Change)) {
+        if self.open == 0 {
+            return;
+        }
+        for (fault, phase) in &mut self.faults {
+            if *phase == Phase::Waiting {
+                let start = match fault.trigger {
+                    Trigger::At(ms) => Some(ms),
+                    Trigger::InState(wanted, after) => (state == wanted).then_some(now + after),
+                    Trigger::AtPoint(k) => (state == State::Operate && point >= k).then_some(now),
+                };
+                if let Some(start) = start {
+                    *phase = Phase::Armed(start);
+                }
+            }
+            if let Phase::Armed(start) = *phase
+                && now >= start
+            {
+                let end = fault.duration_ms.map_or(u64::MAX, |d| now.saturating_add(d));
+                *phase = Phase::Active(end);
+                change(Change::Begin(fault.kind));
+            }
+            if let Phase::Active(end) = *phase
+                && now >= end
+            {
+                *phase = Phase::Over;
+                self.open -= 1;
+                change(Change::End(fault.kind));
+            }
+        }
+    }
+}

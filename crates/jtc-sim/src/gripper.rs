@@ -1,0 +1,226 @@
+//! The vacuum gripper, node 6: a pump, two vacuum switches and the habits of its firmware.
+use jtc_bus::{Answer, GRIPPER, GripperReport, Request, fsm};
+
+use crate::inbox::Inbox;
+
+/// Ticks until the measured pump current follows the command.
+const PUMP_LAG: u32 = 100;
+/// Ticks of pumping until the first and second vacuum level are reached.
+const LEVELS: (u32, u32) = (300, 700);
+/// Ticks after power-up in which it is silent.
+const BOOT: u32 = 250;
+
+/// The gripper.
+#[derive(Clone, Debug)]
+pub struct Gripper {
+    state: u8,
+    age: u32,
+    booting: u32,
+    command: bool,
+    pin: bool,
+    /// 0..PUMP_LAG: how far the motor has run up.
+    speed: u32,
+    /// Ticks of vacuum, up to the second level.
+    vacuum: u32,
+    reacts_to_safety: bool,
+    line_before: bool,
+    inbox: Inbox,
+    /// Off the bus.
+    pub silent: bool,
+    /// The safety line is at the level that means danger.
+    pub safety_line: bool,
+    /// Something is held, so that vacuum can build up.
+    pub part_present: bool,
+}
+
+impl Gripper {
+    /// A gripper with power just switched on.
+    pub fn new(one_message_per_interrupt: bool) -> Self {
+        Self {
+            state: fsm::START,
+            age: 0,
+            booting: BOOT,
+            command: false,
+            pin: false,
+            speed: 0,
+            vacuum: 0,
+            reacts_to_safety: false,
+            line_before: false,
+            inbox: Inbox::new(one_message_per_interrupt),
+            silent: false,
+            safety_line: false,
+            part_present: true,
+        }
+    }
+
+    /// The processor restarts.
+    pub fn reset(&mut self) {
+        self.state = fsm::START;
+        self.age = 0;
+        self.booting = BOOT;
+        self.command = false;
+        self.pin = false;
+        self.reacts_to_safety = false;
+    }
+
+    /// State byte.
+    pub fn state(&self) -> u8 {
+        self.state
+    }
+
+    /// It can hear and acknowledge frames.
+    pub fn on_bus(&self) -> bool {
+        self.booting == 0 && !self.silent
+    }
+
+    /// A request arrives at `now_us`; the answer, if it gives one.
+    pub fn receive(&mut self, now_us: u64, request: &Request) -> Option<Answer> {
+        if !self.on_bus() {
+            return None;
+        }
+        let node = GRIPPER as u8;
+        match self.inbox.take(now_us, request)? {
+            Request::Move { pump, .. } => {
+                self.command = pump;
+                Some(Answer::Gripper(self.report()))
+            }
+            Request::ChangeFsm { target } => {
+                self.change(target[GRIPPER] as u8);
+                Some(Answer::Fsm { node, fsm: self.state })
+            }
+            Request::ChangeMode { gripper, .. } => {
+                let accepted = matches!(self.state, fsm::INIT | fsm::READY);
+                if accepted {
+                    self.reacts_to_safety = gripper & 0x04 != 0;
+                }
+                Some(Answer::Mode { node, accepted })
+            }
+            Request::ResetAll => {
+                self.reset();
+                None
+            }
+            Request::Reset(n) => {
+                if n == node {
+                    self.reset();
+                }
+                None
+            }
+        }
+    }
+
+    /// Its requests are executed in the interrupt: the answer is the transition's code already.
+    fn change(&mut self, request: u8) {
+        self.state = match (request, self.state) {
+            (fsm::INIT, fsm::START) => 10,
+            (fsm::INIT, fsm::READY | fsm::ENABLED) => 14,
+            (fsm::INIT, fsm::FAULT) => 16,
+            (fsm::READY, fsm::INIT) => 11,
+            (fsm::READY, fsm::ENABLED) => 13,
+            (fsm::ENABLED, fsm::READY) => 12,
+            (254, state) if state != fsm::START => fsm::FAULT,
+            _ => return,
+        };
+        self.age = 0;
+    }
+
+    fn report(&self) -> GripperReport {
+        GripperReport {
+            pump: self.speed == PUMP_LAG,
+            pressure1: self.vacuum >= LEVELS.0,
+            pressure2: self.vacuum >= LEVELS.1,
+            fsm: self.state,
+            errors: 0,
+            warnings: 0,
+        }
+    }
+
+    /// One millisecond.
+    pub fn tick(&mut self) {
+        if self.booting > 0 {
+            self.booting -= 1;
+            return;
+        }
+        self.age = self.age.saturating_add(1);
+        // Only the edge counts: enabled while the line is unsafe already, it stays enabled.
+        let edge = self.safety_line && !self.line_before;
+        self.line_before = self.safety_line;
+        if edge && self.reacts_to_safety && self.state == fsm::ENABLED {
+            self.state = 13;
+        }
+        self.state = match self.state {
+            fsm::START => 10,
+            10 | 14 | 16 => fsm::INIT,
+            11 | 13 => fsm::READY,
+            12 => fsm::ENABLED,
+            state => state,
+        };
+        match self.state {
+            fsm::ENABLED => self.pin = self.command,
+            fsm::READY => {
+                self.command = false;
+                self.pin = false;
+            }
+            // The pin keeps its level in other states.
+            _ => {}
+        }
+        self.speed = if self.pin { (self.speed + 1).min(PUMP_LAG) } else { self.speed.saturating_sub(1) };
+        let sucking = self.pin && self.part_present;
+        self.vacuum = if sucking { (self.vacuum + 1).min(LEVELS.1) } else { self.vacuum.saturating_sub(3) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jtc_bus::Target;
+
+    use super::*;
+
+    fn run(gripper: &mut Gripper, ms: u32) {
+        (0..ms).for_each(|_| gripper.tick());
+    }
+
+    fn request(gripper: &mut Gripper, target: u8) -> u8 {
+        let target = [Target::from_byte(target).unwrap(); 7];
+        match gripper.receive(0, &Request::ChangeFsm { target }) {
+            Some(Answer::Fsm { fsm, .. }) => fsm,
+            answer => panic!("{answer:?}"),
+        }
+    }
+
+    fn pump(gripper: &mut Gripper, on: bool) -> GripperReport {
+        match gripper.receive(0, &Request::Move { torque: [0.0; 6], pump: on }) {
+            Some(Answer::Gripper(report)) => report,
+            answer => panic!("{answer:?}"),
+        }
+    }
+
+    #[test]
+    fn the_pump_follows_late_and_only_when_enabled() {
+        let mut gripper = Gripper::new(false);
+        assert!(!gripper.on_bus());
+        run(&mut gripper, 260);
+        assert_eq!(gripper.state(), fsm::INIT);
+        assert_eq!(request(&mut gripper, fsm::READY), 11);
+        run(&mut gripper, 1);
+        pump(&mut gripper, true);
+        run(&mut gripper, 200);
+        assert!(!pump(&mut gripper, true).pump);
+        assert_eq!(request(&mut gripper, fsm::ENABLED), 12);
+        run(&mut gripper, 1);
+        pump(&mut gripper, true);
+        run(&mut gripper, 50);
+        assert!(!pump(&mut gripper, true).pump);
+        run(&mut gripper, 60);
+        assert!(pump(&mut gripper, true).pump);
+        assert!(!pump(&mut gripper, true).pressure1);
+        run(&mut gripper, 250);
+        assert!(pump(&mut gripper, true).pressure1);
+        // Back to INIT straight from ENABLED: the pump runs on until READY.
+        assert_eq!(request(&mut gripper, fsm::INIT), 14);
+        run(&mut gripper, 500);
+        assert!(pump(&mut gripper, false).pressure2);
+        request(&mut gripper, fsm::READY);
+        run(&mut gripper, 200);
+        assert!(!pump(&mut gripper, false).pump);
+    }
+}

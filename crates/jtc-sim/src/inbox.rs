@@ -1,0 +1,54 @@
+//! How a node takes frames out of its receive buffer: at once, or as older firmware does, one per interrupt.
+use std::collections::VecDeque;
+
+use jtc_bus::Request;
+
+/// Requests closer together than this make one interrupt, µs.
+const BACK_TO_BACK_US: u64 = 250;
+/// Depth of the receive buffer.
+const DEPTH: usize = 3;
+
+/// The receive buffer of a node.
+#[derive(Clone, Debug)]
+pub struct Inbox {
+    one_per_interrupt: bool,
+    waiting: VecDeque<Request>,
+    last_us: Option<u64>,
+}
+
+impl Inbox {
+    /// `one_per_interrupt`: two requests back to back leave the second in the buffer until another one comes.
+    pub fn new(one_per_interrupt: bool) -> Self {
+        Self { one_per_interrupt, waiting: VecDeque::new(), last_us: None }
+    }
+
+    /// A request arrives at `now_us`; the one that the node looks at because of it.
+    pub fn take(&mut self, now_us: u64, request: &Request) -> Option<Request> {
+        if !self.one_per_interrupt {
+            return Some(*request);
+        }
+        let merged = self.last_us.is_some_and(|last| now_us < last + BACK_TO_BACK_US);
+        self.last_us = Some(now_us);
+        if self.waiting.len() < DEPTH {
+            self.waiting.push_back(*request);
+        }
+        if merged { None } else { self.waiting.pop_front() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j12_two_requests_back_to_back_leave_an_older_node_one_behind_for_good() {
+        let mut inbox = Inbox::new(true);
+        let request = |node| Request::Reset(node);
+        assert_eq!(inbox.take(0, &request(0)), Some(request(0)));
+        assert_eq!(inbox.take(1000, &request(1)), Some(request(1)));
+        assert_eq!(inbox.take(1100, &request(2)), None);
+        for n in 3..6 {
+            assert_eq!(inbox.take(1000 * u64::from(n), &request(n)), Some(request(n - 1)));
+        }
+    }
+}

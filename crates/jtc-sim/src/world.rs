@@ -1,0 +1,510 @@
+//! The whole world, one millisecond at a time: host line, controller, joint bus, drives, arm.
+use jtc_bus::{Frame, NODES, Scale};
+use jtc_core::{BusState, Config, JOINTS, State, Telemetry};
+use jtc_dynamics::{ArmModel, JointVec};
+
+use crate::arm::Arm;
+use crate::board::{Board, Pins, Worked};
+use crate::bus::{Bus, BusFault, BusStatistics, Nodes, TimedFrame};
+use crate::config::{SimConfig, Support};
+use crate::drive::{Drive, DriveFault};
+use crate::event::{Event, Log};
+use crate::faults::{Change, Fault, FaultKind, Running};
+use crate::gripper::Gripper;
+use crate::serial::{Line, LineFault};
+
+/// Length of a tick, µs.
+const TICK_US: u64 = 1000;
+
+/// How the arm really is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Truth {
+    /// Position, rad.
+    pub q: JointVec,
+    /// Velocity, rad/s.
+    pub qd: JointVec,
+    /// Torque of the drives, N·m.
+    pub torque: JointVec,
+    /// Bearing temperature, °C.
+    pub temperature: JointVec,
+}
+
+/// Counted since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Statistics {
+    /// Joint bus.
+    pub bus: BusStatistics,
+    /// Bytes that reached the controller's end of the line.
+    pub serial_to_device: u64,
+    /// Bytes that reached the host.
+    pub serial_to_host: u64,
+    /// Good host frames that the controller worked off.
+    pub good_frames: u64,
+    /// Bad frames and rubbish.
+    pub bad_frames: u64,
+    /// Resets by the watchdog.
+    pub watchdog_resets: u32,
+    /// Milliseconds simulated.
+    pub ticks: u64,
+}
+
+impl Statistics {
+    /// Share of the time in which the joint bus was busy, 0..1.
+    pub fn bus_load(&self) -> f64 {
+        if self.ticks == 0 { 0.0 } else { self.bus.busy_us as f64 / (self.ticks * TICK_US) as f64 }
+    }
+}
+
+/// The simulated world.
+pub struct World {
+    config: SimConfig,
+    ticks: u64,
+    board: Board,
+    bus: Bus,
+    nodes: Nodes,
+    arm: Arm,
+    truth: Truth,
+    model: ArmModel,
+    stand: bool,
+    to_device: Line,
+    to_host: Line,
+    /// Bytes that have arrived at the device and wait for the parser.
+    arriving: Vec<u8>,
+    host_inbox: Vec<u8>,
+    received: Vec<Frame>,
+    bus_state: BusState,
+    sent: Option<Frame>,
+    ticked: bool,
+    safety_output: bool,
+    safety_input: bool,
+    faults: Running,
+    line_fault: LineFault,
+    overrun: bool,
+    input_fault: bool,
+    line_rng: fastrand::Rng,
+    node_states: [u8; NODES],
+    seen: Seen,
+    good_frames: u64,
+    bad_frames: u64,
+    log: Log,
+}
+
+/// What of the controller was logged last.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Seen {
+    state: State,
+    tes: jtc_core::Tes,
+    errors: u16,
+}
+
+impl World {
+    /// A world in which all power was just switched on.
+    pub fn new(config: SimConfig) -> Self {
+        let (parts, friction) = config.model_error.apply(&config.arm, config.seed);
+        let ceiling = parts.torque_ceiling;
+        let model = parts.model;
+        let drives = core::array::from_fn(|j| Drive::new(j as u8, config.drives[j], ceiling[j]));
+        let older = config.drives[0].one_message_per_interrupt;
+        let nodes = Nodes { drives, gripper: config.gripper.then(|| Gripper::new(older)) };
+        let scales = config.drives.map(|d| Scale { velocity: d.velocity_full_scale });
+        let mut world = Self {
+            ticks: 0,
+            board: Board::new(config.controller.clone(), config.gap_us, config.watchdog_ms),
+            bus: Bus::new(scales, config.seed ^ 0x6275_7300),
+            node_states: nodes.states(),
+            nodes,
+            arm: Arm::new(parts, friction, config.start),
+            truth: Truth::default(),
+            model,
+            stand: config.support == Support::Stand,
+            to_device: Line::new(config.baud),
+            to_host: Line::new(config.baud),
+            arriving: Vec::new(),
+            host_inbox: Vec::new(),
+            received: Vec::with_capacity(16),
+            bus_state: BusState { acknowledged: true, bus_off: false },
+            sent: None,
+            ticked: false,
+            safety_output: false,
+            safety_input: true,
+            faults: Running::new(&config.faults),
+            line_fault: LineFault::default(),
+            overrun: false,
+            input_fault: false,
+            line_rng: fastrand::Rng::with_seed(config.seed ^ 0x6C69_6E65),
+            seen: Seen::default(),
+            good_frames: 0,
+            bad_frames: 0,
+            log: Log::new(config.log_entries),
+            config,
+        };
+        world.read_truth();
+        world
+    }
+
+    /// One millisecond of everything.
+    pub fn step(&mut self) {
+        self.step_faults();
+        self.receive();
+        self.tick_controller();
+        let now = self.now_us();
+        self.bus_state = self.bus.tick(now, self.sent.as_ref(), &mut self.nodes, &mut self.received);
+        self.step_nodes();
+        self.step_arm();
+        self.ticks += 1;
+        let now = self.now_us();
+        self.to_host.arrived(now, usize::MAX, &mut self.host_inbox);
+        self.note();
+    }
+
+    /// Faults that begin or end now.
+    fn step_faults(&mut self) {
+        let telemetry = self.board.telemetry();
+        let (state, point) = (telemetry.state, telemetry.point);
+        let time = self.now_us();
+        let (log, nodes) = (&mut self.log, &mut self.nodes);
+        let mut changed = false;
+        self.faults.step(self.ticks, state, point, |change| {
+            changed = true;
+            match change {
+                Change::Begin(kind) => {
+                    log.push(time, Event::FaultBegins(kind));
+                    begin(kind, nodes);
+                }
+                Change::End(kind) => log.push(time, Event::FaultEnds(kind)),
+            }
+        });
+        if changed {
+            self.apply_faults();
+        }
+    }
+
+    /// Make the faults at work, and no others, act.
+    fn apply_faults(&mut self) {
+        let mut bus = BusFault::default();
+        let mut line = LineFault::default();
+        let mut drives = [DriveFault::default(); JOINTS];
+        let (mut gripper_silent, mut gripper_line) = (false, false);
+        let mut friction = [1.0; JOINTS];
+        self.overrun = false;
+        self.input_fault = false;
+        for kind in self.faults.active() {
+            match kind {
+                FaultKind::NodeReboot { .. } | FaultKind::FaultState { .. } => {}
+                FaultKind::NodeSilent { node } => match drives.get_mut(usize::from(node)) {
+                    Some(drive) => drive.silent = true,
+                    None => gripper_silent = true,
+                },
+                FaultKind::SafetyLine { node } => match drives.get_mut(usize::from(node)) {
+                    Some(drive) => drive.safety_line = true,
+                    None => gripper_line = true,
+                },
+                FaultKind::MotorFault { joint, bits } => drives[usize::from(joint)].motor_control |= bits,
+                FaultKind::HardwareFault { joint } => drives[usize::from(joint)].hardware = true,
+                FaultKind::EncoderJump { joint, rad } => drives[usize::from(joint)].encoder_offset += rad,
+                FaultKind::NotAccurate { joint } => drives[usize::from(joint)].not_accurate = true,
+                FaultKind::Friction { joint, factor } => friction[usize::from(joint)] *= factor,
+                FaultKind::Temperature { joint, celsius } => {
+                    self.arm.temperature[usize::from(joint)] = celsius
+                }
+                FaultKind::FramesLost { probability } => bus.lost = probability,
+                FaultKind::FramesCorrupted { probability } => bus.corrupted = probability,
+                FaultKind::FramesGarbled { probability } => bus.garbled = probability,
+                FaultKind::BusOff => bus.bus_off = true,
+                FaultKind::NoAcknowledge => bus.cut = true,
+                FaultKind::SafetyInput => self.input_fault = true,
+                FaultKind::SerialLost { probability } => line.lost = probability,
+                FaultKind::SerialFlipped { probability } => line.flipped = probability,
+                FaultKind::SerialDelayed => line.held = true,
+                FaultKind::TickOverrun => self.overrun = true,
+            }
+        }
+        self.bus.fault = bus;
+        self.line_fault = line;
+        for (drive, fault) in self.nodes.drives.iter_mut().zip(drives) {
+            drive.fault = fault;
+        }
+        if let Some(gripper) = &mut self.nodes.gripper {
+            gripper.silent = gripper_silent;
+            gripper.safety_line = gripper_line;
+        }
+        if self.arm.friction_fault != friction {
+            self.arm.friction_fault = friction;
+            self.arm.friction_changed();
+        }
+    }
+
+    /// Bytes from the host reach the parser.
+    fn receive(&mut self) {
+        let now = self.now_us();
+        if self.line_fault.held {
+            return self.board.receive(now, &mut Vec::new());
+        }
+        let before = self.arriving.len();
+        self.to_device.arrived(now, usize::MAX, &mut self.arriving);
+        if self.arriving.len() > before && self.line_fault != LineFault::default() {
+            let mut fresh = self.arriving.split_off(before);
+            self.line_fault.apply(&mut fresh, &mut self.line_rng);
+            self.arriving.append(&mut fresh);
+        }
+        self.board.receive(now, &mut self.arriving);
+    }
+
+    fn tick_controller(&mut self) {
+        self.ticked = !self.overrun;
+        self.sent = None;
+        if self.overrun {
+            if self.board.miss() {
+                self.log.push(self.now_us(), Event::WatchdogReset);
+                self.restart();
+            }
+            return;
+        }
+        let outputs = self.board.tick(&Pins {
+            bus: &self.received,
+            bus_state: self.bus_state,
+            safety_input: self.safety_input && !self.input_fault,
+            status_free: self.to_host.is_idle(),
+        });
+        self.sent = outputs.bus;
+        self.safety_output = outputs.safety_output;
+        if let Some(status) = outputs.status {
+            self.to_host.write(self.now_us(), &status);
+        }
+        match self.board.worked {
+            Some(Worked::Frame(frame_type)) => {
+                self.good_frames += 1;
+                self.log.push(self.now_us(), Event::Frame { frame_type });
+            }
+            Some(Worked::Bad(status)) => {
+                self.bad_frames += 1;
+                self.log.push(self.now_us(), Event::BadFrame { status });
+            }
+            None => {}
+        }
+    }
+
+    /// What a reset of the board does to its surroundings.
+    fn restart(&mut self) {
+        self.safety_output = false;
+        self.bus.clear();
+        self.received.clear();
+        self.bus_state = BusState { acknowledged: true, bus_off: false };
+        self.to_host.clear();
+        self.arriving.clear();
+    }
+
+    fn step_nodes(&mut self) {
+        let wired = self.config.safety_wired && !self.safety_output;
+        for (j, drive) in self.nodes.drives.iter_mut().enumerate() {
+            let own = drive.fault.safety_line;
+            drive.fault.safety_line |= wired;
+            drive.tick(self.arm.q[j], self.arm.temperature[j]);
+            drive.fault.safety_line = own;
+        }
+        if let Some(gripper) = &mut self.nodes.gripper {
+            let own = gripper.safety_line;
+            gripper.safety_line |= wired;
+            gripper.tick();
+            gripper.safety_line = own;
+        }
+    }
+
+    fn step_arm(&mut self) {
+        let enabled = |drive: &Drive| drive.state() == jtc_bus::fsm::ENABLED;
+        if self.stand && self.nodes.drives.iter().all(enabled) {
+            self.stand = false;
+        }
+        for (j, drive) in self.nodes.drives.iter().enumerate() {
+            self.truth.torque[j] = drive.torque();
+            self.arm.braked[j] = match self.config.support {
+                Support::Limp => false,
+                Support::Stand => self.stand,
+                Support::Brakes => !enabled(drive),
+            };
+        }
+        self.arm.step(&self.truth.torque, TICK_US as f64 * 1e-6);
+        self.read_truth();
+    }
+
+    fn read_truth(&mut self) {
+        self.truth.q = self.arm.q;
+        self.truth.qd = self.arm.qd;
+        self.truth.temperature = self.arm.temperature;
+    }
+
+    /// Log what has changed.
+    fn note(&mut self) {
+        let time = self.now_us();
+        let telemetry = self.board.telemetry();
+        let now = Seen { state: telemetry.state, tes: telemetry.tes, errors: telemetry.errors };
+        if now != self.seen {
+            let before = core::mem::replace(&mut self.seen, now);
+            if now.state != before.state {
+                self.log.push(time, Event::State { from: before.state, to: now.state });
+            }
+            if now.tes != before.tes {
+                self.log.push(time, Event::Execution { from: before.tes, to: now.tes });
+            }
+            if now.errors != before.errors {
+                self.log.push(time, Event::Errors { from: before.errors, to: now.errors });
+            }
+        }
+        let states = self.nodes.states();
+        if states != self.node_states {
+            for node in 0..NODES {
+                let (from, to) = (self.node_states[node], states[node]);
+                if from != to {
+                    self.log.push(time, Event::Node { node: node as u8, from, to });
+                }
+            }
+            self.node_states = states;
+        }
+    }
+}
+
+/// What a fault does once, when it begins.
+fn begin(kind: FaultKind, nodes: &mut Nodes) {
+    match kind {
+        FaultKind::NodeReboot { node } => match nodes.drives.get_mut(usize::from(node)) {
+            Some(drive) => drive.reset(),
+            None => {
+                if let Some(gripper) = &mut nodes.gripper {
+                    gripper.reset();
+                }
+            }
+        },
+        FaultKind::FaultState { joint } => nodes.drives[usize::from(joint)].force_fault(),
+        _ => {}
+    }
+}
+
+/// What users of the world see and do.
+impl World {
+    /// Virtual time since the start, µs.
+    pub fn now_us(&self) -> u64 {
+        self.ticks * TICK_US
+    }
+
+    /// Bytes from the host enter the line; the device gets them at the rate of the line.
+    pub fn host_write(&mut self, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.to_device.write(self.now_us(), bytes);
+        }
+    }
+
+    /// Bytes of the host that are not yet at the device.
+    pub fn host_write_pending(&self) -> usize {
+        self.to_device.pending()
+    }
+
+    /// Take bytes that have reached the host by now; returns how many.
+    pub fn host_read(&mut self, buffer: &mut [u8]) -> usize {
+        let count = buffer.len().min(self.host_inbox.len());
+        buffer[..count].copy_from_slice(&self.host_inbox[..count]);
+        self.host_inbox.drain(..count);
+        count
+    }
+
+    /// What the controller's last tick computed.
+    pub fn telemetry(&self) -> &Telemetry {
+        self.board.telemetry()
+    }
+
+    /// How the arm really is.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    /// The arm as it is after model errors.
+    pub fn true_model(&self) -> &ArmModel {
+        &self.model
+    }
+
+    /// Settings of the world.
+    pub fn config(&self) -> &SimConfig {
+        &self.config
+    }
+
+    /// Settings of the controller.
+    pub fn controller_config(&self) -> &Config {
+        &self.config.controller
+    }
+
+    /// The frame that the controller gave out in the last tick.
+    pub fn sent(&self) -> Option<&Frame> {
+        self.sent.as_ref()
+    }
+
+    /// The controller had its tick in the last millisecond.
+    pub fn ticked(&self) -> bool {
+        self.ticked
+    }
+
+    /// The bus in the last millisecond.
+    pub fn bus_state(&self) -> BusState {
+        self.bus_state
+    }
+
+    /// All frames on the joint bus in the last millisecond.
+    pub fn bus_frames(&self) -> &[TimedFrame] {
+        self.bus.frames()
+    }
+
+    /// State bytes of joints and gripper (255: no gripper).
+    pub fn node_states(&self) -> [u8; NODES] {
+        self.node_states
+    }
+
+    /// The host frame that the last tick worked off.
+    pub fn worked(&self) -> Option<Worked> {
+        self.board.worked
+    }
+
+    /// Level of the controller's safety output: true = no error.
+    pub fn safety_output(&self) -> bool {
+        self.safety_output
+    }
+
+    /// Set the level of the controller's safety input: true = no error.
+    pub fn set_safety_input(&mut self, level: bool) {
+        self.safety_input = level;
+    }
+
+    /// Something is where the gripper can hold it (from the start it is).
+    pub fn set_part_present(&mut self, present: bool) {
+        if let Some(gripper) = &mut self.nodes.gripper {
+            gripper.part_present = present;
+        }
+    }
+
+    /// One more fault; `Trigger::At` counts from the start of the world.
+    pub fn inject(&mut self, fault: Fault) {
+        self.faults.add(fault);
+    }
+
+    /// Switch the controller's board off and on.
+    pub fn power_cycle_controller(&mut self) {
+        self.log.push(self.now_us(), Event::PowerCycle);
+        self.board.reset();
+        self.restart();
+    }
+
+    /// What happened.
+    pub fn log(&self) -> &Log {
+        &self.log
+    }
+
+    /// Counted since the start.
+    pub fn statistics(&self) -> Statistics {
+        Statistics {
+            bus: self.bus.statistics,
+            serial_to_device: self.to_device.carried,
+            serial_to_host: self.to_host.carried,
+            good_frames: self.good_frames,
+            bad_frames: self.bad_frames,
+            watchdog_resets: self.board.watchdog_resets,
+            ticks: self.ticks,
+        }
+    }
+}

@@ -1,1 +1,22 @@
-//! jtc-host
+//! Client library of the joint trajectory controller: ports, session, upload, checks, parameters, recording.
+#![forbid(unsafe_code)]
+
+pub mod arm;
+pub mod check;
+pub mod error;
+pub mod file;
+pub mod frame;
+pub mod port;
+pub mod recording;
+pub mod report;
+pub mod sample;
+pub mod session;
+pub mod trajectory;
+pub mod words;
+
+pub use arm::Arm;
+pub use error::Error;
+pub use port::{Port, PortError};
+pub use sample::{JointSample, Sample};
+pub use session::Session;
+pub use trajectory::{Point, Trajectory};

@@ -1,0 +1,99 @@
+//! Arms: kinematics, masses, limits, gains and friction of one arm, from the files that people have.
+
+mod parameters;
+mod toml_form;
+
+use std::path::Path;
+
+use jtc_core::{Config, Friction, JOINTS, JointConfig, Parameters, PidGains, TableOf};
+use jtc_dynamics::ArmModel;
+
+pub use parameters::{ParameterError, ParameterSet};
+
+use crate::file::{FileError, read_text};
+
+/// The default arm's file, as delivered.
+pub const AVENA_TOML: &str = include_str!("../../../../arms/avena.toml");
+
+/// Something in a file that could not be carried over, or was filled in.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Warning {
+    /// Joint, link or key.
+    pub place: String,
+    /// What is the matter and what was done.
+    pub problem: String,
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.place, self.problem)
+    }
+}
+
+/// One arm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arm {
+    /// Its name.
+    pub name: String,
+    /// Names of the six joints, base to wrist.
+    pub joint_names: [String; JOINTS],
+    /// Kinematics and masses.
+    pub model: ArmModel,
+    /// Limits and rotor inertia, base to wrist.
+    pub joints: [JointConfig; JOINTS],
+    /// Acceleration of gravity in the base frame, m/s²; `None`: the device's setting.
+    pub gravity: Option<[f64; 3]>,
+    /// Gains.
+    pub pid: Option<[PidGains; JOINTS]>,
+    /// Friction polynomial, c0..c5 ascending.
+    pub polynomial: Option<[[f64; 6]; JOINTS]>,
+    /// Friction tables.
+    pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
+    /// What was not carried over or filled in.
+    pub warnings: Vec<Warning>,
+}
+
+impl Arm {
+    /// The default arm.
+    pub fn avena() -> Self {
+        Self::from_toml(AVENA_TOML).expect("the delivered arm file is good: tests read it")
+    }
+
+    /// From a TOML or URDF file, told apart by their content.
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let text = read_text(path)?;
+        Self::parse(&text).map_err(|e| e.in_file(path))
+    }
+
+    /// From the text of a TOML or URDF file.
+    pub fn parse(text: &str) -> Result<Self, FileError> {
+        Self::from_toml(text)
+    }
+
+    /// Settings of a controller for this arm; what the file does not say is as for the default arm.
+    pub fn config(&self) -> Config {
+        let default = Config::avena();
+        Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default }
+    }
+
+    /// Friction compensation: the polynomial, else the table.
+    pub fn friction(&self) -> Option<Friction> {
+        let polynomial = self.polynomial.map(Friction::Polynomial);
+        polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table((**t).clone())))
+    }
+
+    /// What can be sent to a controller; friction as polynomial, else as table.
+    pub fn parameter_set(&self) -> ParameterSet {
+        ParameterSet { friction: self.friction(), pid: self.pid, model: Some(self.model) }
+    }
+
+    /// Parameters of a controller for this arm; what the file does not say is as for the default arm.
+    pub fn parameters(&self) -> Parameters {
+        let default = Parameters::avena();
+        Parameters {
+            model: self.model,
+            pid: self.pid.unwrap_or(default.pid),
+            friction: self.friction().unwrap_or(default.friction),
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! What a controller is given, and the checks that come before.
+
+use jtc_core::{Friction, JOINTS, PidGains, TableOf};
+use jtc_dynamics::ArmModel;
+
+/// Parameters to send; `None`: not this one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ParameterSet {
+    /// Friction compensation.
+    pub friction: Option<Friction>,
+    /// Gains.
+    pub pid: Option<[PidGains; JOINTS]>,
+    /// Kinematics and masses.
+    pub model: Option<ArmModel>,
+}
+
+/// Why parameters cannot be sent. Joints count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParameterError {
+    /// Not a number that a frame carries.
+    #[error("{what} of joint {joint}: {value} does not fit into a 32-bit float")]
+    NotFinite {
+        /// Which number.
+        what: &'static str,
+        /// Joint from 1.
+        joint: usize,
+        /// The value.
+        value: f64,
+    },
+    /// Integral bounds the wrong way round.
+    #[error("integral of joint {joint}: lower bound {min} is above upper bound {max}")]
+    IntegralBounds {
+        /// Joint from 1.
+        joint: usize,
+        /// rad·s.
+        min: f64,
+        /// rad·s.
+        max: f64,
+    },
+    /// A table axis does not increase.
+    #[error("friction table of joint {joint}: {axis} {after} at place {place} does not lie above {before}")]
+    Axis {
+        /// Joint from 1.
+        joint: usize,
+        /// "velocity" or "temperature".
+        axis: &'static str,
+        /// Place of the second value, from 1.
+        place: usize,
+        /// The value before.
+        before: f32,
+        /// The value there.
+        after: f32,
+    },
+    /// The arm model is not physical.
+    #[error("arm model: {0:?}")]
+    Model(jtc_dynamics::ModelError),
+}
+
+impl ParameterError {
+    /// The next command or act that helps.
+    pub fn hint(&self) -> String {
+        "correct the file; nothing was sent".into()
+    }
+}
+
+impl ParameterSet {
+    /// Nothing in it.
+    pub fn is_empty(&self) -> bool {
+        self.friction.is_none() && self.pid.is_none() && self.model.is_none()
+    }
+
+    /// All that the controller would refuse with "incorrect value" (J-06), before anything is sent.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        match &self.friction {
+            Some(Friction::Polynomial(c)) => {
+                for (j, c) in c.iter().enumerate() {
+                    c.iter().try_for_each(|v| finite("friction coefficient", j, *v))?;
+                }
+            }
+            Some(Friction::Table(tables)) => {
+                tables.iter().enumerate().try_for_each(|(j, t)| check_table(j, t))?;
+            }
+            None => {}
+        }
+        for (j, g) in self.pid.iter().flatten().enumerate() {
+            [g.kp, g.ki, g.kd, g.int_min, g.int_max].into_iter().try_for_each(|v| finite("gain", j, v))?;
+            if g.int_min > g.int_max {
+                return Err(ParameterError::IntegralBounds { joint: j + 1, min: g.int_min, max: g.int_max });
+            }
+        }
+        if let Some(model) = &self.model {
+            model.check().map_err(ParameterError::Model)?;
+        }
+        Ok(())
+    }
+}
+
+fn finite(what: &'static str, joint: usize, value: f64) -> Result<(), ParameterError> {
+    if (value as f32).is_finite() {
+        Ok(())
+    } else {
+        Err(ParameterError::NotFinite { what, joint: joint + 1, value })
+    }
+}
+
+fn check_table(j: usize, t: &TableOf<f32>) -> Result<(), ParameterError> {
+    for (axis, values) in [("velocity", &t.velocity), ("temperature", &t.temperature)] {
+        values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;
+        for (i, w) in values.windows(2).enumerate() {
+            if w[1] <= w[0] {
+                return Err(ParameterError::Axis { joint: j + 1, axis, place: i + 2, before: w[0], after: w[1] });
+            }
+        }
+    }
+    t.torque.iter().flatten().try_for_each(|v| finite("friction torque", j, f64::from(*v)))
+}

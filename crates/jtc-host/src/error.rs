@@ -1,0 +1,195 @@
+//! What can go wrong, with the facts in it, the command that helps and the exit code of the commands.
+
+use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status};
+
+use crate::check::Verdict;
+use crate::port::PortError;
+use crate::words;
+
+/// Any failure of this library.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The port cannot be used.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// No status came.
+    #[error("{port}: no status within {waited_s:.1} s ({})", heard(*bytes))]
+    NoLink {
+        /// Name of the port.
+        port: String,
+        /// Rate of the line, Bd.
+        baud: Option<u32>,
+        /// How long was waited, s.
+        waited_s: f64,
+        /// Bytes that came meanwhile.
+        bytes: u64,
+    },
+    /// A request was not confirmed, although statuses come.
+    #[error("{request:?}: not confirmed in {tries} tries")]
+    NotConfirmed {
+        /// The request.
+        request: FrameType,
+        /// How often it was sent.
+        tries: u32,
+        /// The last bad record for it, if one came.
+        last: Option<Response>,
+    },
+    /// The controller refused a request.
+    #[error("{request:?}: {} (state {}, trajectory {})", words::data_status(*code), words::state(*state), words::tes(*tes))]
+    Refused {
+        /// The request.
+        request: FrameType,
+        /// Why.
+        code: DataStatus,
+        /// State of the controller then.
+        state: u8,
+        /// Trajectory execution state then.
+        tes: u8,
+    },
+    /// The controller refused a segment for good.
+    #[error("segment {segment} of {segments}: {}", words::data_status(*code))]
+    SegmentRefused {
+        /// Number from 0.
+        segment: usize,
+        /// How many there are.
+        segments: usize,
+        /// Why.
+        code: DataStatus,
+    },
+    /// The upload did not end with a complete trajectory.
+    #[error("upload given up after {restarts} restarts; segments confirmed: {confirmed} of {segments}, trajectory {}", words::tes(*tes))]
+    UploadFailed {
+        /// Segments known to have arrived.
+        confirmed: usize,
+        /// How many there are.
+        segments: usize,
+        /// Times the whole was begun again.
+        restarts: u32,
+        /// Trajectory execution state at the end.
+        tes: u8,
+    },
+    /// The controller reports errors.
+    #[error("the controller reports an error: {}", words::errors_line(status))]
+    Device {
+        /// The status that says so.
+        status: Box<Status>,
+    },
+    /// A state was not reached.
+    #[error("{what} not reached within {waited_s:.1} s: {}", words::waiting_for(status))]
+    StateTimeout {
+        /// What was waited for.
+        what: &'static str,
+        /// How long, s.
+        waited_s: f64,
+        /// The last status.
+        status: Box<Status>,
+    },
+    /// A file cannot be read or understood.
+    #[error(transparent)]
+    File(#[from] crate::file::FileError),
+    /// A value does not fit into its frame or is not physical.
+    #[error(transparent)]
+    Parameter(#[from] crate::arm::ParameterError),
+    /// The check found problems; nothing was sent.
+    #[error("{0}")]
+    Check(Box<Verdict>),
+    /// The motion did not end as asked for.
+    #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::errors_line(status))]
+    RunFault {
+        /// Index of the 1 ms point where it ended.
+        point: u32,
+        /// The status that says so.
+        status: Box<Status>,
+    },
+    /// The caller's callback asked to end.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+fn heard(bytes: u64) -> String {
+    match bytes {
+        0 => "no byte came".into(),
+        n => format!("{n} bytes came, but no frame in them"),
+    }
+}
+
+impl Error {
+    /// Exit code of the commands: 1 the device reported an error, 2 unreadable input, 3 no link, 4 refused by a check,
+    /// 5 fault while running.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } => 3,
+            Error::Refused { .. }
+            | Error::SegmentRefused { .. }
+            | Error::UploadFailed { .. }
+            | Error::Device { .. }
+            | Error::StateTimeout { .. } => 1,
+            Error::File(_) | Error::Parameter(_) => 2,
+            Error::Check(_) => 4,
+            Error::RunFault { .. } | Error::Cancelled => 5,
+        }
+    }
+
+    /// A short name for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Error::Port(_) => "port",
+            Error::NoLink { .. } => "no-link",
+            Error::NotConfirmed { .. } => "not-confirmed",
+            Error::Refused { .. } => "refused",
+            Error::SegmentRefused { .. } => "segment-refused",
+            Error::UploadFailed { .. } => "upload-failed",
+            Error::Device { .. } => "device-error",
+            Error::StateTimeout { .. } => "state-timeout",
+            Error::File(_) => "file",
+            Error::Parameter(_) => "parameter",
+            Error::Check(_) => "check",
+            Error::RunFault { .. } => "run-fault",
+            Error::Cancelled => "cancelled",
+        }
+    }
+
+    /// The next command or act that helps.
+    pub fn hint(&self) -> String {
+        match self {
+            Error::Port(e) => e.hint(),
+            Error::NoLink { bytes: 0, .. } => {
+                "check cable and power of the controller, then `jtc doctor`; is it the right one of `jtc ports`?".into()
+            }
+            Error::NoLink { baud, .. } => format!(
+                "the rate is probably wrong ({} Bd here): try `--baud`, `jtc doctor` tries them all",
+                baud.map_or("none".into(), |b| b.to_string())
+            ),
+            Error::NotConfirmed { .. } => "the line towards the controller loses bytes: `jtc doctor`".into(),
+            Error::Refused { code, state, .. } => refused(*code, *state).into(),
+            Error::SegmentRefused { code, .. } => refused(*code, 2).into(),
+            Error::UploadFailed { .. } => "`jtc doctor` looks at the line; then run it again".into(),
+            Error::Device { .. } => "`jtc recover` leads back to HoldPos, `jtc explain CODE` tells about each error".into(),
+            Error::StateTimeout { status, .. } => words::next_step(status).into(),
+            Error::File(e) => e.hint(),
+            Error::Parameter(e) => e.hint(),
+            Error::Check(v) => v.hint(),
+            Error::RunFault { .. } => "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos".into(),
+            Error::Cancelled => "`jtc status` tells where the arm is".into(),
+        }
+    }
+}
+
+fn refused(code: DataStatus, state: u8) -> &'static str {
+    match (code, state) {
+        (DataStatus::NotAllowed, 0 | 1) => "the controller is not ready yet: `jtc doctor` names what is missing",
+        (DataStatus::NotAllowed, 5) => "the controller is in Error: `jtc recover`",
+        (DataStatus::NotAllowed, 4) => "`jtc teach off` first",
+        (DataStatus::NotAllowed, _) => "`jtc status` shows the state; `jtc traj stop` ends a trajectory",
+        (DataStatus::StartPositionMismatch, _) => {
+            "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first"
+        }
+        _ => "`jtc explain` tells about each code",
+    }
+}
+
+/// A record says that its frame was taken.
+pub(crate) fn accepted(r: &Response) -> bool {
+    r.status == FrameStatus::NoError && r.data == DataStatus::NoError
+}

@@ -1,0 +1,180 @@
+//! Reading files of numbers, and what can be wrong with one: file, line, column and value are always named.
+
+use std::path::{Path, PathBuf};
+
+/// Largest file that is read.
+pub const FILE_MAX: u64 = 64 << 20;
+
+/// Why a file cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// The operating system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Its words.
+        source: std::io::Error,
+    },
+    /// A larger file than any of these can be.
+    #[error("{}: {bytes} bytes, more than {FILE_MAX}", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+    },
+    /// A place in a text is wrong.
+    #[error("{}{place}: {problem}", path.display())]
+    At {
+        /// The file.
+        path: PathBuf,
+        /// Line, column, field or key.
+        place: Place,
+        /// What is wrong there, with the value.
+        problem: String,
+    },
+    /// The file as a whole is none of the known forms.
+    #[error("{}: {problem}", path.display())]
+    Form {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what is known.
+        problem: String,
+    },
+}
+
+/// A place in a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// Line from 1.
+    pub line: Option<usize>,
+    /// Column of a table from 1.
+    pub column: Option<usize>,
+    /// Name of a column, key or element.
+    pub name: Option<String>,
+}
+
+impl Place {
+    /// A line.
+    pub fn line(line: usize) -> Self {
+        Self { line: Some(line), ..Self::default() }
+    }
+    /// A cell of a table.
+    pub fn cell(line: usize, column: usize) -> Self {
+        Self { line: Some(line), column: Some(column), name: None }
+    }
+    /// A key or element.
+    pub fn name(name: impl Into<String>) -> Self {
+        Self { name: Some(name.into()), ..Self::default() }
+    }
+    /// The same place with a name.
+    pub fn named(self, name: impl Into<String>) -> Self {
+        Self { name: Some(name.into()), ..self }
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(line) = self.line {
+            write!(f, ", line {line}")?;
+        }
+        if let Some(column) = self.column {
+            write!(f, ", column {column}")?;
+        }
+        if let Some(name) = &self.name {
+            write!(f, ", {name}")?;
+        }
+        Ok(())
+    }
+}
+
+impl FileError {
+    /// The next command or act that helps.
+    pub fn hint(&self) -> String {
+        match self {
+            FileError::Io { .. } => "check the name and the rights of the file".into(),
+            FileError::TooLarge { .. } => "is it the right file?".into(),
+            FileError::At { .. } | FileError::Form { .. } => {
+                "`jtc traj check --help` and `jtc params push --help` show the forms of files".into()
+            }
+        }
+    }
+
+    /// The same error, about `file`.
+    pub fn in_file(mut self, file: &Path) -> Self {
+        let (FileError::Io { path, .. }
+        | FileError::TooLarge { path, .. }
+        | FileError::At { path, .. }
+        | FileError::Form { path, .. }) = &mut self;
+        *path = file.to_owned();
+        self
+    }
+
+    pub(crate) fn at(place: Place, problem: impl Into<String>) -> Self {
+        FileError::At { path: PathBuf::new(), place, problem: problem.into() }
+    }
+
+    pub(crate) fn form(problem: impl Into<String>) -> Self {
+        FileError::Form { path: PathBuf::new(), problem: problem.into() }
+    }
+}
+
+/// The whole text of a file.
+pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
+    let io = |source| FileError::Io { path: path.to_owned(), source };
+    let bytes = std::fs::metadata(path).map_err(io)?.len();
+    if bytes > FILE_MAX {
+        return Err(FileError::TooLarge { path: path.to_owned(), bytes });
+    }
+    std::fs::read_to_string(path).map_err(io)
+}
+
+/// A number as these files write it (`20.`, `-9.e-6`, ` 1`); never NaN or infinite.
+pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileError> {
+    match text.trim().parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        Ok(v) => Err(FileError::at(place(), format!("{v} is not a finite number"))),
+        Err(_) if text.trim().is_empty() => Err(FileError::at(place(), "a number is missing")),
+        Err(_) => Err(FileError::at(place(), format!("\"{}\" is not a number", short(text)))),
+    }
+}
+
+/// A text cut to what an error line can bear.
+pub(crate) fn short(text: &str) -> String {
+    let text = text.trim();
+    if text.chars().count() <= 40 { text.to_owned() } else { text.chars().take(37).chain("...".chars()).collect() }
+}
+
+/// Rows of comma, semicolon or space separated cells; blank lines and lines that begin with `#` are skipped.
+pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
+    text.trim_start_matches('\u{feff}').lines().enumerate().filter_map(|(i, line)| {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            return None;
+        }
+        Some((i + 1, cells(line)))
+    })
+}
+
+fn cells(line: &str) -> Vec<&str> {
+    match [',', ';'].into_iter().find(|c| line.contains(*c)) {
+        Some(c) => line.split(c).map(str::trim).collect(),
+        None => line.split_whitespace().collect(),
+    }
+}
+
+/// Rows of numbers.
+pub(crate) fn number_rows(text: &str) -> Result<Vec<(usize, Vec<f64>)>, FileError> {
+    rows(text)
+        .map(|(line, cells)| {
+            let values = cells
+                .iter()
+                .enumerate()
+                .map(|(i, cell)| number(cell, || Place::cell(line, i + 1)))
+                .collect::<Result<Vec<f64>, _>>()?;
+            Ok((line, values))
+        })
+        .collect()
+}

@@ -1,0 +1,112 @@
+//! A raw record of both directions of a port, one line a piece: seconds, direction, bytes in hex.
+//!
+//! ```text
+//! 0.001250 > 9B 06 00 06 0A E6
+//! 0.016400 < 9B 03 00 AF 06 01
+//! ```
+
+use std::io::{self, BufRead, Write};
+use std::time::Duration;
+
+use super::{Port, PortError};
+
+/// Which way bytes went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// From the host to the controller, `>`.
+    ToDevice,
+    /// From the controller to the host, `<`.
+    ToHost,
+}
+
+/// A port that also writes down all that passes.
+pub struct Capture<P, W: Write> {
+    port: P,
+    out: W,
+    failed: Option<io::Error>,
+}
+
+impl<P: Port, W: Write> Capture<P, W> {
+    /// Wraps `port`; lines go to `out`.
+    pub fn new(port: P, out: W) -> Self {
+        Self { port, out, failed: None }
+    }
+
+    /// The port and the writer; an error that writing met.
+    pub fn finish(mut self) -> (P, W, Option<io::Error>) {
+        if self.failed.is_none() {
+            self.failed = self.out.flush().err();
+        }
+        (self.port, self.out, self.failed)
+    }
+
+    fn note(&mut self, direction: Direction, bytes: &[u8]) {
+        use std::fmt::Write as _;
+        if bytes.is_empty() || self.failed.is_some() {
+            return;
+        }
+        let mark = if direction == Direction::ToDevice { '>' } else { '<' };
+        let mut line = format!("{:.6} {mark}", self.port.now().as_secs_f64());
+        for b in bytes {
+            let _ = write!(line, " {b:02X}");
+        }
+        // A full disk must not end a motion: keep the error for `finish`.
+        self.failed = writeln!(self.out, "{line}").err();
+    }
+}
+
+impl<P: Port, W: Write> Port for Capture<P, W> {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        let n = self.port.read(buffer, timeout)?;
+        self.note(Direction::ToHost, &buffer[..n]);
+        Ok(n)
+    }
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.note(Direction::ToDevice, bytes);
+        self.port.write_all(bytes)
+    }
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
+    fn baud(&self) -> Option<u32> {
+        self.port.baud()
+    }
+    fn name(&self) -> String {
+        self.port.name()
+    }
+}
+
+/// One line of a capture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Captured {
+    /// s.
+    pub time_s: f64,
+    /// Which way.
+    pub direction: Direction,
+    /// What passed.
+    pub bytes: Vec<u8>,
+}
+
+/// Reads a capture back. Lines that are none are an error with their number.
+pub fn read_capture(input: impl BufRead) -> io::Result<Vec<Captured>> {
+    let mut all = Vec::new();
+    for (i, line) in input.lines().enumerate() {
+        let line = line?;
+        if line.trim().is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let wrong = |what: &str| io::Error::new(io::ErrorKind::InvalidData, format!("line {}: {what}", i + 1));
+        let mut words = line.split_whitespace();
+        let time_s = words.next().and_then(|w| w.parse().ok()).ok_or_else(|| wrong("no time"))?;
+        let direction = match words.next() {
+            Some(">") => Direction::ToDevice,
+            Some("<") => Direction::ToHost,
+            _ => return Err(wrong("neither > nor <")),
+        };
+        let bytes = words
+            .map(|w| u8::from_str_radix(w, 16).map_err(|_| wrong("a byte that is not hex")))
+            .collect::<io::Result<_>>()?;
+        all.push(Captured { time_s, direction, bytes });
+    }
+    Ok(all)
+}

@@ -1,0 +1,91 @@
+//! The serial ports of this computer, and why one cannot be used.
+
+use serialport::SerialPortType;
+
+use super::{PortError, SerialPort};
+
+/// What a port is made of.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PortKind {
+    /// An adapter or board on USB.
+    Usb {
+        /// Vendor number.
+        vendor: u16,
+        /// Product number.
+        product: u16,
+        /// Serial number, where it has one.
+        serial: Option<String>,
+        /// Words of the device about itself.
+        description: String,
+    },
+    /// A card in the computer.
+    Pci,
+    /// A paired radio link.
+    Bluetooth,
+    /// The system does not say.
+    Unknown,
+}
+
+/// A serial port of this computer.
+#[derive(Debug)]
+pub struct PortInfo {
+    /// Name to open it with.
+    pub path: String,
+    /// What it is.
+    pub kind: PortKind,
+    /// Why it cannot be used; `None`: it can.
+    pub problem: Option<PortError>,
+}
+
+impl PortInfo {
+    /// It can be opened.
+    pub fn usable(&self) -> bool {
+        self.problem.is_none()
+    }
+}
+
+/// All ports, by name; each is opened for a moment to see whether it can be used.
+pub fn list() -> Result<Vec<PortInfo>, PortError> {
+    let found = serialport::available_ports().map_err(|e| PortError::io("list of ports", e.into()))?;
+    let mut ports: Vec<PortInfo> = found
+        .into_iter()
+        .map(|p| PortInfo {
+            problem: SerialPort::open(&p.port_name, 115_200).err(),
+            kind: kind(p.port_type),
+            path: p.port_name,
+        })
+        .collect();
+    ports.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(ports)
+}
+
+/// The name of the only port that can be used.
+pub fn only_one() -> Result<String, PortError> {
+    let ports = list()?;
+    let mut usable: Vec<String> = ports.iter().filter(|p| p.usable()).map(|p| p.path.clone()).collect();
+    match usable.len() {
+        1 => Ok(usable.remove(0)),
+        // A board that is there but cannot be opened is the more helpful thing to say.
+        0 => Err(ports
+            .into_iter()
+            .filter(|p| matches!(p.kind, PortKind::Usb { .. }))
+            .find_map(|p| p.problem)
+            .unwrap_or(PortError::NoneFound)),
+        _ => Err(PortError::Several { paths: usable }),
+    }
+}
+
+fn kind(kind: SerialPortType) -> PortKind {
+    match kind {
+        SerialPortType::UsbPort(usb) => PortKind::Usb {
+            vendor: usb.vid,
+            product: usb.pid,
+            serial: usb.serial_number,
+            description: [usb.manufacturer, usb.product].into_iter().flatten().collect::<Vec<_>>().join(" "),
+        },
+        SerialPortType::PciPort => PortKind::Pci,
+        SerialPortType::BluetoothPort => PortKind::Bluetooth,
+        SerialPortType::Unknown => PortKind::Unknown,
+    }
+}

@@ -1,0 +1,61 @@
+//! Ways to the controller: serial ports, the simulator in this process, and what can be wrapped around them.
+
+mod capture;
+mod error;
+mod list;
+mod serial;
+#[cfg(feature = "sim")]
+pub mod sim;
+pub mod test;
+
+use std::time::Duration;
+
+pub use capture::{Capture, Captured, Direction, read_capture};
+pub use error::PortError;
+pub use list::{PortInfo, PortKind, list, only_one};
+pub use serial::SerialPort;
+
+/// A byte stream to a controller, polled by one thread.
+///
+/// Time belongs to the port: in the simulator it is virtual and passes while `read` waits, so that the same code is
+/// deterministic there.
+pub trait Port {
+    /// Waits until at least one byte is there or `timeout` is over; returns how many were read (0: none in that time).
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError>;
+    /// Hands all bytes to the line; may block while the line's buffer is full.
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError>;
+    /// Time since some fixed moment.
+    fn now(&self) -> Duration;
+    /// Bits per second on the line, where the line has a speed.
+    fn baud(&self) -> Option<u32>;
+    /// What a person calls this port.
+    fn name(&self) -> String {
+        "port".to_owned()
+    }
+}
+
+impl<P: Port + ?Sized> Port for Box<P> {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        (**self).read(buffer, timeout)
+    }
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        (**self).write_all(bytes)
+    }
+    fn now(&self) -> Duration {
+        (**self).now()
+    }
+    fn baud(&self) -> Option<u32> {
+        (**self).baud()
+    }
+    fn name(&self) -> String {
+        (**self).name()
+    }
+}
+
+/// Time that `bytes` take on a line of 8N1 at `baud`; none on a line without a speed.
+pub fn line_time(bytes: usize, baud: Option<u32>) -> Duration {
+    match baud {
+        Some(baud) if baud > 0 => Duration::from_secs_f64(bytes as f64 * 10.0 / f64::from(baud)),
+        _ => Duration::ZERO,
+    }
+}

@@ -1,0 +1,59 @@
+//! A port whose other end is a closure: for tests and for protocol experiments without a device.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::{Port, PortError, line_time};
+
+/// Calls `device(now, bytes)` whenever bytes are written and each virtual millisecond that is waited (then with no bytes); what it
+/// returns is read.
+pub struct ScriptedPort<F> {
+    device: F,
+    now: Duration,
+    inbox: VecDeque<u8>,
+    baud: Option<u32>,
+    written: Vec<u8>,
+}
+
+impl<F: FnMut(Duration, &[u8]) -> Vec<u8>> ScriptedPort<F> {
+    /// A port in front of `device`. With a `baud`, writing takes virtual time.
+    pub fn new(baud: Option<u32>, device: F) -> Self {
+        Self { device, now: Duration::ZERO, inbox: VecDeque::new(), baud, written: Vec::new() }
+    }
+
+    /// All bytes written so far.
+    pub fn written(&self) -> &[u8] {
+        &self.written
+    }
+}
+
+impl<F: FnMut(Duration, &[u8]) -> Vec<u8>> Port for ScriptedPort<F> {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        let end = self.now + timeout;
+        while self.inbox.is_empty() && self.now < end {
+            self.now = end.min(self.now + Duration::from_millis(1));
+            self.inbox.extend((self.device)(self.now, &[]));
+        }
+        let n = buffer.len().min(self.inbox.len());
+        for (slot, byte) in buffer.iter_mut().zip(self.inbox.drain(..n)) {
+            *slot = byte;
+        }
+        Ok(n)
+    }
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.written.extend(bytes);
+        self.now += line_time(bytes.len(), self.baud);
+        let answer = (self.device)(self.now, bytes);
+        self.inbox.extend(answer);
+        Ok(())
+    }
+    fn now(&self) -> Duration {
+        self.now
+    }
+    fn baud(&self) -> Option<u32> {
+        self.baud
+    }
+    fn name(&self) -> String {
+        "script".to_owned()
+    }
+}

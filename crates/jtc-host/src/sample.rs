@@ -1,0 +1,149 @@
+//! One moment of a run, as recordings and reports hold it, from the controller itself or from a status.
+
+use jtc_core::{JOINTS, JointTelemetry, Telemetry};
+use jtc_wire::Status;
+
+/// One joint in a [`Sample`]; NaN where the source does not know a value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointSample {
+    /// Commanded position, rad.
+    pub set_position: f64,
+    /// Commanded velocity, rad/s.
+    pub set_velocity: f64,
+    /// Commanded acceleration, rad/s².
+    pub set_acceleration: f64,
+    /// Measured position, rad.
+    pub position: f64,
+    /// Measured velocity, rad/s.
+    pub velocity: f64,
+    /// Model torque, N·m.
+    pub torque_model: f64,
+    /// Proportional part, N·m.
+    pub torque_p: f64,
+    /// Integral part, N·m.
+    pub torque_i: f64,
+    /// Derivative part, N·m.
+    pub torque_d: f64,
+    /// Friction compensation, N·m.
+    pub torque_friction: f64,
+    /// Torque commanded on the bus (over a real link: the torque that the drive reports), N·m.
+    pub torque: f64,
+    /// Bearing temperature, °C.
+    pub temperature: f64,
+    /// Node FSM byte.
+    pub fsm: u8,
+    /// Internal errors of the joint.
+    pub internal: u16,
+}
+
+impl JointSample {
+    /// A joint of which nothing is known.
+    pub const UNKNOWN: Self = Self {
+        set_position: f64::NAN,
+        set_velocity: f64::NAN,
+        set_acceleration: f64::NAN,
+        position: f64::NAN,
+        velocity: f64::NAN,
+        torque_model: f64::NAN,
+        torque_p: f64::NAN,
+        torque_i: f64::NAN,
+        torque_d: f64::NAN,
+        torque_friction: f64::NAN,
+        torque: f64::NAN,
+        temperature: f64::NAN,
+        fsm: 0,
+        internal: 0,
+    };
+
+    /// Commanded minus measured position, rad; NaN where one is unknown.
+    pub fn position_error(&self) -> f64 {
+        self.set_position - self.position
+    }
+}
+
+impl Default for JointSample {
+    fn default() -> Self {
+        Self::UNKNOWN
+    }
+}
+
+impl From<&JointTelemetry> for JointSample {
+    fn from(t: &JointTelemetry) -> Self {
+        Self {
+            set_position: t.set_position,
+            set_velocity: t.set_velocity,
+            set_acceleration: t.set_acceleration,
+            position: t.position,
+            velocity: t.velocity,
+            torque_model: t.torque_model,
+            torque_p: t.torque_p,
+            torque_i: t.torque_i,
+            torque_d: t.torque_d,
+            torque_friction: t.torque_friction,
+            torque: t.torque,
+            temperature: t.temperature,
+            fsm: t.fsm,
+            internal: t.internal,
+        }
+    }
+}
+
+/// The arm and its controller at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Time since the first sample's clock began, s.
+    pub time_s: f64,
+    /// State of the controller as on the wire.
+    pub state: u8,
+    /// Trajectory execution state as on the wire.
+    pub tes: u8,
+    /// Index of the current 1 ms point.
+    pub point: u32,
+    /// Current error word of the controller.
+    pub errors: u16,
+    /// Current CAN flags; 0 where the source does not know them.
+    pub can_current: u32,
+    /// Base to wrist.
+    pub joints: [JointSample; JOINTS],
+}
+
+impl From<&Telemetry> for Sample {
+    /// Time is that of the controller's tick count.
+    fn from(t: &Telemetry) -> Self {
+        Self {
+            time_s: t.tick as f64 * 1e-3,
+            state: t.state as u8,
+            tes: t.tes as u8,
+            point: t.point,
+            errors: t.errors,
+            can_current: 0,
+            joints: std::array::from_fn(|j| JointSample::from(&t.joints[j])),
+        }
+    }
+}
+
+impl Sample {
+    /// What a status says, received at `time_s`. Commanded values and the torque split are unknown.
+    pub fn from_status(time_s: f64, status: &Status) -> Self {
+        Self {
+            time_s,
+            state: status.fsm,
+            tes: status.tes,
+            point: status.point,
+            errors: status.errors,
+            can_current: status.can_current,
+            joints: std::array::from_fn(|j| {
+                let s = &status.joints[j];
+                JointSample {
+                    position: f64::from(s.position),
+                    velocity: f64::from(s.velocity),
+                    torque: f64::from(s.torque),
+                    temperature: f64::from(s.temperature),
+                    fsm: s.fsm,
+                    internal: s.internal,
+                    ..JointSample::UNKNOWN
+                }
+            }),
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! The simple commands.
+
+use jtc_wire::{ExecCommand, FrameType, Status};
+
+use super::{Session, not_allowed};
+use crate::error::accepted;
+use crate::port::Port;
+use crate::{Error, frame, words};
+
+/// What the controller wants to be given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Parameter {
+    /// Friction table.
+    FrictionTable,
+    /// Friction polynomial.
+    FrictionPolynomial,
+    /// Gains.
+    Pid,
+    /// Kinematics and masses.
+    ArmModel,
+}
+
+impl Parameter {
+    /// Its name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Parameter::FrictionTable => "friction table",
+            Parameter::FrictionPolynomial => "friction polynomial",
+            Parameter::Pid => "PID gains",
+            Parameter::ArmModel => "arm model",
+        }
+    }
+
+    fn use_default(self) -> FrameType {
+        match self {
+            Parameter::FrictionTable => FrameType::FrictionTableUseDefault,
+            Parameter::FrictionPolynomial => FrameType::FrictionPolynomialUseDefault,
+            Parameter::Pid => FrameType::PidParamUseDefault,
+            Parameter::ArmModel => FrameType::ArmModelUseDefault,
+        }
+    }
+}
+
+impl<P: Port> Session<P> {
+    /// Clears current errors: the controller's own, and those of the nodes in `nodes` (bits 0..6).
+    pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), Error> {
+        self.command(&frame::clear_current(jtc, nodes))
+    }
+
+    /// Clears current and occurred errors.
+    pub fn clear_occurred(&mut self) -> Result<(), Error> {
+        self.command(&frame::frame(FrameType::ClearOccurredErrors, &[]))
+    }
+
+    /// Resets the nodes in `nodes` (bits 0..6).
+    pub fn reset(&mut self, nodes: u8) -> Result<(), Error> {
+        self.command(&frame::reset(nodes))
+    }
+
+    /// Teaching on (only in HoldPos) or off.
+    pub fn teach(&mut self, on: bool) -> Result<(), Error> {
+        let kind = if on { FrameType::TeachingModeEnable } else { FrameType::TeachingModeDisable };
+        self.command(&frame::frame(kind, &[]))
+    }
+
+    /// Pump on or off.
+    pub fn gripper(&mut self, pump: bool) -> Result<(), Error> {
+        self.command(&frame::gripper(pump))
+    }
+
+    /// Tells the controller to use its default of one parameter.
+    pub fn use_default(&mut self, parameter: Parameter) -> Result<(), Error> {
+        self.command(&frame::frame(parameter.use_default(), &[]))
+    }
+
+    /// Tells the controller to use its defaults: friction polynomial, gains and arm model.
+    pub fn use_defaults(&mut self) -> Result<(), Error> {
+        [Parameter::FrictionPolynomial, Parameter::Pid, Parameter::ArmModel]
+            .into_iter()
+            .try_for_each(|p| self.use_default(p))
+    }
+
+    /// Starts the trajectory, or goes on after a pause.
+    pub fn execute(&mut self) -> Result<(), Error> {
+        self.exec(ExecCommand::Execute, |s| s.tes == 3)
+    }
+
+    /// Pauses on the path.
+    pub fn pause(&mut self) -> Result<(), Error> {
+        self.exec(ExecCommand::Pause, |s| s.tes == 2)
+    }
+
+    /// Ends the trajectory; the next execution begins at its start.
+    pub fn stop(&mut self) -> Result<(), Error> {
+        self.exec(ExecCommand::Stop, |s| s.tes == 1)
+    }
+
+    fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
+        let retries = self.statistics.retries;
+        let record = self.request(&frame::exec(command))?;
+        if accepted(&record) {
+            return Ok(());
+        }
+        // Sent again after its confirmation was lost, it is refused although the first one did its work.
+        if not_allowed(&record) && self.statistics.retries > retries && self.last.is_some_and(|s| reached(&s)) {
+            return Ok(());
+        }
+        Err(self.refused(record))
+    }
+
+    /// Waits until the controller is in HoldPos; an error at once when it reports errors.
+    pub fn wait_hold(&mut self, timeout: std::time::Duration) -> Result<Status, Error> {
+        let status = self.wait_for("HoldPos", timeout, |s| s.fsm == 2 || s.fsm == 5)?;
+        if status.fsm == 5 { Err(Error::Device { status: Box::new(status) }) } else { Ok(status) }
+    }
+
+    /// One line about where the controller is.
+    pub fn where_now(&mut self) -> Result<String, Error> {
+        Ok(words::waiting_for(&self.fresh_status()?))
+    }
+}

@@ -1,0 +1,313 @@
+//! A conversation with the controller: one writer, the stream of its statuses, each request confirmed.
+//!
+//! Records of the controller are one-shot (J-04): each received frame is answered in exactly one status, in order. The session
+//! queues them and gives each to the request that waits for it.
+
+mod commands;
+mod follow;
+mod params;
+mod recover;
+mod scanner;
+mod statistics;
+mod upload;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status};
+
+pub use commands::Parameter;
+pub use follow::{Flow, Outcome};
+pub use params::Pushed;
+pub use recover::RecoverStep;
+pub use scanner::Scanner;
+pub use statistics::LinkStatistics;
+pub use upload::{Progress, UploadOptions, UploadReport};
+
+use crate::Error;
+use crate::error::accepted;
+use crate::port::{Port, line_time};
+
+/// Called with each status and the port's time.
+type Observer = Box<dyn FnMut(Duration, &Status)>;
+
+/// How patient a session is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patience {
+    /// Longest silence of the controller before the link counts as lost.
+    pub status: Duration,
+    /// Time for a confirmation beyond what the line needs for the bytes.
+    pub confirmation: Duration,
+    /// How often a frame is sent before it counts as not confirmed.
+    pub tries: u32,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self { status: Duration::from_secs(2), confirmation: Duration::from_millis(300), tries: 4 }
+    }
+}
+
+/// A conversation over a port.
+pub struct Session<P> {
+    port: P,
+    scanner: Scanner,
+    arrived: VecDeque<Status>,
+    records: VecDeque<Response>,
+    last: Option<Status>,
+    statistics: LinkStatistics,
+    start: Duration,
+    last_heard: Duration,
+    observer: Option<Observer>,
+    /// How patient the session is.
+    pub patience: Patience,
+}
+
+impl<P: Port> Session<P> {
+    /// Over an open port; nothing is sent or awaited yet.
+    pub fn new(port: P) -> Self {
+        let start = port.now();
+        Self {
+            port,
+            scanner: Scanner::default(),
+            arrived: VecDeque::new(),
+            records: VecDeque::new(),
+            last: None,
+            statistics: LinkStatistics::default(),
+            start,
+            last_heard: start,
+            observer: None,
+            patience: Patience::default(),
+        }
+    }
+
+    /// Calls `observer` with each status that arrives from now on, whatever the session does then.
+    pub fn observe(&mut self, observer: impl FnMut(Duration, &Status) + 'static) {
+        self.observer = Some(Box::new(observer));
+    }
+
+    /// No observer any more.
+    pub fn stop_observing(&mut self) {
+        self.observer = None;
+    }
+
+    /// The port.
+    pub fn port(&self) -> &P {
+        &self.port
+    }
+
+    /// The port, for what only it can do. Bytes written past the session confuse it.
+    pub fn port_mut(&mut self) -> &mut P {
+        &mut self.port
+    }
+
+    /// Ends the conversation.
+    pub fn into_port(self) -> P {
+        self.port
+    }
+
+    /// Time of the port.
+    pub fn now(&self) -> Duration {
+        self.port.now()
+    }
+
+    /// What passed so far.
+    pub fn statistics(&self) -> LinkStatistics {
+        LinkStatistics {
+            bad_bytes: self.scanner.skipped(),
+            time_s: (self.port.now() - self.start).as_secs_f64(),
+            ..self.statistics
+        }
+    }
+
+    /// The last status that arrived, however old.
+    pub fn last(&self) -> Option<&Status> {
+        self.last.as_ref()
+    }
+
+    /// The next status; `None` when none comes in this time.
+    pub fn poll(&mut self, timeout: Duration) -> Result<Option<Status>, Error> {
+        let end = self.port.now() + timeout;
+        loop {
+            if let Some(status) = self.arrived.pop_front() {
+                return Ok(Some(status));
+            }
+            let now = self.port.now();
+            if self.read(end.saturating_sub(now))? == 0 && self.port.now() >= end {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// The next status; an error when the controller is silent.
+    pub fn next_status(&mut self) -> Result<Status, Error> {
+        let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
+        match self.poll(self.patience.status)? {
+            Some(status) => Ok(status),
+            None => Err(Error::NoLink {
+                port: self.port.name(),
+                baud: self.port.baud(),
+                waited_s: (self.port.now() - start).as_secs_f64(),
+                bytes: self.statistics.bytes_received - bytes,
+            }),
+        }
+    }
+
+    /// A status that was made after this call: what had arrived before is passed over.
+    pub fn fresh_status(&mut self) -> Result<Status, Error> {
+        self.catch_up()?;
+        self.next_status()
+    }
+
+    /// Takes in what has arrived, without waiting.
+    fn catch_up(&mut self) -> Result<(), Error> {
+        // Bounded, so that a line that never stops talking cannot hold us.
+        for _ in 0..64 {
+            if self.read(Duration::ZERO)? == 0 {
+                break;
+            }
+        }
+        self.arrived.clear();
+        Ok(())
+    }
+
+    fn read(&mut self, timeout: Duration) -> Result<usize, Error> {
+        let mut buffer = [0; 4096];
+        let n = self.port.read(&mut buffer, timeout)?;
+        self.statistics.bytes_received += n as u64;
+        let before = self.arrived.len();
+        let arrived = &mut self.arrived;
+        self.scanner.push(&buffer[..n], |status| arrived.push_back(status));
+        let now = self.port.now();
+        for status in self.arrived.iter().skip(before) {
+            self.statistics.statuses += 1;
+            if status.response.status != FrameStatus::Idle {
+                self.statistics.bad_frames += u64::from(status.response.status != FrameStatus::NoError);
+                self.records.push_back(status.response);
+            }
+            if let Some(observer) = &mut self.observer {
+                observer(now, status);
+            }
+            self.last = Some(*status);
+            self.last_heard = now;
+        }
+        // Whoever does not look at statuses does not pile them up.
+        while self.arrived.len() > 256 {
+            self.arrived.pop_front();
+        }
+        Ok(n)
+    }
+
+    fn write(&mut self, frame: &[u8]) -> Result<(), Error> {
+        self.port.write_all(frame)?;
+        self.statistics.bytes_sent += frame.len() as u64;
+        self.statistics.frames_sent += 1;
+        Ok(())
+    }
+
+    /// Longest time until the confirmation of a frame of `len` bytes must have come.
+    fn confirmation_time(&self, len: usize) -> Duration {
+        // The frame, a status that is just being sent, and the one with the record.
+        line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.patience.confirmation
+    }
+
+    /// Sends a frame and waits for its record; frames that arrive damaged are sent again.
+    pub fn request(&mut self, frame: &[u8]) -> Result<Response, Error> {
+        let kind = frame.get(1).copied().unwrap_or(0);
+        let mut bad = None;
+        self.catch_up()?;
+        self.records.clear();
+        for attempt in 0..self.patience.tries {
+            self.statistics.retries += u64::from(attempt > 0);
+            self.write(frame)?;
+            match self.record_for(kind, frame.len())? {
+                Some(record) if record.status == FrameStatus::NoError => return Ok(record),
+                Some(record) => bad = Some(record),
+                None => {}
+            }
+        }
+        if self.port.now() - self.last_heard > self.patience.status {
+            self.next_status()?;
+        }
+        Err(Error::NotConfirmed { request: frame_type(kind), tries: self.patience.tries, last: bad })
+    }
+
+    /// The record of the frame just sent; `None` when none came in time.
+    fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, Error> {
+        let end = self.port.now() + self.confirmation_time(len);
+        loop {
+            while let Some(record) = self.records.pop_front() {
+                // A good record of another type belongs to a request whose time was over.
+                if record.status != FrameStatus::NoError || record.frame_type == kind {
+                    return Ok(Some(record));
+                }
+            }
+            let now = self.port.now();
+            if now >= end {
+                return Ok(None);
+            }
+            self.read(end - now)?;
+        }
+    }
+
+    /// Sends a command; an error when it is refused.
+    fn command(&mut self, frame: &[u8]) -> Result<(), Error> {
+        let record = self.request(frame)?;
+        if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
+    }
+
+    fn refused(&self, record: Response) -> Error {
+        let last = self.last.unwrap_or_default();
+        Error::Refused { request: frame_type(record.frame_type), code: record.data, state: last.fsm, tes: last.tes }
+    }
+
+    /// Waits until `reached` says yes; `what` names it in the error.
+    pub fn wait_for(
+        &mut self,
+        what: &'static str,
+        timeout: Duration,
+        mut reached: impl FnMut(&Status) -> bool,
+    ) -> Result<Status, Error> {
+        let start = self.port.now();
+        loop {
+            let status = self.next_status()?;
+            if reached(&status) {
+                return Ok(status);
+            }
+            let waited = self.port.now() - start;
+            if waited >= timeout {
+                return Err(Error::StateTimeout { what, waited_s: waited.as_secs_f64(), status: Box::new(status) });
+            }
+        }
+    }
+}
+
+/// The type of a request that this library sent itself.
+fn frame_type(kind: u8) -> FrameType {
+    use FrameType::*;
+    const ALL: [FrameType; 17] = [
+        ClearCurrentErrors,
+        ClearOccurredErrors,
+        JtcStatus,
+        Trajectory,
+        FrictionTable,
+        FrictionTableUseDefault,
+        PidParam,
+        PidParamUseDefault,
+        ArmModel,
+        ArmModelUseDefault,
+        TrajSetExecStatus,
+        TeachingModeEnable,
+        TeachingModeDisable,
+        FrictionPolynomial,
+        FrictionPolynomialUseDefault,
+        ResetCanDevices,
+        GripperControl,
+    ];
+    ALL.into_iter().find(|t| *t as u8 == kind).unwrap_or(JtcStatus)
+}
+
+/// The record says that the state forbids it.
+fn not_allowed(record: &Response) -> bool {
+    record.status == FrameStatus::NoError && record.data == DataStatus::NotAllowed
+}

@@ -1,0 +1,372 @@
+//! Upload of a trajectory: several frames in flight, each segment confirmed, what was lost is sent again.
+//!
+//! Frames are short (113 points, 4,082 bytes): beyond 4,095 bytes CRC-16 misses some double bit errors, because x has order
+//! 32,767 modulo its polynomial.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
+use jtc_wire::{DataStatus, FrameStatus, RawPoint, Response, STATUS_LEN};
+
+use super::{Flow, Session};
+use crate::error::accepted;
+use crate::port::{Port, line_time};
+use crate::{Error, frame};
+
+/// Points of a segment whose frame CRC-16 protects against every double bit error.
+const SEGMENT_POINTS: usize = 113;
+/// Points of a segment when 113 would need more than 100 segments.
+const SEGMENT_POINTS_LONG: usize = 120;
+/// Times that one segment is sent.
+const SEGMENT_TRIES: u32 = 16;
+/// Times that the whole is begun again.
+const RESTARTS: u32 = 3;
+/// Records that the controller queues, less one for safety.
+const WINDOW_MAX: usize = 7;
+
+/// How to upload.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct UploadOptions {
+    /// Points per segment; `None` chooses.
+    pub points_per_segment: Option<usize>,
+    /// Number of the trajectory.
+    pub number: u16,
+}
+
+impl UploadOptions {
+    /// Points per segment for a trajectory of `points`.
+    pub fn segment_points(&self, points: usize) -> usize {
+        let usual = if points > SEGMENT_POINTS * SEGMENTS_MAX { SEGMENT_POINTS_LONG } else { SEGMENT_POINTS };
+        self.points_per_segment.unwrap_or(usual).clamp(1, SEGMENT_POINTS_MAX)
+    }
+}
+
+/// How far an upload is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Progress {
+    /// Segments confirmed.
+    pub segments_done: usize,
+    /// Segments in all.
+    pub segments: usize,
+    /// Bytes of confirmed segments.
+    pub bytes_done: usize,
+    /// Bytes of all segments.
+    pub bytes: usize,
+    /// Bytes per second so far.
+    pub bytes_per_s: f64,
+    /// Time left at this rate, s.
+    pub left_s: f64,
+    /// Segments sent again.
+    pub retries: u32,
+}
+
+/// What an upload took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct UploadReport {
+    /// Points.
+    pub points: usize,
+    /// Segments.
+    pub segments: usize,
+    /// Bytes of all segments.
+    pub bytes: usize,
+    /// First byte to last confirmation, s.
+    pub time_s: f64,
+    /// Bytes per second.
+    pub bytes_per_s: f64,
+    /// Share of what the line can carry, where it has a speed.
+    pub line_share: Option<f64>,
+    /// Segments sent again.
+    pub retries: u32,
+    /// Times the whole was begun again.
+    pub restarts: u32,
+}
+
+struct InFlight {
+    /// When the line will have carried it.
+    done: Duration,
+}
+
+/// State of one upload.
+struct Upload {
+    frames: Vec<Vec<u8>>,
+    confirmed: usize,
+    next: usize,
+    in_flight: VecDeque<InFlight>,
+    /// Rest of the frame being written.
+    writing: Option<(usize, usize)>,
+    line_done: Duration,
+    /// Send one at a time until it is clear what the controller has.
+    probing: bool,
+    tries: u32,
+    retries: u32,
+    restarts: u32,
+    window: usize,
+    chunk: usize,
+    start: Duration,
+    bytes_done: usize,
+    bytes: usize,
+}
+
+impl Upload {
+    fn new(points: &[RawPoint], step_ms: u16, options: &UploadOptions, baud: Option<u32>, now: Duration) -> Self {
+        let per_segment = options.segment_points(points.len());
+        let count = points.len().div_ceil(per_segment);
+        let frames: Vec<Vec<u8>> = points
+            .chunks(per_segment)
+            .enumerate()
+            .map(|(i, chunk)| frame::segment(options.number, i as u16, count as u16, step_ms, chunk))
+            .collect();
+        let longest = frames.first().map_or(0, Vec::len);
+        // Enough in flight for 60 ms, which covers the latency of USB adapters.
+        let time = line_time(longest, baud).as_secs_f64();
+        let window = if time > 0.0 { (0.060 / time).ceil() as usize + 2 } else { WINDOW_MAX };
+        Self {
+            bytes: frames.iter().map(Vec::len).sum(),
+            frames,
+            confirmed: 0,
+            next: 0,
+            in_flight: VecDeque::new(),
+            writing: None,
+            line_done: now,
+            probing: false,
+            tries: 0,
+            retries: 0,
+            restarts: 0,
+            window: window.clamp(3, WINDOW_MAX),
+            // 10 ms of line, so that statuses are taken in meanwhile.
+            chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
+            start: now,
+            bytes_done: 0,
+        }
+    }
+
+    fn progress(&self, now: Duration) -> Progress {
+        let seconds = (now - self.start).as_secs_f64();
+        let rate = if seconds > 0.0 { self.bytes_done as f64 / seconds } else { 0.0 };
+        Progress {
+            segments_done: self.confirmed,
+            segments: self.frames.len(),
+            bytes_done: self.bytes_done,
+            bytes: self.bytes,
+            bytes_per_s: rate,
+            left_s: if rate > 0.0 { (self.bytes - self.bytes_done) as f64 / rate } else { 0.0 },
+            retries: self.retries,
+        }
+    }
+
+    fn confirm(&mut self) {
+        self.bytes_done += self.frames[self.confirmed].len();
+        self.confirmed += 1;
+        self.next = self.next.max(self.confirmed);
+        self.in_flight.pop_front();
+        self.tries = 0;
+    }
+
+    /// All again from the first unconfirmed segment, one at a time at first.
+    fn go_back(&mut self) {
+        self.retries += (self.next - self.confirmed) as u32;
+        self.next = self.confirmed;
+        self.in_flight.clear();
+        self.probing = true;
+        self.tries += 1;
+    }
+
+    fn restart(&mut self) {
+        self.restarts += 1;
+        self.confirmed = 0;
+        self.bytes_done = 0;
+        self.tries = 0;
+        self.go_back();
+        self.probing = false;
+    }
+
+    fn may_send(&self) -> bool {
+        self.next < self.frames.len() && self.in_flight.len() < if self.probing { 1 } else { self.window }
+    }
+}
+
+impl<P: Port> Session<P> {
+    /// Uploads points that are `step_ms` apart; done when the controller says that the trajectory is complete (TES Stop).
+    /// `progress` is called after each confirmed segment and may end it with [`Flow::Cancel`].
+    pub fn upload(
+        &mut self,
+        points: &[RawPoint],
+        step_ms: u16,
+        options: &UploadOptions,
+        mut progress: impl FnMut(&Progress) -> Flow,
+    ) -> Result<UploadReport, Error> {
+        let per_segment = options.segment_points(points.len());
+        let segments = points.len().div_ceil(per_segment);
+        let refused = |code| Error::SegmentRefused { segment: 0, segments, code };
+        if points.is_empty() {
+            return Err(refused(DataStatus::IncorrectValue));
+        }
+        if points.len() > POINTS_MAX {
+            return Err(refused(DataStatus::TooManyPoints));
+        }
+        if segments > SEGMENTS_MAX {
+            return Err(refused(DataStatus::TooManySegments));
+        }
+        self.catch_up()?;
+        self.records.clear();
+        let (baud, start) = (self.port.baud(), self.port.now());
+        let mut up = Upload::new(points, step_ms, options, baud, start);
+        loop {
+            while up.confirmed < segments {
+                if self.advance(&mut up)? && progress(&up.progress(self.port.now())) == Flow::Cancel {
+                    return Err(Error::Cancelled);
+                }
+            }
+            if self.complete()? {
+                break;
+            }
+            if up.restarts >= RESTARTS {
+                return Err(self.upload_failed(&up));
+            }
+            up.restart();
+        }
+        let time_s = (self.port.now() - start).as_secs_f64();
+        self.statistics.retries += u64::from(up.retries);
+        Ok(UploadReport {
+            points: points.len(),
+            segments,
+            bytes: up.bytes,
+            time_s,
+            bytes_per_s: up.bytes as f64 / time_s.max(1e-9),
+            line_share: baud.map(|_| line_time(up.bytes, baud).as_secs_f64() / time_s.max(1e-9)),
+            retries: up.retries,
+            restarts: up.restarts,
+        })
+    }
+
+    fn upload_failed(&self, up: &Upload) -> Error {
+        Error::UploadFailed {
+            confirmed: up.confirmed,
+            segments: up.frames.len(),
+            restarts: up.restarts,
+            tes: self.last.map_or(0, |s| s.tes),
+        }
+    }
+
+    /// The controller has the whole trajectory.
+    fn complete(&mut self) -> Result<bool, Error> {
+        if self.last.is_some_and(|s| s.tes == 1) {
+            return Ok(true);
+        }
+        for _ in 0..8 {
+            if self.next_status()?.tes == 1 {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Writes a piece or waits for a record; true when a segment was confirmed.
+    fn advance(&mut self, up: &mut Upload) -> Result<bool, Error> {
+        if up.writing.is_none() && up.may_send() {
+            up.writing = Some((up.next, 0));
+            let now = self.port.now();
+            up.line_done = up.line_done.max(now) + line_time(up.frames[up.next].len(), self.port.baud());
+            up.in_flight.push_back(InFlight { done: up.line_done });
+            up.next += 1;
+        }
+        let mut wait = Duration::ZERO;
+        if let Some((index, at)) = up.writing {
+            let frame = &up.frames[index];
+            let end = frame.len().min(at + up.chunk);
+            self.port.write_all(&frame[at..end])?;
+            self.statistics.bytes_sent += (end - at) as u64;
+            up.writing = (end < frame.len()).then_some((index, end));
+            self.statistics.frames_sent += u64::from(end == frame.len());
+        } else {
+            wait = self.deadline(up).saturating_sub(self.port.now());
+        }
+        if self.records.is_empty() {
+            self.read(wait)?;
+        }
+        let confirmed = up.confirmed;
+        while let Some(record) = self.records.pop_front() {
+            if up.confirmed >= up.frames.len() {
+                break;
+            }
+            self.take_record(up, record)?;
+        }
+        if up.writing.is_none() && !up.in_flight.is_empty() && self.port.now() >= self.deadline(up) {
+            self.overdue(up)?;
+        }
+        Ok(up.confirmed > confirmed)
+    }
+
+    fn deadline(&self, up: &Upload) -> Duration {
+        let oldest = up.in_flight.front().map_or(self.port.now(), |f| f.done);
+        oldest + line_time(2 * STATUS_LEN, self.port.baud()) + self.patience.confirmation
+    }
+
+    fn take_record(&mut self, up: &mut Upload, record: Response) -> Result<(), Error> {
+        if record.status != FrameStatus::NoError {
+            return self.start_over(up);
+        }
+        if record.frame_type != jtc_wire::FrameType::Trajectory as u8 || up.in_flight.is_empty() {
+            return Ok(());
+        }
+        if accepted(&record) {
+            up.confirm();
+            up.probing = false;
+            return Ok(());
+        }
+        match record.data {
+            // The only one in flight, and refused as out of order: it had arrived, its confirmation was lost.
+            DataStatus::IncorrectSegmentOrder if up.probing && up.confirmed > 0 => {
+                up.confirm();
+                Ok(())
+            }
+            DataStatus::IncorrectSegmentOrder => self.start_over(up),
+            code => Err(Error::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }),
+        }
+    }
+
+    /// No record came in time.
+    fn overdue(&mut self, up: &mut Upload) -> Result<(), Error> {
+        if self.port.now() - self.last_heard > self.patience.status {
+            self.next_status()?;
+        }
+        // All sent and complete: only confirmations were lost. (TES is Null since segment 0 was confirmed.)
+        if up.next == up.frames.len() && up.confirmed > 0 && self.last.is_some_and(|s| s.tes == 1) {
+            while up.confirmed < up.frames.len() {
+                up.confirm();
+            }
+            return Ok(());
+        }
+        self.start_over(up)
+    }
+
+    /// Lets what is in flight come to its end, then goes back to the first segment that is not confirmed.
+    fn start_over(&mut self, up: &mut Upload) -> Result<(), Error> {
+        if up.tries >= SEGMENT_TRIES {
+            return Err(self.upload_failed(up));
+        }
+        if let Some((index, at)) = up.writing.take() {
+            self.port.write_all(&up.frames[index][at..])?;
+            self.statistics.bytes_sent += (up.frames[index].len() - at) as u64;
+        }
+        let quiet = up.line_done.max(self.port.now()) + line_time(2 * STATUS_LEN, self.port.baud());
+        // Records follow their frames at once; a status period more for those that do not.
+        let end = quiet + Duration::from_millis(60);
+        loop {
+            let now = self.port.now();
+            if now >= end {
+                break;
+            }
+            self.read(end - now)?;
+        }
+        while let Some(record) = self.records.pop_front() {
+            let trajectory = record.frame_type == jtc_wire::FrameType::Trajectory as u8;
+            if trajectory && accepted(&record) && !up.in_flight.is_empty() {
+                up.confirm();
+            }
+        }
+        up.go_back();
+        Ok(())
+    }
+}

@@ -1,0 +1,87 @@
+//! Trajectories: points at a fixed step, from the files that people have.
+
+use jtc_core::JOINTS;
+use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
+
+/// One point of a trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// rad.
+    pub position: [f64; JOINTS],
+    /// rad/s.
+    pub velocity: [f64; JOINTS],
+    /// rad/s².
+    pub acceleration: [f64; JOINTS],
+}
+
+/// Points at a fixed step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trajectory {
+    /// Time between points, ms.
+    pub step_ms: u16,
+    /// First to last.
+    pub points: Vec<Point>,
+}
+
+/// A number that a trajectory frame cannot carry.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("point {point}, joint {joint}: {channel} {value} is outside the scale of ±{limit} {unit}")]
+pub struct ScaleError {
+    /// Point from 0.
+    pub point: usize,
+    /// Joint from 1.
+    pub joint: usize,
+    /// "position", "velocity" or "acceleration".
+    pub channel: &'static str,
+    /// The value.
+    pub value: f64,
+    /// Largest value.
+    pub limit: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+impl From<&RawPoint> for Point {
+    fn from(raw: &RawPoint) -> Self {
+        let scaled = |v: &[i16; JOINTS], scale: f64| v.map(|x| f64::from(x) * scale / 32767.0);
+        Self {
+            position: scaled(&raw.position, POSITION_SCALE),
+            velocity: scaled(&raw.velocity, VELOCITY_SCALE),
+            acceleration: scaled(&raw.acceleration, ACCELERATION_SCALE),
+        }
+    }
+}
+
+impl Point {
+    /// As the wire carries it; `index` is for the error.
+    pub fn raw(&self, index: usize) -> Result<RawPoint, ScaleError> {
+        let channel = |values: &[f64; JOINTS], scale: f64, channel, unit| {
+            let mut out = [0i16; JOINTS];
+            for (j, (to, v)) in out.iter_mut().zip(values).enumerate() {
+                let scaled = (v * 32767.0 / scale).round();
+                if !(-32768.0..=32767.0).contains(&scaled) {
+                    return Err(ScaleError { point: index, joint: j + 1, channel, value: *v, limit: scale, unit });
+                }
+                *to = scaled as i16;
+            }
+            Ok(out)
+        };
+        Ok(RawPoint {
+            position: channel(&self.position, POSITION_SCALE, "position", "rad")?,
+            velocity: channel(&self.velocity, VELOCITY_SCALE, "velocity", "rad/s")?,
+            acceleration: channel(&self.acceleration, ACCELERATION_SCALE, "acceleration", "rad/s²")?,
+        })
+    }
+}
+
+impl Trajectory {
+    /// All points as the wire carries them.
+    pub fn raw(&self) -> Result<Vec<RawPoint>, ScaleError> {
+        self.points.iter().enumerate().map(|(i, p)| p.raw(i)).collect()
+    }
+
+    /// From the first to the last point, s.
+    pub fn duration_s(&self) -> f64 {
+        self.points.len().saturating_sub(1) as f64 * f64::from(self.step_ms) * 1e-3
+    }
+}

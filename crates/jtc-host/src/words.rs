@@ -1,0 +1,194 @@
+//! The controller's numbers in words.
+
+use jtc_wire::{DataStatus, FrameStatus, Status};
+
+/// State of the controller.
+pub fn state(fsm: u8) -> &'static str {
+    ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"].get(fsm as usize).copied().unwrap_or("unknown")
+}
+
+/// Trajectory execution state.
+pub fn tes(tes: u8) -> &'static str {
+    ["Null", "Stop", "Pause", "Execute", "Finish", "TransNullToStop"].get(tes as usize).copied().unwrap_or("unknown")
+}
+
+/// State of a node; numbers from 10 to 16 are transitions.
+pub fn node_state(fsm: u8) -> &'static str {
+    match fsm {
+        0 => "Start",
+        1 => "Init",
+        2 => "ReadyToOperate",
+        3 => "OperationEnable",
+        10..=16 => "in transition",
+        254 => "FaultReactionActive",
+        255 => "Fault",
+        _ => "unknown",
+    }
+}
+
+/// Name of a node on the joint bus: joints count from 1, as people do.
+pub fn node(n: usize) -> String {
+    if n == 6 { "gripper".into() } else { format!("joint {}", n + 1) }
+}
+
+/// What became of a frame's data.
+pub fn data_status(code: DataStatus) -> &'static str {
+    match code {
+        DataStatus::Idle => "nothing",
+        DataStatus::NoError => "accepted",
+        DataStatus::TooManyPoints => "too many points",
+        DataStatus::TooManySegments => "too many segments",
+        DataStatus::IncorrectSegmentOrder => "incorrect segment order",
+        DataStatus::IncorrectStepTime => "incorrect step time",
+        DataStatus::IncorrectValue => "incorrect value",
+        DataStatus::NotAllowed => "not allowed in this state",
+        DataStatus::StartPositionMismatch => "the arm is not at the start of the trajectory",
+    }
+}
+
+/// How a frame arrived.
+pub fn frame_status(code: FrameStatus) -> &'static str {
+    match code {
+        FrameStatus::Idle => "nothing",
+        FrameStatus::NoError => "good",
+        FrameStatus::IncorrectHeader => "incorrect header",
+        FrameStatus::IncorrectFrameType => "incorrect frame type",
+        FrameStatus::IncorrectCrc => "incorrect CRC",
+        FrameStatus::DiscontinuousFrame => "discontinuous frame",
+    }
+}
+
+fn list(bits: u32, names: &[&'static str]) -> Vec<&'static str> {
+    names.iter().enumerate().filter(|(i, n)| bits >> i & 1 == 1 && !n.is_empty()).map(|(_, n)| *n).collect()
+}
+
+/// Error word of the controller.
+pub fn errors(word: u16) -> Vec<&'static str> {
+    list(
+        u32::from(word),
+        &[
+            "emergency input",
+            "emergency output",
+            "internal error",
+            "external error",
+            "internal joint error",
+            "CAN error",
+            "host link error",
+            "external joint error",
+        ],
+    )
+}
+
+/// Internal error word of a joint.
+pub fn joint_errors(word: u16) -> Vec<&'static str> {
+    list(
+        u32::from(word),
+        &[
+            "set position over limit",
+            "set velocity over limit",
+            "set acceleration over limit",
+            "torque over limit",
+            "position error over limit",
+            "friction table value missing",
+        ],
+    )
+}
+
+/// Fault byte of a drive's motor control.
+pub fn motor_faults(byte: u8) -> Vec<&'static str> {
+    list(
+        u32::from(byte),
+        &[
+            "FOC duration",
+            "over-voltage",
+            "under-voltage",
+            "over-temperature",
+            "start-up failed",
+            "speed feedback",
+            "over-current",
+            "software error",
+        ],
+    )
+}
+
+/// Error byte of a drive.
+pub fn node_errors(byte: u8) -> Vec<&'static str> {
+    list(u32::from(byte), &["encoder failed", "motor control fault", "over-speed", "hardware fault", "", "", "", ""])
+}
+
+/// Warning byte of a node.
+pub fn node_warnings(byte: u8) -> Vec<&'static str> {
+    list(
+        u32::from(byte),
+        &["position not accurate", "outside working area", "magnetic field out of range", "safety line active"],
+    )
+}
+
+/// CAN flags.
+pub fn can_flags(word: u32) -> Vec<String> {
+    let mut all = Vec::new();
+    if word & 1 != 0 {
+        all.push("no acknowledge on the joint bus".to_owned());
+    }
+    all.extend((0..7).filter(|n| word >> (8 + n) & 1 == 1).map(|n| format!("{} does not answer", node(n))));
+    all
+}
+
+/// What the controller still waits for in Init: friction, PID, arm model.
+pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
+    list(u32::from(jtc_init), &["friction", "PID", "arm model"])
+}
+
+/// Nodes that are not ready.
+pub fn missing_nodes(node_init: u8) -> Vec<String> {
+    (0..7).filter(|n| node_init >> n & 1 == 1).map(node).collect()
+}
+
+/// All current errors of a status in one line; empty when there are none.
+pub fn errors_line(s: &Status) -> String {
+    let mut all: Vec<String> = errors(s.errors).into_iter().map(String::from).collect();
+    all.extend(can_flags(s.can_current));
+    for (j, joint) in s.joints.iter().enumerate() {
+        let words = joint_errors(joint.internal)
+            .into_iter()
+            .chain(node_errors(joint.errors))
+            .chain(motor_faults(joint.mc_current))
+            .chain((joint.warnings & 8 != 0).then_some("safety line active"))
+            .chain((joint.fsm >= 254).then(|| node_state(joint.fsm)));
+        all.extend(words.map(|w| format!("joint {}: {w}", j + 1)));
+    }
+    if let Some(g) = s.gripper {
+        all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
+    }
+    if all.is_empty() { format!("no error bit is set (state {}, trajectory {})", state(s.fsm), tes(s.tes)) } else { all.join(", ") }
+}
+
+/// Why the controller is not further than it is.
+pub fn waiting_for(s: &Status) -> String {
+    let head = format!("state {}, trajectory {}", state(s.fsm), tes(s.tes));
+    let mut missing: Vec<String> = missing_parameters(s.jtc_init).into_iter().map(|m| format!("{m} not given")).collect();
+    if s.fsm <= 1 {
+        missing.extend(missing_nodes(s.node_init).into_iter().map(|n| format!("{n} not ready")));
+    }
+    if s.errors != 0 {
+        missing.push(errors_line(s));
+    }
+    if missing.is_empty() { head } else { format!("{head}; {}", missing.join(", ")) }
+}
+
+/// The command that leads on from here.
+pub fn next_step(s: &Status) -> &'static str {
+    if s.errors != 0 || s.fsm == 5 {
+        "`jtc recover`"
+    } else if s.jtc_init != 0 {
+        "`jtc params push FILE` or `jtc params use-defaults`"
+    } else if s.fsm <= 1 && s.node_init != 0 {
+        "`jtc doctor` looks at the nodes that are not ready"
+    } else if s.fsm == 4 {
+        "`jtc teach off`"
+    } else if s.tes == 3 {
+        "`jtc traj stop` ends the motion"
+    } else {
+        "`jtc status`"
+    }
+}

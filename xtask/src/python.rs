@@ -1,6 +1,6 @@
 //! Independent references in Python: a virtual environment made by itself, and the checks that run in it.
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
@@ -46,8 +46,29 @@ pub fn environment(requirements: &str) -> Result<PathBuf> {
     Ok(python)
 }
 
-/// A step for each references/*/check_*.py.
-pub fn checks(tally: &mut Tally) {
+/// What a check is called with.
+struct Check {
+    /// Below references/.
+    script: &'static str,
+    /// Example of a crate that it runs, as its first argument.
+    example: Option<&'static str>,
+    /// Files of the demo that it reads, as the arguments after.
+    demo_files: &'static [&'static str],
+}
+
+const CHECKS: [Check; 4] = [
+    Check { script: "dynamics/check_pinocchio.py", example: Some("reference"), demo_files: &[] },
+    Check { script: "mujoco/check_free_fall.py", example: Some("free_fall"), demo_files: &[] },
+    Check { script: "can/check_multicast.py", example: None, demo_files: &[] },
+    Check {
+        script: "recording/check_mcap.py",
+        example: None,
+        demo_files: &["recording.mcap", "recording.csv"],
+    },
+];
+
+/// A step for each reference; `demo` is where the demo left its files.
+pub fn checks(tally: &mut Tally, demo: &Path) {
     let mut python = None;
     tally.step("Python environment of the references", || {
         python = Some(environment("requirements.txt")?);
@@ -55,25 +76,33 @@ pub fn checks(tally: &mut Tally) {
     });
     let mut built = false;
     tally.step("programs for the references", || {
-        run(&mut cargo(&["build", "--release", "--workspace", "--bins", "--examples"]))?;
+        let packages = ["--package", "jtc-dynamics", "--package", "jtc-sim", "--package", "can-link"];
+        run(cargo(&["build", "--release", "--examples"]).args(packages))?;
         built = true;
         Ok(Outcome::Passed)
     });
-    for script in shell::files(&root().join("references"), &["py"]) {
-        let name = script.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if !name.starts_with("check_") {
-            continue;
+    tally.step("every reference is run", || {
+        for script in shell::files(&root().join("references"), &["py"]) {
+            let name =
+                script.strip_prefix(root().join("references")).unwrap_or(&script).display().to_string();
+            ensure!(
+                !name.contains("check_") || CHECKS.iter().any(|check| check.script == name),
+                "xtask/src/python.rs does not know references/{name}"
+            );
         }
-        let title = script.strip_prefix(root()).unwrap_or(&script).display().to_string();
-        tally.step(&title, || {
-            let python = python.as_ref().context("no Python environment")?;
+        Ok(Outcome::Passed)
+    });
+    let examples = shell::target().join("release/examples");
+    for check in &CHECKS {
+        tally.step(&format!("references/{}", check.script), || {
+            let python = python.as_ref().context("there is no Python environment")?;
             ensure!(built, "the programs it needs were not built");
-            let mut check = command(python);
-            check.arg(&script);
-            check.env("JTC_BIN", shell::target().join("release/jtc"));
-            check.env("JTC_EXAMPLES", shell::target().join("release/examples"));
-            check.env("PYTHONDONTWRITEBYTECODE", "1");
-            run(&mut check).map(|()| Outcome::Passed)
+            let mut script = command(python);
+            script.arg(Path::new("references").join(check.script));
+            script.args(check.example.map(|name| examples.join(name)));
+            script.args(check.demo_files.iter().map(|name| demo.join(name)));
+            script.env("JTC_EXAMPLES", &examples).env("PYTHONDONTWRITEBYTECODE", "1");
+            run(&mut script).map(|()| Outcome::Passed)
         });
     }
 }

@@ -38,8 +38,9 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             let mut doc = cargo(&["doc", "--workspace", "--no-deps"]);
             passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
         });
-        tally.step("demo", || passed(demo()));
-        python::checks(&mut tally);
+        let scratch = Scratch::new("demo")?;
+        tally.step("demo", || passed(demo(scratch.path())));
+        python::checks(&mut tally, scratch.path());
     }
     tally.step("the working tree is as it was", || {
         let (Some(before), Some(after)) = (before, tree()) else {
@@ -99,16 +100,13 @@ fn board_builds() -> Result<()> {
 }
 
 /// The newcomer's command, into a directory of its own; what it wrote is looked at.
-fn demo() -> Result<()> {
-    let scratch = Scratch::new("demo")?;
-    let out = scratch.path().join("demo");
-    let text = shell::read(
-        cargo(&["run", "--release", "--quiet", "--", "demo", "--speed", "max", "--json", "--out"]).arg(&out),
-    )?;
+fn demo(out: &Path) -> Result<()> {
+    let mut demo = cargo(&["run", "--release", "--quiet", "--", "demo", "--speed", "max", "--json", "--out"]);
+    let text = shell::read(demo.arg(out))?;
     let last = text.lines().rev().find(|line| line.starts_with('{')).unwrap_or(&text);
     let report: Value = serde_json::from_str(last).context("the demo's --json output is no JSON object")?;
     check_demo_figures(&report)?;
-    check_demo_files(&out)
+    check_demo_files(out)
 }
 
 fn check_demo_figures(report: &Value) -> Result<()> {

@@ -1,0 +1,199 @@
+//! What the host asks for: the meaning of each frame type.
+use crate::frame::{FrameRef, FrameType};
+use crate::response::DataStatus;
+use crate::segment::Segment;
+
+/// What TrajSetExecStatus asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+#[allow(missing_docs)]
+pub enum ExecCommand {
+    Stop = 1,
+    Pause = 2,
+    Execute = 3,
+}
+
+impl ExecCommand {
+    /// The command of number `byte`.
+    pub const fn from_byte(byte: u8) -> Option<Self> {
+        match byte {
+            1 => Some(Self::Stop),
+            2 => Some(Self::Pause),
+            3 => Some(Self::Execute),
+            _ => None,
+        }
+    }
+}
+
+/// A list of big-endian f32 in a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Floats<'a>(pub(crate) &'a [u8]);
+
+impl<'a> Floats<'a> {
+    /// View of big-endian f32; a rest of fewer than four bytes is left out.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self(&bytes[..bytes.len() & !3])
+    }
+    /// All in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
+        self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_be_bytes(*bytes))
+    }
+    /// The bytes viewed.
+    pub fn as_bytes(&self) -> &'a [u8] {
+        self.0
+    }
+}
+
+impl Floats<'_> {
+    /// Number of floats.
+    pub fn len(&self) -> usize {
+        self.0.len() / 4
+    }
+    /// No float at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Float `i`; `None` past the end.
+    pub fn get(&self, i: usize) -> Option<f32> {
+        self.0.as_chunks::<4>().0.get(i).map(|bytes| f32::from_be_bytes(*bytes))
+    }
+}
+
+/// Bits of the nodes 0..6.
+pub const ALL_NODES: u8 = 0x7F;
+
+/// A command's meaning, borrowed from the frame. Lengths are right; numbers in `Floats` are not yet checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command<'a> {
+    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old 6-byte form reads as everything.
+    ClearCurrentErrors {
+        /// Clear the controller's own errors.
+        jtc: bool,
+        /// Mask of nodes.
+        nodes: u8,
+    },
+    /// Clear current and occurred errors.
+    ClearOccurredErrors,
+    /// One segment.
+    Trajectory(Segment<'a>),
+    /// 6 × (20 velocities, 20 temperatures, 400 torques).
+    FrictionTable(Floats<'a>),
+    /// Use the default table.
+    FrictionTableUseDefault,
+    /// 6 × (Kp, Ki, Kd, IntMin, IntMax).
+    PidParam(Floats<'a>),
+    /// Use the default gains.
+    PidParamUseDefault,
+    /// 7 × 6 joint origins, 7 × 13 links.
+    ArmModel(Floats<'a>),
+    /// Use the default model.
+    ArmModelUseDefault,
+    /// Trajectory execution.
+    TrajSetExecStatus(ExecCommand),
+    /// Teaching on.
+    TeachingModeEnable,
+    /// Teaching off.
+    TeachingModeDisable,
+    /// 6 × 4 or 6 × 6 coefficients, highest index first.
+    FrictionPolynomial(Floats<'a>),
+    /// Use the default polynomial (also type 0x0E with 6 bytes).
+    FrictionPolynomialUseDefault,
+    /// Mask of nodes.
+    ResetCanDevices {
+        /// Bits 0..6.
+        nodes: u8,
+    },
+    /// Pump.
+    GripperControl {
+        /// On.
+        pump: bool,
+    },
+}
+
+/// Where the parts of the short bodies are, from their first byte.
+pub mod field {
+    /// ClearCurrentErrors: bit 0 the controller itself.
+    pub const CLEAR_JTC: usize = 0;
+    /// ClearCurrentErrors: bits 0..6 the nodes.
+    pub const CLEAR_NODES: usize = 1;
+    /// TrajSetExecStatus: what to do.
+    pub const EXEC: usize = 0;
+    /// ResetCanDevices: bits 0..6 the nodes.
+    pub const RESET_NODES: usize = 0;
+    /// GripperControl: pump 0 or 1.
+    pub const PUMP: usize = 0;
+}
+
+impl<'a> Command<'a> {
+    /// Device side. Errors: `IncorrectValue` for a command or pump byte that is none of those listed, `NotAllowed` for a
+    /// JtcStatus. A body that is too short for its type, which [`crate::Receiver`] never hands out, is `IncorrectValue`.
+    pub fn parse(frame: FrameRef<'a>) -> Result<Self, DataStatus> {
+        let body = frame.body();
+        let byte = |i: usize| body.get(i).copied().ok_or(DataStatus::IncorrectValue);
+        let floats = |counts: &[usize]| {
+            if body.len().is_multiple_of(4) && counts.contains(&(body.len() / 4)) {
+                Ok(Floats(body))
+            } else {
+                Err(DataStatus::IncorrectValue)
+            }
+        };
+        Ok(match frame.frame_type {
+            FrameType::ClearCurrentErrors if body.is_empty() => {
+                Self::ClearCurrentErrors { jtc: true, nodes: ALL_NODES }
+            }
+            FrameType::ClearCurrentErrors => Self::ClearCurrentErrors {
+                jtc: byte(field::CLEAR_JTC)? & 1 != 0,
+                nodes: byte(field::CLEAR_NODES)? & ALL_NODES,
+            },
+            FrameType::ClearOccurredErrors => Self::ClearOccurredErrors,
+            FrameType::JtcStatus => return Err(DataStatus::NotAllowed),
+            FrameType::Trajectory => {
+                Self::Trajectory(Segment::parse(body).ok_or(DataStatus::IncorrectValue)?)
+            }
+            FrameType::FrictionTable => Self::FrictionTable(floats(&[2640])?),
+            FrameType::FrictionTableUseDefault => Self::FrictionTableUseDefault,
+            FrameType::PidParam => Self::PidParam(floats(&[30])?),
+            FrameType::PidParamUseDefault => Self::PidParamUseDefault,
+            FrameType::ArmModel => Self::ArmModel(floats(&[133])?),
+            FrameType::ArmModelUseDefault => Self::ArmModelUseDefault,
+            FrameType::TrajSetExecStatus => Self::TrajSetExecStatus(
+                ExecCommand::from_byte(byte(field::EXEC)?).ok_or(DataStatus::IncorrectValue)?,
+            ),
+            FrameType::TeachingModeEnable => Self::TeachingModeEnable,
+            FrameType::TeachingModeDisable => Self::TeachingModeDisable,
+            FrameType::FrictionPolynomial if body.is_empty() => Self::FrictionPolynomialUseDefault,
+            FrameType::FrictionPolynomial => Self::FrictionPolynomial(floats(&[24, 36])?),
+            FrameType::FrictionPolynomialUseDefault => Self::FrictionPolynomialUseDefault,
+            FrameType::ResetCanDevices => {
+                Self::ResetCanDevices { nodes: byte(field::RESET_NODES)? & ALL_NODES }
+            }
+            FrameType::GripperControl => match byte(field::PUMP)? {
+                0 => Self::GripperControl { pump: false },
+                1 => Self::GripperControl { pump: true },
+                _ => return Err(DataStatus::IncorrectValue),
+            },
+        })
+    }
+
+    /// The type of frame that says this.
+    pub const fn frame_type(&self) -> FrameType {
+        match self {
+            Self::ClearCurrentErrors { .. } => FrameType::ClearCurrentErrors,
+            Self::ClearOccurredErrors => FrameType::ClearOccurredErrors,
+            Self::Trajectory(_) => FrameType::Trajectory,
+            Self::FrictionTable(_) => FrameType::FrictionTable,
+            Self::FrictionTableUseDefault => FrameType::FrictionTableUseDefault,
+            Self::PidParam(_) => FrameType::PidParam,
+            Self::PidParamUseDefault => FrameType::PidParamUseDefault,
+            Self::ArmModel(_) => FrameType::ArmModel,
+            Self::ArmModelUseDefault => FrameType::ArmModelUseDefault,
+            Self::TrajSetExecStatus(_) => FrameType::TrajSetExecStatus,
+            Self::TeachingModeEnable => FrameType::TeachingModeEnable,
+            Self::TeachingModeDisable => FrameType::TeachingModeDisable,
+            Self::FrictionPolynomial(_) => FrameType::FrictionPolynomial,
+            Self::FrictionPolynomialUseDefault => FrameType::FrictionPolynomialUseDefault,
+            Self::ResetCanDevices { .. } => FrameType::ResetCanDevices,
+            Self::GripperControl { .. } => FrameType::GripperControl,
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! What a frame is: header, type, length, body, CRC, and which lengths each type can have.
+use core::fmt;
+use core::ops::Range;
+
+use crate::crc16;
+
+/// First byte of every frame.
+pub const HEADER: u8 = 0x9B;
+/// Shortest frame: no body (J-02).
+pub const FRAME_MIN: usize = 6;
+/// Longest frame (J-02).
+pub const FRAME_MAX: usize = 60_000;
+/// Joints of the arm.
+pub const JOINTS: usize = 6;
+
+/// Where the parts of a frame are.
+pub mod field {
+    use super::Range;
+
+    /// Header byte.
+    pub const HEADER: usize = 0;
+    /// Type byte.
+    pub const TYPE: usize = 1;
+    /// Length of the whole frame, u16.
+    pub const LENGTH: Range<usize> = 2..4;
+    /// First byte of the body.
+    pub const BODY: usize = 4;
+    /// Bytes of the CRC at the end.
+    pub const CRC_LEN: usize = 2;
+    /// Body of a frame of `n` bytes.
+    pub const fn body(n: usize) -> Range<usize> {
+        BODY..n - CRC_LEN
+    }
+}
+
+/// Frame types (J-06 table).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u8)]
+#[allow(missing_docs)]
+pub enum FrameType {
+    ClearCurrentErrors = 0x01,
+    ClearOccurredErrors = 0x02,
+    JtcStatus = 0x03,
+    Trajectory = 0x04,
+    FrictionTable = 0x05,
+    FrictionTableUseDefault = 0x06,
+    PidParam = 0x07,
+    PidParamUseDefault = 0x08,
+    ArmModel = 0x09,
+    ArmModelUseDefault = 0x0A,
+    TrajSetExecStatus = 0x0B,
+    TeachingModeEnable = 0x0C,
+    TeachingModeDisable = 0x0D,
+    FrictionPolynomial = 0x0E,
+    FrictionPolynomialUseDefault = 0x0F,
+    ResetCanDevices = 0x10,
+    GripperControl = 0x11,
+}
+
+/// Lengths that frames of one type can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lengths {
+    /// One of these.
+    OneOf(&'static [u16]),
+    /// `first` and every `step` bytes more, up to [`FRAME_MAX`].
+    Steps {
+        /// Shortest.
+        first: u16,
+        /// Bytes from one to the next.
+        step: u16,
+    },
+}
+
+/// Length of a Trajectory frame without points.
+pub const TRAJECTORY_OVERHEAD: usize = 14;
+/// Bytes of a point in a Trajectory frame.
+pub const POINT_LEN: usize = 36;
+/// Most points that fit into one frame (the controller takes 1,500).
+pub const FRAME_POINTS_MAX: usize = (FRAME_MAX - TRAJECTORY_OVERHEAD) / POINT_LEN;
+
+impl FrameType {
+    /// All types in the order of their numbers.
+    pub const ALL: [FrameType; 17] = [
+        FrameType::ClearCurrentErrors,
+        FrameType::ClearOccurredErrors,
+        FrameType::JtcStatus,
+        FrameType::Trajectory,
+        FrameType::FrictionTable,
+        FrameType::FrictionTableUseDefault,
+        FrameType::PidParam,
+        FrameType::PidParamUseDefault,
+        FrameType::ArmModel,
+        FrameType::ArmModelUseDefault,
+        FrameType::TrajSetExecStatus,
+        FrameType::TeachingModeEnable,
+        FrameType::TeachingModeDisable,
+        FrameType::FrictionPolynomial,
+        FrameType::FrictionPolynomialUseDefault,
+        FrameType::ResetCanDevices,
+        FrameType::GripperControl,
+    ];
+
+    /// The type of number `byte`.
+    pub const fn from_byte(byte: u8) -> Option<FrameType> {
+        match byte {
+            0x01..=0x11 => Some(FrameType::ALL[byte as usize - 1]),
+            _ => None,
+        }
+    }
+
+    /// Lengths of whole frames of this type. The 6 bytes of ClearCurrentErrors and FrictionPolynomial are what some
+    /// hosts send (J-06); the three of JtcStatus are those of J-08.
+    pub const fn lengths(self) -> Lengths {
+        use FrameType::*;
+        match self {
+            ClearCurrentErrors => Lengths::OneOf(&[6, 10]),
+            JtcStatus => Lengths::OneOf(&[165, 173, 175]),
+            Trajectory => Lengths::Steps { first: TRAJECTORY_OVERHEAD as u16, step: POINT_LEN as u16 },
+            FrictionTable => Lengths::OneOf(&[10_566]),
+            PidParam => Lengths::OneOf(&[126]),
+            ArmModel => Lengths::OneOf(&[538]),
+            TrajSetExecStatus => Lengths::OneOf(&[7]),
+            FrictionPolynomial => Lengths::OneOf(&[6, 102, 150]),
+            ResetCanDevices | GripperControl => Lengths::OneOf(&[10]),
+            ClearOccurredErrors
+            | FrictionTableUseDefault
+            | PidParamUseDefault
+            | ArmModelUseDefault
+            | TeachingModeEnable
+            | TeachingModeDisable
+            | FrictionPolynomialUseDefault => Lengths::OneOf(&[6]),
+        }
+    }
+
+    /// A whole frame of this type can have `n` bytes.
+    pub const fn can_have(self, n: usize) -> bool {
+        match self.lengths() {
+            Lengths::OneOf(list) => {
+                let mut i = 0;
+                while i < list.len() {
+                    if list[i] as usize == n {
+                        return true;
+                    }
+                    i += 1;
+                }
+                false
+            }
+            Lengths::Steps { first, step } => {
+                let (first, step) = (first as usize, step as usize);
+                n >= first && n <= FRAME_MAX && (n - first).is_multiple_of(step)
+            }
+        }
+    }
+
+    /// Sent by the host (all but JtcStatus).
+    pub const fn from_host(self) -> bool {
+        !matches!(self, FrameType::JtcStatus)
+    }
+
+    /// Name as in the table of frames.
+    pub const fn name(self) -> &'static str {
+        use FrameType::*;
+        match self {
+            ClearCurrentErrors => "ClearCurrentErrors",
+            ClearOccurredErrors => "ClearOccurredErrors",
+            JtcStatus => "JtcStatus",
+            Trajectory => "Trajectory",
+            FrictionTable => "FrictionTable",
+            FrictionTableUseDefault => "FrictionTableUseDefault",
+            PidParam => "PidParam",
+            PidParamUseDefault => "PidParamUseDefault",
+            ArmModel => "ArmModel",
+            ArmModelUseDefault => "ArmModelUseDefault",
+            TrajSetExecStatus => "TrajSetExecStatus",
+            TeachingModeEnable => "TeachingModeEnable",
+            TeachingModeDisable => "TeachingModeDisable",
+            FrictionPolynomial => "FrictionPolynomial",
+            FrictionPolynomialUseDefault => "FrictionPolynomialUseDefault",
+            ResetCanDevices => "ResetCanDevices",
+            GripperControl => "GripperControl",
+        }
+    }
+}
+
+impl fmt::Display for FrameType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A complete frame whose CRC is right and whose length its type can have. Bodies are not yet checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameRef<'a> {
+    /// Type.
+    pub frame_type: FrameType,
+    /// All bytes, header and CRC included.
+    pub bytes: &'a [u8],
+}
+
+impl<'a> FrameRef<'a> {
+    /// Checks a whole frame: header, type, a length that its type can have and that is that of `bytes`, CRC.
+    pub fn new_checked(bytes: &'a [u8]) -> Option<Self> {
+        let (head, _) = bytes.split_first_chunk::<4>()?;
+        let frame_type = FrameType::from_byte(head[field::TYPE])?;
+        let n = usize::from(u16::from_be_bytes([head[2], head[3]]));
+        let good = head[field::HEADER] == HEADER
+            && n == bytes.len()
+            && frame_type.can_have(n)
+            // The remainder over a message and its CRC is zero.
+            && crc16(bytes) == 0;
+        good.then_some(Self { frame_type, bytes })
+    }
+
+    /// Bytes between the length and the CRC.
+    pub fn body(&self) -> &'a [u8] {
+        let end = self.bytes.len().saturating_sub(field::CRC_LEN);
+        self.bytes.get(field::BODY..end).unwrap_or(&[])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j06_numbers_and_names() {
+        for byte in 0..=255u8 {
+            match FrameType::from_byte(byte) {
+                Some(t) => assert_eq!(t as u8, byte),
+                None => assert!(byte == 0 || byte > 0x11),
+            }
+        }
+    }
+
+    #[test]
+    fn j05_lengths_of_each_type() {
+        let allowed = |t: FrameType| (0..=65_535).filter(|n| t.can_have(*n)).count();
+        for t in FrameType::ALL {
+            let expected = match t {
+                FrameType::ClearCurrentErrors => 2,
+                FrameType::JtcStatus | FrameType::FrictionPolynomial => 3,
+                FrameType::Trajectory => FRAME_POINTS_MAX + 1,
+                _ => 1,
+            };
+            assert_eq!(allowed(t), expected, "{t}");
+        }
+        assert_eq!(FRAME_POINTS_MAX, 1666);
+        assert!(FrameType::Trajectory.can_have(54_014) && !FrameType::Trajectory.can_have(54_015));
+        assert!(FrameType::FrictionTable.can_have(10_566));
+    }
+
+    #[test]
+    fn j07_a_short_slice_has_no_body() {
+        let frame = FrameRef { frame_type: FrameType::ArmModel, bytes: &[HEADER, 9, 0] };
+        assert!(frame.body().is_empty());
+        assert_eq!(FrameRef::new_checked(&[]), None);
+    }
+}

@@ -1,0 +1,126 @@
+//! Trajectory bodies: four numbers and points of eighteen int16.
+use crate::frame::{JOINTS, POINT_LEN};
+
+/// One trajectory point as the wire carries it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[repr(C)]
+pub struct RawPoint {
+    /// Full scale 3.141592 rad.
+    pub position: [i16; JOINTS],
+    /// Full scale 6.283185 rad/s.
+    pub velocity: [i16; JOINTS],
+    /// Full scale 12.566370 rad/s².
+    pub acceleration: [i16; JOINTS],
+}
+
+/// rad at 32767 in a trajectory point.
+pub const POSITION_SCALE: f64 = 3.141592;
+/// rad/s at 32767 in a trajectory point.
+pub const VELOCITY_SCALE: f64 = 6.283185;
+/// rad/s² at 32767 in a trajectory point.
+pub const ACCELERATION_SCALE: f64 = 12.566370;
+
+/// Raw value at full scale.
+pub const RAW_FULL_SCALE: f64 = 32767.0;
+
+/// Where the parts of a Trajectory body are, from its first byte.
+pub mod field {
+    use core::ops::Range;
+
+    /// Trajectory number, u16.
+    pub const TRAJECTORY: Range<usize> = 0..2;
+    /// Segment number from 0, u16.
+    pub const SEGMENT: Range<usize> = 2..4;
+    /// Number of segments, u16.
+    pub const SEGMENTS: Range<usize> = 4..6;
+    /// ms between points, u16.
+    pub const STEP_TIME: Range<usize> = 6..8;
+    /// First point.
+    pub const POINTS: usize = 8;
+}
+
+impl RawPoint {
+    /// From the 36 bytes of a point.
+    pub fn parse(bytes: &[u8; POINT_LEN]) -> Self {
+        let i16_at = |i: usize| i16::from_be_bytes([bytes[2 * i], bytes[2 * i + 1]]);
+        Self {
+            position: core::array::from_fn(i16_at),
+            velocity: core::array::from_fn(|j| i16_at(JOINTS + j)),
+            acceleration: core::array::from_fn(|j| i16_at(2 * JOINTS + j)),
+        }
+    }
+
+    /// The 36 bytes of a point.
+    pub fn emit(&self) -> [u8; POINT_LEN] {
+        let mut bytes = [0; POINT_LEN];
+        let values = self.position.iter().chain(&self.velocity).chain(&self.acceleration);
+        for (to, value) in bytes.chunks_exact_mut(2).zip(values) {
+            to.copy_from_slice(&value.to_be_bytes());
+        }
+        bytes
+    }
+
+    /// rad; `raw * 3.141592 / 32767`, the product taken first.
+    pub fn position_rad(&self) -> [f64; JOINTS] {
+        self.position.map(|raw| f64::from(raw) * POSITION_SCALE / RAW_FULL_SCALE)
+    }
+
+    /// rad/s; `raw * 6.283185 / 32767`, the product taken first.
+    pub fn velocity_rad_s(&self) -> [f64; JOINTS] {
+        self.velocity.map(|raw| f64::from(raw) * VELOCITY_SCALE / RAW_FULL_SCALE)
+    }
+
+    /// rad/s²; `raw * 12.566370 / 32767`, the product taken first.
+    pub fn acceleration_rad_s2(&self) -> [f64; JOINTS] {
+        self.acceleration.map(|raw| f64::from(raw) * ACCELERATION_SCALE / RAW_FULL_SCALE)
+    }
+}
+
+/// Borrowed view of a Trajectory body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment<'a> {
+    /// Trajectory number.
+    pub trajectory: u16,
+    /// Number of this segment, from 0.
+    pub segment: u16,
+    /// Number of segments of the trajectory.
+    pub segments: u16,
+    /// ms between points.
+    pub step_time: u16,
+    points: &'a [u8],
+}
+
+impl<'a> Segment<'a> {
+    /// From a body; `None` when it is too short for the four numbers. A rest that is no whole point is left out.
+    pub fn parse(body: &'a [u8]) -> Option<Self> {
+        let (head, points) = body.split_first_chunk::<{ field::POINTS }>()?;
+        let u16_at = |i: usize| u16::from_be_bytes([head[i], head[i + 1]]);
+        Some(Self {
+            trajectory: u16_at(field::TRAJECTORY.start),
+            segment: u16_at(field::SEGMENT.start),
+            segments: u16_at(field::SEGMENTS.start),
+            step_time: u16_at(field::STEP_TIME.start),
+            points,
+        })
+    }
+
+    /// All points in order.
+    pub fn points(&self) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
+        self.points.as_chunks::<POINT_LEN>().0.iter().map(RawPoint::parse)
+    }
+}
+
+impl Segment<'_> {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len() / POINT_LEN
+    }
+    /// No point at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Point `i`; `None` past the end.
+    pub fn point(&self, i: usize) -> Option<RawPoint> {
+        self.points.as_chunks::<POINT_LEN>().0.get(i).map(RawPoint::parse)
+    }
+}

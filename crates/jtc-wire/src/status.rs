@@ -1,0 +1,296 @@
+//! JtcStatus: what the controller says about itself 25 times a second.
+use crate::crc16;
+use crate::frame::{FrameType, HEADER, JOINTS, field as frame_field};
+use crate::response::{DataStatus, FrameStatus, Response};
+
+/// Length of JtcStatus.
+pub const STATUS_LEN: usize = 175;
+/// Length of the layout with a u16 point index (J-08).
+pub const STATUS_LEN_SHORT_INDEX: usize = 173;
+/// Length of the layout without gripper (J-08).
+pub const STATUS_LEN_NO_GRIPPER: usize = 165;
+
+/// Where the parts of the 175-byte frame are.
+///
+/// The 165-byte layout ends after the joints; in the 173-byte layout the point index has two bytes and all that follows
+/// it comes two bytes earlier.
+pub mod field {
+    use core::ops::Range;
+
+    /// Record: type of the frame that is answered.
+    pub const RESPONSE_TYPE: usize = 4;
+    /// Record: status code.
+    pub const RESPONSE_STATUS: usize = 5;
+    /// Record: data status code.
+    pub const RESPONSE_DATA: usize = 6;
+    /// Record: bytes received, u16.
+    pub const RESPONSE_LENGTH: Range<usize> = 7..9;
+    /// State of the controller.
+    pub const FSM: usize = 9;
+    /// Current errors, u16.
+    pub const ERRORS: Range<usize> = 10..12;
+    /// Occurred errors, u16.
+    pub const OCCURRED: Range<usize> = 12..14;
+    /// What the host has not given yet.
+    pub const JTC_INIT: usize = 14;
+    /// Nodes that are not ready yet.
+    pub const NODE_INIT: usize = 15;
+    /// Trajectory execution state.
+    pub const TES: usize = 16;
+    /// Index of the current 1 ms point, u32.
+    pub const POINT: Range<usize> = 17..21;
+    /// Friction type.
+    pub const FRICTION_TYPE: usize = 21;
+    /// CAN: 0 good, 1 error.
+    pub const CAN_ERROR: usize = 22;
+    /// CAN: current flags, u32.
+    pub const CAN_CURRENT: Range<usize> = 23..27;
+    /// CAN: occurred flags, u32.
+    pub const CAN_OCCURRED: Range<usize> = 27..31;
+    /// Joint 0; each has [`JOINT_LEN`] bytes.
+    pub const JOINTS: usize = 31;
+    /// Bytes of a joint.
+    pub const JOINT_LEN: usize = 22;
+    /// Gripper: state, pump, pressure 1, pressure 2, errors, warnings, four zeros.
+    pub const GRIPPER: Range<usize> = 163..173;
+    /// CRC.
+    pub const CRC: Range<usize> = 173..175;
+
+    /// Where the parts of a joint are, from its first byte.
+    pub mod joint {
+        use super::Range;
+
+        /// State.
+        pub const FSM: usize = 0;
+        /// Current motor-control faults.
+        pub const MC_CURRENT: usize = 1;
+        /// Occurred motor-control faults.
+        pub const MC_OCCURRED: usize = 2;
+        /// Errors.
+        pub const ERRORS: usize = 3;
+        /// Warnings.
+        pub const WARNINGS: usize = 4;
+        /// Errors found by the controller, u16.
+        pub const INTERNAL: Range<usize> = 5..7;
+        /// Occurred errors found by the controller, u16.
+        pub const INTERNAL_OCCURRED: Range<usize> = 7..9;
+        /// rad, f32.
+        pub const POSITION: Range<usize> = 9..13;
+        /// rad/s, f32.
+        pub const VELOCITY: Range<usize> = 13..17;
+        /// N·m, f32.
+        pub const TORQUE: Range<usize> = 17..21;
+        /// °C.
+        pub const TEMPERATURE: usize = 21;
+    }
+}
+
+/// JtcStatus (section 2), both ways: `emit` for the device, `parse` for the host (165, 173 and 175 bytes, J-08).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Status {
+    /// Record of a received frame, or none.
+    pub response: Response,
+    /// State: see [`crate::words::jtc_fsm`].
+    pub fsm: u8,
+    /// Current errors: bits of [`crate::words::JTC_ERRORS`].
+    pub errors: u16,
+    /// Occurred errors, same bits.
+    pub occurred: u16,
+    /// What is missing: bits of [`crate::words::JTC_INIT`].
+    pub jtc_init: u8,
+    /// Nodes that are missing: bits of [`crate::words::NODES`].
+    pub node_init: u8,
+    /// Trajectory execution state: see [`crate::words::tes`].
+    pub tes: u8,
+    /// Index of the current 1 ms point.
+    pub point: u32,
+    /// 0 polynomial, 1 table.
+    pub friction_type: u8,
+    /// 0 good, 1 error.
+    pub can_error: u8,
+    /// Bit 0 transmit timeout, bit 8+n receive timeout of node n.
+    pub can_current: u32,
+    /// Occurred flags, same bits.
+    pub can_occurred: u32,
+    /// Joints 0..5.
+    pub joints: [JointStatus; JOINTS],
+    /// `None` in the 165-byte layout.
+    pub gripper: Option<GripperStatus>,
+}
+
+/// One joint in JtcStatus.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct JointStatus {
+    /// State of the drive: see [`crate::words::node_fsm`].
+    pub fsm: u8,
+    /// Current motor-control faults: bits of [`crate::words::MC_FAULTS`].
+    pub mc_current: u8,
+    /// Occurred motor-control faults.
+    pub mc_occurred: u8,
+    /// Errors of the drive: bits of [`crate::words::NODE_ERRORS`].
+    pub errors: u8,
+    /// Warnings of the drive: bits of [`crate::words::NODE_WARNINGS`].
+    pub warnings: u8,
+    /// Errors found by the controller: bits of [`crate::words::JOINT_INTERNAL`].
+    pub internal: u16,
+    /// Occurred errors found by the controller.
+    pub internal_occurred: u16,
+    /// rad.
+    pub position: f32,
+    /// rad/s.
+    pub velocity: f32,
+    /// N·m.
+    pub torque: f32,
+    /// Bearing temperature, °C.
+    pub temperature: u8,
+}
+
+/// The gripper in JtcStatus.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct GripperStatus {
+    /// State: see [`crate::words::node_fsm`].
+    pub fsm: u8,
+    /// Pump 0 off, 1 on.
+    pub pump: u8,
+    /// 1: first pressure level reached.
+    pub pressure1: u8,
+    /// 1: second pressure level reached.
+    pub pressure2: u8,
+    /// Errors: bits of [`crate::words::NODE_ERRORS`].
+    pub errors: u8,
+    /// Warnings: bits of [`crate::words::NODE_WARNINGS`].
+    pub warnings: u8,
+}
+
+/// `N` bytes of `bytes` from `at`; zeros past the end (no caller goes there).
+fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    bytes.get(at..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
+}
+
+impl JointStatus {
+    fn emit(&self) -> [u8; field::JOINT_LEN] {
+        use field::joint::*;
+        let mut b = [0; field::JOINT_LEN];
+        b[FSM] = self.fsm;
+        b[MC_CURRENT] = self.mc_current;
+        b[MC_OCCURRED] = self.mc_occurred;
+        b[ERRORS] = self.errors;
+        b[WARNINGS] = self.warnings;
+        b[INTERNAL].copy_from_slice(&self.internal.to_be_bytes());
+        b[INTERNAL_OCCURRED].copy_from_slice(&self.internal_occurred.to_be_bytes());
+        b[POSITION].copy_from_slice(&self.position.to_be_bytes());
+        b[VELOCITY].copy_from_slice(&self.velocity.to_be_bytes());
+        b[TORQUE].copy_from_slice(&self.torque.to_be_bytes());
+        b[TEMPERATURE] = self.temperature;
+        b
+    }
+
+    fn parse(b: &[u8; field::JOINT_LEN]) -> Self {
+        use field::joint::*;
+        Self {
+            fsm: b[FSM],
+            mc_current: b[MC_CURRENT],
+            mc_occurred: b[MC_OCCURRED],
+            errors: b[ERRORS],
+            warnings: b[WARNINGS],
+            internal: u16::from_be_bytes(get(b, INTERNAL.start)),
+            internal_occurred: u16::from_be_bytes(get(b, INTERNAL_OCCURRED.start)),
+            position: f32::from_be_bytes(get(b, POSITION.start)),
+            velocity: f32::from_be_bytes(get(b, VELOCITY.start)),
+            torque: f32::from_be_bytes(get(b, TORQUE.start)),
+            temperature: b[TEMPERATURE],
+        }
+    }
+}
+
+impl Status {
+    /// The 175-byte frame with CRC (a missing gripper is emitted as zeros).
+    pub fn emit(&self) -> [u8; STATUS_LEN] {
+        use field::*;
+        let mut b = [0; STATUS_LEN];
+        b[frame_field::HEADER] = HEADER;
+        b[frame_field::TYPE] = FrameType::JtcStatus as u8;
+        b[frame_field::LENGTH].copy_from_slice(&(STATUS_LEN as u16).to_be_bytes());
+        b[RESPONSE_TYPE] = self.response.frame_type;
+        b[RESPONSE_STATUS] = self.response.status as u8;
+        b[RESPONSE_DATA] = self.response.data as u8;
+        b[RESPONSE_LENGTH].copy_from_slice(&self.response.length.to_be_bytes());
+        b[FSM] = self.fsm;
+        b[ERRORS].copy_from_slice(&self.errors.to_be_bytes());
+        b[OCCURRED].copy_from_slice(&self.occurred.to_be_bytes());
+        b[JTC_INIT] = self.jtc_init;
+        b[NODE_INIT] = self.node_init;
+        b[TES] = self.tes;
+        b[POINT].copy_from_slice(&self.point.to_be_bytes());
+        b[FRICTION_TYPE] = self.friction_type;
+        b[CAN_ERROR] = self.can_error;
+        b[CAN_CURRENT].copy_from_slice(&self.can_current.to_be_bytes());
+        b[CAN_OCCURRED].copy_from_slice(&self.can_occurred.to_be_bytes());
+        for (to, joint) in b[JOINTS..GRIPPER.start].chunks_exact_mut(JOINT_LEN).zip(&self.joints) {
+            to.copy_from_slice(&joint.emit());
+        }
+        let g = self.gripper.unwrap_or_default();
+        b[GRIPPER][..6].copy_from_slice(&[g.fsm, g.pump, g.pressure1, g.pressure2, g.errors, g.warnings]);
+        let crc = crc16(&b[..CRC.start]);
+        b[CRC].copy_from_slice(&crc.to_be_bytes());
+        b
+    }
+
+    /// From a whole frame of 165, 173 or 175 bytes; `None` when type, length or CRC is wrong.
+    ///
+    /// A record with a code that this version does not know reads as one of status Idle, so that it confirms nothing.
+    pub fn parse(bytes: &[u8]) -> Option<Status> {
+        let frame = crate::FrameRef::new_checked(bytes)?;
+        if frame.frame_type != FrameType::JtcStatus {
+            return None;
+        }
+        let short_index = bytes.len() == STATUS_LEN_SHORT_INDEX;
+        // Where a byte is that follows the point index.
+        let late = |at: usize| if short_index { at - 2 } else { at };
+        let byte = |at: usize| get::<1>(bytes, at)[0];
+        let response = match (
+            FrameStatus::from_byte(byte(field::RESPONSE_STATUS)),
+            DataStatus::from_byte(byte(field::RESPONSE_DATA)),
+        ) {
+            (Some(status), Some(data)) => Response {
+                frame_type: byte(field::RESPONSE_TYPE),
+                status,
+                data,
+                length: u16::from_be_bytes(get(bytes, field::RESPONSE_LENGTH.start)),
+            },
+            _ => Response::default(),
+        };
+        let point = field::POINT.start;
+        let gripper = (bytes.len() != STATUS_LEN_NO_GRIPPER).then(|| {
+            let [fsm, pump, pressure1, pressure2, errors, warnings] = get(bytes, late(field::GRIPPER.start));
+            GripperStatus { fsm, pump, pressure1, pressure2, errors, warnings }
+        });
+        Some(Status {
+            response,
+            fsm: byte(field::FSM),
+            errors: u16::from_be_bytes(get(bytes, field::ERRORS.start)),
+            occurred: u16::from_be_bytes(get(bytes, field::OCCURRED.start)),
+            jtc_init: byte(field::JTC_INIT),
+            node_init: byte(field::NODE_INIT),
+            tes: byte(field::TES),
+            point: if short_index {
+                u16::from_be_bytes(get(bytes, point)).into()
+            } else {
+                u32::from_be_bytes(get(bytes, point))
+            },
+            friction_type: byte(late(field::FRICTION_TYPE)),
+            can_error: byte(late(field::CAN_ERROR)),
+            can_current: u32::from_be_bytes(get(bytes, late(field::CAN_CURRENT.start))),
+            can_occurred: u32::from_be_bytes(get(bytes, late(field::CAN_OCCURRED.start))),
+            joints: core::array::from_fn(|j| {
+                JointStatus::parse(&get(bytes, late(field::JOINTS + j * field::JOINT_LEN)))
+            }),
+            gripper,
+        })
+    }
+
+    /// The record it carries; `None` when it carries none.
+    pub fn response(&self) -> Option<Response> {
+        (!self.response.is_idle()).then_some(self.response)
+    }
+}

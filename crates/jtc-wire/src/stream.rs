@@ -1,0 +1,386 @@
+//! The device's stream parser: finds frames in bytes that arrive in any pieces, and says what else arrived (J-03, J-04).
+//!
+//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins where no good frame begins and ends
+//! where one does, or at a gap. It makes one event when it is known what is wrong at its first byte; the rest of it is
+//! passed over in silence. A frame that is not yet complete is waited for until it is, or until a gap ends it; then the bytes
+//! after its first one are looked at again, so that a false header costs nothing that follows it.
+//!
+//! Terms: a *candidate* is a place with a header, a known type and a length that the type can have. A *gap* is a silence of
+//! `gap_us` or more after bytes that were received.
+//!
+//! Cost: each byte is copied and enters the CRC once, when it arrives. The CRC register is kept at every 64th byte, so that
+//! any candidate is checked with two registers and some arithmetic, however long it is. Hostile bytes full of false
+//! headers cost a constant each, and [`Receiver::poll`] looks at a bounded number of them per call.
+use crate::crc::{advance, crc16_update};
+use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
+use crate::response::{FrameStatus, Response};
+
+/// What the parser found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinkEvent<'a> {
+    /// A good frame.
+    Frame(FrameRef<'a>),
+    /// A bad frame or a run of bytes that is no frame.
+    Bad(Response),
+}
+
+/// Bytes between two kept CRC registers.
+const GRID: usize = 64;
+/// CRC registers kept.
+const REGISTERS: usize = FRAME_MAX.div_ceil(GRID) + 1;
+/// Gaps among the held bytes that are remembered.
+const GAPS: usize = 64;
+/// Work of one `poll`: a byte passed over costs one, a candidate whose CRC is taken `CANDIDATE`.
+const BUDGET: usize = 4096;
+const CANDIDATE: usize = 128;
+
+/// Stream parser of rule J-03 over a buffer of at least [`FRAME_MAX`] bytes (with a shorter one, frames that do not fit into it
+/// are refused as such with a wrong length).
+///
+/// ```
+/// use jtc_wire::{LinkEvent, Receiver};
+/// let mut receiver = Receiver::new(vec![0; jtc_wire::FRAME_MAX], 5000);
+/// receiver.push(0, &[0x9B, 0x0C, 0x00]);
+/// assert!(!receiver.poll(1000));
+/// receiver.push(1000, &[0x06, 0xCD, 0x27]);
+/// assert!(receiver.poll(1000));
+/// let Some(LinkEvent::Frame(frame)) = receiver.event() else { panic!() };
+/// assert_eq!(frame.frame_type, jtc_wire::FrameType::TeachingModeEnable);
+/// receiver.release();
+/// ```
+pub struct Receiver<B> {
+    buffer: B,
+    gap_us: u64,
+    /// Held bytes are `start..end` of the buffer.
+    start: usize,
+    end: usize,
+    /// When the last byte came.
+    last_us: u64,
+    /// The caller has bytes that were not taken: silence is not the line's.
+    refused: bool,
+    /// Such bytes come after a gap.
+    gap_before_refused: bool,
+    /// The bytes from `start` belong to a run that has had its event.
+    in_run: bool,
+    /// The last `poll` stopped early.
+    busy: bool,
+    event: Option<Found>,
+    gaps: Gaps,
+    registers: Registers,
+}
+
+#[derive(Clone, Copy)]
+enum Found {
+    Frame(FrameType, usize),
+    Bad(Response),
+}
+
+/// What is at the first held byte.
+enum Sight {
+    Frame(FrameType, usize),
+    /// Nothing can be said before more bytes or a gap.
+    Wait,
+    Bad(Response),
+}
+
+impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
+    /// `gap_us`: a gap within a frame that ends it (5000).
+    pub fn new(buffer: B, gap_us: u32) -> Self {
+        Self {
+            buffer,
+            gap_us: gap_us.into(),
+            start: 0,
+            end: 0,
+            last_us: 0,
+            refused: false,
+            gap_before_refused: false,
+            in_run: false,
+            busy: false,
+            event: None,
+            gaps: Gaps::new(),
+            registers: Registers::new(),
+        }
+    }
+
+    /// Bytes that are held at most.
+    fn capacity(&self) -> usize {
+        self.buffer.as_ref().len().min(FRAME_MAX)
+    }
+
+    /// Take bytes that were received until `now_us`; returns how many were taken (fewer when the buffer is full: offer the
+    /// rest again after `release` or more `poll`s; that they came late is not taken for a gap).
+    ///
+    /// Call it at least each millisecond or two while bytes come: between two calls more than `gap_us` apart is a gap.
+    pub fn push(&mut self, now_us: u64, bytes: &[u8]) -> usize {
+        if bytes.is_empty() {
+            return 0;
+        }
+        let gap = if self.refused {
+            self.gap_before_refused
+        } else {
+            now_us.saturating_sub(self.last_us) >= self.gap_us
+        };
+        if gap && !self.mark_gap() {
+            self.refused = true;
+            self.gap_before_refused = true;
+            return 0;
+        }
+        if self.capacity() - self.end < bytes.len() {
+            self.compact();
+        }
+        let room = self.capacity() - self.end;
+        let taken = &bytes[..room.min(bytes.len())];
+        let to = self.end..self.end + taken.len();
+        self.buffer.as_mut()[to].copy_from_slice(taken);
+        self.registers.absorb(self.end, taken);
+        self.end += taken.len();
+        self.refused = taken.len() < bytes.len();
+        // A gap before bytes of which none was taken is marked already.
+        self.gap_before_refused = false;
+        self.last_us = now_us;
+        taken.len()
+    }
+
+    /// Look for the next event with bounded work; true when `event` has one. Call it after `push` and at least each
+    /// millisecond so that gaps are seen; false with [`busy`](Self::busy) means that calling it again goes on.
+    pub fn poll(&mut self, now_us: u64) -> bool {
+        if !self.refused && now_us.saturating_sub(self.last_us) >= self.gap_us {
+            // A full list of gaps ends in one at the last byte or is shortened below.
+            self.mark_gap();
+        }
+        self.busy = false;
+        let mut budget = BUDGET;
+        while self.event.is_none() {
+            if self.gaps.first() == Some(self.start) {
+                self.gaps.pop();
+                self.in_run = false;
+                continue;
+            }
+            if self.start == self.end {
+                return false;
+            }
+            if budget < CANDIDATE {
+                self.busy = true;
+                return false;
+            }
+            match self.look() {
+                Sight::Wait => return false,
+                Sight::Frame(kind, n) => {
+                    self.in_run = false;
+                    self.event = Some(Found::Frame(kind, n));
+                }
+                Sight::Bad(response) => {
+                    if !self.in_run {
+                        self.in_run = true;
+                        self.event = Some(Found::Bad(response));
+                    }
+                    budget -= CANDIDATE;
+                    let passed = self.pass_over(budget);
+                    budget -= passed;
+                }
+            }
+        }
+        true
+    }
+
+    /// The event found, until it is released.
+    pub fn event(&self) -> Option<LinkEvent<'_>> {
+        Some(match self.event? {
+            Found::Frame(frame_type, n) => {
+                let bytes = &self.buffer.as_ref()[self.start..self.start + n];
+                LinkEvent::Frame(FrameRef { frame_type, bytes })
+            }
+            Found::Bad(response) => LinkEvent::Bad(response),
+        })
+    }
+
+    /// Done with the event.
+    pub fn release(&mut self) {
+        if let Some(Found::Frame(_, n)) = self.event.take() {
+            self.start += n;
+        }
+    }
+
+    /// Bytes are held that may become a frame.
+    pub fn mid_frame(&self) -> bool {
+        let frame = match self.event {
+            Some(Found::Frame(_, n)) => n,
+            _ => 0,
+        };
+        self.end > self.start + frame
+    }
+
+    /// The last `poll` stopped because its work is bounded: there is more to look at without new bytes.
+    pub fn busy(&self) -> bool {
+        self.busy
+    }
+
+    /// What is at `start`, seen up to the next gap. There is at least one byte.
+    fn look(&self) -> Sight {
+        let closed = self.gaps.first();
+        let limit = closed.unwrap_or(self.end);
+        let seen = &self.buffer.as_ref()[self.start..limit];
+        let bad = |kind, status, length: usize| Sight::Bad(Response::bad(kind, status, length as u16));
+        let incomplete = |kind| match closed {
+            Some(_) => bad(kind, FrameStatus::DiscontinuousFrame, seen.len()),
+            None => Sight::Wait,
+        };
+        if seen[field::HEADER] != HEADER {
+            return bad(0, FrameStatus::IncorrectHeader, 0);
+        }
+        let Some(&byte) = seen.get(field::TYPE) else { return incomplete(0) };
+        let kind = match FrameType::from_byte(byte) {
+            Some(kind) if kind.from_host() => kind,
+            _ => return bad(byte, FrameStatus::IncorrectFrameType, 0),
+        };
+        let Some(&[high, low]) = seen.get(field::LENGTH).and_then(<[u8]>::first_chunk) else {
+            return incomplete(byte);
+        };
+        let n = usize::from(u16::from_be_bytes([high, low]));
+        if n < FRAME_MIN || n > self.capacity() {
+            return bad(0, FrameStatus::IncorrectHeader, 0);
+        }
+        if !kind.can_have(n) {
+            return bad(byte, FrameStatus::IncorrectFrameType, n);
+        }
+        if seen.len() < n {
+            return incomplete(byte);
+        }
+        let (from, to) = (self.start, self.start + n);
+        if self.register(to) == advance(self.register(from), n) {
+            Sight::Frame(kind, n)
+        } else {
+            bad(byte, FrameStatus::IncorrectCrc, n)
+        }
+    }
+
+    /// Gives up the first held byte and at most `most` more up to the next header or gap; returns how many more.
+    fn pass_over(&mut self, most: usize) -> usize {
+        self.start += 1;
+        let limit = self.gaps.first().unwrap_or(self.end).min(self.start + most);
+        let rest = &self.buffer.as_ref()[self.start..limit];
+        let passed = rest.iter().position(|byte| *byte == HEADER).unwrap_or(rest.len());
+        self.start += passed;
+        passed
+    }
+
+    /// Remembers a gap after the last held byte; false when there is no place for it.
+    fn mark_gap(&mut self) -> bool {
+        if self.start == self.end && self.event.is_none() {
+            self.in_run = false;
+            return true;
+        }
+        self.gaps.mark(self.end)
+    }
+
+    /// CRC register before byte `at` of the buffer.
+    fn register(&self, at: usize) -> u16 {
+        self.registers.at(at, self.end, self.buffer.as_ref())
+    }
+
+    /// Moves the held bytes to the front of the buffer.
+    fn compact(&mut self) {
+        if self.start == 0 {
+            return;
+        }
+        self.registers.shift(self.start, self.end, self.buffer.as_ref());
+        self.gaps.shift(self.start);
+        self.buffer.as_mut().copy_within(self.start..self.end, 0);
+        self.end -= self.start;
+        self.start = 0;
+    }
+}
+
+/// Places of gaps in the buffer, in order.
+struct Gaps {
+    places: [u16; GAPS],
+    count: usize,
+}
+
+impl Gaps {
+    const fn new() -> Self {
+        Self { places: [0; GAPS], count: 0 }
+    }
+
+    fn first(&self) -> Option<usize> {
+        (self.count > 0).then_some(usize::from(self.places[0]))
+    }
+
+    fn pop(&mut self) {
+        self.places.copy_within(1.., 0);
+        self.count = self.count.saturating_sub(1);
+    }
+
+    fn mark(&mut self, place: usize) -> bool {
+        let place = place as u16;
+        if self.count > 0 && self.places[self.count - 1] == place {
+            return true;
+        }
+        let Some(free) = self.places.get_mut(self.count) else { return false };
+        *free = place;
+        self.count += 1;
+        true
+    }
+
+    fn shift(&mut self, by: usize) {
+        for place in &mut self.places[..self.count] {
+            *place -= by as u16;
+        }
+    }
+}
+
+/// CRC registers along the buffer: before its first byte, and before the bytes `phase`, `phase + 64`, …
+struct Registers {
+    base: u16,
+    last: u16,
+    /// 1..=GRID.
+    phase: usize,
+    count: usize,
+    kept: [u16; REGISTERS],
+}
+
+impl Registers {
+    const fn new() -> Self {
+        Self { base: 0, last: 0, phase: GRID, count: 0, kept: [0; REGISTERS] }
+    }
+
+    /// Goes on over `bytes`, which are at `end..` of the buffer.
+    fn absorb(&mut self, mut end: usize, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let next = self.phase + self.count * GRID;
+            let (piece, rest) = bytes.split_at((next - end).min(bytes.len()));
+            self.last = crc16_update(self.last, piece);
+            end += piece.len();
+            bytes = rest;
+            if end == next {
+                self.kept[self.count] = self.last;
+                self.count += 1;
+            }
+        }
+    }
+
+    fn at(&self, at: usize, end: usize, buffer: &[u8]) -> u16 {
+        if at == end {
+            self.last
+        } else if at < self.phase {
+            crc16_update(self.base, &buffer[..at])
+        } else {
+            let slot = (at - self.phase) / GRID;
+            crc16_update(self.kept[slot], &buffer[self.phase + slot * GRID..at])
+        }
+    }
+
+    /// The bytes before `by` go.
+    fn shift(&mut self, by: usize, end: usize, buffer: &[u8]) {
+        self.base = self.at(by, end, buffer);
+        if by >= self.phase {
+            let gone = (by - self.phase) / GRID + 1;
+            self.kept.copy_within(gone.min(self.count)..self.count, 0);
+            self.count = self.count.saturating_sub(gone);
+            self.phase += gone * GRID;
+        }
+        self.phase -= by;
+    }
+}
+
+const _: () = assert!(size_of::<Receiver<[u8; FRAME_MAX]>>() <= FRAME_MAX + 2560);

@@ -111,7 +111,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // What has come in.
         let had_errors = self.state == State::Error;
         self.nodes.take(inputs, &self.config, self.goal());
-        let host_done = self.serve_host(inputs.host);
+        // In Start nothing is executed yet; the event is offered again.
+        let host_done = self.state != State::Start && self.serve_host(inputs.host);
 
         // What state that makes.
         self.check_errors(inputs);

@@ -1,0 +1,295 @@
+//! The control law in the loop of the controller (section 6), and torque without steps.
+mod rig;
+
+use jtc_core::{Config, Parameters, State, Tes, error, joint_error};
+use jtc_dynamics::Dynamics;
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use rig::{Rig, floats, rest};
+
+fn torques(rig: &Rig) -> [f64; 6] {
+    rig.controller.telemetry().joints.map(|j| j.torque)
+}
+
+fn model(rig: &Rig) -> [f64; 6] {
+    rig.controller.telemetry().joints.map(|j| j.torque_model)
+}
+
+/// Runs `ticks` and asserts that no torque steps by more than its model part and `slack` N·m.
+fn run_without_steps(rig: &mut Rig, ticks: usize, slack: f64) {
+    for _ in 0..ticks {
+        let (t0, m0) = (torques(rig), model(rig));
+        rig.tick();
+        let (t1, m1) = (torques(rig), model(rig));
+        for j in 0..6 {
+            let step = ((t1[j] - t0[j]) - (m1[j] - m0[j])).abs();
+            assert!(step < slack, "joint {j}: step of {step} N·m in {:?}", rig.state());
+        }
+    }
+}
+
+#[test]
+fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
+    let mut rig = Rig::holding();
+    let config = Config::avena();
+    let dynamics = Dynamics::new(&Parameters::avena().model, config.gravity);
+    rig.follow = false;
+    rig.nodes[1].report.position = 0.005;
+    rig.run(3);
+    let q = rig.controller.telemetry().joints.map(|j| j.position);
+    assert_eq!(model(&rig), dynamics.gravity_torque(&q));
+
+    let points: Vec<_> = (0..100i16)
+        .map(|i| RawPoint {
+            position: [i; 6],
+            velocity: [50 * i, 0, 30 * i, 0, 0, 0],
+            acceleration: [300, 0, 200, 0, 0, 100],
+        })
+        .collect();
+    let mut rig = Rig::holding();
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(500, |r| r.controller.telemetry().point == 105);
+    let t = *rig.controller.telemetry();
+    let (q, qd, qdd) = (
+        t.joints.map(|j| j.position),
+        t.joints.map(|j| j.set_velocity),
+        t.joints.map(|j| j.set_acceleration),
+    );
+    let expected = dynamics.inverse(&q, &qd, &qdd);
+    for j in 0..6 {
+        let rotor = config.joints[j].rotor_inertia;
+        assert!(rotor > 0.0);
+        assert!((t.joints[j].torque_model - expected[j] - rotor * qdd[j]).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn j40_gravity_is_a_setting() {
+    let down = Rig::holding();
+    let up = Rig::holding_with(Config { gravity: [0.0, 0.0, 9.81], ..Config::avena() });
+    let sideways = Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() });
+    for j in 0..6 {
+        assert!((model(&down)[j] + model(&up)[j]).abs() < 1e-9);
+    }
+    // At zero the arm is stretched along the vertical: only gravity across it loads joint 1.
+    assert!(model(&down)[1].abs() < 1.0);
+    assert!(model(&sideways)[1].abs() > 50.0);
+}
+
+#[test]
+fn j41_no_derivative_kick_when_holding_begins() {
+    let mut rig = Rig::new(Config::avena());
+    rig.follow = false;
+    for j in 0..6 {
+        rig.nodes[j].report.position = 0.3;
+    }
+    rig.defaults();
+    for _ in 0..300 {
+        rig.tick();
+        for j in &rig.controller.telemetry().joints {
+            assert!(j.torque_d.abs() < 1e-6 && j.torque_p.abs() < 1e-2);
+        }
+    }
+    assert_eq!(rig.state(), State::HoldPos);
+}
+
+#[test]
+fn j43_limits_of_set_values() {
+    let point = |p: f64, v: f64, a: f64| RawPoint {
+        position: [0, (p / 3.141592 * 32767.0) as i16, 0, 0, 0, 0],
+        velocity: [0, (v / 6.283185 * 32767.0) as i16, 0, 0, 0, 0],
+        acceleration: [0, (a / 12.566370 * 32767.0) as i16, 0, 0, 0, 0],
+    };
+    for (at, bit) in [
+        (point(1.60, 0.0, 0.0), joint_error::POSITION),
+        (point(0.0, 1.55, 0.0), joint_error::VELOCITY),
+        (point(0.0, 0.0, 9.0), joint_error::ACCELERATION),
+    ] {
+        let mut config = Config::avena();
+        config.joints[1].acceleration_max = 8.0;
+        // Only the limit under test: leave the others room.
+        config.joints[1].torque_max = 1e6;
+        config.joints[1].position_error_max = 10.0;
+        let mut rig = Rig::holding_with(config);
+        rig.upload(&[point(0.0, 0.0, 0.0), at, at], 100);
+        rig.exec(ExecCommand::Execute);
+        rig.until(800, |r| r.state() == State::Error);
+        assert_eq!(rig.status().joints[1].internal & 0b111, bit);
+        assert_eq!(rig.torque, [0.0; 6], "the set value is not used");
+        assert_ne!(rig.errors() & (error::INTERNAL_JOINTS | error::INTERNAL), 0);
+    }
+}
+
+#[test]
+fn j43_position_error_and_torque_zero_the_torque_of_the_same_tick() {
+    let mut config = Config::avena();
+    config.joints[3].torque_max = 1e6;
+    let mut rig = Rig::holding_with(config);
+    rig.follow = false;
+    rig.nodes[3].report.position = 0.095;
+    rig.run(2);
+    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.status().joints[3].internal, joint_error::POSITION_ERROR);
+    assert!(
+        rig.sent
+            .iter()
+            .rev()
+            .take(2)
+            .all(|r| !matches!(r, jtc_bus::Request::Move { torque, .. } if *torque != [0.0; 6]))
+    );
+
+    let mut rig = Rig::holding();
+    rig.follow = false;
+    rig.nodes[5].report.position = 0.02; // 80 N·m wanted, 40 N·m allowed
+    rig.run(2);
+    assert_eq!(rig.status().joints[5].internal, joint_error::TORQUE);
+    assert_eq!(rig.torque, [0.0; 6]);
+}
+
+#[test]
+fn j43_a_configuration_may_let_the_torque_saturate_for_a_while_and_j41_holds_the_integral() {
+    let mut rig = Rig::holding_with(Config { torque_over_ms: 50, ..Config::avena() });
+    rig.follow = false;
+    rig.nodes[5].report.position = -0.02;
+    rig.run(10);
+    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.controller.telemetry().joints[5].torque, 40.0);
+    let integral = rig.controller.telemetry().joints[5].torque_i;
+    rig.run(20);
+    assert_eq!(rig.controller.telemetry().joints[5].torque_i, integral);
+    rig.run(60);
+    assert_eq!(rig.status().joints[5].internal, joint_error::TORQUE);
+}
+
+#[test]
+fn j42_outside_the_friction_table_is_a_joint_error() {
+    let mut rig = Rig::holding();
+    assert_eq!(rig.ask(FrameType::FrictionTableUseDefault, &[]), DataStatus::NoError);
+    assert_eq!(rig.status().friction_type, 1);
+    rig.nodes[4].report.temperature = 60; // the table ends at 43.2 °C
+    rig.run(10);
+    assert_eq!(rig.state(), State::HoldPos, "friction acts in Operate only");
+    let points: Vec<_> = (0..50).map(|_| rest(0)).collect();
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(20, |r| r.state() == State::Error);
+    assert_eq!(rig.status().joints[4].internal, joint_error::FRICTION_TABLE);
+    assert_eq!(rig.torque, [0.0; 6]);
+}
+
+#[test]
+fn j42_polynomial_order_and_lengths() {
+    // Highest index first on the wire: c3, c2, c1, c0.
+    let mut rig = Rig::holding();
+    let four = floats((0..6).flat_map(|_| [0.0, 0.0, 0.0, 5.0]));
+    assert_eq!(rig.ask(FrameType::FrictionPolynomial, &four), DataStatus::NoError);
+    let points: Vec<_> =
+        (0..100i16).map(|i| RawPoint { position: [i * 3; 6], velocity: [150; 6], ..rest(0) }).collect();
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(900, |r| r.controller.telemetry().point == 500);
+    for j in &rig.controller.telemetry().joints {
+        assert!((j.torque_friction - 5.0).abs() < 1e-9, "Coulomb friction only: {}", j.torque_friction);
+    }
+    // Six: c5..c0, and 25 °C is c5, so the factor is 1.
+    let mut rig = Rig::holding();
+    let six = floats((0..6).flat_map(|_| [25.0, -0.02, 0.0, 0.0, 10.0, 2.0]));
+    assert_eq!(rig.ask(FrameType::FrictionPolynomial, &six), DataStatus::NoError);
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(900, |r| r.controller.telemetry().point == 500);
+    let v = 150.0 * 6.283185 / 32767.0;
+    for j in &rig.controller.telemetry().joints {
+        assert!((j.torque_friction - (2.0 + 10.0 * v)).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn j44_no_torque_step_at_any_switch() {
+    let mut rig = Rig::holding();
+    rig.follow = false;
+    // A standing error, so that PID torque is there to be carried over.
+    for j in 0..6 {
+        rig.nodes[j].report.position = 0.0003;
+    }
+    rig.run(300);
+    assert!(rig.controller.telemetry().joints[0].torque_p.abs() > 2.0);
+    assert_eq!(rig.ask(FrameType::FrictionTableUseDefault, &[]), DataStatus::NoError);
+    let points: Vec<_> = (0..60).map(|_| rest(0)).collect();
+    rig.upload(&points, 10);
+    rig.send(FrameType::TrajSetExecStatus, &[3]);
+    // Slack: integral and the blend of 100 ms.
+    run_without_steps(&mut rig, 1200, 1.5);
+    assert_eq!(rig.tes(), Tes::Finish);
+    rig.send(FrameType::TeachingModeEnable, &[]);
+    run_without_steps(&mut rig, 300, 1.5);
+    assert_eq!(rig.state(), State::Teaching);
+    rig.send(FrameType::TeachingModeDisable, &[]);
+    run_without_steps(&mut rig, 300, 1.5);
+    assert_eq!(rig.state(), State::HoldPos);
+    // New gains while holding.
+    rig.send(FrameType::PidParam, &floats((0..6).flat_map(|_| [100.0, 10.0, 1.0, -1.0, 1.0])));
+    run_without_steps(&mut rig, 300, 1.5);
+}
+
+#[test]
+fn j25_teaching_compensates_gravity_and_brakes_above_the_speed_limit() {
+    let mut rig = Rig::holding();
+    rig.ask(FrameType::TeachingModeEnable, &[]);
+    rig.run(150);
+    rig.nodes[1].report.position = 0.05;
+    rig.follow = false;
+    rig.run(3);
+    assert_eq!(torques(&rig), model(&rig), "nothing but the model");
+    rig.nodes[2].report.velocity = 1.5;
+    rig.run(2);
+    let t = rig.controller.telemetry().joints[2];
+    assert!((t.torque - t.torque_model + 40.0 * 0.5).abs() < 0.01, "{} {}", t.torque, t.torque_model);
+    // The brake never asks for more than the joint has.
+    rig.nodes[2].report.velocity = -1.999;
+    rig.nodes[5].report.velocity = 1.999;
+    rig.run(5);
+    assert_eq!(rig.state(), State::Teaching);
+}
+
+#[test]
+fn j25_leaving_teaching_in_motion_comes_to_rest() {
+    let mut rig = Rig::holding();
+    rig.ask(FrameType::TeachingModeEnable, &[]);
+    rig.run(150);
+    rig.nodes[0].report.velocity = 0.8;
+    rig.run(2);
+    rig.ask(FrameType::TeachingModeDisable, &[]);
+    rig.nodes[0].report.velocity = 0.0;
+    rig.run(400);
+    let t = rig.controller.telemetry();
+    assert_eq!((t.state, t.errors), (State::HoldPos, 0));
+    assert_eq!(t.joints[0].set_velocity, 0.0);
+    assert!((t.joints[0].set_position - 0.08).abs() < 0.01, "{}", t.joints[0].set_position);
+}
+
+#[test]
+fn j06_refused_parameters_change_nothing() {
+    let mut rig = Rig::new(Config::avena());
+    rig.run(200);
+    let pid = |min: f32, kp: f32| floats((0..6).flat_map(|_| [kp, 1.0, 1.0, min, 1.0]));
+    for bad in [pid(2.0, 1.0), pid(-1.0, f32::NAN), pid(-1.0, f32::INFINITY)] {
+        assert_eq!(rig.ask(FrameType::PidParam, &bad), DataStatus::IncorrectValue);
+    }
+    let mut polynomial = vec![0.0f32; 24];
+    polynomial[23] = f32::NEG_INFINITY;
+    assert_eq!(rig.ask(FrameType::FrictionPolynomial, &floats(polynomial)), DataStatus::IncorrectValue);
+    // A table whose last joint has an axis that does not increase.
+    let mut table: Vec<f32> = (0..6)
+        .flat_map(|_| (0..20).map(|i| i as f32).chain((0..20).map(|i| i as f32)).chain((0..400).map(|_| 1.0)))
+        .collect();
+    table[5 * 440 + 7] = table[5 * 440 + 6];
+    assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table.clone())), DataStatus::IncorrectValue);
+    // Bodies of zeros: masses of links 1..5 are zero.
+    assert_eq!(rig.ask(FrameType::ArmModel, &vec![0; 532]), DataStatus::IncorrectValue);
+    let status = rig.status();
+    assert_eq!((status.jtc_init, status.friction_type), (0b111, 0));
+    table[5 * 440 + 7] = 7.0;
+    assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table)), DataStatus::NoError);
+    assert_eq!(rig.status().friction_type, 1);
+}

@@ -1,0 +1,334 @@
+//! A bench without physics: nodes that answer at once and joints that are where the test puts them.
+#![allow(dead_code)]
+
+use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
+use jtc_core::{BusState, Config, Controller, Inputs, Outputs, POINTS_MAX, State, Tes};
+use jtc_wire::{DataStatus, ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Response, Status, crc16};
+
+pub const SCALE: Scale = Scale { velocity: 2.0 };
+
+/// A node as its state machine shows it on the bus.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    pub report: JointReport,
+    /// Does not answer.
+    pub silent: bool,
+    /// Refuses to be enabled: stays in the transition.
+    pub slow_enable: bool,
+    pub configured: bool,
+    pub resets: u32,
+    /// Ticks until it answers again after a reset.
+    pub booting: u32,
+}
+
+pub struct Rig {
+    pub controller: Controller<Vec<RawPoint>>,
+    pub nodes: [Node; 7],
+    pub pump: bool,
+    pub torque: [f64; 6],
+    pub safety_input: bool,
+    pub acknowledged: bool,
+    pub bus_off: bool,
+    /// Positions follow the commanded ones.
+    pub follow: bool,
+    /// Frames sent by the controller, by tick.
+    pub sent: Vec<Request>,
+    pub statuses: Vec<Status>,
+    pub last: Outputs,
+    /// Frames that reach the controller instead of those of the nodes, in the next tick.
+    pub inject: Vec<Frame>,
+    answers: Vec<Frame>,
+    host: std::collections::VecDeque<HostEvent>,
+}
+
+enum HostEvent {
+    Frame(FrameType, Vec<u8>),
+    Bad(Response),
+}
+
+/// A frame with length and CRC.
+pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
+    let n = body.len() + 6;
+    let mut bytes = vec![0x9B, frame_type as u8, (n >> 8) as u8, n as u8];
+    bytes.extend_from_slice(body);
+    bytes.extend_from_slice(&crc16(&bytes).to_be_bytes());
+    bytes
+}
+
+pub fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+    values.into_iter().flat_map(f32::to_be_bytes).collect()
+}
+
+/// A Trajectory body.
+pub fn segment_body(number: u16, segment: u16, segments: u16, step: u16, points: &[RawPoint]) -> Vec<u8> {
+    let mut body: Vec<u8> = [number, segment, segments, step].iter().flat_map(|x| x.to_be_bytes()).collect();
+    for p in points {
+        for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
+            body.extend_from_slice(&v.to_be_bytes());
+        }
+    }
+    body
+}
+
+/// A point at rest: `raw` in every joint.
+pub fn rest(raw: i16) -> RawPoint {
+    RawPoint { position: [raw; 6], ..RawPoint::default() }
+}
+
+/// rad of a raw position.
+pub fn rad(raw: i16) -> f64 {
+    f64::from(raw) * 3.141592 / 32767.0
+}
+
+impl Rig {
+    pub fn new(config: Config) -> Self {
+        let node = Node {
+            report: JointReport { temperature: 25, ..JointReport::default() },
+            silent: false,
+            slow_enable: false,
+            configured: false,
+            resets: 0,
+            booting: 0,
+        };
+        let last = Outputs { bus: None, safety_output: false, status: None, host_done: false };
+        Self {
+            controller: Controller::new(config, vec![RawPoint::default(); POINTS_MAX]),
+            nodes: [node; 7],
+            pump: false,
+            torque: [0.0; 6],
+            safety_input: true,
+            acknowledged: true,
+            bus_off: false,
+            follow: true,
+            sent: Vec::new(),
+            statuses: Vec::new(),
+            last,
+            inject: Vec::new(),
+            answers: Vec::new(),
+            host: std::collections::VecDeque::new(),
+        }
+    }
+
+    /// In HoldPos with every joint enabled and the default parameters.
+    pub fn holding() -> Self {
+        Self::holding_with(Config::avena())
+    }
+
+    pub fn holding_with(config: Config) -> Self {
+        let mut rig = Self::new(config);
+        rig.defaults();
+        rig.run(200);
+        assert_eq!(rig.state(), State::HoldPos, "{:?}", rig.controller.telemetry());
+        assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+        rig
+    }
+
+    pub fn defaults(&mut self) {
+        use FrameType::*;
+        for t in [FrictionPolynomialUseDefault, PidParamUseDefault, ArmModelUseDefault] {
+            self.send(t, &[]);
+        }
+    }
+
+    pub fn state(&self) -> State {
+        self.controller.telemetry().state
+    }
+
+    pub fn tes(&self) -> Tes {
+        self.controller.telemetry().tes
+    }
+
+    pub fn errors(&self) -> u16 {
+        self.controller.telemetry().errors
+    }
+
+    /// The current status as the host would see it.
+    pub fn status(&mut self) -> Status {
+        let before = self.statuses.len();
+        while self.statuses.len() == before {
+            self.tick();
+        }
+        *self.statuses.last().unwrap()
+    }
+
+    pub fn send(&mut self, frame_type: FrameType, body: &[u8]) {
+        self.host.push_back(HostEvent::Frame(frame_type, frame(frame_type, body)));
+    }
+
+    pub fn send_bad(&mut self, response: Response) {
+        self.host.push_back(HostEvent::Bad(response));
+    }
+
+    /// Sends, runs until it is worked off, and returns how its data were taken.
+    pub fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
+        self.send(frame_type, body);
+        for _ in 0..1000 {
+            self.tick();
+            if let Some(s) =
+                self.statuses.iter().rev().take(1).find(|s| s.response.frame_type == frame_type as u8)
+                && self.last.status.is_some()
+                && self.host.is_empty()
+            {
+                return s.response.data;
+            }
+        }
+        panic!("no response to {frame_type:?}");
+    }
+
+    pub fn exec(&mut self, command: ExecCommand) -> DataStatus {
+        self.ask(FrameType::TrajSetExecStatus, &[command as u8])
+    }
+
+    pub fn clear(&mut self, jtc: bool, nodes: u8) -> DataStatus {
+        self.ask(FrameType::ClearCurrentErrors, &[u8::from(jtc), nodes, 0, 0])
+    }
+
+    /// Uploads in segments of at most 100 points.
+    pub fn upload(&mut self, points: &[RawPoint], step: u16) {
+        let chunks: Vec<_> = points.chunks(100).collect();
+        for (i, chunk) in chunks.iter().enumerate() {
+            let body = segment_body(7, i as u16, chunks.len() as u16, step, chunk);
+            assert_eq!(self.ask(FrameType::Trajectory, &body), DataStatus::NoError, "segment {i}");
+        }
+        assert_eq!(self.tes(), Tes::Stop);
+    }
+
+    pub fn run(&mut self, ticks: usize) {
+        for _ in 0..ticks {
+            self.tick();
+        }
+    }
+
+    /// Runs until `done`, at most `ticks`; returns the ticks it took.
+    pub fn until(&mut self, ticks: usize, mut done: impl FnMut(&Self) -> bool) -> usize {
+        for t in 0..ticks {
+            if done(self) {
+                return t;
+            }
+            self.tick();
+        }
+        panic!("not within {ticks} ticks: {:?}", self.controller.telemetry());
+    }
+
+    pub fn tick(&mut self) {
+        let bus = if self.inject.is_empty() {
+            core::mem::take(&mut self.answers)
+        } else {
+            core::mem::take(&mut self.inject)
+        };
+        self.answers.clear();
+        let host = self.host.front().map(|e| match e {
+            HostEvent::Frame(frame_type, bytes) => {
+                LinkEvent::Frame(FrameRef { frame_type: *frame_type, bytes })
+            }
+            HostEvent::Bad(response) => LinkEvent::Bad(*response),
+        });
+        let inputs = Inputs {
+            bus: &bus,
+            bus_state: BusState { acknowledged: self.acknowledged, bus_off: self.bus_off },
+            safety_input: self.safety_input,
+            host,
+            status_free: true,
+        };
+        self.last = self.controller.tick(&inputs);
+        if self.last.host_done {
+            self.host.pop_front();
+        }
+        if let Some(bytes) = self.last.status {
+            self.statuses.push(Status::parse(&bytes).expect("a valid status"));
+        }
+        let request = Request::parse(&self.last.bus.expect("a frame each tick")).expect("a valid request");
+        self.sent.push(request);
+        if self.follow {
+            for j in 0..6 {
+                if self.nodes[j].configured {
+                    self.nodes[j].report.position = self.controller.telemetry().joints[j].set_position;
+                }
+            }
+        }
+        if self.acknowledged && !self.bus_off {
+            self.answer(request);
+        }
+    }
+
+    fn answer(&mut self, request: Request) {
+        for n in 0..7 {
+            let node = &mut self.nodes[n];
+            node.booting = node.booting.saturating_sub(1);
+            if node.booting > 0 || node.silent {
+                continue;
+            }
+            let number = n as u8;
+            match request {
+                Request::Move { torque, pump } => {
+                    self.torque = torque;
+                    self.pump = pump;
+                    let report = JointReport {
+                        position: if node.configured { node.report.position } else { 0.0 },
+                        motor_temperature: Some(30),
+                        ..node.report
+                    };
+                    self.answers.push(if n < 6 {
+                        Answer::Joint { node: number, report }.emit(SCALE)
+                    } else {
+                        let gripper = GripperReport {
+                            pump,
+                            fsm: report.fsm,
+                            errors: report.errors,
+                            ..GripperReport::default()
+                        };
+                        Answer::Gripper(gripper).emit(SCALE)
+                    });
+                }
+                Request::ChangeFsm { target } => {
+                    self.answers.push(Answer::Fsm { node: number, fsm: node.report.fsm }.emit(SCALE));
+                    node.report.fsm = match (target[n], node.report.fsm) {
+                        (Target::Init, fsm::START | fsm::READY) => fsm::INIT,
+                        (Target::Init, fsm::FAULT) => {
+                            (node.report.errors, node.report.mc_current, node.report.mc_occurred) = (0, 0, 0);
+                            fsm::INIT
+                        }
+                        (Target::Ready, fsm::INIT | fsm::ENABLED) => fsm::READY,
+                        (Target::Enable, fsm::READY) => {
+                            if node.slow_enable {
+                                12
+                            } else {
+                                fsm::ENABLED
+                            }
+                        }
+                        (_, state) => state,
+                    };
+                }
+                Request::ChangeMode { .. } => {
+                    let accepted = matches!(node.report.fsm, fsm::INIT | fsm::READY);
+                    node.configured |= accepted;
+                    self.answers.push(Answer::Mode { node: number, accepted }.emit(SCALE));
+                }
+                Request::ResetAll => node.restart(),
+                Request::Reset(which) if which == number => node.restart(),
+                Request::Reset(_) => {}
+            }
+        }
+    }
+}
+
+impl Node {
+    pub fn restart(&mut self) {
+        self.resets += 1;
+        self.booting = 50;
+        self.configured = false;
+        self.report = JointReport {
+            fsm: fsm::INIT,
+            temperature: 25,
+            position: self.report.position,
+            ..JointReport::default()
+        };
+    }
+
+    pub fn fault(&mut self) {
+        self.report.fsm = fsm::FAULT;
+        self.report.errors = 2;
+        self.report.mc_current = 4;
+        self.report.mc_occurred = 4;
+    }
+}

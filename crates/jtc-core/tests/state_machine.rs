@@ -1,0 +1,428 @@
+//! Bring-up, errors and the way back (sections 3 and 4).
+mod rig;
+
+use jtc_bus::{Frame, Request, Target, fsm, warning};
+use jtc_core::{Config, State, Tes, error, joint_error};
+use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response};
+use rig::{Rig, rest};
+
+fn is_move(request: &Request) -> bool {
+    matches!(request, Request::Move { .. })
+}
+
+fn torque_of(request: &Request) -> [f64; 6] {
+    match request {
+        Request::Move { torque, .. } => *torque,
+        _ => [0.0; 6],
+    }
+}
+
+#[test]
+fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
+    let mut rig = Rig::new(Config::avena());
+    rig.run(500);
+    // Without parameters it stays in Init, with no joint enabled.
+    assert_eq!(rig.state(), State::Init);
+    assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.fsm == fsm::READY && n.configured));
+    let status = rig.status();
+    assert_eq!((status.jtc_init, status.node_init), (0b111, 0));
+    // Each parameter clears its bit; then Init ends.
+    for (t, left) in [
+        (FrameType::PidParamUseDefault, 0b101),
+        (FrameType::FrictionTableUseDefault, 0b100),
+        (FrameType::ArmModelUseDefault, 0b000),
+    ] {
+        assert_eq!(rig.ask(t, &[]), DataStatus::NoError);
+        assert_eq!(rig.status().jtc_init, left);
+    }
+    assert_eq!(rig.state(), State::HoldPos);
+    rig.run(100);
+    assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::ENABLED && n.resets == 1));
+}
+
+#[test]
+fn j20_no_node_is_enabled_before_the_reset_of_the_boot() {
+    let mut rig = Rig::new(Config::avena());
+    for node in &mut rig.nodes {
+        node.report.fsm = fsm::READY;
+        node.configured = true;
+    }
+    rig.defaults();
+    rig.run(40);
+    let reset = rig.sent.iter().position(|r| *r == Request::ResetAll).expect("a reset");
+    for request in &rig.sent[..reset] {
+        assert!(is_move(request) && torque_of(request) == [0.0; 6]);
+    }
+    assert_eq!(rig.sent.iter().filter(|r| **r == Request::ResetAll).count(), 1);
+}
+
+#[test]
+fn j20_waits_for_accurate_positions() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.run(60);
+    rig.nodes[3].report.warnings = warning::POSITION_NOT_ACCURATE;
+    rig.run(300);
+    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.status().node_init, 1 << 3);
+    rig.nodes[3].report.warnings = 0;
+    rig.run(5);
+    assert_eq!(rig.state(), State::HoldPos);
+}
+
+#[test]
+fn j20_a_node_that_falls_back_to_init_takes_the_controller_back() {
+    let mut rig = Rig::holding();
+    rig.nodes[2].configured = false;
+    rig.nodes[2].report.fsm = fsm::INIT;
+    rig.run(2);
+    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.torque, [0.0; 6]);
+    assert_eq!(rig.errors(), 0);
+    rig.run(200);
+    assert_eq!(rig.state(), State::HoldPos);
+    assert!(rig.nodes.iter().all(|n| n.resets == 1), "later entries reset none");
+}
+
+#[test]
+fn j20_the_gripper_can_be_absent() {
+    let mut rig = Rig::new(Config { gripper: false, ..Config::avena() });
+    rig.nodes[6].silent = true;
+    rig.defaults();
+    rig.run(3000);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    // With a gripper configured its silence is an error.
+    let mut rig = Rig::new(Config::avena());
+    rig.nodes[6].silent = true;
+    rig.defaults();
+    rig.run(3000);
+    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.status().can_current, 1 << 14);
+}
+
+#[test]
+fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
+    let mut rig = Rig::holding();
+    rig.safety_input = false;
+    rig.tick();
+    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.errors(), error::EMERGENCY_INPUT | error::EXTERNAL);
+    // Clearing while the cause is there does not help.
+    rig.clear(true, 0x7F);
+    assert_eq!(rig.state(), State::Error);
+    // The cause gone does not help either.
+    rig.safety_input = true;
+    rig.run(200);
+    assert_eq!(rig.state(), State::Error);
+    assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY), "joints are in ReadyToOperate");
+    rig.clear(true, 0);
+    rig.run(100);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    // Occurred errors stay until 0x02.
+    assert_eq!(rig.status().occurred, error::EMERGENCY_INPUT | error::EXTERNAL);
+    assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
+    assert_eq!(rig.status().occurred, 0);
+}
+
+#[test]
+fn j21_clearing_a_node_holds_the_command_until_it_follows() {
+    let mut rig = Rig::holding();
+    rig.nodes[1].fault();
+    rig.run(3);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+    rig.clear(true, 0);
+    assert_eq!(rig.state(), State::Error, "the node's fault is still there");
+    // The node does not listen for a while.
+    rig.nodes[1].report.fsm = 254;
+    rig.clear(true, 1 << 1);
+    let from = rig.sent.len();
+    rig.run(400);
+    assert_eq!(rig.state(), State::Error);
+    let asked = rig.sent[from..]
+        .iter()
+        .filter(|r| matches!(r, Request::ChangeFsm { target } if target[1] == Target::Init));
+    assert!(asked.count() >= 90, "the command is repeated");
+    rig.nodes[1].report.fsm = fsm::FAULT;
+    rig.run(300);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!(rig.nodes[1].report.errors, 0);
+}
+
+#[test]
+fn j21_healthy_nodes_are_left_alone_by_a_clear() {
+    let mut rig = Rig::holding();
+    rig.clear(true, 0x7F);
+    rig.run(50);
+    assert_eq!(rig.state(), State::HoldPos);
+    assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::ENABLED));
+}
+
+#[test]
+fn j22_safety_input_acts_in_the_first_tick_and_output_follows_internal_errors() {
+    let mut rig = Rig::holding();
+    assert!(rig.last.safety_output);
+    rig.safety_input = false;
+    rig.tick();
+    assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6]);
+    assert!(is_move(rig.sent.last().unwrap()), "the first frame after an error is Move");
+    assert!(rig.last.safety_output, "an external error does not pull the output");
+    // An internal error pulls it and its bit says so.
+    let mut rig = Rig::holding();
+    rig.nodes[4].silent = true;
+    rig.until(20, |r| r.state() == State::Error);
+    assert!(!rig.last.safety_output);
+    assert_ne!(rig.errors() & error::EMERGENCY_OUTPUT, 0);
+    rig.nodes[4].silent = false;
+    rig.run(100);
+    assert!(!rig.last.safety_output, "held while latched");
+    rig.clear(true, 0);
+    rig.run(2);
+    assert!(rig.last.safety_output);
+    assert_eq!(rig.errors() & error::EMERGENCY_OUTPUT, 0);
+}
+
+#[test]
+fn j23_a_reset_touches_only_the_nodes_in_its_mask() {
+    let mut rig = Rig::holding();
+    assert_eq!(rig.ask(FrameType::ResetCanDevices, &[0b10_0010, 0, 0, 0]), DataStatus::NoError);
+    rig.run(600);
+    let resets: Vec<_> = rig.nodes.iter().map(|n| n.resets).collect();
+    assert_eq!(resets, [1, 2, 1, 1, 1, 2, 1]);
+    assert_eq!(rig.state(), State::HoldPos);
+    // An empty mask does nothing at all.
+    rig.ask(FrameType::ResetCanDevices, &[0, 0, 0, 0]);
+    rig.run(50);
+    assert_eq!(rig.state(), State::HoldPos);
+    // Bits that mean nothing are ignored: hosts send 0xFF for all.
+    rig.ask(FrameType::ResetCanDevices, &[0xFF, 0, 0, 0]);
+    rig.run(600);
+    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.sent.iter().filter(|r| **r == Request::ResetAll).count(), 2);
+}
+
+#[test]
+fn j24_a_trajectory_is_not_resumed_after_an_error() {
+    let mut rig = Rig::holding();
+    let points: Vec<RawPoint> = (0..50).map(|i| rest(i * 10)).collect();
+    rig.upload(&points, 10);
+    rig.exec(jtc_wire::ExecCommand::Execute);
+    rig.until(400, |r| r.controller.telemetry().point > 50);
+    rig.safety_input = false;
+    rig.tick();
+    assert_eq!(rig.tes(), Tes::Null);
+    rig.safety_input = true;
+    rig.clear(true, 0);
+    rig.run(500);
+    assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Null));
+    assert_eq!(rig.exec(jtc_wire::ExecCommand::Execute), DataStatus::NotAllowed);
+    let before = rig.controller.telemetry().joints[0].set_position;
+    rig.run(500);
+    assert_eq!(rig.controller.telemetry().joints[0].set_position, before);
+}
+
+#[test]
+fn j12_one_broadcast_a_tick_and_other_frames_in_one_tick_of_four() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.run(300);
+    rig.nodes[2].fault();
+    rig.run(50);
+    rig.clear(true, 0x7F);
+    rig.run(300);
+    rig.ask(FrameType::ResetCanDevices, &[0x3F, 0, 0, 0]);
+    rig.run(600);
+    let mut since = 100;
+    for request in &rig.sent {
+        if is_move(request) {
+            since += 1;
+        } else {
+            assert!(since >= 3, "{request:?} after {since} Moves");
+            since = 0;
+        }
+    }
+}
+
+#[test]
+fn j14_five_unanswered_moves_are_a_receive_timeout() {
+    for node in 0..7 {
+        let mut rig = Rig::holding();
+        rig.nodes[node].silent = true;
+        let from = rig.sent.len();
+        rig.until(30, |r| r.state() == State::Error);
+        assert_eq!(rig.status().can_current, 1 << (8 + node));
+        // The answer to the last Move before the silence still arrives; then five are missed.
+        let moves = rig.sent[from..].iter().take_while(|r| is_move(r)).count();
+        assert!(moves >= 5);
+        let mut rig = Rig::holding();
+        rig.nodes[node].silent = true;
+        rig.run(4);
+        rig.nodes[node].silent = false;
+        rig.run(20);
+        assert_eq!(rig.state(), State::HoldPos, "four missed answers are no error yet");
+    }
+}
+
+#[test]
+fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
+    let mut rig = Rig::holding();
+    rig.acknowledged = false;
+    rig.run(4);
+    assert_eq!(rig.state(), State::HoldPos);
+    rig.run(2);
+    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.status().can_current, 1);
+}
+
+#[test]
+fn j14_bus_off_is_an_error_at_once() {
+    let mut rig = Rig::holding();
+    rig.bus_off = true;
+    rig.tick();
+    assert_eq!(rig.state(), State::Error);
+    assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6]);
+    assert_ne!(rig.errors() & error::INTERNAL_CAN, 0);
+}
+
+#[test]
+fn j15_frames_not_understood_are_counted_and_ignored() {
+    let mut rig = Rig::holding();
+    rig.inject = vec![
+        Frame::new(0x3FF, &[0; 8]).unwrap(),
+        Frame::new(0x203, &[0; 3]).unwrap(),
+        Frame::new(0x000, &[0; 16]).unwrap(),
+    ];
+    rig.tick();
+    rig.run(5);
+    assert_eq!(rig.controller.ignored_frames(), 3);
+    assert_eq!(rig.state(), State::HoldPos);
+}
+
+#[test]
+fn j16_faults_show_even_without_error_bytes() {
+    for state in [254, 255] {
+        let mut rig = Rig::holding();
+        rig.nodes[0].report.fsm = state;
+        rig.run(2);
+        assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS, "state {state}");
+    }
+    let mut rig = Rig::holding();
+    rig.nodes[5].report.warnings = warning::SAFETY_LINE;
+    rig.run(2);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+}
+
+#[test]
+fn j16_leaving_operation_enable_unasked_is_an_error() {
+    let mut rig = Rig::holding();
+    rig.nodes[3].report.fsm = fsm::READY;
+    rig.run(2);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+    assert_eq!(rig.torque, [0.0; 6]);
+}
+
+#[test]
+fn j16_enabling_has_a_time_limit() {
+    let mut rig = Rig::new(Config { enable_timeout_ms: 500, ..Config::avena() });
+    rig.nodes[2].slow_enable = true;
+    rig.defaults();
+    rig.until(200, |r| r.state() == State::HoldPos);
+    rig.run(490);
+    assert_eq!(rig.state(), State::HoldPos);
+    rig.run(30);
+    assert_eq!((rig.state(), rig.errors()), (State::Error, error::EXTERNAL | error::EXTERNAL_JOINTS));
+    // The default leaves time for the four seconds of motor alignment.
+    assert_eq!(Config::avena().enable_timeout_ms, 10_000);
+}
+
+#[test]
+fn j16_only_known_states_are_requested_and_positions_count_after_configuration() {
+    let mut rig = Rig::new(Config::avena());
+    for (j, node) in rig.nodes.iter_mut().enumerate() {
+        node.report.position = 0.1 * j as f64;
+    }
+    rig.follow = false;
+    rig.defaults();
+    for _ in 0..400 {
+        rig.tick();
+        let t = rig.controller.telemetry();
+        for j in 0..6 {
+            let q = t.joints[j].position;
+            assert!(q == 0.0 || (q - 0.1 * j as f64).abs() < 1e-6);
+            // A hold position is never latched from the zero that is reported before configuration.
+            if t.state == State::HoldPos {
+                assert!((t.joints[j].set_position - 0.1 * j as f64).abs() < 1e-6);
+            }
+        }
+    }
+    assert_eq!(rig.state(), State::HoldPos);
+}
+
+#[test]
+fn j04_each_record_is_carried_once_and_in_order() {
+    let mut rig = Rig::holding();
+    rig.run(50);
+    rig.statuses.clear();
+    let bad =
+        Response { frame_type: 4, status: FrameStatus::IncorrectCrc, data: DataStatus::Idle, length: 18014 };
+    rig.send(FrameType::PidParamUseDefault, &[]);
+    rig.send_bad(bad);
+    for _ in 0..20 {
+        rig.send(FrameType::FrictionPolynomialUseDefault, &[]);
+    }
+    rig.run(30);
+    let records: Vec<_> =
+        rig.statuses.iter().map(|s| s.response).filter(|r| *r != Response::default()).collect();
+    assert_eq!(records.len(), 22);
+    assert_eq!(records[0].frame_type, 0x08);
+    assert_eq!(records[1], bad);
+    assert!(records[2..].iter().all(|r| (r.frame_type, r.data, r.length) == (0x0F, DataStatus::NoError, 6)));
+    // Without records: one status every 40 ms, carrying zeros.
+    rig.run(40);
+    rig.statuses.clear();
+    rig.run(400);
+    assert_eq!(rig.statuses.len(), 10);
+    assert!(rig.statuses.iter().all(|s| s.response == Response::default()));
+}
+
+#[test]
+fn j25_teaching_is_refused_outside_holdpos() {
+    let mut rig = Rig::new(Config::avena());
+    rig.run(300);
+    assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NotAllowed);
+    assert_eq!(rig.state(), State::Init);
+    let mut rig = Rig::holding();
+    assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
+    rig.run(2);
+    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
+    rig.run(2);
+    assert_eq!(rig.state(), State::HoldPos);
+}
+
+#[test]
+fn the_pump_follows_the_host_and_stops_on_error() {
+    let mut rig = Rig::holding();
+    rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]);
+    rig.run(5);
+    assert!(rig.pump);
+    rig.safety_input = false;
+    rig.run(5);
+    assert!(!rig.pump);
+    assert_eq!(rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]), DataStatus::NotAllowed);
+    rig.safety_input = true;
+    rig.clear(true, 0);
+    rig.run(200);
+    assert!(!rig.pump, "it does not start again by itself");
+}
+
+#[test]
+fn an_impossible_jump_of_a_measured_position_is_an_error() {
+    let mut rig = Rig::holding();
+    rig.ask(FrameType::TeachingModeEnable, &[]);
+    rig.run(5);
+    rig.follow = false;
+    rig.nodes[1].report.position += 0.5;
+    rig.run(2);
+    assert_eq!(rig.errors() & error::EXTERNAL_JOINTS, error::EXTERNAL_JOINTS);
+    assert_eq!(rig.status().joints[1].internal & joint_error::POSITION, 0);
+}

@@ -1,0 +1,331 @@
+//! The trajectory: segments, execution, pause and stop (section 5).
+mod rig;
+
+use jtc_core::{Config, POINTS_MAX, State, Tes};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use rig::{Rig, rad, rest, segment_body};
+
+/// A motion of joint 2 (and a smaller one of joint 5) that starts and ends at rest: `n` points, `step` ms apart.
+fn motion(n: usize, step: u16) -> Vec<RawPoint> {
+    let total = (n - 1) as f64 * f64::from(step) / 1000.0;
+    (0..n)
+        .map(|i| {
+            let u = i as f64 / (n - 1) as f64;
+            let p = u * u * u * (10.0 + u * (6.0 * u - 15.0));
+            let v = 30.0 * u * u * (1.0 - u) * (1.0 - u) / total;
+            let a = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (total * total);
+            let mut point = RawPoint::default();
+            for (j, way) in [(2, 0.4), (5, -0.2)] {
+                point.position[j] = (way * p / 3.141592 * 32767.0).round() as i16;
+                point.velocity[j] = (way * v / 6.283185 * 32767.0).round() as i16;
+                point.acceleration[j] = (way * a / 12.566370 * 32767.0).round() as i16;
+            }
+            point
+        })
+        .collect()
+}
+
+fn traj(
+    rig: &mut Rig,
+    number: u16,
+    segment: u16,
+    segments: u16,
+    step: u16,
+    points: &[RawPoint],
+) -> DataStatus {
+    rig.ask(FrameType::Trajectory, &segment_body(number, segment, segments, step, points))
+}
+
+#[test]
+fn j30_segments_come_in_order_and_the_right_one_can_follow_a_refused_one() {
+    use DataStatus::*;
+    let mut rig = Rig::holding();
+    let p = [rest(0), rest(0)];
+    assert_eq!(traj(&mut rig, 1, 1, 3, 10, &p), IncorrectSegmentOrder, "segment 1 without segment 0");
+    assert_eq!(traj(&mut rig, 1, 0, 3, 10, &p), NoError);
+    assert_eq!(traj(&mut rig, 1, 2, 3, 10, &p), IncorrectSegmentOrder, "skipped");
+    assert_eq!(traj(&mut rig, 2, 1, 3, 10, &p), IncorrectSegmentOrder, "another trajectory");
+    assert_eq!(traj(&mut rig, 1, 1, 4, 10, &p), IncorrectSegmentOrder, "another number of segments");
+    assert_eq!(traj(&mut rig, 1, 1, 3, 20, &p), IncorrectStepTime, "another step time");
+    assert_eq!(traj(&mut rig, 1, 1, 3, 0, &p), IncorrectStepTime);
+    assert_eq!(traj(&mut rig, 1, 3, 3, 10, &p), IncorrectSegmentOrder, "out of range");
+    assert_eq!(traj(&mut rig, 1, 1, 3, 10, &[]), IncorrectValue, "empty");
+    assert_eq!(traj(&mut rig, 1, 1, 3, 10, &p), NoError);
+    assert_eq!(traj(&mut rig, 1, 1, 3, 10, &p), IncorrectSegmentOrder, "repeated");
+    assert_eq!(rig.tes(), Tes::Null);
+    assert_eq!(traj(&mut rig, 1, 2, 3, 10, &p), NoError);
+    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(traj(&mut rig, 1, 3, 3, 10, &p), IncorrectSegmentOrder, "after the last");
+    assert_eq!(rig.exec(ExecCommand::Execute), NoError);
+    rig.until(1000, |r| r.tes() == Tes::Finish);
+    assert_eq!(rig.controller.telemetry().point, 50, "six points, five steps of 10 ms");
+}
+
+#[test]
+fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
+    use DataStatus::*;
+    let mut rig = Rig::holding();
+    rig.upload(&motion(100, 10), 10);
+    let p = [rest(0)];
+    assert_eq!(traj(&mut rig, 1, 0, 101, 10, &p), TooManySegments);
+    assert_eq!(traj(&mut rig, 1, 0, 0, 10, &p), IncorrectSegmentOrder);
+    assert_eq!(traj(&mut rig, 1, 0, 1, 10, &vec![rest(0); 1501]), TooManyPoints);
+    assert_eq!(traj(&mut rig, 1, 0, 1, 0, &p), IncorrectStepTime);
+    assert_eq!(rig.tes(), Tes::Stop);
+    // Fill the store to its last point; one more is refused, and segment 0 of another counts only its own.
+    for s in 0..8 {
+        assert_eq!(traj(&mut rig, 9, s, 9, 1, &vec![rest(0); 1500]), NoError);
+    }
+    assert_eq!(POINTS_MAX, 8 * 1500);
+    assert_eq!(traj(&mut rig, 9, 8, 9, 1, &p), TooManyPoints);
+    assert_eq!(traj(&mut rig, 9, 0, 1, 1, &vec![rest(0); 1500]), NoError);
+    assert_eq!(rig.tes(), Tes::Stop);
+}
+
+#[test]
+fn j30_segments_are_accepted_in_holdpos_only() {
+    let mut rig = Rig::new(Config::avena());
+    rig.run(200);
+    assert_eq!(traj(&mut rig, 1, 0, 1, 10, &[rest(0)]), DataStatus::NotAllowed);
+    let mut rig = Rig::holding();
+    rig.upload(&motion(100, 10), 10);
+    rig.exec(ExecCommand::Execute);
+    rig.run(300);
+    assert_eq!(rig.state(), State::Operate);
+    assert_eq!(traj(&mut rig, 1, 0, 1, 10, &[rest(0)]), DataStatus::NotAllowed);
+    rig.until(3000, |r| r.tes() == Tes::Finish);
+    rig.run(2);
+    assert_eq!(traj(&mut rig, 1, 0, 2, 10, &[rest(0)]), DataStatus::NoError);
+    assert_eq!(rig.tes(), Tes::Null);
+}
+
+#[test]
+fn j06_parameters_are_not_changed_under_a_moving_arm() {
+    let mut rig = Rig::holding();
+    rig.upload(&motion(100, 10), 10);
+    rig.exec(ExecCommand::Execute);
+    rig.run(300);
+    for t in
+        [FrameType::PidParamUseDefault, FrameType::ArmModelUseDefault, FrameType::FrictionTableUseDefault]
+    {
+        assert_eq!(rig.ask(t, &[]), DataStatus::NotAllowed);
+    }
+    assert_eq!(rig.state(), State::Operate);
+}
+
+#[test]
+fn j31_first_and_last_point_are_commanded_exactly_and_the_index_counts_milliseconds() {
+    let mut rig = Rig::holding();
+    let points = motion(41, 25);
+    rig.upload(&points, 25);
+    rig.exec(ExecCommand::Execute);
+    rig.until(1000, |r| r.controller.telemetry().point == 1);
+    for k in 1..=1000u32 {
+        let t = *rig.controller.telemetry();
+        assert_eq!(t.point, k);
+        if k % 25 == 0 {
+            let point = &points[(k / 25) as usize];
+            assert_eq!(t.joints[2].set_position, rad(point.position[2]));
+        }
+        rig.tick();
+    }
+    let t = rig.controller.telemetry();
+    assert_eq!((t.tes, t.point), (Tes::Finish, 1000));
+    assert_eq!(t.joints[2].set_position, rad(points[40].position[2]));
+    rig.run(500);
+    // J-33: after Finish the last point is held.
+    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.controller.telemetry().joints[2].set_position, rad(points[40].position[2]));
+    assert_eq!(rig.controller.telemetry().point, 1000);
+}
+
+#[test]
+fn j31_point_0_is_commanded() {
+    let mut rig = Rig::holding();
+    let points: Vec<_> = (0..20).map(|i| rest(100 + i)).collect();
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    let mut seen = false;
+    for _ in 0..400 {
+        rig.tick();
+        let t = rig.controller.telemetry();
+        seen |= t.state == State::Operate && t.point == 0 && t.joints[3].set_position == rad(100);
+    }
+    assert!(seen);
+}
+
+/// Every commanded position of a paused run lies on the path, and nothing is skipped.
+#[test]
+fn j33_pause_and_resume_follow_the_path() {
+    let mut rig = Rig::holding();
+    let points = motion(301, 10);
+    rig.upload(&points, 10);
+    // Undisturbed run: position of joint 5 as a function of that of joint 2.
+    rig.exec(ExecCommand::Execute);
+    let mut path = Vec::new();
+    while rig.tes() != Tes::Finish {
+        rig.tick();
+        let t = rig.controller.telemetry();
+        if t.point > 0 {
+            path.push((t.joints[2].set_position, t.joints[5].set_position));
+        }
+    }
+    // Back to the start, then with a pause.
+    rig.exec(ExecCommand::Stop);
+    rig.follow = false;
+    for j in 0..6 {
+        rig.nodes[j].report.position = 0.0;
+    }
+    let mut rig = Rig::holding();
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(3000, |r| r.controller.telemetry().point == 1400);
+    assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
+    let mut last = *rig.controller.telemetry();
+    let mut ticks_to_stand = 0;
+    let check = |t: &jtc_core::Telemetry, last: &jtc_core::Telemetry| {
+        let (x, y) = (t.joints[2].set_position, t.joints[5].set_position);
+        let i = path.partition_point(|p| p.0 < x).clamp(1, path.len() - 1);
+        let near = |p: &(f64, f64)| (p.0 - x).hypot(p.1 - y) < 5e-4;
+        assert!(near(&path[i]) || near(&path[i - 1]), "({x}, {y}) is off the path");
+        assert!(t.point >= last.point && t.point <= last.point + 1, "the index is monotone");
+        // No step of velocity: at most what 12.6 rad/s² do in a tick, and the int16 grid.
+        let dv = (t.joints[2].set_velocity - last.joints[2].set_velocity).abs();
+        assert!(dv < 0.0126 + 0.0004, "step of {dv} rad/s");
+    };
+    while rig.tes() == Tes::Execute {
+        rig.tick();
+        ticks_to_stand += 1;
+        let t = *rig.controller.telemetry();
+        check(&t, &last);
+        last = t;
+    }
+    assert_eq!(rig.tes(), Tes::Pause);
+    assert!((150..=260).contains(&ticks_to_stand), "{ticks_to_stand}");
+    let held = rig.controller.telemetry().joints[2].set_position;
+    rig.run(500);
+    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.controller.telemetry().joints[2].set_position, held, "the commanded position is held");
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    while rig.tes() != Tes::Finish {
+        rig.tick();
+        let t = *rig.controller.telemetry();
+        check(&t, &last);
+        last = t;
+    }
+    assert_eq!(last.joints[2].set_position, rad(points[300].position[2]));
+}
+
+#[test]
+fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
+    // 1 rad/s on every joint: 200 ms would need 7.5 rad/s², which this configuration does not allow.
+    let n = 101;
+    let points: Vec<_> = (0..n)
+        .map(|i| {
+            let mut p = RawPoint::default();
+            for j in 0..6 {
+                p.position[j] = (f64::from(i) * 0.01 / 3.141592 * 32767.0).round() as i16;
+                p.velocity[j] = (1.0 / 6.283185 * 32767.0f64).round() as i16;
+            }
+            p
+        })
+        .collect();
+    let mut config = Config::avena();
+    for joint in &mut config.joints {
+        joint.acceleration_max = 4.0;
+    }
+    let mut rig = Rig::holding_with(config);
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(1000, |r| r.controller.telemetry().point == 300);
+    rig.exec(ExecCommand::Stop);
+    let ticks = rig.until(1000, |r| r.tes() != Tes::Execute);
+    assert!((400..500).contains(&ticks), "{ticks}");
+    assert_eq!((rig.tes(), rig.errors()), (Tes::Stop, 0));
+}
+
+#[test]
+fn j34_commands_follow_the_table() {
+    use ExecCommand::*;
+    let fresh = |tes: Tes| {
+        let mut rig = Rig::holding();
+        if tes == Tes::Null {
+            return rig;
+        }
+        rig.upload(&motion(100, 10), 10);
+        if tes == Tes::Stop {
+            return rig;
+        }
+        rig.exec(Execute);
+        rig.until(1000, |r| r.controller.telemetry().point > 300);
+        if tes == Tes::Pause {
+            rig.exec(Pause);
+            rig.until(1000, |r| r.tes() == Tes::Pause);
+        }
+        if tes == Tes::Finish {
+            // A closed path would be needed to run again: put the joints back to the start instead.
+            rig.until(3000, |r| r.tes() == Tes::Finish);
+        }
+        rig
+    };
+    let allowed = [
+        (Tes::Stop, Execute),
+        (Tes::Execute, Pause),
+        (Tes::Execute, Stop),
+        (Tes::Pause, Execute),
+        (Tes::Pause, Stop),
+        (Tes::Finish, Stop),
+    ];
+    for tes in [Tes::Null, Tes::Stop, Tes::Pause, Tes::Execute, Tes::Finish] {
+        for command in [Stop, Pause, Execute] {
+            if (tes, command) == (Tes::Finish, Execute) {
+                continue; // below
+            }
+            let mut rig = fresh(tes);
+            let expected =
+                if allowed.contains(&(tes, command)) { DataStatus::NoError } else { DataStatus::NotAllowed };
+            assert_eq!(rig.exec(command), expected, "{tes:?} {command:?}");
+            if expected == DataStatus::NotAllowed {
+                let point = rig.controller.telemetry().point;
+                rig.run(5);
+                let moving = tes == Tes::Execute;
+                assert_eq!(
+                    rig.controller.telemetry().point > point,
+                    moving,
+                    "a refused command is forgotten"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn j34_a_finished_closed_path_runs_again() {
+    let mut there = motion(60, 10);
+    let back: Vec<_> =
+        there.iter().rev().skip(1).map(|p| RawPoint { velocity: p.velocity.map(|v| -v), ..*p }).collect();
+    there.extend(back);
+    let mut rig = Rig::holding();
+    rig.upload(&there, 10);
+    for _ in 0..2 {
+        assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+        rig.until(3000, |r| r.tes() == Tes::Finish);
+        rig.run(3);
+    }
+}
+
+#[test]
+fn j34_execute_needs_the_arm_at_the_first_point() {
+    let mut rig = Rig::holding();
+    let points: Vec<_> = (0..10).map(|_| rest(250)).collect(); // 0.024 rad away
+    rig.upload(&points, 10);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
+    rig.run(300);
+    assert_eq!((rig.tes(), rig.state()), (Tes::Stop, State::HoldPos));
+    assert_eq!(rig.controller.telemetry().joints[0].set_position, 0.0, "nothing moves");
+    let points: Vec<_> = (0..10).map(|_| rest(190)).collect(); // 0.018 rad
+    rig.upload(&points, 10);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(1000, |r| r.tes() == Tes::Finish);
+    assert_eq!(rig.errors(), 0);
+}

@@ -111,6 +111,8 @@ pub struct Bus {
     off_us: Option<u32>,
     rng: fastrand::Rng,
     log: Vec<TimedFrame>,
+    /// Something else on the bus, such as an analyser, acknowledges frames too.
+    pub monitored: bool,
     /// What is wrong with it.
     pub fault: BusFault,
     /// Counted since the start.
@@ -127,6 +129,7 @@ impl Bus {
             off_us: None,
             rng: fastrand::Rng::with_seed(seed),
             log: Vec::new(),
+            monitored: false,
             fault: BusFault::default(),
             statistics: BusStatistics::default(),
         }
@@ -183,7 +186,7 @@ impl Bus {
 
     /// The controller's request; true when somebody acknowledged it.
     fn send(&mut self, now_us: u64, frame: &Frame, nodes: &mut Nodes, time: &mut u32) -> bool {
-        if self.fault.cut || !nodes.any_on_bus() {
+        if self.fault.cut || !(self.monitored || nodes.any_on_bus()) {
             // Repeated until the next tick replaces it; such errors alone make no bus-off.
             self.statistics.unacknowledged += 1;
             self.statistics.busy_us += u64::from(TICK_US);

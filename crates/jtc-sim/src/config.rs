@@ -76,6 +76,8 @@ pub struct SimConfig {
     pub drives: [DriveConfig; JOINTS],
     /// A gripper is on the bus.
     pub gripper: bool,
+    /// Something else on the joint bus, such as an analyser, acknowledges frames even while no node does.
+    pub bus_monitored: bool,
     /// Rate of the serial line, bit/s; `None`: bytes take no time.
     pub baud: Option<u32>,
     /// Gap that ends a frame, µs (J-03).
@@ -111,6 +113,7 @@ impl SimConfig {
             start: [0.0; JOINTS],
             support: Support::Brakes,
             drives: [drive; JOINTS],
+            bus_monitored: false,
             baud: Some(115_200),
             gap_us: 5_000,
             watchdog_ms: 10,

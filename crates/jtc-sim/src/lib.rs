@@ -24,6 +24,7 @@ mod drive;
 mod event;
 mod faults;
 mod gripper;
+pub mod host;
 mod inbox;
 mod serial;
 mod world;

@@ -138,6 +138,7 @@ impl World {
             log: Log::new(config.log_entries),
             config,
         };
+        world.bus.monitored = world.config.bus_monitored;
         world.read_truth();
         world
     }

@@ -1,7 +1,7 @@
 """python-can's udp_multicast interface against can-link's: every frame is echoed as it was sent.
 
-Needs python-can and msgpack. The example `echo` is taken from $JTC_EXAMPLES, else built with cargo. Frames stay on
-this host (hop limit 0). Exit code 0: all agreed.
+Needs python-can and msgpack. The example `echo` is taken from $JTC_EXAMPLES, else built with cargo. Frames
+stay on this host (hop limit 0). Exit code 0: all agreed.
 """
 
 import os
@@ -71,10 +71,12 @@ def differences(sent: can.Message, heard: can.Message) -> list[str]:
 
 
 def send_rubbish(group: str, port: int) -> None:
-    family, option = (socket.AF_INET6, (socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_HOPS)) if ":" in group else (
-        socket.AF_INET, (socket.IPPROTO_IP, socket.IP_MULTICAST_TTL))
-    with socket.socket(family, socket.SOCK_DGRAM) as sender:
-        sender.setsockopt(*option, 0)
+    six = ":" in group
+    with socket.socket(socket.AF_INET6 if six else socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        if six:
+            sender.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_HOPS, 0)
+        else:
+            sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
         sender.sendto(b"rubbish", (group, port))
 
 

@@ -21,8 +21,8 @@ pub enum CanError {
     },
     /// A multicast group could not be joined.
     #[error(
-        "cannot join multicast group {group} port {port}: {step}: {source}; has this host a network interface \
-         with multicast (`ip -br link`), and may others share the port?"
+        "cannot join multicast group {group} port {port}: {step}: {source}; has this host a network \
+         interface with multicast (`ip -br link`), and may others share the port?"
     )]
     Join {
         /// The group.

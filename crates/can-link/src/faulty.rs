@@ -75,7 +75,7 @@ impl Line {
         Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, counts: Counts::default() }
     }
 
-    /// Draws in the same number and order whatever happens, so that one setting does not change the others' faults.
+    /// Draws in the same number and order whatever happens: one setting does not change the others' faults.
     fn put(&mut self, now: Duration, mut frame: CanFrame) {
         let Faults { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
@@ -148,7 +148,7 @@ impl<B: CanBus> Faulty<B> {
         Self::with_clock(bus, plan, move || start.elapsed())
     }
 
-    /// Delays by a clock of your own, which must not run backwards: virtual time makes delays exactly repeatable.
+    /// Delays by a clock of your own, which must not run backwards: virtual time makes them repeatable.
     pub fn with_clock(bus: B, plan: Plan, clock: impl FnMut() -> Duration + Send + 'static) -> Self {
         let mut seeds = fastrand::Rng::with_seed(plan.seed);
         let out = Line::new(plan.send, seeds.u64(..));

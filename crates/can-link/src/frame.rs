@@ -50,7 +50,7 @@ enum Kind {
     Fd { brs: bool },
 }
 
-/// A classic, remote or CAN FD frame. Its length is one that its kind can have: whoever has a frame can send it.
+/// A classic, remote or CAN FD frame. Its length is one that its kind can have: every frame can be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     id: Id,
@@ -80,7 +80,7 @@ impl CanFrame {
         Ok(Self::made(id, Kind::Fd { brs: true }, data))
     }
 
-    /// A CAN FD frame with bit rate switch; payloads between two lengths get zeros up to the next, as on the wire.
+    /// A CAN FD frame with bit rate switch; payloads between two lengths get zeros up to the next.
     pub fn fd_padded(id: Id, data: &[u8]) -> Result<Self, InvalidFrame> {
         let len = Self::fd_len(data.len()).ok_or(InvalidFrame::FdLength { id, len: data.len() })?;
         Ok(Self { len: len as u8, ..Self::made(id, Kind::Fd { brs: true }, data) })

@@ -3,10 +3,10 @@
 //! | URL | what | CAN FD |
 //! |---|---|---|
 //! | `virtual:NAME` | a bus inside this process | yes |
-//! | `multicast:ADDR:PORT` | UDP multicast as python-can's `udp_multicast` speaks it; stays on this host | yes |
+//! | `multicast:ADDR:PORT` | python-can's `udp_multicast`; stays on this host | yes |
 //!
-//! `socketcan:`, `slcan:` and `socketcand:` are understood as [URLs](CanUrl) and refused by [`open`] with an error
-//! that says what can be opened.
+//! `socketcan:`, `slcan:` and `socketcand:` are understood as [URLs](CanUrl) and refused by [`open`] with an
+//! error that says what can be opened.
 //!
 //! ```
 //! use std::time::Duration;

@@ -99,7 +99,7 @@ fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<
     step("sharing the port", share_port(&listener))?;
     // More is better but not needed.
     let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
-    // Bound to the group, the listener hears nothing of other groups; Windows binds to addresses of its own alone.
+    // Bound to the group, the listener hears nothing of other groups; Windows only binds to own addresses.
     let address = if cfg!(windows) { unspecified(group) } else { group };
     step("binding the port", listener.bind(&SocketAddr::new(address, port).into()))?;
 

@@ -72,9 +72,9 @@ impl VirtualHub {
         Self::default()
     }
 
-    /// A bus where a sender waits so long for a member whose queue of 4096 frames is full (else 100 ms). A member
-    /// that takes nothing for so long misses frames from then on until it takes one: it must not stop the bus for
-    /// the others.
+    /// A bus where a sender waits so long for a member whose queue of 4096 frames is full (else 100 ms). A
+    /// member that takes nothing for so long misses frames from then on until it takes one: it must not stop
+    /// the bus for the others.
     pub fn with_patience(patience: Duration) -> Self {
         Self { shared: Arc::new(Shared { patience, ..Shared::default() }) }
     }

@@ -10,8 +10,8 @@ const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
 const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
 /// Bits of the stuff count with its parity, sent before the checksum.
 const STUFF_COUNT_BITS: u32 = 4;
-/// The delimiter after the checksum. Its two halves are sent at different rates, as are those of the bit where
-/// the rate goes up; as both change over at the same share of the bit, one counts as nominal, one as data bit.
+/// The delimiter after the checksum. Its two parts are sent at different rates, as are those of the bit where
+/// the rate goes up; both change over at the same share of the bit: one counts as nominal, one as data bit.
 const CRC_DELIMITER_BITS: u32 = 1;
 
 /// Nanoseconds from the start of the frame until the next may start (intermission included), with rates as in
@@ -50,7 +50,7 @@ struct Stuffer {
 impl Stuffer {
     fn push(&mut self, value: u32, width: u32) {
         for at in (0..width).rev() {
-            // The stuff bit is due before the next bit: behind the last bit of all the fixed one takes its place.
+            // The stuff bit is due before the next bit; behind the last of all the fixed one takes its place.
             if self.run == 5 {
                 self.bits += 1;
                 self.last = self.last.map(|bit| !bit);

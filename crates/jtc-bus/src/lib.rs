@@ -1,7 +1,8 @@
 //! Joint bus of the controller: the CAN FD frames between it and its drives, both ways, without any I/O.
 //!
-//! Each millisecond the controller sends at most one [`Request`]; the nodes (joints 0..5, gripper 6) reply with
-//! an [`Answer`] each. Both are made from and into a [`Frame`], so either end can be simulated or replaced.
+//! Each millisecond the controller sends at most one [`Request`]; the nodes (joints 0..5, gripper 6) reply
+//! with an [`Answer`] each. Both are made from and into a [`Frame`], so either end can be
+//! simulated or replaced.
 //!
 //! ```
 //! use jtc_bus::{Answer, JointReport, Request, Scale};

@@ -45,8 +45,8 @@ pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
     f64::from(i32::from_be_bytes(bytes)) * full_scale / f64::from(i32::MAX)
 }
 
-/// `value` in units of the last bit, moved by half a unit so that the cast (which truncates, saturates and makes
-/// NaN 0) rounds; a nonsensical full scale (0, NaN) gives a saturated value or 0, never one of the other sign.
+/// `value` in units of the last bit, moved by half a unit so that the cast (which truncates and makes NaN 0)
+/// rounds. A nonsensical full scale (0, NaN) gives a saturated value or 0, never one of the other sign.
 fn nearest(value: f64, full_scale: f64, max: f64) -> f64 {
     let raw = value * (max / full_scale.abs());
     (raw + 0.5_f64.copysign(raw)).clamp(-max, max)

@@ -15,8 +15,8 @@ pub mod fsm {
     /// Fault.
     pub const FAULT: u8 = 255;
 
-    /// The state in words. Generations of drives disagree about what 14, 15 and 16 mean, so these only say that
-    /// the node is between two states.
+    /// The state in words. Generations of drives disagree about what 14, 15 and 16 mean, so these only say
+    /// that the node is between two states.
     pub const fn name(fsm: u8) -> &'static str {
         match fsm {
             START => "start",

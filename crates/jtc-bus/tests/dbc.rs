@@ -13,8 +13,8 @@ use proptest::prelude::*;
 static DBC: LazyLock<Dbc> =
     LazyLock::new(|| Dbc::try_from(include_str!("../joint-bus.dbc")).expect("the file is a DBC"));
 
-/// Bits of a signal, highest first. Big-endian signals begin at their highest bit and go on with bit 7 of the next
-/// byte.
+/// Bits of a signal, highest first. Big-endian signals begin at their highest bit and go on with bit 7 of the
+/// next byte.
 fn bits_of(signal: &Signal) -> impl Iterator<Item = usize> {
     assert_eq!(signal.byte_order, ByteOrder::BigEndian);
     let (byte, bit) = (signal.start_bit as usize / 8, signal.start_bit as usize % 8);

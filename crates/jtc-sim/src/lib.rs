@@ -26,6 +26,7 @@ mod faults;
 mod gripper;
 pub mod host;
 mod inbox;
+mod operator;
 mod serial;
 mod world;
 
@@ -37,5 +38,6 @@ pub use drive::{Drive, DriveConfig, DriveFault};
 pub use event::{Event, Log, LogEntry};
 pub use faults::{Fault, FaultKind, FaultPlan, Trigger};
 pub use gripper::Gripper;
+pub use operator::{Operator, OperatorError};
 pub use serial::{Line, LineFault};
 pub use world::{Statistics, Truth, World};

@@ -1,0 +1,43 @@
+//! Prints how long a simulated millisecond takes, as one JSON object: arm, drives, bus and controller while the arm follows a motion.
+use std::time::Instant;
+
+use jtc_sim::{ModelError, Operator, SimConfig, host};
+use jtc_wire::ExecCommand;
+
+/// Milliseconds per measurement.
+const BATCH: u32 = 2_000;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let config = SimConfig {
+        baud: None,
+        bus_monitored: true,
+        model_error: ModelError::default(),
+        ..SimConfig::default()
+    };
+    let mut operator = Operator::new(config);
+    operator.bring_up()?;
+    let points = host::there_and_back(&[0.0; 6], &[0.6, -0.4, 0.5, 0.8, -0.6, 0.7], 2.5, 20, 10);
+    operator.upload(&points, 10)?;
+    operator.ask(&host::exec(ExecCommand::Execute))?;
+    let world = &mut operator.world;
+    let mut sink = [0; 4096];
+    let mut times: Vec<f64> = (0..40)
+        .map(|_| {
+            let start = Instant::now();
+            for _ in 0..BATCH {
+                world.step();
+                std::hint::black_box(world.host_read(&mut sink));
+            }
+            start.elapsed().as_nanos() as f64 / f64::from(BATCH)
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    let median = times[times.len() / 2];
+    println!(
+        "{{\"name\":\"simulated_millisecond\",\"median_ns\":{median:.1},\"least_ns\":{:.1},\"real_time_factor\":{:.0},\"state\":\"{:?}\"}}",
+        times[0],
+        1e6 / median,
+        world.telemetry().state,
+    );
+    Ok(())
+}

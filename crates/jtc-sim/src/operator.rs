@@ -1,0 +1,162 @@
+//! A patient operator at the small host: brings the world up, uploads, executes, and waits in virtual time.
+use core::fmt;
+
+use jtc_bus::{JOINTS, fsm};
+use jtc_core::{State, Tes};
+use jtc_wire::{DataStatus, ExecCommand, FrameStatus, FrameType, RawPoint, Response};
+
+use crate::config::SimConfig;
+use crate::host::{self, Listener};
+use crate::world::World;
+
+/// What an operator waited for did not come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OperatorError {
+    /// The world did not get there in time.
+    Late {
+        /// What was waited for.
+        waited_for: &'static str,
+        /// For how long, ms.
+        ms: u64,
+        /// State then.
+        state: State,
+        /// Error word then.
+        errors: u16,
+    },
+    /// A frame was refused.
+    Refused(Response),
+}
+
+impl fmt::Display for OperatorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Late { waited_for, ms, state, errors } => {
+                write!(
+                    f,
+                    "{waited_for}: not within {ms} ms; the controller is in {state:?}, errors 0x{errors:04X}"
+                )
+            }
+            Self::Refused(response) => write!(f, "refused: {response:?}"),
+        }
+    }
+}
+
+impl std::error::Error for OperatorError {}
+
+/// The operator and the world.
+pub struct Operator {
+    /// The world.
+    pub world: World,
+    /// What came from the device.
+    pub listener: Listener,
+}
+
+impl Operator {
+    /// In front of a world that was just switched on.
+    pub fn new(config: SimConfig) -> Self {
+        Self { world: World::new(config), listener: Listener::default() }
+    }
+
+    /// State of the controller.
+    pub fn state(&self) -> State {
+        self.world.telemetry().state
+    }
+
+    /// One millisecond.
+    pub fn step(&mut self) {
+        self.world.step();
+        self.listener.listen(&mut self.world);
+    }
+
+    /// Let `ms` pass.
+    pub fn run(&mut self, ms: u64) {
+        (0..ms).for_each(|_| self.step());
+    }
+
+    /// Let time pass until `done`, at most `ms`; `waited_for` names it in the error.
+    pub fn wait(
+        &mut self,
+        waited_for: &'static str,
+        ms: u64,
+        mut done: impl FnMut(&World) -> bool,
+    ) -> Result<(), OperatorError> {
+        for _ in 0..ms {
+            if done(&self.world) {
+                return Ok(());
+            }
+            self.step();
+        }
+        if done(&self.world) {
+            return Ok(());
+        }
+        let telemetry = self.world.telemetry();
+        Err(OperatorError::Late { waited_for, ms, state: telemetry.state, errors: telemetry.errors })
+    }
+
+    /// Send a frame and wait for its response, which must say no error.
+    pub fn ask(&mut self, frame: &[u8]) -> Result<(), OperatorError> {
+        let response = self.response(frame)?;
+        let good = response.status == FrameStatus::NoError && response.data == DataStatus::NoError;
+        if good { Ok(()) } else { Err(OperatorError::Refused(response)) }
+    }
+
+    /// Send a frame and wait for its response.
+    pub fn response(&mut self, frame: &[u8]) -> Result<Response, OperatorError> {
+        self.listener.responses.clear();
+        self.world.host_write(frame);
+        // Long frames need their time on the line.
+        for _ in 0..8_000 {
+            self.step();
+            if !self.listener.responses.is_empty() {
+                return Ok(self.listener.responses.remove(0));
+            }
+        }
+        let telemetry = self.world.telemetry();
+        Err(OperatorError::Late {
+            waited_for: "response",
+            ms: 8_000,
+            state: telemetry.state,
+            errors: telemetry.errors,
+        })
+    }
+
+    /// Give the default parameters and wait until every joint is enabled and held.
+    pub fn bring_up(&mut self) -> Result<(), OperatorError> {
+        self.world.host_write(&host::use_defaults());
+        self.wait_for_hold(12_000)
+    }
+
+    /// Wait until every joint is enabled and held.
+    pub fn wait_for_hold(&mut self, ms: u64) -> Result<(), OperatorError> {
+        self.wait("HoldPos with all joints enabled", ms, |world| {
+            world.telemetry().state == State::HoldPos
+                && world.node_states()[..JOINTS] == [fsm::ENABLED; JOINTS]
+        })
+    }
+
+    /// Send a trajectory; every segment must be accepted.
+    pub fn upload(&mut self, points: &[RawPoint], step_ms: u16) -> Result<(), OperatorError> {
+        for segment in host::trajectory(points, step_ms, 113) {
+            self.ask(&segment)?;
+        }
+        self.wait("trajectory complete", 100, |world| world.telemetry().tes == Tes::Stop)
+    }
+
+    /// Execute the trajectory that is there, until it is finished.
+    pub fn execute(&mut self, ms: u64) -> Result<(), OperatorError> {
+        self.ask(&host::exec(ExecCommand::Execute))?;
+        self.wait("end of the trajectory", ms, |world| world.telemetry().tes == Tes::Finish)
+    }
+
+    /// Clear every error, and wait until the arm is held again.
+    pub fn recover(&mut self) -> Result<(), OperatorError> {
+        self.ask(&host::clear_all())?;
+        self.wait_for_hold(15_000)
+    }
+
+    /// Teaching on.
+    pub fn teach(&mut self) -> Result<(), OperatorError> {
+        self.ask(&host::frame(FrameType::TeachingModeEnable, &[]))?;
+        self.wait("Teaching", 100, |world| world.telemetry().state == State::Teaching)
+    }
+}

@@ -50,7 +50,7 @@ enum Path {
 ///
 /// Parts that differ in what they know live in modules of their own: `nodes` (the bus), `host` (commands), `store` (trajectory),
 /// `motion` (control law), `errors`. This type connects them; [`Controller::tick`] is the figure of the manual, top to bottom.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Controller<M> {
     pub(crate) config: Config,
     pub(crate) state: State,
@@ -250,7 +250,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Every measured position is within the start tolerance of `position`.
     fn near(&self, position: &[f64; JOINTS]) -> bool {
         let tolerance = self.config.start_tolerance_rad;
-        self.nodes.positions().iter().zip(position).all(|(q, p)| (q - p).abs() <= tolerance)
+        (0..JOINTS).all(|j| (self.nodes.positions()[j] - position[j]).abs() <= tolerance)
     }
 
     /// Execute from Pause.
@@ -295,7 +295,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn teach(&mut self) {
-        self.motion.set = crate::SetPoint::still(self.nodes.positions());
+        self.motion.set = crate::SetPoint::still(*self.nodes.positions());
         self.compute(Law::Teach);
     }
 
@@ -307,13 +307,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Set values of Operate.
     fn walk(&mut self) {
-        let Some(first) = self.store.at(0.0) else { return };
         match self.path {
             Path::Waiting => {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
                 self.motion.hold(&self.config);
                 if self.motion.all_holding() {
-                    if self.near(&first.position) {
+                    if self.near(&self.first_point()) {
                         self.path = Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0 };
                     } else {
                         self.set_tes(Tes::Stop);
@@ -323,29 +322,38 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Path::Gliding { from, elapsed_ms } => {
                 let length = f64::from(self.config.ramp_ms.max(1));
                 let elapsed_ms = elapsed_ms + 1.0;
-                self.motion.glide(&from, &first.position, (elapsed_ms / length).min(1.0), length);
+                self.motion.glide(&from, &self.first_point(), (elapsed_ms / length).min(1.0), length);
                 self.path =
                     if elapsed_ms < length { Path::Gliding { from, elapsed_ms } } else { Path::AtStart };
             }
             Path::AtStart => {
                 self.clock = PathClock::start();
                 self.path = Path::Running { leave: None };
-                self.motion.follow(&first, 1.0, 0.0);
+                self.follow();
                 self.finish_at_end();
             }
             Path::Running { leave } => {
                 self.clock.advance();
-                let end = f64::from(self.store.duration_ms());
-                self.clock.time = self.clock.time.min(end);
-                if let Some(at) = self.store.at(self.clock.time) {
-                    self.motion.follow(&at, self.clock.rate, self.clock.slope);
-                }
+                self.clock.time = self.clock.time.min(f64::from(self.store.duration_ms()));
+                self.follow();
                 match leave {
                     Some(tes) if self.clock.standing() => self.set_tes(tes),
                     _ => self.finish_at_end(),
                 }
             }
         }
+    }
+
+    /// Set values at the present path time.
+    fn follow(&mut self) {
+        if let Some(at) = self.store.at(self.clock.time) {
+            self.motion.follow(&at, self.clock.rate, self.clock.slope);
+        }
+    }
+
+    /// Positions of the first point; without a trajectory (which Execute refuses) where the arm is held.
+    fn first_point(&self) -> [f64; JOINTS] {
+        self.store.at(0.0).map_or(self.motion.set.position, |first| first.position)
     }
 
     /// The last point was commanded in this tick (J-31).
@@ -376,12 +384,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !matches!(self.state, State::HoldPos | State::Operate | State::Teaching) {
             return torque;
         }
-        let measured = self.nodes.positions();
         for (j, torque) in torque.iter_mut().enumerate() {
+            let measured = self.nodes.positions()[j];
             let mut errors = if self.state == State::Teaching {
                 0
             } else {
-                self.motion.check_set(j, measured[j], &self.config)
+                self.motion.check_set(j, measured, &self.config)
             };
             match self.motion.limit_torque(j, &self.config) {
                 Ok(limited) => *torque = limited,
@@ -478,5 +486,19 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }),
         };
         Some(status.emit())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::POINTS_MAX;
+
+    /// The controller with its trajectory, without the buffer of the host link.
+    #[test]
+    fn memory_fits_448_kib() {
+        let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>();
+        assert_eq!(size_of::<[RawPoint; POINTS_MAX]>(), 432_000);
+        assert!(bytes <= 448 * 1024, "{bytes} bytes");
     }
 }

@@ -3,7 +3,7 @@
 //! Each channel comes from its own samples: the position from the quintic through both points' position, velocity and
 //! acceleration, the velocity from the cubic through their velocity and acceleration, the acceleration from the line. No
 //! channel is the derivative of another, because the int16 grid of the positions (96 µrad) would turn into tens of rad/s².
-use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
+use jtc_wire::RawPoint;
 
 use crate::JOINTS;
 
@@ -27,11 +27,10 @@ impl SetPoint {
 
 impl From<&RawPoint> for SetPoint {
     fn from(raw: &RawPoint) -> Self {
-        let scaled = |v: &[i16; JOINTS], scale: f64| v.map(|x| f64::from(x) * scale / 32767.0);
         Self {
-            position: scaled(&raw.position, POSITION_SCALE),
-            velocity: scaled(&raw.velocity, VELOCITY_SCALE),
-            acceleration: scaled(&raw.acceleration, ACCELERATION_SCALE),
+            position: raw.position_rad(),
+            velocity: raw.velocity_rad_s(),
+            acceleration: raw.acceleration_rad_s2(),
         }
     }
 }

@@ -103,7 +103,7 @@ fn smooth(u: f64) -> f64 {
 impl Motion {
     /// Limp: nothing is held, no torque is remembered.
     pub fn release(&mut self, nodes: &Nodes) {
-        *self = Self { set: SetPoint::still(nodes.positions()), ..Self::default() };
+        *self = Self { set: SetPoint::still(*nodes.positions()), ..Self::default() };
     }
 
     /// The state changes among HoldPos, Operate and Teaching: continue without a step but that of the model (J-44).
@@ -118,7 +118,7 @@ impl Motion {
 
     /// Begin to hold where the arm is, coming to rest first if it moves.
     pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
-        let (from, mut velocity) = (nodes.positions(), nodes.velocities());
+        let (from, mut velocity) = (*nodes.positions(), *nodes.velocities());
         for (v, limit) in velocity.iter_mut().zip(&config.joints) {
             *v = v.max(-limit.velocity_max).min(limit.velocity_max);
         }
@@ -198,8 +198,8 @@ impl Motion {
         // Steepest slope of a ramp of length 1 s.
         const STEEPEST: f64 = 1.5;
         let q = nodes.positions();
-        let gravity = dynamics.gravity_torque(&q);
-        let push = dynamics.inverse(&q, &[0.0; JOINTS], &at.velocity);
+        let gravity = dynamics.gravity_torque(q);
+        let push = dynamics.inverse(q, &[0.0; JOINTS], &at.velocity);
         let mut seconds = f64::from(config.ramp_ms) / 1000.0;
         for j in 0..JOINTS {
             let limit = &config.joints[j];
@@ -225,7 +225,7 @@ impl Motion {
         let zero = [0.0; JOINTS];
         let (qd, qdd) =
             if law == Law::Follow { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
-        let model = gains.dynamics.inverse(&q, &qd, &qdd);
+        let model = gains.dynamics.inverse(q, &qd, &qdd);
         for j in 0..JOINTS {
             let limit = &config.joints[j];
             let mut torque =

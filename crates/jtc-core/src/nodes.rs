@@ -115,6 +115,9 @@ impl Node {
 #[derive(Clone, Debug)]
 pub(crate) struct Nodes {
     nodes: [Node; NODES],
+    /// Measured positions (rad) and velocities (rad/s) of the joints; 0 where they do not count yet.
+    position: [f64; JOINTS],
+    velocity: [f64; JOINTS],
     gripper: bool,
     /// Measured state of the gripper.
     pub pump: bool,
@@ -137,6 +140,8 @@ impl Nodes {
         node.reset = true;
         Self {
             nodes: [node; NODES],
+            position: [0.0; JOINTS],
+            velocity: [0.0; JOINTS],
             gripper: config.gripper,
             pump: false,
             pressure: [false; 2],
@@ -159,13 +164,13 @@ impl Nodes {
     }
 
     /// Measured positions, rad; those that do not count yet are 0.
-    pub fn positions(&self) -> [f64; JOINTS] {
-        core::array::from_fn(|j| if self.node(j).valid { self.node(j).report.position } else { 0.0 })
+    pub fn positions(&self) -> &[f64; JOINTS] {
+        &self.position
     }
 
     /// Measured velocities, rad/s; those that do not count yet are 0.
-    pub fn velocities(&self) -> [f64; JOINTS] {
-        core::array::from_fn(|j| if self.node(j).valid { self.node(j).report.velocity } else { 0.0 })
+    pub fn velocities(&self) -> &[f64; JOINTS] {
+        &self.velocity
     }
 
     /// Takes in what came over the bus since the last tick.
@@ -205,6 +210,11 @@ impl Nodes {
                 Ok(Answer::Fsm { .. }) => {}
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
+        }
+        for j in 0..JOINTS {
+            let node = &self.nodes[j];
+            (self.position[j], self.velocity[j]) =
+                if node.valid { (node.report.position, node.report.velocity) } else { (0.0, 0.0) };
         }
         self.count_silence(inputs, config, &answered);
         self.watch(config, goal);

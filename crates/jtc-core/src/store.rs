@@ -5,7 +5,7 @@ use crate::interpolation::{SetPoint, interpolate};
 use crate::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 /// What was received of the current trajectory. `M` is the memory of its points.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Store<M> {
     points: M,
     /// Points of the accepted segments.

@@ -1,0 +1,126 @@
+//! Time of one control tick in Operate and memory of the controller, one `name value` a line (ns, bytes).
+use std::hint::black_box;
+use std::time::Instant;
+
+use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
+use jtc_core::{BusState, Config, Controller, Inputs, POINTS_MAX, State};
+use jtc_wire::{FrameRef, FrameType, LinkEvent, RawPoint, crc16};
+
+const SCALE: Scale = Scale { velocity: 2.0 };
+
+fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
+    let n = (body.len() + 6) as u16;
+    let mut bytes = vec![0x9B, frame_type as u8, (n >> 8) as u8, n as u8];
+    bytes.extend_from_slice(body);
+    bytes.extend_from_slice(&crc16(&bytes).to_be_bytes());
+    bytes
+}
+
+/// Nodes that answer at once and are where they should be.
+fn answers(request: &Request, state: &mut [u8; 7], position: &[f64; 6]) -> Vec<Frame> {
+    let mut out = Vec::new();
+    for n in 0..7u8 {
+        let node = &mut state[usize::from(n)];
+        let answer = match request {
+            Request::Move { .. } if n < 6 => Answer::Joint {
+                node: n,
+                report: JointReport {
+                    position: position[usize::from(n)],
+                    temperature: 30,
+                    fsm: *node,
+                    motor_temperature: Some(30),
+                    ..JointReport::default()
+                },
+            },
+            Request::Move { .. } => Answer::Gripper(GripperReport { fsm: *node, ..GripperReport::default() }),
+            Request::ChangeFsm { target } => {
+                let before = *node;
+                *node = match target[usize::from(n)] {
+                    Target::NoChange => before,
+                    other => other as u8,
+                };
+                Answer::Fsm { node: n, fsm: before }
+            }
+            Request::ChangeMode { .. } => Answer::Mode { node: n, accepted: true },
+            Request::ResetAll | Request::Reset(_) => {
+                *node = fsm::INIT;
+                continue;
+            }
+        };
+        out.push(answer.emit(SCALE));
+    }
+    out
+}
+
+fn main() {
+    let points: Vec<RawPoint> = (0..1500i32)
+        .map(|i| {
+            let phase = f64::from(i) * 0.01;
+            let wave = |scale: f64, x: f64| [(x / scale * 32767.0) as i16; 6];
+            RawPoint {
+                position: wave(3.141592, 0.3 * (1.0 - phase.cos())),
+                velocity: wave(6.283185, 0.3 * phase.sin()),
+                acceleration: wave(12.566370, 0.3 * phase.cos()),
+            }
+        })
+        .collect();
+    let mut body: Vec<u8> = [0u16, 0, 1, 10].iter().flat_map(|x| x.to_be_bytes()).collect();
+    for p in &points {
+        for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
+            body.extend_from_slice(&v.to_be_bytes());
+        }
+    }
+    let commands = [
+        (FrameType::FrictionPolynomialUseDefault, vec![]),
+        (FrameType::PidParamUseDefault, vec![]),
+        (FrameType::ArmModelUseDefault, vec![]),
+        (FrameType::Trajectory, body),
+        (FrameType::TrajSetExecStatus, vec![3]),
+    ];
+    let mut queue: std::collections::VecDeque<_> = commands.iter().map(|(t, b)| (*t, frame(*t, b))).collect();
+
+    let mut controller = Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX]);
+    let mut nodes = [fsm::INIT; 7];
+    let mut bus = Vec::new();
+    let mut recorded: Vec<Vec<Frame>> = Vec::new();
+    let mut start = None;
+    let bus_state = BusState { acknowledged: true, bus_off: false };
+    while recorded.len() < 4_000 {
+        // Later commands need HoldPos.
+        let ready = queue.len() > 2 || controller.telemetry().state == State::HoldPos;
+        let host = queue
+            .front()
+            .filter(|_| ready)
+            .map(|(t, bytes)| LinkEvent::Frame(FrameRef { frame_type: *t, bytes }));
+        if controller.telemetry().point == 1000 && start.is_none() {
+            start = Some(controller.clone());
+        }
+        if start.is_some() {
+            recorded.push(bus.clone());
+        }
+        let outputs =
+            controller.tick(&Inputs { bus: &bus, bus_state, safety_input: true, host, status_free: true });
+        if outputs.host_done {
+            queue.pop_front();
+        }
+        let request = Request::parse(&outputs.bus.expect("a frame each tick")).expect("a request");
+        let set = controller.telemetry().joints.map(|j| j.set_position);
+        bus = answers(&request, &mut nodes, &set);
+    }
+    let start = start.expect("the trajectory was executed");
+
+    let mut times = Vec::new();
+    for _ in 0..25 {
+        let mut controller = start.clone();
+        let begin = Instant::now();
+        for bus in &recorded {
+            let inputs = Inputs { bus, bus_state, safety_input: true, host: None, status_free: true };
+            black_box(controller.tick(black_box(&inputs)));
+        }
+        times.push(begin.elapsed().as_nanos() as f64 / recorded.len() as f64);
+        assert_eq!(controller.telemetry().state, State::Operate);
+    }
+    times.sort_by(f64::total_cmp);
+    println!("control_tick_ns {:.1}", times[times.len() / 2]);
+    println!("controller_bytes {}", size_of::<Controller<[RawPoint; POINTS_MAX]>>());
+}

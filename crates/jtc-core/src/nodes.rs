@@ -175,18 +175,18 @@ impl Nodes {
 
     /// Takes in what came over the bus since the last tick.
     pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal) {
-        let mut answered = [false; NODES];
-        // A configuration accepted in this very tick is followed by its Move answer in a later one.
-        let configured_before: [bool; NODES] = core::array::from_fn(|n| self.node(n).configured);
-        for node in &mut self.nodes {
+        // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
+        let (mut answered, mut configured_before) = (0u8, 0u8);
+        for (n, node) in self.nodes.iter_mut().enumerate() {
             node.misbehaved = false;
             node.deaf_left = node.deaf_left.saturating_sub(1);
+            configured_before |= u8::from(node.configured) << n;
         }
         let scale = Scale { velocity: config.velocity_full_scale };
         for frame in inputs.bus.iter().take(FRAMES_MAX) {
             match Answer::parse(frame, scale) {
                 Ok(Answer::Joint { node, report }) => {
-                    self.report(node.into(), report, config, &configured_before, &mut answered)
+                    self.report(node.into(), &report, config, configured_before, &mut answered)
                 }
                 Ok(Answer::Gripper(g)) => {
                     (self.pump, self.pressure) = (g.pump, [g.pressure1, g.pressure2]);
@@ -196,7 +196,7 @@ impl Nodes {
                         warnings: g.warnings,
                         ..JointReport::default()
                     };
-                    self.report(GRIPPER, report, config, &configured_before, &mut answered);
+                    self.report(GRIPPER, &report, config, configured_before, &mut answered);
                 }
                 Ok(Answer::Mode { node, accepted }) => {
                     if let Some(node) =
@@ -216,33 +216,26 @@ impl Nodes {
             (self.position[j], self.velocity[j]) =
                 if node.valid { (node.report.position, node.report.velocity) } else { (0.0, 0.0) };
         }
-        self.count_silence(inputs, config, &answered);
+        self.count_silence(inputs, config, answered);
         self.watch(config, goal);
     }
 
     fn report(
         &mut self,
         n: usize,
-        report: JointReport,
+        report: &JointReport,
         config: &Config,
-        configured_before: &[bool; NODES],
-        answered: &mut [bool; NODES],
+        configured_before: u8,
+        answered: &mut u8,
     ) {
-        let (Some(node), Some(answered), Some(configured_before)) =
-            (self.nodes.get_mut(n), answered.get_mut(n), configured_before.get(n))
-        else {
-            return;
-        };
-        if node.deaf_left > 0 {
-            return;
-        }
-        *answered = true;
+        let Some(node) = self.nodes.get_mut(n).filter(|node| node.deaf_left == 0) else { return };
+        *answered |= 1 << n;
         let was_starting = node.starting();
         let jump = (report.position - node.report.position).abs();
         if node.valid && jump > config.position_jump_max {
             node.misbehaved = true;
         }
-        node.report = report;
+        node.report = *report;
         node.seen = true;
         if node.starting() {
             if !was_starting || report.fsm == fsm::START {
@@ -253,20 +246,24 @@ impl Nodes {
                 node.clear_left = 0;
             }
         }
-        if node.configured && *configured_before {
+        if node.configured && configured_before & (1 << n) != 0 {
             node.valid = true;
         }
     }
 
     /// Counts Moves without answer and without acknowledge (J-14).
-    fn count_silence(&mut self, inputs: &Inputs<'_>, config: &Config, answered: &[bool; NODES]) {
+    fn count_silence(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
-        if self.sent_move {
-            self.unacknowledged = if on_the_bus { 0 } else { self.unacknowledged.saturating_add(1) };
+        // While every node boots there is nobody to acknowledge.
+        let somebody = self.nodes[..self.present()].iter().any(|node| node.boot_left == 0);
+        if on_the_bus {
+            self.unacknowledged = 0;
+        } else if self.sent_move && somebody {
+            self.unacknowledged = self.unacknowledged.saturating_add(1);
         }
-        for (node, &answered) in self.nodes.iter_mut().zip(answered) {
+        for (n, node) in self.nodes.iter_mut().enumerate() {
             node.boot_left = node.boot_left.saturating_sub(1);
-            if answered {
+            if answered & (1 << n) != 0 {
                 node.missed = 0;
                 node.boot_left = 0;
             } else if self.sent_move && on_the_bus && node.boot_left == 0 {
@@ -380,7 +377,7 @@ impl Nodes {
 
     fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
         let present = self.present();
-        let to_reset = (0..present).filter(|&n| self.node(n).reset).count();
+        let to_reset = self.nodes[..present].iter().filter(|node| node.reset).count();
         if to_reset == present {
             for node in &mut self.nodes {
                 node.restart(config);
@@ -392,10 +389,13 @@ impl Nodes {
             node.restart(config);
             return Some(Request::Reset(n as u8));
         }
-        let target: [Target; NODES] =
-            core::array::from_fn(|n| if n < present { self.node(n).request(goal) } else { Target::NoChange });
-        let change = target.iter().any(|&t| t != Target::NoChange);
-        let configure = goal == Goal::Ready && (0..present).any(|n| self.node(n).wants_configuration());
+        let mut target = [Target::NoChange; NODES];
+        let mut change = false;
+        for n in 0..present {
+            target[n] = self.nodes[n].request(goal);
+            change |= target[n] != Target::NoChange;
+        }
+        let configure = goal == Goal::Ready && self.nodes[..present].iter().any(Node::wants_configuration);
         if configure && !(change && self.configured_last) {
             self.configured_last = true;
             return Some(Request::ChangeMode {

@@ -5,6 +5,8 @@ use crate::config::PidGains;
 const DT: f64 = 0.001;
 /// Ticks over which the derivative is taken.
 const WINDOW: usize = 5;
+/// 1/s: one over the length of the window.
+const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
 /// What the controller remembers.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,9 +49,9 @@ impl Pid {
         }
         // Also while held: new gains may have brought narrower bounds.
         self.integral = self.integral.max(gains.int_min).min(gains.int_max);
-        let rate = (error - self.errors[self.oldest]) / (WINDOW as f64 * DT);
+        let rate = (error - self.errors[self.oldest]) * RATE;
         self.errors[self.oldest] = error;
-        self.oldest = (self.oldest + 1) % WINDOW;
+        self.oldest = if self.oldest + 1 < WINDOW { self.oldest + 1 } else { 0 };
         PidTorque { p: gains.kp * error, i: gains.ki * self.integral, d: gains.kd * rate }
     }
 }

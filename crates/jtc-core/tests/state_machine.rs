@@ -274,6 +274,17 @@ fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
 }
 
 #[test]
+fn j14_a_bus_on_which_every_node_boots_is_no_error_until_that_takes_too_long() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.acknowledged = false;
+    rig.run(1500);
+    assert_eq!((rig.state(), rig.errors()), (State::Init, 0));
+    rig.run(600);
+    assert_eq!((rig.state(), rig.status().can_current), (State::Error, 1));
+}
+
+#[test]
 fn j14_bus_off_is_an_error_at_once() {
     let mut rig = Rig::holding();
     rig.bus_off = true;

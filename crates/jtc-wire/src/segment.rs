@@ -13,9 +13,11 @@ pub struct RawPoint {
     pub acceleration: [i16; JOINTS],
 }
 
-/// rad at 32767 in a trajectory point.
+/// rad at 32767 in a trajectory point. These three are numbers of the protocol, not roundings of ours.
+#[allow(clippy::approx_constant)]
 pub const POSITION_SCALE: f64 = 3.141592;
 /// rad/s at 32767 in a trajectory point.
+#[allow(clippy::approx_constant)]
 pub const VELOCITY_SCALE: f64 = 6.283185;
 /// rad/s² at 32767 in a trajectory point.
 pub const ACCELERATION_SCALE: f64 = 12.566370;
@@ -60,19 +62,19 @@ impl RawPoint {
         bytes
     }
 
-    /// rad; `raw * 3.141592 / 32767`, the product taken first.
+    /// rad; `raw * (3.141592 / 32767)`, the quotient taken first.
     pub fn position_rad(&self) -> [f64; JOINTS] {
-        self.position.map(|raw| f64::from(raw) * POSITION_SCALE / RAW_FULL_SCALE)
+        self.position.map(|raw| f64::from(raw) * (POSITION_SCALE / RAW_FULL_SCALE))
     }
 
-    /// rad/s; `raw * 6.283185 / 32767`, the product taken first.
+    /// rad/s; `raw * (6.283185 / 32767)`, the quotient taken first.
     pub fn velocity_rad_s(&self) -> [f64; JOINTS] {
-        self.velocity.map(|raw| f64::from(raw) * VELOCITY_SCALE / RAW_FULL_SCALE)
+        self.velocity.map(|raw| f64::from(raw) * (VELOCITY_SCALE / RAW_FULL_SCALE))
     }
 
-    /// rad/s²; `raw * 12.566370 / 32767`, the product taken first.
+    /// rad/s²; `raw * (12.566370 / 32767)`, the quotient taken first.
     pub fn acceleration_rad_s2(&self) -> [f64; JOINTS] {
-        self.acceleration.map(|raw| f64::from(raw) * ACCELERATION_SCALE / RAW_FULL_SCALE)
+        self.acceleration.map(|raw| f64::from(raw) * (ACCELERATION_SCALE / RAW_FULL_SCALE))
     }
 }
 

@@ -77,7 +77,7 @@ pub fn rest(raw: i16) -> RawPoint {
 
 /// rad of a raw position.
 pub fn rad(raw: i16) -> f64 {
-    f64::from(raw) * 3.141592 / 32767.0
+    f64::from(raw) * (3.141592 / 32767.0)
 }
 
 impl Rig {

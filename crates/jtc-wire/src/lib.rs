@@ -5,9 +5,16 @@
 #[cfg(any(test, feature = "fuzzing"))]
 extern crate std;
 
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub mod fuzzing;
+
 mod command;
 mod crc;
+mod describe;
+mod encode;
 mod frame;
+mod receive;
 mod response;
 mod segment;
 mod status;
@@ -16,10 +23,16 @@ pub mod words;
 
 pub use command::{ALL_NODES, Command, ExecCommand, Floats};
 pub use crc::{crc16, crc16_update};
+pub use describe::{Described, Piece, Pieces, pieces};
+pub use encode::{
+    Channel, EncodeError, FloatName, FrictionTable, OutOfScale, arm_model, fixed, floats,
+    friction_polynomial, friction_table, pid_param, trajectory,
+};
 pub use frame::{
     FRAME_MAX, FRAME_MIN, FRAME_POINTS_MAX, FrameRef, FrameType, HEADER, JOINTS, Lengths, POINT_LEN,
     TRAJECTORY_OVERHEAD,
 };
+pub use receive::{StatusCounters, StatusReceiver};
 pub use response::{DataStatus, FrameStatus, Response};
 pub use segment::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, Segment, VELOCITY_SCALE};
 pub use status::{

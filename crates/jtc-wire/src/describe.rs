@@ -1,0 +1,291 @@
+//! Frames in words: a line each, like a network sniffer's; `{:#}` adds every number.
+use core::fmt::{Display, Formatter, Result};
+
+use crate::command::{Command, ExecCommand, Floats};
+use crate::encode::FloatName;
+use crate::frame::{FRAME_MIN, FrameRef, FrameType, HEADER, field};
+use crate::segment::Segment;
+use crate::status::Status;
+use crate::words::{self, Bits};
+
+/// Any bytes in words: a frame of either direction, or what is wrong with them.
+///
+/// ```
+/// use jtc_wire::Described;
+/// let text = Described(&[0x9B, 0x0B, 0x00, 0x07, 0x03, 0x7D, 0x9E]).to_string();
+/// assert_eq!(text, "TrajSetExecStatus: execute");
+/// let text = Described(&[0x9B, 0x0C, 0x00, 0x06, 0xCD, 0x28]).to_string();
+/// assert_eq!(text, "TeachingModeEnable of 6 bytes: CRC is CD28, should be CD27");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Described<'a>(pub &'a [u8]);
+
+impl Display for Described<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match FrameRef::new_checked(self.0) {
+            Some(frame) => frame.fmt(f),
+            None => wrong(self.0, f),
+        }
+    }
+}
+
+fn wrong(bytes: &[u8], f: &mut Formatter<'_>) -> Result {
+    let Some((&[header, kind, high, low], rest)) = bytes.split_first_chunk::<4>() else {
+        return write!(f, "{} bytes, too few for a frame", bytes.len());
+    };
+    if header != HEADER {
+        return write!(f, "{} bytes that begin with {header:02X} instead of {HEADER:02X}", bytes.len());
+    }
+    let Some(kind) = FrameType::from_byte(kind) else {
+        return write!(f, "frame of unknown type {kind:02X}, {} bytes", bytes.len());
+    };
+    let n = usize::from(u16::from_be_bytes([high, low]));
+    if n < FRAME_MIN || !kind.can_have(n) {
+        return write!(f, "{kind} with a length field of {n}, which it cannot have; {} bytes", bytes.len());
+    }
+    let (covered, crc) = bytes.split_at(bytes.len() - field::CRC_LEN.min(rest.len()));
+    match crc {
+        [high, low] if bytes.len() == n => {
+            let (is, should) = (u16::from_be_bytes([*high, *low]), crate::crc16(covered));
+            write!(f, "{kind} of {n} bytes: CRC is {is:04X}, should be {should:04X}")
+        }
+        _ => write!(f, "{kind}: {} bytes of {n}", bytes.len()),
+    }
+}
+
+impl Display for FrameRef<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        if self.frame_type == FrameType::JtcStatus {
+            return match Status::parse(self.bytes) {
+                Some(status) => status.fmt(f),
+                None => f.write_str("JtcStatus that does not parse"),
+            };
+        }
+        match Command::parse(*self) {
+            Ok(command) => {
+                command.fmt(f)?;
+                // Two frames say this, only one of them is the right one.
+                if self.frame_type != command.frame_type() {
+                    write!(f, " (sent as an empty {})", self.frame_type)?;
+                }
+                Ok(())
+            }
+            Err(data) => write!(f, "{}: {data}", self.frame_type),
+        }
+    }
+}
+
+impl Display for ExecCommand {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        f.write_str(match self {
+            Self::Stop => "stop",
+            Self::Pause => "pause",
+            Self::Execute => "execute",
+        })
+    }
+}
+
+impl Display for Segment<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let Self { trajectory, segment, segments, step_time, .. } = self;
+        write!(f, "trajectory {trajectory}, segment {segment} of {segments}, ")?;
+        write!(f, "{} points, {step_time} ms apart", self.len())?;
+        if f.alternate() {
+            for (i, point) in self.points().enumerate() {
+                write!(f, "\n  {i:4} rad {}", Row(&point.position_rad()))?;
+                write!(f, " rad/s {}", Row(&point.velocity_rad_s()))?;
+                write!(f, " rad/s² {}", Row(&point.acceleration_rad_s2()))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+struct Row<'a>(&'a [f64]);
+
+impl Display for Row<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        self.0
+            .iter()
+            .enumerate()
+            .try_for_each(|(i, value)| write!(f, "{}{value:.4}", if i > 0 { " " } else { "" }))
+    }
+}
+
+impl Display for Command<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let kind = self.frame_type();
+        f.write_str(kind.name())?;
+        match *self {
+            Self::ClearCurrentErrors { jtc, nodes } => {
+                let own = if jtc { "the controller's own, " } else { "" };
+                write!(f, ": {own}nodes: {}", Bits(nodes.into(), &words::NODES))
+            }
+            Self::Trajectory(segment) => {
+                f.write_str(": ")?;
+                segment.fmt(f)
+            }
+            Self::PidParam(values) | Self::ArmModel(values) => list(kind, values, f),
+            Self::FrictionTable(values) => {
+                let ends = |from, to| (values.get(from).unwrap_or(0.0), values.get(to).unwrap_or(0.0));
+                let (velocity, temperature) = (ends(0, 19), ends(20, 39));
+                write!(f, ": joint 0 {}..{} rad/s, ", velocity.0, velocity.1)?;
+                write!(f, "{}..{} °C", temperature.0, temperature.1)?;
+                if f.alternate() { list(kind, values, f) } else { Ok(()) }
+            }
+            Self::FrictionPolynomial(values) => polynomial(values, f),
+            Self::TrajSetExecStatus(command) => write!(f, ": {command}"),
+            Self::ResetCanDevices { nodes } => write!(f, ": {}", Bits(nodes.into(), &words::NODES)),
+            Self::GripperControl { pump } => write!(f, ": pump {}", if pump { "on" } else { "off" }),
+            Self::ClearOccurredErrors
+            | Self::FrictionTableUseDefault
+            | Self::PidParamUseDefault
+            | Self::ArmModelUseDefault
+            | Self::TeachingModeEnable
+            | Self::TeachingModeDisable
+            | Self::FrictionPolynomialUseDefault => Ok(()),
+        }
+    }
+}
+
+fn list(kind: FrameType, values: Floats<'_>, f: &mut Formatter<'_>) -> Result {
+    if !f.alternate() {
+        return write!(f, ": {} numbers", values.len());
+    }
+    values.iter().enumerate().try_for_each(|(i, value)| write!(f, "\n  {} = {value}", FloatName(kind, i)))
+}
+
+fn polynomial(values: Floats<'_>, f: &mut Formatter<'_>) -> Result {
+    let each = values.len() / crate::JOINTS;
+    write!(f, ": {each} coefficients a joint")?;
+    if f.alternate() && each > 0 {
+        for (i, value) in values.iter().enumerate() {
+            let (joint, index) = (i / each, each - 1 - i % each);
+            write!(f, "\n  joint {joint} c{index} = {value}")?;
+        }
+    }
+    Ok(())
+}
+
+impl Display for Status {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let (state, tes) = (words::jtc_fsm(self.fsm), words::tes(self.tes));
+        write!(f, "JtcStatus: {state}, trajectory {tes}, point {}", self.point)?;
+        if let Some(response) = self.response() {
+            write!(f, "; record: {response}")?;
+        }
+        let mut lists = Lists { f };
+        lists.add("errors", self.errors.into(), &words::JTC_ERRORS)?;
+        lists.add("missing", self.jtc_init.into(), &words::JTC_INIT)?;
+        lists.add("not ready", self.node_init.into(), &words::NODES)?;
+        lists.add("CAN", self.can_current, &words::CAN_FLAGS)?;
+        let f = lists.f;
+        if f.alternate() {
+            write!(f, "\n  occurred: {}", Bits(self.occurred.into(), &words::JTC_ERRORS))?;
+            write!(f, "\n  friction: {}", words::friction_type(self.friction_type))?;
+            write!(f, "\n  CAN occurred: {}", Bits(self.can_occurred, &words::CAN_FLAGS))?;
+            for (j, joint) in self.joints.iter().enumerate() {
+                write!(f, "\n  joint {j}: {joint}")?;
+            }
+            if let Some(gripper) = &self.gripper {
+                write!(f, "\n  gripper: {gripper}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Words of set bits, only of those words that have any.
+struct Lists<'a, 'b> {
+    f: &'a mut Formatter<'b>,
+}
+
+impl Lists<'_, '_> {
+    fn add(&mut self, name: &str, word: u32, names: &[&str]) -> Result {
+        if word == 0 {
+            return Ok(());
+        }
+        write!(self.f, "; {name}: {}", Bits(word, names))
+    }
+}
+
+impl Display for crate::JointStatus {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        write!(f, "{}, {:.6} rad, {:.6} rad/s, ", words::node_fsm(self.fsm), self.position, self.velocity)?;
+        write!(f, "{:.3} N·m, {} °C", self.torque, self.temperature)?;
+        let mut lists = Lists { f };
+        lists.add("found by the controller", self.internal.into(), &words::JOINT_INTERNAL)?;
+        lists.add("occurred", self.internal_occurred.into(), &words::JOINT_INTERNAL)?;
+        lists.add("motor control", self.mc_current.into(), &words::MC_FAULTS)?;
+        lists.add("motor control occurred", self.mc_occurred.into(), &words::MC_FAULTS)?;
+        lists.add("errors", self.errors.into(), &words::NODE_ERRORS)?;
+        lists.add("warnings", self.warnings.into(), &words::NODE_WARNINGS)
+    }
+}
+
+impl Display for crate::GripperStatus {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let pump = if self.pump == 0 { "off" } else { "on" };
+        write!(f, "{}, pump {pump}, ", words::node_fsm(self.fsm))?;
+        let level = |reached: u8| if reached == 0 { "not reached" } else { "reached" };
+        write!(f, "pressure 1 {}, pressure 2 {}", level(self.pressure1), level(self.pressure2))?;
+        let mut lists = Lists { f };
+        lists.add("errors", self.errors.into(), &words::NODE_ERRORS)?;
+        lists.add("warnings", self.warnings.into(), &words::NODE_WARNINGS)
+    }
+}
+
+/// A part of a capture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Piece<'a> {
+    /// A good frame of either direction.
+    Frame(FrameRef<'a>),
+    /// Bytes between good frames: bad frames, rubbish, a frame that the capture cuts off.
+    Other(&'a [u8]),
+}
+
+/// The frames of a whole capture and what is between them, in order; gaps in time are not known and end nothing.
+///
+/// ```
+/// use jtc_wire::{Piece, fixed, pieces};
+/// let capture = [&[0x00, 0x9B][..], &fixed::STOP, &fixed::PUMP_ON].concat();
+/// let found: Vec<_> = pieces(&capture).map(|piece| match piece {
+///     Piece::Frame(frame) => frame.to_string(),
+///     Piece::Other(bytes) => format!("{} other bytes", bytes.len()),
+/// }).collect();
+/// assert_eq!(found, ["2 other bytes", "TrajSetExecStatus: stop", "GripperControl: pump on"]);
+/// ```
+pub fn pieces(capture: &[u8]) -> Pieces<'_> {
+    Pieces { rest: capture }
+}
+
+/// Iterator of [`pieces`].
+#[derive(Clone, Debug)]
+pub struct Pieces<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Iterator for Pieces<'a> {
+    type Item = Piece<'a>;
+
+    fn next(&mut self) -> Option<Piece<'a>> {
+        if let Some(frame) = frame_at(self.rest) {
+            self.rest = &self.rest[frame.bytes.len()..];
+            return Some(Piece::Frame(frame));
+        }
+        let others = (0..self.rest.len()).position(|at| frame_at(&self.rest[at..]).is_some());
+        let (other, rest) = self.rest.split_at(others.unwrap_or(self.rest.len()));
+        self.rest = rest;
+        (!other.is_empty()).then_some(Piece::Other(other))
+    }
+}
+
+/// The good frame at the front of `bytes`.
+fn frame_at(bytes: &[u8]) -> Option<FrameRef<'_>> {
+    let &[header, _, high, low] = bytes.first_chunk()?;
+    let n = usize::from(u16::from_be_bytes([high, low]));
+    if header != HEADER {
+        return None;
+    }
+    FrameRef::new_checked(bytes.get(..n)?)
+}

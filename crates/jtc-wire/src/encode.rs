@@ -1,0 +1,423 @@
+//! Frames from the host: every command into a caller's buffer, numbers checked and scaled, never wrapped or clipped.
+use core::fmt;
+
+use crate::command::{Command, ExecCommand, Floats};
+use crate::crc::crc16_const;
+use crate::crc16;
+use crate::frame::{
+    FRAME_POINTS_MAX, FrameType, HEADER, JOINTS, POINT_LEN, TRAJECTORY_OVERHEAD, field as frame_field,
+};
+use crate::segment::{
+    ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, Segment, VELOCITY_SCALE, field,
+};
+
+/// One of the three lists of numbers of a trajectory point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// rad.
+    Position,
+    /// rad/s.
+    Velocity,
+    /// rad/s².
+    Acceleration,
+}
+
+impl Channel {
+    /// Full scale: the largest magnitude that the wire carries.
+    pub const fn scale(self) -> f64 {
+        match self {
+            Self::Position => POSITION_SCALE,
+            Self::Velocity => VELOCITY_SCALE,
+            Self::Acceleration => ACCELERATION_SCALE,
+        }
+    }
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+        }
+    }
+    /// Unit of `scale`.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Position => "rad",
+            Self::Velocity => "rad/s",
+            Self::Acceleration => "rad/s²",
+        }
+    }
+}
+
+/// A number that a trajectory point cannot carry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfScale {
+    /// 0..5.
+    pub joint: usize,
+    /// Which of its numbers.
+    pub channel: Channel,
+    /// The number: too large in magnitude, infinite, or not a number.
+    pub value: f64,
+    /// Largest magnitude that the wire carries.
+    pub limit: f64,
+}
+
+impl fmt::Display for OutOfScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { joint, channel, value, limit } = self;
+        let unit = channel.unit();
+        write!(
+            f,
+            "{} of joint {joint} is {value} {unit}, the frame carries -{limit}..{limit} {unit}",
+            channel.name()
+        )
+    }
+}
+
+impl core::error::Error for OutOfScale {}
+
+impl RawPoint {
+    /// The nearest point that the wire carries: rad, rad/s, rad/s². A number outside the scale, or none at all, is an error.
+    pub fn from_si(
+        position: &[f64; JOINTS],
+        velocity: &[f64; JOINTS],
+        acceleration: &[f64; JOINTS],
+    ) -> Result<Self, OutOfScale> {
+        let channel = |channel: Channel, values: &[f64; JOINTS]| {
+            let limit = channel.scale();
+            let mut raw = [0; JOINTS];
+            for (joint, (to, &value)) in raw.iter_mut().zip(values).enumerate() {
+                // Not `value.abs() > limit`: that is false for NaN.
+                if !(-limit..=limit).contains(&value) {
+                    return Err(OutOfScale { joint, channel, value, limit });
+                }
+                let exact = value * RAW_FULL_SCALE / limit;
+                // The cast cuts off towards zero: with the half it rounds to the nearest.
+                *to = (exact + if exact < 0.0 { -0.5 } else { 0.5 }) as i16;
+            }
+            Ok(raw)
+        };
+        Ok(Self {
+            position: channel(Channel::Position, position)?,
+            velocity: channel(Channel::Velocity, velocity)?,
+            acceleration: channel(Channel::Acceleration, acceleration)?,
+        })
+    }
+}
+
+/// Why a frame was not written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EncodeError {
+    /// The buffer is too short for the frame.
+    BufferTooShort {
+        /// Bytes of the frame.
+        needed: usize,
+        /// Bytes of the buffer.
+        given: usize,
+    },
+    /// More points than a frame can have.
+    TooManyPoints {
+        /// How many (at least).
+        points: usize,
+        /// How many fit into a frame.
+        limit: usize,
+    },
+    /// Frames of this type do not have that many floats.
+    WrongCount {
+        /// Type of the frame.
+        frame_type: FrameType,
+        /// How many floats (at least).
+        count: usize,
+    },
+    /// A float is infinite or not a number, or too large for an f32.
+    NotFinite {
+        /// Type of the frame.
+        frame_type: FrameType,
+        /// Which float, from 0, in the order of the wire.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::BufferTooShort { needed, given } => {
+                write!(f, "the frame has {needed} bytes, the buffer {given}")
+            }
+            Self::TooManyPoints { points, limit } => write!(f, "{points} points, a frame carries {limit}"),
+            Self::WrongCount { frame_type, count } => {
+                write!(f, "no {frame_type} frame has {count} numbers")
+            }
+            Self::NotFinite { frame_type, index, value } => {
+                write!(f, "{}: {value} is no number that a frame carries", FloatName(*frame_type, *index))
+            }
+        }
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+/// What a float of a frame is: its type and the index from 0 in the order of the wire. Displays as `PidParam joint 2 Ki`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FloatName(pub FrameType, pub usize);
+
+impl fmt::Display for FloatName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const PID: [&str; 5] = ["Kp", "Ki", "Kd", "IntMin", "IntMax"];
+        const ORIGIN: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
+        const LINK: [&str; 13] =
+            ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
+        let Self(kind, index) = *self;
+        write!(f, "{kind} ")?;
+        match kind {
+            FrameType::PidParam => write!(f, "joint {} {}", index / 5, PID[index % 5]),
+            FrameType::ArmModel if index < 42 => write!(f, "joint {} {}", index / 6, ORIGIN[index % 6]),
+            FrameType::ArmModel => write!(f, "link {} {}", (index - 42) / 13, LINK[(index - 42) % 13]),
+            FrameType::FrictionTable => {
+                let (joint, i) = (index / 440, index % 440);
+                match i {
+                    0..20 => write!(f, "joint {joint} velocity {i}"),
+                    20..40 => write!(f, "joint {joint} temperature {}", i - 20),
+                    _ => write!(f, "joint {joint} torque [{}][{}]", (i - 40) / 20, (i - 40) % 20),
+                }
+            }
+            _ => write!(f, "number {index}"),
+        }
+    }
+}
+
+/// Writes header and length for `n` bytes, leaves the body to `body`, ends with the CRC.
+fn frame(
+    out: &mut [u8],
+    frame_type: FrameType,
+    n: usize,
+    body: impl FnOnce(&mut [u8]) -> Result<(), EncodeError>,
+) -> Result<usize, EncodeError> {
+    let given = out.len();
+    let out = out.get_mut(..n).ok_or(EncodeError::BufferTooShort { needed: n, given })?;
+    out[frame_field::HEADER] = HEADER;
+    out[frame_field::TYPE] = frame_type as u8;
+    out[frame_field::LENGTH].copy_from_slice(&(n as u16).to_be_bytes());
+    body(&mut out[frame_field::body(n)])?;
+    let (all, crc) = out.split_at_mut(n - frame_field::CRC_LEN);
+    crc.copy_from_slice(&crc16(all).to_be_bytes());
+    Ok(n)
+}
+
+/// A Trajectory frame; returns its length. What it writes is meaningless after an error.
+pub fn trajectory(
+    out: &mut [u8],
+    (number, segment, segments): (u16, u16, u16),
+    step_time_ms: u16,
+    points: impl IntoIterator<Item = RawPoint>,
+) -> Result<usize, EncodeError> {
+    let given = out.len();
+    let mut count = 0;
+    for point in points {
+        if count == FRAME_POINTS_MAX {
+            return Err(EncodeError::TooManyPoints { points: count + 1, limit: FRAME_POINTS_MAX });
+        }
+        let at = frame_field::BODY + field::POINTS + count * POINT_LEN;
+        count += 1;
+        let needed = TRAJECTORY_OVERHEAD + count * POINT_LEN;
+        let to = out.get_mut(at..at + POINT_LEN).ok_or(EncodeError::BufferTooShort { needed, given })?;
+        to.copy_from_slice(&point.emit());
+    }
+    frame(out, FrameType::Trajectory, TRAJECTORY_OVERHEAD + count * POINT_LEN, |body| {
+        body[field::TRAJECTORY].copy_from_slice(&number.to_be_bytes());
+        body[field::SEGMENT].copy_from_slice(&segment.to_be_bytes());
+        body[field::SEGMENTS].copy_from_slice(&segments.to_be_bytes());
+        body[field::STEP_TIME].copy_from_slice(&step_time_ms.to_be_bytes());
+        Ok(())
+    })
+}
+
+/// A frame of floats in the order of the wire: FrictionTable, PidParam, ArmModel or FrictionPolynomial; returns its length.
+pub fn floats(
+    out: &mut [u8],
+    frame_type: FrameType,
+    values: impl IntoIterator<Item = f64>,
+) -> Result<usize, EncodeError> {
+    let given = out.len();
+    let mut count = 0;
+    for (index, value) in values.into_iter().enumerate() {
+        let single = value as f32;
+        if !single.is_finite() {
+            return Err(EncodeError::NotFinite { frame_type, index, value });
+        }
+        let at = frame_field::BODY + 4 * index;
+        count = index + 1;
+        let to = out.get_mut(at..at + 4).ok_or(EncodeError::BufferTooShort { needed: at + 4 + 2, given })?;
+        to.copy_from_slice(&single.to_be_bytes());
+    }
+    let n = 4 * count + 6;
+    if count == 0 || !frame_type.can_have(n) || frame_type == FrameType::Trajectory {
+        return Err(EncodeError::WrongCount { frame_type, count });
+    }
+    frame(out, frame_type, n, |_| Ok(()))
+}
+
+/// A PidParam frame: per joint Kp, Ki, Kd, IntMin, IntMax (the last two in rad·s).
+pub fn pid_param(out: &mut [u8], gains: &[[f64; 5]; JOINTS]) -> Result<usize, EncodeError> {
+    floats(out, FrameType::PidParam, gains.as_flattened().iter().copied())
+}
+
+/// An ArmModel frame: joint origins (x, y, z in m, roll, pitch, yaw in rad), and links (origin likewise, Ixx Ixy Ixz Iyy Iyz
+/// Izz in kg·m², mass in kg).
+pub fn arm_model(
+    out: &mut [u8],
+    joints: &[[f64; 6]; 7],
+    links: &[[f64; 13]; 7],
+) -> Result<usize, EncodeError> {
+    let values = joints.as_flattened().iter().chain(links.as_flattened());
+    floats(out, FrameType::ArmModel, values.copied())
+}
+
+/// A FrictionPolynomial frame. `coefficients` in the order of their index, c0 first, 4 or 6 per joint; the wire carries the
+/// highest first.
+pub fn friction_polynomial<const N: usize>(
+    out: &mut [u8],
+    coefficients: &[[f64; N]; JOINTS],
+) -> Result<usize, EncodeError> {
+    const { assert!(N == 4 || N == 6, "a friction polynomial has 4 or 6 coefficients") }
+    let values = coefficients.iter().flat_map(|joint| joint.iter().rev());
+    floats(out, FrameType::FrictionPolynomial, values.copied())
+}
+
+/// Friction of one joint by velocity and temperature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionTable<'a> {
+    /// rad/s, strictly increasing.
+    pub velocity: &'a [f32; 20],
+    /// °C, strictly increasing.
+    pub temperature: &'a [f32; 20],
+    /// N·m, a row per velocity.
+    pub torque: &'a [[f32; 20]; 20],
+}
+
+/// A FrictionTable frame.
+pub fn friction_table(out: &mut [u8], tables: &[FrictionTable<'_>; JOINTS]) -> Result<usize, EncodeError> {
+    let values = tables
+        .iter()
+        .flat_map(|table| table.velocity.iter().chain(table.temperature).chain(table.torque.as_flattened()));
+    floats(out, FrameType::FrictionTable, values.map(|value| f64::from(*value)))
+}
+
+fn raw_floats(out: &mut [u8], frame_type: FrameType, floats: Floats<'_>) -> Result<usize, EncodeError> {
+    let n = floats.as_bytes().len() + 6;
+    if floats.is_empty() || !frame_type.can_have(n) {
+        return Err(EncodeError::WrongCount { frame_type, count: floats.len() });
+    }
+    frame(out, frame_type, n, |body| {
+        body.copy_from_slice(floats.as_bytes());
+        Ok(())
+    })
+}
+
+impl Command<'_> {
+    /// The frame that says this; returns its length. Floats are copied as they are.
+    pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
+        let mut fixed = |bytes: &[u8]| {
+            let given = out.len();
+            let to = out.get_mut(..bytes.len());
+            to.ok_or(EncodeError::BufferTooShort { needed: bytes.len(), given })?.copy_from_slice(bytes);
+            Ok(bytes.len())
+        };
+        match *self {
+            Self::ClearCurrentErrors { jtc, nodes } => fixed(&fixed::clear_current_errors(jtc, nodes)),
+            Self::Trajectory(s) => segment(out, s),
+            Self::FrictionTable(values)
+            | Self::PidParam(values)
+            | Self::ArmModel(values)
+            | Self::FrictionPolynomial(values) => raw_floats(out, self.frame_type(), values),
+            Self::TrajSetExecStatus(command) => fixed(&fixed::exec(command)),
+            Self::ResetCanDevices { nodes } => fixed(&fixed::reset_can_devices(nodes)),
+            Self::GripperControl { pump } => fixed(&fixed::gripper_control(pump)),
+            Self::ClearOccurredErrors
+            | Self::FrictionTableUseDefault
+            | Self::PidParamUseDefault
+            | Self::ArmModelUseDefault
+            | Self::TeachingModeEnable
+            | Self::TeachingModeDisable
+            | Self::FrictionPolynomialUseDefault => fixed(&fixed::empty(self.frame_type())),
+        }
+    }
+}
+
+fn segment(out: &mut [u8], s: Segment<'_>) -> Result<usize, EncodeError> {
+    trajectory(out, (s.trajectory, s.segment, s.segments), s.step_time, s.points())
+}
+
+/// Frames of few bytes, as constants.
+pub mod fixed {
+    use super::*;
+
+    const fn sealed<const N: usize>(frame_type: FrameType, body: &[u8]) -> [u8; N] {
+        let mut bytes = [0; N];
+        bytes[0] = HEADER;
+        bytes[1] = frame_type as u8;
+        bytes[2] = (N >> 8) as u8;
+        bytes[3] = N as u8;
+        let mut i = 0;
+        while i < body.len() {
+            bytes[4 + i] = body[i];
+            i += 1;
+        }
+        let crc = crc16_const(bytes.split_at(N - 2).0);
+        bytes[N - 2] = (crc >> 8) as u8;
+        bytes[N - 1] = crc as u8;
+        bytes
+    }
+
+    /// A frame without body.
+    pub const fn empty(frame_type: FrameType) -> [u8; 6] {
+        sealed(frame_type, &[])
+    }
+
+    /// ClearCurrentErrors: the controller's own errors, and those of the nodes in `nodes` (bits 0..6).
+    pub const fn clear_current_errors(jtc: bool, nodes: u8) -> [u8; 10] {
+        sealed(FrameType::ClearCurrentErrors, &[jtc as u8, nodes])
+    }
+
+    /// TrajSetExecStatus.
+    pub const fn exec(command: ExecCommand) -> [u8; 7] {
+        sealed(FrameType::TrajSetExecStatus, &[command as u8])
+    }
+
+    /// ResetCanDevices: the nodes in `nodes` (bits 0..6).
+    pub const fn reset_can_devices(nodes: u8) -> [u8; 10] {
+        sealed(FrameType::ResetCanDevices, &[nodes])
+    }
+
+    /// GripperControl.
+    pub const fn gripper_control(pump: bool) -> [u8; 10] {
+        sealed(FrameType::GripperControl, &[pump as u8])
+    }
+
+    /// ClearOccurredErrors.
+    pub const CLEAR_OCCURRED_ERRORS: [u8; 6] = empty(FrameType::ClearOccurredErrors);
+    /// FrictionTableUseDefault.
+    pub const FRICTION_TABLE_USE_DEFAULT: [u8; 6] = empty(FrameType::FrictionTableUseDefault);
+    /// PidParamUseDefault.
+    pub const PID_PARAM_USE_DEFAULT: [u8; 6] = empty(FrameType::PidParamUseDefault);
+    /// ArmModelUseDefault.
+    pub const ARM_MODEL_USE_DEFAULT: [u8; 6] = empty(FrameType::ArmModelUseDefault);
+    /// TeachingModeEnable.
+    pub const TEACHING_MODE_ENABLE: [u8; 6] = empty(FrameType::TeachingModeEnable);
+    /// TeachingModeDisable.
+    pub const TEACHING_MODE_DISABLE: [u8; 6] = empty(FrameType::TeachingModeDisable);
+    /// FrictionPolynomialUseDefault.
+    pub const FRICTION_POLYNOMIAL_USE_DEFAULT: [u8; 6] = empty(FrameType::FrictionPolynomialUseDefault);
+    /// TrajSetExecStatus: stop.
+    pub const STOP: [u8; 7] = exec(ExecCommand::Stop);
+    /// TrajSetExecStatus: pause.
+    pub const PAUSE: [u8; 7] = exec(ExecCommand::Pause);
+    /// TrajSetExecStatus: execute.
+    pub const EXECUTE: [u8; 7] = exec(ExecCommand::Execute);
+    /// GripperControl: pump on.
+    pub const PUMP_ON: [u8; 10] = gripper_control(true);
+    /// GripperControl: pump off.
+    pub const PUMP_OFF: [u8; 10] = gripper_control(false);
+}

@@ -1,0 +1,72 @@
+//! Bodies of the fuzz targets: each takes any bytes and panics when a promise is broken.
+mod reference;
+mod script;
+mod status;
+
+use std::format;
+use std::vec;
+use std::vec::Vec;
+
+use crate::{Command, FRAME_MAX, FrameRef, FrameType, Lengths, RawPoint, crc16};
+
+pub use reference::{Event, events};
+pub use script::stream_parser;
+pub use status::status_stream;
+
+/// A frame of any type and body, with a right CRC, whether or not its type can have that length.
+pub fn sealed(kind: u8, body: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![crate::HEADER, kind];
+    bytes.extend((body.len() as u16 + 6).to_be_bytes());
+    bytes.extend(body);
+    bytes.extend(crc16(&bytes).to_be_bytes());
+    bytes
+}
+
+/// A body length that `kind` can have, the one that `pick` points to.
+fn body_len(kind: FrameType, pick: u8) -> usize {
+    match kind.lengths() {
+        Lengths::OneOf(list) => usize::from(list[usize::from(pick) % list.len()]) - 6,
+        Lengths::Steps { first, step } => usize::from(first) - 6 + usize::from(step) * usize::from(pick % 40),
+    }
+}
+
+/// Type, pick of a length, then the body (repeated or cut to the length): parse, say in words, send again, parse again.
+pub fn frame_bodies(data: &[u8]) {
+    let [kind, pick, rest @ ..] = data else { return };
+    let Some(kind) = FrameType::from_byte(kind % 0x12) else { return };
+
+    // A body that no receiver hands out must not break anything either.
+    let raw = FrameRef { frame_type: kind, bytes: rest };
+    if let Ok(command) = Command::parse(raw) {
+        let mut out = vec![0; FRAME_MAX];
+        let _ = command.emit(&mut out);
+        let _ = format!("{command} {command:#}");
+    }
+
+    let body: Vec<u8> = rest.iter().chain(&[0]).copied().cycle().take(body_len(kind, *pick)).collect();
+    let bytes = sealed(kind as u8, &body);
+    let frame = FrameRef::new_checked(&bytes).expect("a good frame");
+    assert_eq!(frame.body(), body);
+    let _ = format!("{frame} {frame:#}");
+    let Ok(command) = Command::parse(frame) else { return };
+    let mut out = vec![0; bytes.len().max(10)];
+    let n = command.emit(&mut out).expect("what was understood can be said");
+    let again = FrameRef::new_checked(&out[..n]).expect("what is sent is a good frame");
+    assert_eq!(Command::parse(again), Ok(command));
+    assert!(command.emit(&mut vec![0; n - 1]).is_err(), "never longer than the buffer");
+    if let Command::Trajectory(segment) = command {
+        assert_eq!(n, bytes.len());
+        segment.points().for_each(scaled_and_back);
+    }
+}
+
+fn scaled_and_back(point: RawPoint) {
+    let again =
+        RawPoint::from_si(&point.position_rad(), &point.velocity_rad_s(), &point.acceleration_rad_s2());
+    let lowest = [point.position, point.velocity, point.acceleration].as_flattened().contains(&i16::MIN);
+    match again {
+        Ok(again) => assert_eq!(again, point),
+        // The one number that lies outside the scale.
+        Err(_) => assert!(lowest),
+    }
+}

@@ -1,0 +1,80 @@
+//! A second stream parser: slow, with the whole stream at hand, made to be seen to be right.
+use std::vec::Vec;
+
+use crate::{FrameRef, FrameStatus, FrameType, Response};
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// Bytes of a good frame.
+    Frame(Vec<u8>),
+    /// A run of other bytes.
+    Bad(Response),
+}
+
+/// Events of a stream; `regions` are its parts between gaps, `capacity` the longest frame that can be held.
+pub fn events(regions: &[Vec<u8>], capacity: usize) -> Vec<Event> {
+    regions.iter().flat_map(|region| of_region(region, capacity)).collect()
+}
+
+fn of_region(region: &[u8], capacity: usize) -> Vec<Event> {
+    let mut found = Vec::new();
+    let mut run = None;
+    let mut at = 0;
+    while at < region.len() {
+        if let Some(n) = good_frame(&region[at..], capacity) {
+            found.extend(run.take().map(|from| Event::Bad(judge(&region[from..], capacity))));
+            found.push(Event::Frame(region[at..at + n].to_vec()));
+            at += n;
+        } else {
+            run.get_or_insert(at);
+            at += 1;
+        }
+    }
+    found.extend(run.map(|from| Event::Bad(judge(&region[from..], capacity))));
+    found
+}
+
+/// Length of the good frame at the front.
+fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
+    let n = usize::from(u16::from_be_bytes([*bytes.get(2)?, *bytes.get(3)?]));
+    let frame = FrameRef::new_checked(bytes.get(..n)?)?;
+    (frame.frame_type != FrameType::JtcStatus && n <= capacity).then_some(n)
+}
+
+/// What is wrong with bytes that begin no good frame and end in a gap.
+fn judge(bytes: &[u8], capacity: usize) -> Response {
+    let record = |kind, status, length: usize| Response::bad(kind, status, length as u16);
+    if bytes[0] != 0x9B {
+        return record(0, FrameStatus::IncorrectHeader, 0);
+    }
+    if bytes.len() == 1 {
+        return record(0, FrameStatus::DiscontinuousFrame, 1);
+    }
+    if bytes[1] == 0 || bytes[1] == 3 || bytes[1] > 0x11 {
+        return record(bytes[1], FrameStatus::IncorrectFrameType, 0);
+    }
+    if bytes.len() < 4 {
+        return record(bytes[1], FrameStatus::DiscontinuousFrame, bytes.len());
+    }
+    let n = usize::from(bytes[2]) * 256 + usize::from(bytes[3]);
+    if n < 6 || n > capacity {
+        return record(0, FrameStatus::IncorrectHeader, 0);
+    }
+    let possible = match bytes[1] {
+        0x01 => n == 6 || n == 10,
+        0x04 => n >= 14 && (n - 14) % 36 == 0,
+        0x05 => n == 10566,
+        0x07 => n == 126,
+        0x09 => n == 538,
+        0x0B => n == 7,
+        0x0E => n == 6 || n == 102 || n == 150,
+        0x10 | 0x11 => n == 10,
+        _ => n == 6,
+    };
+    match () {
+        () if !possible => record(bytes[1], FrameStatus::IncorrectFrameType, n),
+        () if bytes.len() < n => record(bytes[1], FrameStatus::DiscontinuousFrame, bytes.len()),
+        () => record(bytes[1], FrameStatus::IncorrectCrc, n),
+    }
+}

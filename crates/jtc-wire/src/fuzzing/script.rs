@@ -1,0 +1,215 @@
+//! Streams made from bytes: frames, broken frames, false headers, rubbish, gaps, in any pieces and with a slow reader.
+use std::vec;
+use std::vec::Vec;
+
+use super::reference::{Event, events};
+use super::{body_len, sealed};
+use crate::{FrameType, HEADER, LinkEvent, Receiver};
+
+const GAP_US: u64 = 5000;
+
+enum Step {
+    Bytes(Vec<u8>),
+    /// µs without a byte.
+    Silence(u64),
+    /// From now on each event is kept for so many pushes.
+    Hold(u8),
+    /// From now on bytes come in pieces of this length.
+    Pieces(usize),
+    /// From now on `poll` is called after each piece, or only when it must be.
+    Lazy(bool),
+}
+
+/// Bytes read one after another, zeros after the end.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn byte(&mut self) -> u8 {
+        let Some((first, rest)) = self.0.split_first() else { return 0 };
+        self.0 = rest;
+        *first
+    }
+    fn take(&mut self, n: usize) -> &'a [u8] {
+        let (taken, rest) = self.0.split_at(n.min(self.0.len()));
+        self.0 = rest;
+        taken
+    }
+    fn kind(&mut self) -> FrameType {
+        loop {
+            let kind = FrameType::ALL[usize::from(self.byte()) % FrameType::ALL.len()];
+            if kind != FrameType::JtcStatus || self.0.is_empty() {
+                return kind;
+            }
+        }
+    }
+    /// A good frame; its body repeats some bytes.
+    fn frame(&mut self) -> Vec<u8> {
+        let kind = self.kind();
+        let n = body_len(kind, self.byte());
+        let seed = [self.byte(), self.byte(), self.byte()];
+        let body: Vec<u8> = seed.iter().copied().cycle().take(n).collect();
+        sealed(kind as u8, &body)
+    }
+    fn step(&mut self) -> Step {
+        Step::Bytes(match self.byte() % 16 {
+            0 => return Step::Silence(GAP_US + u64::from(self.byte()) * 100),
+            1 => return Step::Silence(GAP_US - 201),
+            2 => return Step::Hold(self.byte() % 40),
+            3 => return Step::Pieces(usize::from(self.byte()) * 3 + 1),
+            4 => return Step::Lazy(self.byte() % 2 == 1),
+            5 => {
+                let n = self.byte() % 32;
+                self.take(n.into()).to_vec()
+            }
+            6 | 7 => self.frame(),
+            8 => {
+                let mut frame = self.frame();
+                let at = usize::from(u16::from_be_bytes([self.byte(), self.byte()])) % frame.len();
+                frame[at] ^= self.byte() | 1;
+                frame
+            }
+            9 => {
+                let mut frame = self.frame();
+                frame.truncate(usize::from(self.byte()) % frame.len());
+                frame
+            }
+            10 => {
+                let kind = self.kind();
+                let n = (body_len(kind, self.byte()) + 6) as u16;
+                vec![HEADER, kind as u8, (n >> 8) as u8, n as u8]
+            }
+            11 => {
+                let n = 14 + 36 * u16::from(self.byte()) * 6;
+                let [high, low] = n.to_be_bytes();
+                [HEADER, 4, high, low].repeat(usize::from(self.byte()) + 1)
+            }
+            12 => [HEADER].repeat(self.byte().into()),
+            13 => {
+                // Frames inside a Trajectory frame, which is good or not.
+                let mut body: Vec<u8> = (0..4).flat_map(|_| self.frame()).collect();
+                body.resize(8 + body.len().next_multiple_of(36), self.byte());
+                let mut frame = sealed(FrameType::Trajectory as u8, &body);
+                let last = frame.len() - 1;
+                frame[last] ^= self.byte() % 2;
+                frame
+            }
+            14 => [self.byte()].repeat(usize::from(self.byte()) * 20),
+            _ => vec![self.byte()],
+        })
+    }
+}
+
+/// A receiver and what came out of it.
+struct Driver {
+    receiver: Receiver<Vec<u8>>,
+    now: u64,
+    /// When the last byte came.
+    last: u64,
+    hold: u8,
+    /// Pushes until the present event is released.
+    held: u8,
+    piece: usize,
+    lazy: bool,
+    found: Vec<Event>,
+    bytes: usize,
+    busy_polls: usize,
+}
+
+impl Driver {
+    fn poll(&mut self) -> bool {
+        let found = self.receiver.poll(self.now);
+        assert_eq!(found, self.receiver.event().is_some());
+        if !found && self.receiver.busy() {
+            self.busy_polls += 1;
+            assert!(self.busy_polls <= self.bytes / 30 + 1, "too much work for so few bytes");
+        }
+        found
+    }
+
+    fn release(&mut self) {
+        let event = match self.receiver.event().expect("an event is there") {
+            LinkEvent::Frame(frame) => {
+                assert_eq!(crate::FrameRef::new_checked(frame.bytes), Some(frame));
+                Event::Frame(frame.bytes.to_vec())
+            }
+            LinkEvent::Bad(response) => Event::Bad(response),
+        };
+        self.found.push(event);
+        self.receiver.release();
+        self.held = self.hold;
+    }
+
+    fn drain(&mut self) {
+        while self.poll() || self.receiver.busy() {
+            if self.receiver.event().is_some() {
+                self.release();
+            }
+        }
+    }
+
+    fn push(&mut self, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let piece = &bytes[..self.piece.min(bytes.len())];
+            let taken = self.receiver.push(self.now, piece);
+            assert!(taken <= piece.len());
+            bytes = &bytes[taken..];
+            self.bytes += taken;
+            if taken < piece.len() {
+                // A reader that was slow for longer than a gap must not break a frame.
+                self.now += 2 * GAP_US;
+                let before = self.found.len();
+                self.drain();
+                assert!(taken > 0 || self.found.len() > before || self.receiver.event().is_none());
+                continue;
+            }
+            if self.held > 0 {
+                self.held -= 1;
+                self.poll();
+            } else if !self.lazy {
+                self.drain();
+            }
+            self.last = self.now;
+            self.now += 200;
+        }
+    }
+}
+
+/// First byte: size of the buffer. Then steps. The receiver must find what the reference finds in the whole stream.
+pub fn stream_parser(data: &[u8]) {
+    const CAPACITY: [usize; 5] = [64, 256, 1500, 11_000, crate::FRAME_MAX];
+    let mut reader = Reader(data);
+    let capacity = CAPACITY[usize::from(reader.byte()) % CAPACITY.len()];
+    let mut driver = Driver {
+        receiver: Receiver::new(vec![0; capacity], GAP_US as u32),
+        now: 0,
+        last: 0,
+        hold: 0,
+        held: 0,
+        piece: usize::MAX,
+        lazy: false,
+        found: Vec::new(),
+        bytes: 0,
+        busy_polls: 0,
+    };
+    let mut regions = vec![Vec::new()];
+    while !reader.0.is_empty() && regions.iter().map(Vec::len).sum::<usize>() < 150_000 {
+        match reader.step() {
+            Step::Bytes(bytes) if bytes.is_empty() => {}
+            Step::Bytes(bytes) => {
+                if driver.now - driver.last >= GAP_US {
+                    regions.push(Vec::new());
+                }
+                driver.push(&bytes);
+                regions.last_mut().expect("one at least").extend(bytes);
+            }
+            Step::Silence(us) => driver.now += us,
+            Step::Hold(n) => driver.hold = n,
+            Step::Pieces(n) => driver.piece = n,
+            Step::Lazy(lazy) => driver.lazy = lazy,
+        }
+    }
+    driver.now += GAP_US;
+    driver.drain();
+    assert!(!driver.receiver.mid_frame(), "nothing is left");
+    assert_eq!(driver.found, events(&regions, capacity));
+}

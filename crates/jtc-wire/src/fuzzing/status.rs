@@ -1,0 +1,76 @@
+//! Streams of statuses of all layouts, broken ones and rubbish.
+use std::format;
+use std::vec::Vec;
+
+use super::sealed;
+use crate::{FrameRef, FrameType, Status, StatusReceiver};
+
+/// The statuses of a whole stream, each at the first place where one begins, and the bytes between them.
+fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
+    let (mut found, mut skipped, mut at) = (Vec::new(), 0, 0);
+    while at < stream.len() {
+        let status = [165, 173, 175].into_iter().find_map(|n| {
+            let frame = FrameRef::new_checked(stream.get(at..at + n)?)?;
+            (frame.frame_type == FrameType::JtcStatus).then(|| Status::parse(frame.bytes))?
+        });
+        match status {
+            Some(status) => {
+                at += usize::from(u16::from_be_bytes([stream[at + 2], stream[at + 3]]));
+                found.push(status);
+            }
+            None => {
+                at += 1;
+                skipped += 1;
+            }
+        }
+    }
+    (found, skipped)
+}
+
+/// First byte: length of the pieces. Then steps: statuses from some bytes, broken ones, rubbish.
+pub fn status_stream(data: &[u8]) {
+    let Some((piece, mut rest)) = data.split_first() else { return };
+    let mut stream = Vec::new();
+    while let [step, more @ ..] = rest {
+        let n = usize::from(step >> 3).min(more.len());
+        let (bytes, more) = more.split_at(n);
+        rest = more;
+        let status = |len: usize| {
+            let body: Vec<u8> = bytes.iter().chain(&[0x9B, 3]).copied().cycle().take(len - 6).collect();
+            sealed(FrameType::JtcStatus as u8, &body)
+        };
+        match step % 8 {
+            0 => stream.extend(status(165)),
+            1 => stream.extend(status(173)),
+            2 | 3 => stream.extend(status(175)),
+            4 => {
+                let mut broken = status(175);
+                broken[bytes.first().map_or(0, |at| usize::from(*at) % 175)] ^= 0x10;
+                stream.extend(broken);
+            }
+            5 => stream.extend(&status(175)[..n * 5]),
+            _ => stream.extend(bytes),
+        }
+    }
+    // So that a candidate at the end is decided.
+    stream.extend([0; 175]);
+
+    let mut receiver = StatusReceiver::new();
+    let mut found = Vec::new();
+    for mut piece in stream.chunks(usize::from(*piece) + 1) {
+        while let Some(status) = receiver.next(&mut piece) {
+            let again = Status::parse(&status.emit()).expect("what is sent is understood");
+            assert_eq!(
+                format!("{:?}", Status { gripper: None, ..again }),
+                format!("{:?}", Status { gripper: None, ..status })
+            );
+            let _ = format!("{status} {status:#}");
+            found.push(status);
+        }
+        assert!(piece.is_empty());
+    }
+    let (expected, skipped) = reference(&stream);
+    assert_eq!(format!("{found:?}"), format!("{expected:?}"));
+    assert_eq!(receiver.counters().frames, expected.len() as u64);
+    assert_eq!(receiver.counters().skipped_bytes + receiver.held() as u64, skipped);
+}

@@ -5,15 +5,10 @@ use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::ExecCommand;
 
 /// Milliseconds per measurement.
-const BATCH: u32 = 2_000;
+const BATCH: u32 = 200;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let config = SimConfig {
-        baud: None,
-        bus_monitored: true,
-        model_error: ModelError::default(),
-        ..SimConfig::default()
-    };
+    let config = SimConfig { baud: None, model_error: ModelError::default(), ..SimConfig::default() };
     let mut operator = Operator::new(config);
     operator.bring_up()?;
     let points = host::there_and_back(&[0.0; 6], &[0.6, -0.4, 0.5, 0.8, -0.6, 0.7], 2.5, 20, 10);
@@ -21,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     operator.ask(&host::exec(ExecCommand::Execute))?;
     let world = &mut operator.world;
     let mut sink = [0; 4096];
-    let mut times: Vec<f64> = (0..40)
+    let mut times: Vec<f64> = (0..400)
         .map(|_| {
             let start = Instant::now();
             for _ in 0..BATCH {

@@ -27,8 +27,10 @@ mod faults;
 mod gripper;
 pub mod host;
 mod inbox;
+pub mod invariants;
 mod operator;
 mod serial;
+pub mod soak;
 mod world;
 
 pub use arm::{Arm, SimArm, SimFriction};

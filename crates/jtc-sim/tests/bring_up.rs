@@ -5,8 +5,7 @@ use jtc_sim::{SimConfig, World};
 
 #[test]
 fn j20_power_up_to_hold_position() {
-    let config =
-        SimConfig { start: [0.1, -0.4, 0.9, 0.2, -0.3, 0.5], bus_monitored: true, ..SimConfig::default() };
+    let config = SimConfig { start: [0.1, -0.4, 0.9, 0.2, -0.3, 0.5], ..SimConfig::default() };
     let mut world = World::new(config);
     world.host_write(&use_defaults());
     let mut host = Listener::default();

@@ -11,7 +11,6 @@ fn held(seed: u64) -> Operator {
         start: FROM,
         seed,
         baud: None,
-        bus_monitored: true,
         model_error: ModelError::default(),
         ..SimConfig::default()
     };

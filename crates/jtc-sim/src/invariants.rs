@@ -1,0 +1,285 @@
+//! What must hold in every millisecond, whatever happens: the checker to run beside a world.
+use core::fmt;
+
+use jtc_bus::{Request, Target};
+use jtc_core::{JOINTS, State, Tes};
+use jtc_wire::FrameType;
+
+use crate::board::Worked;
+use crate::world::World;
+
+/// Ticks between two frames that take the place of Move.
+const MOVES_BETWEEN: u32 = 3;
+
+/// An invariant that was broken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Broken {
+    /// A torque went out in a state without torque.
+    Torque {
+        /// State.
+        state: State,
+        /// Joint.
+        joint: usize,
+        /// N·m.
+        torque: f64,
+    },
+    /// A torque is larger than the joint's limit.
+    TorqueLimit {
+        /// Joint.
+        joint: usize,
+        /// N·m.
+        torque: f64,
+        /// N·m.
+        limit: f64,
+    },
+    /// A number is NaN or infinite.
+    NotFinite {
+        /// What.
+        what: &'static str,
+        /// Joint.
+        joint: usize,
+    },
+    /// The error state was left, though the host had not cleared anything.
+    LeftErrorAlone {
+        /// State that was entered.
+        to: State,
+    },
+    /// Operate was entered without Execute from the host.
+    MovedAlone,
+    /// Teaching was entered without a command from the host.
+    TaughtAlone,
+    /// An execution state that only the host can bring about.
+    ExecutionAlone {
+        /// State that was entered.
+        to: Tes,
+    },
+    /// The point index went back within a run.
+    IndexFell {
+        /// Before.
+        from: u32,
+        /// Now.
+        to: u32,
+    },
+    /// No frame went out though the controller ticked and is not in Start.
+    Silent {
+        /// State.
+        state: State,
+    },
+    /// Frames that take the place of Move are too close together.
+    NoMove {
+        /// Ticks since the last such frame.
+        ticks: u32,
+    },
+    /// The first frame after an error is not Move with zero torque.
+    ErrorWithoutZero,
+    /// A node is asked to be enabled in a state that does not want it.
+    Enabled {
+        /// State.
+        state: State,
+        /// Node.
+        node: usize,
+    },
+    /// What went out is no frame of the protocol.
+    UnknownFrame {
+        /// Its id.
+        id: u16,
+    },
+    /// The safety output is not what the errors say.
+    SafetyOutput {
+        /// Its level.
+        level: bool,
+        /// Error word.
+        errors: u16,
+    },
+}
+
+/// A broken invariant and its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Violation {
+    /// µs since the start.
+    pub time_us: u64,
+    /// What.
+    pub broken: Broken,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {:.3} s: {:?}", self.time_us as f64 * 1e-6, self.broken)
+    }
+}
+
+impl std::error::Error for Violation {}
+
+/// Remembers what it needs from one millisecond to the next.
+#[derive(Clone, Debug)]
+pub struct Invariants {
+    state: State,
+    tes: Tes,
+    point: u32,
+    resets: u32,
+    controller_ticks: u64,
+    since_other: u32,
+    cleared: bool,
+    execute: bool,
+    teach: bool,
+}
+
+impl Default for Invariants {
+    fn default() -> Self {
+        Self {
+            state: State::Start,
+            tes: Tes::Null,
+            point: 0,
+            resets: 0,
+            controller_ticks: 0,
+            since_other: MOVES_BETWEEN,
+            cleared: false,
+            execute: false,
+            teach: false,
+        }
+    }
+}
+
+impl Invariants {
+    /// Look at the millisecond that has just passed.
+    pub fn check(&mut self, world: &World) -> Result<(), Violation> {
+        self.look(world).map_err(|broken| Violation { time_us: world.now_us(), broken })
+    }
+
+    fn look(&mut self, world: &World) -> Result<(), Broken> {
+        if !world.ticked() {
+            return Ok(());
+        }
+        let telemetry = world.telemetry();
+        if telemetry.tick <= self.controller_ticks {
+            // A fresh controller after a reset.
+            *self = Self::default();
+        }
+        self.controller_ticks = telemetry.tick;
+        self.hear(world);
+        self.finite(world)?;
+        self.states(world)?;
+        self.frame(world)?;
+        let internal = telemetry.errors & jtc_core::error::INTERNAL != 0;
+        if world.safety_output() != (telemetry.state != State::Start && !internal) {
+            return Err(Broken::SafetyOutput { level: world.safety_output(), errors: telemetry.errors });
+        }
+        self.state = telemetry.state;
+        self.tes = telemetry.tes;
+        self.point = telemetry.point;
+        Ok(())
+    }
+
+    /// Commands that permit something.
+    fn hear(&mut self, world: &World) {
+        let Some(Worked::Frame(frame_type)) = world.worked() else { return };
+        const CLEAR_CURRENT: u8 = FrameType::ClearCurrentErrors as u8;
+        const CLEAR_OCCURRED: u8 = FrameType::ClearOccurredErrors as u8;
+        const EXECUTE: u8 = FrameType::TrajSetExecStatus as u8;
+        const TEACH: u8 = FrameType::TeachingModeEnable as u8;
+        match frame_type {
+            CLEAR_CURRENT | CLEAR_OCCURRED => self.cleared = true,
+            EXECUTE => self.execute = true,
+            TEACH => self.teach = true,
+            _ => {}
+        }
+    }
+
+    fn finite(&self, world: &World) -> Result<(), Broken> {
+        let truth = world.truth();
+        for (joint, t) in world.telemetry().joints.iter().enumerate() {
+            let commanded = [t.set_position, t.set_velocity, t.set_acceleration, t.torque];
+            let parts =
+                [t.torque_model, t.torque_p, t.torque_i, t.torque_d, t.torque_friction, t.torque_other];
+            let measured = [t.position, t.velocity, t.temperature];
+            let real = [truth.q[joint], truth.qd[joint], truth.torque[joint]];
+            let bad = |values: &[f64]| values.iter().any(|x| !x.is_finite());
+            let what = if bad(&commanded) {
+                "commanded value"
+            } else if bad(&parts) {
+                "part of the torque"
+            } else if bad(&measured) {
+                "measured value"
+            } else if bad(&real) {
+                "true value"
+            } else {
+                continue;
+            };
+            return Err(Broken::NotFinite { what, joint });
+        }
+        Ok(())
+    }
+
+    /// J-24: nothing moves by itself. J-31: the index goes forward.
+    fn states(&mut self, world: &World) -> Result<(), Broken> {
+        let telemetry = world.telemetry();
+        let (from, to) = (self.state, telemetry.state);
+        if from == State::Error && to != State::Error && !self.cleared {
+            return Err(Broken::LeftErrorAlone { to });
+        }
+        if to == State::Error {
+            // What was commanded before the error permits nothing after it.
+            self.execute = false;
+            self.teach = false;
+        } else {
+            self.cleared = false;
+        }
+        if telemetry.tes == Tes::Execute && self.tes != Tes::Execute && !core::mem::take(&mut self.execute) {
+            return Err(Broken::ExecutionAlone { to: telemetry.tes });
+        }
+        if to == State::Operate && telemetry.tes == Tes::Null {
+            return Err(Broken::MovedAlone);
+        }
+        if to == State::Teaching && from != State::Teaching && !core::mem::take(&mut self.teach) {
+            return Err(Broken::TaughtAlone);
+        }
+        // Stop ends the run and goes back to the first point.
+        let executing = (self.tes, telemetry.tes) == (Tes::Execute, Tes::Execute);
+        let running = (from, to) == (State::Operate, State::Operate) && executing;
+        if running && telemetry.point < self.point {
+            return Err(Broken::IndexFell { from: self.point, to: telemetry.point });
+        }
+        Ok(())
+    }
+
+    /// J-12, J-13, J-16, J-21 on the bus.
+    fn frame(&mut self, world: &World) -> Result<(), Broken> {
+        let state = world.telemetry().state;
+        let Some(frame) = world.sent() else {
+            return if state == State::Start { Ok(()) } else { Err(Broken::Silent { state }) };
+        };
+        let Ok(request) = Request::parse(frame) else { return Err(Broken::UnknownFrame { id: frame.id }) };
+        let Request::Move { torque, .. } = request else {
+            if state == State::Error && self.state != State::Error {
+                return Err(Broken::ErrorWithoutZero);
+            }
+            if self.since_other < MOVES_BETWEEN {
+                return Err(Broken::NoMove { ticks: self.since_other });
+            }
+            self.since_other = 0;
+            return self.targets(state, &request);
+        };
+        self.since_other = self.since_other.saturating_add(1);
+        let powered = matches!(state, State::HoldPos | State::Operate | State::Teaching);
+        for joint in 0..JOINTS {
+            if torque[joint] != 0.0 && !powered {
+                return Err(Broken::Torque { state, joint, torque: torque[joint] });
+            }
+            let limit = world.controller_config().joints[joint].torque_max;
+            // A step of the bus' grid may round up.
+            if torque[joint].abs() > limit + 0.02 {
+                return Err(Broken::TorqueLimit { joint, torque: torque[joint], limit });
+            }
+        }
+        Ok(())
+    }
+
+    fn targets(&self, state: State, request: &Request) -> Result<(), Broken> {
+        let Request::ChangeFsm { target } = request else { return Ok(()) };
+        let powered = matches!(state, State::HoldPos | State::Operate | State::Teaching);
+        match target.iter().position(|&t| t == Target::Enable) {
+            Some(node) if !powered => Err(Broken::Enabled { state, node }),
+            _ => Ok(()),
+        }
+    }
+}

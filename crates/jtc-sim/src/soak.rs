@@ -1,0 +1,270 @@
+//! Hours of virtual time with random commands and faults, every millisecond checked: the soak run.
+use jtc_core::{JOINTS, State, Tes};
+use jtc_wire::{ExecCommand, FrameType};
+
+use crate::config::{SimConfig, Support};
+use crate::drive::DriveConfig;
+use crate::faults::{Fault, FaultKind, Trigger};
+use crate::host::{self, Listener};
+use crate::invariants::{Invariants, Violation};
+use crate::world::{Statistics, World};
+
+/// What a soak run saw.
+#[derive(Clone, Debug, Default)]
+pub struct SoakReport {
+    /// Virtual time, s.
+    pub seconds: f64,
+    /// Times that each state was entered.
+    pub entered: [u64; 6],
+    /// Milliseconds in each state.
+    pub spent_ms: [u64; 6],
+    /// Trajectories run to their end.
+    pub finished: u64,
+    /// Faults thrown in.
+    pub faults: u64,
+    /// Commands sent.
+    pub commands: u64,
+    /// Counted by the world.
+    pub statistics: Statistics,
+    /// The invariant that was broken; the run ends there.
+    pub violation: Option<Violation>,
+}
+
+impl core::fmt::Display for SoakReport {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let names = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
+        writeln!(f, "{:.3} h of virtual time", self.seconds / 3600.0)?;
+        for (n, name) in names.iter().enumerate() {
+            let share = self.spent_ms[n] as f64 / (self.seconds * 10.0);
+            writeln!(f, "  {name:<9} entered {:>8} times, {share:5.1} % of the time", self.entered[n])?;
+        }
+        writeln!(
+            f,
+            "  {} commands, {} faults, {} motions finished",
+            self.commands, self.faults, self.finished
+        )?;
+        let s = &self.statistics;
+        writeln!(
+            f,
+            "  bus: {} frames, load {:.1} %, {} lost, {} repeated, {} bus-offs; host: {} good and {} bad frames; {} watchdog resets",
+            s.bus.frames,
+            100.0 * s.bus_load(),
+            s.bus.lost,
+            s.bus.repeated,
+            s.bus.bus_offs,
+            s.good_frames,
+            s.bad_frames,
+            s.watchdog_resets
+        )?;
+        match &self.violation {
+            None => write!(f, "every invariant held"),
+            Some(violation) => write!(f, "BROKEN {violation}"),
+        }
+    }
+}
+
+/// A soak run that can be gone on with.
+pub struct Soak {
+    world: World,
+    listener: Listener,
+    invariants: Invariants,
+    rng: fastrand::Rng,
+    report: SoakReport,
+    state: State,
+    tes: Tes,
+    /// When the next command, the next fault comes, ms.
+    next_command: u64,
+    next_fault: u64,
+    now: u64,
+}
+
+impl Soak {
+    /// A world that differs with the seed: model errors, drives, line rate, start pose.
+    pub fn new(seed: u64) -> Self {
+        let mut rng = fastrand::Rng::with_seed(seed ^ 0x736F_616B);
+        let mut config = SimConfig { seed, log_entries: 200, ..SimConfig::default() };
+        config.start = core::array::from_fn(|_| 1.6 * (rng.f64() - 0.5));
+        config.baud = [Some(115_200), Some(921_600), Some(3_000_000), None][rng.usize(0..4)];
+        config.support = if rng.u8(0..8) == 0 { Support::Limp } else { Support::Brakes };
+        config.gripper = true;
+        // Alignment times that leave time for other things.
+        let quick = rng.bool();
+        let mut drive = if rng.u8(0..3) == 0 { DriveConfig::older() } else { DriveConfig::default() };
+        drive.first_enable_ms = if quick { 300 } else { 4000 };
+        config.controller.velocity_full_scale = drive.velocity_full_scale;
+        config.drives = [drive; JOINTS];
+        Self {
+            world: World::new(config),
+            listener: Listener::default(),
+            invariants: Invariants::default(),
+            rng,
+            report: SoakReport::default(),
+            state: State::Start,
+            tes: Tes::Null,
+            next_command: 0,
+            next_fault: 20_000,
+            now: 0,
+        }
+    }
+
+    /// Let `ms` pass; false when an invariant was broken.
+    pub fn run(&mut self, ms: u64) -> bool {
+        for _ in 0..ms {
+            if self.report.violation.is_some() {
+                return false;
+            }
+            self.step();
+        }
+        true
+    }
+
+    /// What was seen so far.
+    pub fn report(&self) -> SoakReport {
+        SoakReport {
+            seconds: self.now as f64 * 1e-3,
+            statistics: self.world.statistics(),
+            ..self.report.clone()
+        }
+    }
+
+    /// The world, for a look at what led to a violation.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    fn step(&mut self) {
+        if self.now >= self.next_command {
+            self.command();
+        }
+        if self.now >= self.next_fault {
+            self.throw();
+        }
+        self.world.step();
+        self.now += 1;
+        self.listener.listen(&mut self.world);
+        self.listener.responses.clear();
+        let telemetry = self.world.telemetry();
+        if telemetry.state != self.state {
+            self.state = telemetry.state;
+            self.report.entered[self.state as usize] += 1;
+        }
+        self.report.spent_ms[self.state as usize] += 1;
+        if telemetry.tes != self.tes {
+            self.tes = telemetry.tes;
+            self.report.finished += u64::from(self.tes == Tes::Finish);
+        }
+        if let Err(violation) = self.invariants.check(&self.world) {
+            self.report.violation = Some(violation);
+        }
+    }
+
+    /// Mostly what brings the arm on from where it is, sometimes anything.
+    fn command(&mut self) {
+        let waiting = self.world.host_write_pending() > 0;
+        self.next_command = self.now + self.rng.u64(5..1500);
+        if waiting && self.rng.u8(0..20) != 0 {
+            return;
+        }
+        let bytes = if self.rng.u8(0..5) == 0 { self.anything() } else { self.sensible() };
+        self.report.commands += 1;
+        self.world.host_write(&bytes);
+    }
+
+    fn sensible(&mut self) -> Vec<u8> {
+        use ExecCommand::{Execute, Pause, Stop};
+        match (self.state, self.tes) {
+            (State::Error, _) => host::clear_all(),
+            (State::Init | State::Start, _) => host::use_defaults(),
+            (State::Teaching, _) => host::frame(FrameType::TeachingModeDisable, &[]),
+            (_, Tes::Null) if self.rng.u8(0..6) == 0 => host::frame(FrameType::TeachingModeEnable, &[]),
+            (_, Tes::Null) => self.motion(),
+            (_, Tes::Execute) => match self.rng.u8(0..16) {
+                0 => host::exec(Pause),
+                1 => host::exec(Stop),
+                _ => Vec::new(),
+            },
+            (_, Tes::Finish) if self.rng.bool() => self.motion(),
+            (_, Tes::Stop) if self.rng.u8(0..6) == 0 => self.motion(),
+            _ => host::exec(Execute),
+        }
+    }
+
+    /// From where the arm is to somewhere near and back, in one go.
+    fn motion(&mut self) -> Vec<u8> {
+        let from = self.world.telemetry().joints.map(|j| j.position);
+        let to = from.map(|q| (q + 1.2 * (self.rng.f64() - 0.5)).clamp(-1.4, 1.4));
+        let points = host::there_and_back(&from, &to, 1.0 + 2.0 * self.rng.f64(), 1, 10);
+        host::trajectory(&points, 10, 113).concat()
+    }
+
+    fn anything(&mut self) -> Vec<u8> {
+        let any = |rng: &mut fastrand::Rng, n: usize| -> Vec<u8> { (0..n).map(|_| rng.u8(..)).collect() };
+        let rng = &mut self.rng;
+        match rng.u8(0..10) {
+            0 => {
+                let n = rng.usize(0..200);
+                any(rng, n)
+            }
+            1 => host::frame(FrameType::ResetCanDevices, &[rng.u8(..), 0, 0, 0]),
+            2 => host::frame(FrameType::GripperControl, &[rng.u8(0..3), 0, 0, 0]),
+            3 => host::frame(FrameType::TrajSetExecStatus, &[rng.u8(0..5)]),
+            4 => host::frame(FrameType::ClearOccurredErrors, &[]),
+            5 => host::frame(FrameType::ClearCurrentErrors, &[rng.u8(0..2), rng.u8(..), 0, 0]),
+            6 => {
+                let n = [120, 96, 144, 532][rng.usize(0..4)];
+                let types = [
+                    FrameType::PidParam,
+                    FrameType::FrictionPolynomial,
+                    FrameType::ArmModel,
+                    FrameType::Trajectory,
+                ];
+                let t = types[rng.usize(0..4)];
+                host::frame(t, &any(rng, n))
+            }
+            7 => host::frame(FrameType::FrictionTableUseDefault, &[]),
+            8 => host::frame(FrameType::FrictionPolynomialUseDefault, &[]),
+            _ => {
+                // A good frame with a flipped bit.
+                let mut bytes = host::exec(ExecCommand::Execute);
+                let at = rng.usize(0..bytes.len());
+                bytes[at] ^= 1 << rng.u8(0..8);
+                bytes
+            }
+        }
+    }
+
+    fn throw(&mut self) {
+        let rng = &mut self.rng;
+        self.next_fault = self.now + rng.u64(500..25_000);
+        let joint = rng.u8(0..6);
+        let node = rng.u8(0..7);
+        let small = rng.f64() * 0.05;
+        let kind = match rng.u8(0..20) {
+            0 => FaultKind::NodeSilent { node },
+            1 => FaultKind::NodeReboot { node },
+            2 => FaultKind::MotorFault { joint, bits: 1 << rng.u8(0..8) },
+            3 => FaultKind::HardwareFault { joint },
+            4 => FaultKind::FaultState { joint },
+            5 => FaultKind::EncoderJump { joint, rad: 0.4 * (rng.f64() - 0.5) },
+            6 => FaultKind::NotAccurate { joint },
+            7 => FaultKind::Friction { joint, factor: 3.0 * rng.f64() },
+            8 => FaultKind::Temperature { joint, celsius: 90.0 * rng.f64() - 10.0 },
+            9 => FaultKind::FramesLost { probability: small },
+            10 => FaultKind::FramesCorrupted { probability: 4.0 * small },
+            11 => FaultKind::FramesGarbled { probability: small },
+            12 => FaultKind::BusOff,
+            13 => FaultKind::NoAcknowledge,
+            14 => FaultKind::SafetyInput,
+            15 => FaultKind::SafetyLine { node },
+            16 => FaultKind::SerialLost { probability: small },
+            17 => FaultKind::SerialFlipped { probability: small },
+            18 => FaultKind::SerialDelayed,
+            _ => FaultKind::TickOverrun,
+        };
+        // Short and long ones.
+        let duration = if rng.bool() { rng.u64(1..12) } else { rng.u64(12..1500) };
+        self.report.faults += 1;
+        let fault = Fault { kind, trigger: Trigger::At(self.now), duration_ms: Some(duration) };
+        self.world.inject(fault);
+    }
+}

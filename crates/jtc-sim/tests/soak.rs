@@ -1,0 +1,23 @@
+//! The short form of the soak run, and that it repeats.
+use jtc_sim::soak::Soak;
+
+#[test]
+fn j24_random_commands_and_faults_break_no_invariant() {
+    let mut finished = 0;
+    for seed in 1..=6 {
+        let mut soak = Soak::new(seed);
+        let good = soak.run(60_000);
+        println!("seed {seed}: {}", soak.report());
+        if !good {
+            for entry in soak.world().log().entries() {
+                println!("{entry}");
+            }
+        }
+        assert!(good, "seed {seed}: {}", soak.report());
+        finished += soak.report().finished;
+    }
+    assert!(
+        finished > 5,
+        "only {finished} motions came to their end: the run does not reach what it should test"
+    );
+}

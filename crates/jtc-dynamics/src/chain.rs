@@ -5,8 +5,8 @@
 //! * **Frames.** Each constant rotation between joints is Rz(a)·Rx(α)·Rz(b). Rz(b) is added to the joint's position and
 //!   Rz(a) is given to the frame before, so Rx(α)·Rz(q + offset) is left: two plane rotations. The frame's origin
 //!   may sit anywhere on its joint axis; it sits where the vector from the frame before is perpendicular to the axis.
-//! * **Inertia.** What of a link is symmetric about its joint axis (its mass, the first moment along the axis, an
-//!   equal part of Ixx and Iyy) moves in the same way whether it turns with the link or not, so it is carried by the link
+//! * **Inertia.** What of a link is symmetric about its joint axis (its mass, the first and second
+//!   moment along the axis) moves in the same way whether it turns with the link or not, so it is carried by the link
 //!   before. Going from the wrist to the base, every link keeps seven numbers and no mass at all.
 
 use crate::model::{ArmModel, JOINTS, symmetric};
@@ -25,18 +25,19 @@ pub(crate) struct Twist {
     pub mid: [f64; 2],
 }
 
-/// A link: what is left of its inertia in its own frame (mass, z of the first moment and Iyy are zero).
+/// A link: what is left of its inertia in its own frame (mass, first moment along z and the integral of z² are zero).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
-    /// First moment of mass, kg·m.
+    /// First moment of mass: integrals of x and y over the mass, kg·m.
     pub hx: f64,
     pub hy: f64,
-    /// Inertia about the frame's origin, kg·m².
+    /// Second moments of mass: integrals of x², y² and of the products, kg·m². Unlike moments of inertia these enter
+    /// the torque with the acceleration of each axis alone.
     pub xx: f64,
+    pub yy: f64,
     pub xy: f64,
     pub xz: f64,
     pub yz: f64,
-    pub zz: f64,
 }
 
 /// A joint frame as the model has it: for kinematics.
@@ -84,9 +85,12 @@ impl Inertia {
     /// Splits off what is symmetric about z.
     fn split(&self) -> (Body, Self) {
         let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = self.j;
-        let rest = Body { hx: self.h[0], hy: self.h[1], xx: xx - yy, xy, xz, yz, zz };
-        let j = [[yy, 0.0, 0.0], [0.0, yy, 0.0], [0.0; 3]];
-        (rest, Self { mass: self.mass, h: [0.0, 0.0, self.h[2]], j })
+        // Integral of z²: what x² + z² and y² + z² share.
+        let z2 = 0.5 * (xx + yy - zz);
+        let [hx, hy, hz] = self.h;
+        let rest = Body { hx, hy, xx: yy - z2, yy: xx - z2, xy: -xy, xz: -xz, yz: -yz };
+        let j = [[z2, 0.0, 0.0], [0.0, z2, 0.0], [0.0; 3]];
+        (rest, Self { mass: self.mass, h: [0.0, 0.0, hz], j })
     }
 }
 

@@ -6,11 +6,13 @@
 use crate::chain::{Body, Chain, Twist};
 use crate::inverse::{Turns, Wrench, inverse, inwards, rx, rz};
 use crate::model::{JOINTS, JointVec};
+use crate::unroll::unroll;
 
 /// A square matrix over the joints.
 pub(crate) type JointMat = [[f64; JOINTS]; JOINTS];
 
-/// A link and all that it carries, about the link's origin. There is no mass: see [`crate::chain`].
+/// A link and all that it carries: first and second moments of mass about the link's origin. There is no mass: see
+/// [`crate::chain`].
 #[derive(Clone, Copy)]
 struct Composite {
     h: [f64; 3],
@@ -31,8 +33,9 @@ fn turn(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
 }
 
 impl Composite {
+    #[inline(always)]
     fn of(b: &Body) -> Self {
-        Self { h: [b.hx, b.hy, 0.0], xx: b.xx, yy: 0.0, zz: b.zz, xy: b.xy, xz: b.xz, yz: b.yz }
+        Self { h: [b.hx, b.hy, 0.0], xx: b.xx, yy: b.yy, zz: 0.0, xy: b.xy, xz: b.xz, yz: b.yz }
     }
 
     /// What frame k carries, as frame k−1 sees it.
@@ -42,10 +45,9 @@ impl Composite {
         let [xz, yz, zz] = rz(s, c, [self.xz, self.yz, self.zz]);
         let h = rz(s, c, self.h);
         let [a, b] = t.mid;
-        let (ah, bh) = (a * h[0], b * h[1]);
-        let (ah, bh) = (ah + ah, bh + bh);
-        let (xx, yy, zz) = (xx + bh, yy + ah, zz + (ah + bh));
-        let (xy, xz, yz) = (xy - (a * h[1] + b * h[0]), xz - a * h[2], yz - b * h[2]);
+        let (ax, by) = (a * h[0], b * h[1]);
+        let (xx, yy) = (xx + (ax + ax), yy + (by + by));
+        let (xy, xz, yz) = (xy + (a * h[1] + b * h[0]), xz + a * h[2], yz + b * h[2]);
         let (yy, zz, yz) = turn(t.sin, t.cos, yy, zz, yz);
         let [_, xy, xz] = rx(t, [0.0, xy, xz]);
         Self { h: rx(t, h), xx, yy, zz, xy, xz, yz }
@@ -56,16 +58,16 @@ impl Composite {
         self.h[0] += b.hx;
         self.h[1] += b.hy;
         self.xx += b.xx;
+        self.yy += b.yy;
         self.xy += b.xy;
         self.xz += b.xz;
         self.yz += b.yz;
-        self.zz += b.zz;
     }
 
     /// The wrench of a unit acceleration about the frame's z axis.
     #[inline(always)]
     fn column(&self) -> Wrench {
-        Wrench { f: [-self.h[1], self.h[0], 0.0], n: [self.xz, self.yz, self.zz] }
+        [[-self.h[1], -self.xz], [self.h[0], -self.yz], [0.0, self.xx + self.yy]]
     }
 }
 
@@ -73,23 +75,25 @@ impl Composite {
 #[inline(always)]
 fn lower(chain: &Chain, turns: &Turns) -> JointMat {
     let mut m = [[0.0; JOINTS]; JOINTS];
-    let mut columns = [Wrench { f: [0.0; 3], n: [0.0; 3] }; JOINTS];
+    let mut columns = [[[0.0; 2]; 3]; JOINTS];
     let mut composite = Composite::of(&chain.bodies[5]);
-    for k in (0..JOINTS).rev() {
-        columns[k] = composite.column();
-        for i in k..JOINTS {
-            m[i][k] = columns[i].n[2];
-        }
-        if k > 0 {
-            let t = &chain.twists[k];
-            let turn = (turns.sin[k], turns.cos[k]);
-            for column in &mut columns[k..] {
-                *column = inwards(t, turn, column);
+    unroll!(K in [5, 4, 3, 2, 1] {
+        columns[K] = composite.column();
+        let t = &chain.twists[K];
+        let turn = (turns.sin[K], turns.cos[K]);
+        unroll!(I in [1, 2, 3, 4, 5] {
+            if I >= K {
+                m[I][K] = columns[I][2][1];
+                columns[I] = inwards(t, turn, &columns[I]);
             }
-            composite = composite.inwards(t, turn);
-            composite.add(&chain.bodies[k - 1]);
-        }
-    }
+        });
+        composite = composite.inwards(t, turn);
+        composite.add(&chain.bodies[K - 1]);
+    });
+    m[0][0] = composite.column()[2][1];
+    unroll!(I in [1, 2, 3, 4, 5] {
+        m[I][0] = columns[I][2][1];
+    });
     m
 }
 
@@ -113,34 +117,34 @@ const PIVOT_MIN: f64 = 1.0e-14;
 #[inline(always)]
 fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     let mut inverse = [0.0; JOINTS];
-    for k in 0..JOINTS {
-        let pivot = m[k][k];
-        for i in 0..k {
-            // Row k holds L·D so far; make it L and take its part off the diagonal.
-            let ld = m[k][i];
-            let l = ld * inverse[i];
-            m[k][k] -= l * ld;
-            for j in k + 1..JOINTS {
-                m[j][k] -= m[j][i] * l;
+    unroll!(K in [0, 1, 2, 3, 4, 5] {
+        let floor = m[K][K] * PIVOT_MIN;
+        // Rows above are done: m[K][I] holds L·D, and becomes L.
+        unroll!(I in [0, 1, 2, 3, 4] {
+            if I < K {
+                let scaled = m[K][I];
+                let l = scaled * inverse[I];
+                m[K][K] -= l * scaled;
+                unroll!(J in [1, 2, 3, 4, 5] {
+                    if J > K {
+                        m[J][K] -= m[J][I] * l;
+                    }
+                });
+                m[K][I] = l;
+                x[K] -= l * x[I];
             }
-            m[k][i] = l;
-        }
-        let reciprocal = 1.0 / m[k][k];
-        inverse[k] = if m[k][k] > pivot * PIVOT_MIN { reciprocal } else { 0.0 };
-    }
-    for k in 1..JOINTS {
-        for i in 0..k {
-            x[k] -= m[k][i] * x[i];
-        }
-    }
-    for k in 0..JOINTS {
-        x[k] *= inverse[k];
-    }
-    for k in (0..JOINTS).rev() {
-        for i in 0..k {
-            x[i] -= m[k][i] * x[k];
-        }
-    }
+        });
+        let reciprocal = 1.0 / m[K][K];
+        inverse[K] = if m[K][K] > floor { reciprocal } else { 0.0 };
+    });
+    unroll!(K in [5, 4, 3, 2, 1, 0] {
+        x[K] *= inverse[K];
+        unroll!(I in [1, 2, 3, 4, 5] {
+            if I > K {
+                x[K] -= m[I][K] * x[I];
+            }
+        });
+    });
     x
 }
 
@@ -153,8 +157,9 @@ pub(crate) fn forward(
     tau: &JointVec,
     rotor: &JointVec,
 ) -> JointVec {
-    let mut m = lower(chain, &Turns::new(chain, q));
-    let mut rest = inverse(chain, q, qd, &[0.0; JOINTS]);
+    let turns = Turns::new(chain, q);
+    let mut m = lower(chain, &turns);
+    let mut rest = inverse(chain, &turns, qd, &[0.0; JOINTS]);
     for k in 0..JOINTS {
         m[k][k] += rotor[k];
         rest[k] = tau[k] - rest[k];

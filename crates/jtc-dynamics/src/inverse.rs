@@ -1,10 +1,14 @@
 //! Inverse dynamics: recursive Newton-Euler in the frames and with the parameters of [`crate::chain`].
 
+// The indices are those of the formulas.
+#![allow(clippy::needless_range_loop)]
+
 use crate::chain::{Body, Chain, Twist};
 use crate::model::{JOINTS, JointVec};
 use crate::trig::sin_cos;
+use crate::unroll::unroll;
 
-pub(crate) type Vec3 = [f64; 3];
+type Vec3 = [f64; 3];
 
 /// Sine and cosine of every joint angle of the chain.
 #[derive(Clone, Copy)]
@@ -16,11 +20,15 @@ pub(crate) struct Turns {
 impl Turns {
     #[inline(always)]
     pub fn new(chain: &Chain, q: &JointVec) -> Self {
-        let mut turns = Self { sin: [0.0; JOINTS], cos: [0.0; JOINTS] };
-        for (k, (q, twist)) in q.iter().zip(&chain.twists).enumerate() {
-            (turns.sin[k], turns.cos[k]) = sin_cos(q + twist.offset);
+        let mut angle = *q;
+        for k in 0..JOINTS {
+            angle[k] += chain.twists[k].offset;
         }
-        turns
+        let (mut sin, mut cos) = ([0.0; JOINTS], [0.0; JOINTS]);
+        for k in 0..JOINTS {
+            (sin[k], cos[k]) = sin_cos(angle[k]);
+        }
+        Self { sin, cos }
     }
 }
 
@@ -48,150 +56,186 @@ fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
     [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]
 }
 
-/// Motion of a link in its own frame: angular velocity and acceleration, acceleration of the origin.
+/// Two vectors side by side: they are turned together.
+pub(crate) type Pair3 = [[f64; 2]; 3];
+
+/// Rx(α) of both vectors.
+#[inline(always)]
+fn rx_pair(t: &Twist, v: &Pair3) -> Pair3 {
+    let mut out = *v;
+    for i in 0..2 {
+        out[1][i] = t.cos * v[1][i] - t.sin * v[2][i];
+        out[2][i] = t.sin * v[1][i] + t.cos * v[2][i];
+    }
+    out
+}
+
+/// Rx(α)ᵀ of both vectors.
+#[inline(always)]
+fn rx_pair_back(t: &Twist, v: &Pair3) -> Pair3 {
+    let mut out = *v;
+    for i in 0..2 {
+        out[1][i] = t.cos * v[1][i] + t.sin * v[2][i];
+        out[2][i] = t.cos * v[2][i] - t.sin * v[1][i];
+    }
+    out
+}
+
+/// Rz of both vectors.
+#[inline(always)]
+fn rz_pair(s: f64, c: f64, v: &Pair3) -> Pair3 {
+    let mut out = *v;
+    for i in 0..2 {
+        out[0][i] = c * v[0][i] - s * v[1][i];
+        out[1][i] = s * v[0][i] + c * v[1][i];
+    }
+    out
+}
+
+/// Rzᵀ of both vectors.
+#[inline(always)]
+fn rz_pair_back(s: f64, c: f64, v: &Pair3) -> Pair3 {
+    let mut out = *v;
+    for i in 0..2 {
+        out[0][i] = c * v[0][i] + s * v[1][i];
+        out[1][i] = c * v[1][i] - s * v[0][i];
+    }
+    out
+}
+
+/// Motion of a link in its own frame.
 #[derive(Clone, Copy)]
 struct Motion {
-    w: Vec3,
-    dw: Vec3,
+    /// Angular velocity and angular acceleration.
+    turn: Pair3,
+    /// Acceleration of the origin.
     acc: Vec3,
 }
 
 /// Force and moment that a link asks for, in its own frame and about its origin.
-#[derive(Clone, Copy)]
-pub(crate) struct Wrench {
-    pub f: Vec3,
-    pub n: Vec3,
-}
+pub(crate) type Wrench = Pair3;
 
-const ZERO: Wrench = Wrench { f: [0.0; 3], n: [0.0; 3] };
-
-/// The products of the angular velocity, and U = [dw]× + [w]×[w]×, which takes a point to its acceleration.
-struct Swing {
-    u: [Vec3; 3],
-    /// wx², wy², wz².
-    square: Vec3,
-    /// wy·wz, wz·wx, wx·wy.
-    cross: Vec3,
-}
+/// U = [dw]× + [w]×[w]×, which takes a point to its acceleration relative to the origin.
+type Swing = [Vec3; 3];
 
 impl Motion {
     #[inline(always)]
     fn swing(&self) -> Swing {
-        let [x, y, z] = self.w;
-        let [ax, ay, az] = self.dw;
+        let [[x, ax], [y, ay], [z, az]] = self.turn;
         let (xx, yy, zz) = (x * x, y * y, z * z);
         let (yz, zx, xy) = (y * z, z * x, x * y);
-        Swing {
-            u: [
-                [-(yy + zz), xy - az, zx + ay],
-                [xy + az, -(zz + xx), yz - ax],
-                [zx - ay, yz + ax, -(xx + yy)],
-            ],
-            square: [xx, yy, zz],
-            cross: [yz, zx, xy],
-        }
+        [[-(yy + zz), xy - az, zx + ay], [xy + az, -(zz + xx), yz - ax], [zx - ay, yz + ax, -(xx + yy)]]
     }
 
     /// Motion of the link after joint `t`.
     #[inline(always)]
-    fn next(&self, swing: &Swing, t: &Twist, (s, c): (f64, f64), qd: f64, qdd: f64) -> Self {
+    fn next(&self, u: &Swing, t: &Twist, (s, c): (f64, f64), qd: f64, qdd: f64) -> Self {
         let p = &t.p;
-        let reach = |k: usize| {
-            let u = &swing.u[k];
-            self.acc[k] + (u[0] * p[0] + u[1] * p[1] + u[2] * p[2])
-        };
+        let reach = |k: usize| self.acc[k] + (u[k][0] * p[0] + u[k][1] * p[1] + u[k][2] * p[2]);
         let acc = rz_back(s, c, rx_back(t, [reach(0), reach(1), reach(2)]));
-        let w = rz_back(s, c, rx_back(t, self.w));
-        let dw = rz_back(s, c, rx_back(t, self.dw));
-        Self { w: [w[0], w[1], w[2] + qd], dw: [dw[0] + w[1] * qd, dw[1] - w[0] * qd, dw[2] + qdd], acc }
+        let mut turn = rz_pair_back(s, c, &rx_pair_back(t, &self.turn));
+        let (wx, wy) = (turn[0][0], turn[1][0]);
+        turn[0][1] += wy * qd;
+        turn[1][1] -= wx * qd;
+        turn[2][0] += qd;
+        turn[2][1] += qdd;
+        Self { turn, acc }
     }
 }
 
 impl Body {
     #[inline(always)]
-    fn wrench(&self, m: &Motion, swing: &Swing) -> Wrench {
-        let Swing { u, square: [xx, yy, zz], cross: [yz, zx, xy] } = swing;
-        let [ax, _, az] = m.dw;
+    fn wrench(&self, m: &Motion, [ux, uy, uz]: &Swing) -> Wrench {
         let b = self;
-        let force = |k: usize| u[k][0] * b.hx + u[k][1] * b.hy;
-        // Euler's equations written with the entries of U; Iyy is zero.
-        let nx = (b.xx * ax + b.zz * yz) + (b.xz * u[1][0] - b.xy * u[2][0]) + b.yz * (yy - zz);
-        let ny = (b.xx - b.zz) * zx + (b.xy * u[2][1] - b.yz * u[0][1]) + b.xz * (zz - xx);
-        let nz = (b.zz * az - b.xx * xy) + (b.yz * u[0][2] - b.xz * u[1][2]) + b.xy * (xx - yy);
-        // The first moment times the acceleration of the origin (with gravity in it).
-        let n = [nx + b.hy * m.acc[2], ny - b.hx * m.acc[2], nz + (b.hx * m.acc[1] - b.hy * m.acc[0])];
-        Wrench { f: [force(0), force(1), force(2)], n }
+        let force = |u: &Vec3| u[0] * b.hx + u[1] * b.hy;
+        // The integral of r × (acc + U·r) over the mass.
+        let nx = (uz[0] * b.xy + uz[1] * b.yy + m.acc[2] * b.hy) + ((uz[2] - uy[1]) * b.yz - uy[0] * b.xz);
+        let ny = ((ux[0] - uz[2]) * b.xz + ux[1] * b.yz) - (uz[0] * b.xx + uz[1] * b.xy + m.acc[2] * b.hx);
+        let nz = (uy[0] * b.xx - ux[1] * b.yy) + (uy[1] - ux[0]) * b.xy + (uy[2] * b.xz - ux[2] * b.yz);
+        let nz = nz + (m.acc[1] * b.hx - m.acc[0] * b.hy);
+        [[force(ux), nx], [force(uy), ny], [force(uz), nz]]
     }
 }
 
 /// A wrench on frame k as the frame k−1 sees it.
 #[inline(always)]
 pub(crate) fn inwards(t: &Twist, (s, c): (f64, f64), wrench: &Wrench) -> Wrench {
-    let f = rz(s, c, wrench.f);
-    let n = rz(s, c, wrench.n);
+    let mut v = rz_pair(s, c, wrench);
     let [a, b] = t.mid;
-    let n = [n[0] + b * f[2], n[1] - a * f[2], n[2] + (a * f[1] - b * f[0])];
-    Wrench { f: rx(t, f), n: rx(t, n) }
+    v[0][1] += b * v[2][0];
+    v[1][1] -= a * v[2][0];
+    v[2][1] += a * v[1][0] - b * v[0][0];
+    rx_pair(t, &v)
 }
 
-/// The wrench of each link alone, under the motion `qd`, `qdd`.
+/// The wrench of each link alone, under the motion `qd`, `qdd`. Of the first only the moment about its axis is filled in:
+/// the rest goes into the base.
 #[inline(always)]
-pub(crate) fn wrenches(chain: &Chain, turns: &Turns, qd: &JointVec, qdd: &JointVec) -> [Wrench; JOINTS] {
-    let mut out = [ZERO; JOINTS];
+fn wrenches(chain: &Chain, turns: &Turns, qd: &JointVec, qdd: &JointVec) -> [Wrench; JOINTS] {
+    let mut out = [[[0.0; 2]; 3]; JOINTS];
+    let acc = rz_back(turns.sin[0], turns.cos[0], chain.lift);
+    let first = &chain.bodies[0];
+    out[0][2][1] = qdd[0] * (first.xx + first.yy) + (acc[1] * first.hx - acc[0] * first.hy);
+    // The first link only turns about its axis, so most of U and of the motion of the second is zero.
+    let t = &chain.twists[1];
+    let (s, c) = (turns.sin[1], turns.cos[1]);
+    let square = qd[0] * qd[0];
+    let reach =
+        [acc[0] - (square * t.p[0] + qdd[0] * t.p[1]), acc[1] + (qdd[0] * t.p[0] - square * t.p[1]), acc[2]];
+    let (y, z) = ([t.sin * qd[0], t.sin * qdd[0]], [t.cos * qd[0], t.cos * qdd[0]]);
+    let (wx, wy) = (s * y[0], c * y[0]);
     let mut motion = Motion {
-        w: [0.0, 0.0, qd[0]],
-        dw: [0.0, 0.0, qdd[0]],
-        acc: rz_back(turns.sin[0], turns.cos[0], chain.lift),
+        turn: [[wx, s * y[1] + wy * qd[1]], [wy, c * y[1] - wx * qd[1]], [z[0] + qd[1], z[1] + qdd[1]]],
+        acc: rz_back(s, c, rx_back(t, reach)),
     };
     let mut swing = motion.swing();
-    out[0] = chain.bodies[0].wrench(&motion, &swing);
-    for k in 1..JOINTS {
-        motion = motion.next(&swing, &chain.twists[k], (turns.sin[k], turns.cos[k]), qd[k], qdd[k]);
+    out[1] = chain.bodies[1].wrench(&motion, &swing);
+    unroll!(K in [2, 3, 4, 5] {
+        motion = motion.next(&swing, &chain.twists[K], (turns.sin[K], turns.cos[K]), qd[K], qdd[K]);
         swing = motion.swing();
-        out[k] = chain.bodies[k].wrench(&motion, &swing);
-    }
+        out[K] = chain.bodies[K].wrench(&motion, &swing);
+    });
     out
+}
+
+#[inline(always)]
+fn sum(a: &Wrench, b: &Wrench) -> Wrench {
+    core::array::from_fn(|i| [a[i][0] + b[i][0], a[i][1] + b[i][1]])
 }
 
 /// Joint torques, N·m.
 #[inline(always)]
-pub(crate) fn inverse(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
-    let turns = Turns::new(chain, q);
-    let links = wrenches(chain, &turns, qd, qdd);
+pub(crate) fn inverse(chain: &Chain, turns: &Turns, qd: &JointVec, qdd: &JointVec) -> JointVec {
+    let links = wrenches(chain, turns, qd, qdd);
     let mut torque = [0.0; JOINTS];
     let mut total = links[5];
-    torque[5] = total.n[2];
-    for k in (0..JOINTS - 1).rev() {
-        let Wrench { f, n } = inwards(&chain.twists[k + 1], (turns.sin[k + 1], turns.cos[k + 1]), &total);
-        let own = &links[k];
-        total.f = [own.f[0] + f[0], own.f[1] + f[1], own.f[2] + f[2]];
-        total.n = [own.n[0] + n[0], own.n[1] + n[1], own.n[2] + n[2]];
-        torque[k] = total.n[2];
-    }
+    torque[5] = total[2][1];
+    unroll!(K in [4, 3, 2, 1, 0] {
+        let v = inwards(&chain.twists[K + 1], (turns.sin[K + 1], turns.cos[K + 1]), &total);
+        total = sum(&links[K], &v);
+        torque[K] = total[2][1];
+    });
     torque
 }
 
 /// Joint torques at rest, N·m: with no mass left in the links there are no forces, only moments.
 #[inline(always)]
-pub(crate) fn gravity_torque(chain: &Chain, q: &JointVec) -> JointVec {
-    let turns = Turns::new(chain, q);
+pub(crate) fn gravity_torque(chain: &Chain, turns: &Turns) -> JointVec {
     let mut acc = chain.lift;
     let mut moments = [[0.0; 3]; JOINTS];
-    for (k, moment) in moments.iter_mut().enumerate() {
-        let t = &chain.twists[k];
-        let along = if k == 0 { acc } else { rx_back(t, acc) };
-        acc = rz_back(turns.sin[k], turns.cos[k], along);
-        let b = &chain.bodies[k];
-        *moment = [b.hy * acc[2], -b.hx * acc[2], b.hx * acc[1] - b.hy * acc[0]];
-    }
+    unroll!(K in [0, 1, 2, 3, 4, 5] {
+        let along = if K == 0 { acc } else { rx_back(&chain.twists[K], acc) };
+        acc = rz_back(turns.sin[K], turns.cos[K], along);
+        let b = &chain.bodies[K];
+        moments[K] = [b.hy * acc[2], -b.hx * acc[2], b.hx * acc[1] - b.hy * acc[0]];
+    });
     let mut torque = [0.0; JOINTS];
     let mut n = moments[5];
     torque[5] = n[2];
-    for k in (0..JOINTS - 1).rev() {
-        let t = &chain.twists[k + 1];
-        let inner = rx(t, rz(turns.sin[k + 1], turns.cos[k + 1], n));
-        n = [moments[k][0] + inner[0], moments[k][1] + inner[1], moments[k][2] + inner[2]];
-        torque[k] = n[2];
-    }
+    unroll!(K in [4, 3, 2, 1, 0] {
+        let inner = rx(&chain.twists[K + 1], rz(turns.sin[K + 1], turns.cos[K + 1], n));
+        n = [moments[K][0] + inner[0], moments[K][1] + inner[1], moments[K][2] + inner[2]];
+        torque[K] = n[2];
+    });
     torque
 }

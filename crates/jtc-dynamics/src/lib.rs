@@ -9,6 +9,9 @@ mod kinematics;
 mod model;
 mod rotation;
 mod trig;
+mod unroll;
+
+use inverse::Turns;
 
 pub use kinematics::Pose;
 pub use model::{ArmModel, Field, JOINTS, JointVec, Link, ModelError, Origin};
@@ -30,12 +33,12 @@ impl Dynamics {
 
     /// Joint torques (N·m) for positions (rad), velocities (rad/s) and accelerations (rad/s²); recursive Newton-Euler.
     pub fn inverse(&self, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
-        inverse::inverse(&self.chain, q, qd, qdd)
+        inverse::inverse(&self.chain, &Turns::new(&self.chain, q), qd, qdd)
     }
 
     /// Joint torques that hold the arm still at `q`, N·m.
     pub fn gravity_torque(&self, q: &JointVec) -> JointVec {
-        inverse::gravity_torque(&self.chain, q)
+        inverse::gravity_torque(&self.chain, &Turns::new(&self.chain, q))
     }
 
     /// Joint-space mass matrix, kg·m², symmetric, without rotors.

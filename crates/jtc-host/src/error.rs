@@ -178,7 +178,9 @@ impl Error {
 
 fn refused(code: DataStatus, state: u8) -> &'static str {
     match (code, state) {
-        (DataStatus::NotAllowed, 0 | 1) => "the controller is not ready yet: `jtc doctor` names what is missing",
+        (DataStatus::NotAllowed, 0 | 1) => {
+            "the controller is not ready yet: `jtc doctor` names what is missing"
+        }
         (DataStatus::NotAllowed, 5) => "the controller is in Error: `jtc recover`",
         (DataStatus::NotAllowed, 4) => "`jtc teach off` first",
         (DataStatus::NotAllowed, _) => "`jtc status` shows the state; `jtc traj stop` ends a trajectory",

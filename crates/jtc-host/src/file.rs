@@ -144,7 +144,11 @@ pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileE
 /// A text cut to what an error line can bear.
 pub(crate) fn short(text: &str) -> String {
     let text = text.trim();
-    if text.chars().count() <= 40 { text.to_owned() } else { text.chars().take(37).chain("...".chars()).collect() }
+    if text.chars().count() <= 40 {
+        text.to_owned()
+    } else {
+        text.chars().take(37).chain("...".chars()).collect()
+    }
 }
 
 /// Rows of comma, semicolon or space separated cells; blank lines and lines that begin with `#` are skipped.

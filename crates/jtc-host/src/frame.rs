@@ -79,9 +79,10 @@ pub fn arm_model(model: &ArmModel) -> Vec<u8> {
 /// Friction compensation: the polynomial (six coefficients, highest index first on the wire) or the tables.
 pub fn friction(friction: &Friction) -> Vec<u8> {
     match friction {
-        Friction::Polynomial(c) => {
-            floats(FrameType::FrictionPolynomial, c.iter().flat_map(|c| c.iter().rev().copied().collect::<Vec<_>>()))
-        }
+        Friction::Polynomial(c) => floats(
+            FrameType::FrictionPolynomial,
+            c.iter().flat_map(|c| c.iter().rev().copied().collect::<Vec<_>>()),
+        ),
         Friction::Table(tables) => {
             let mut body = Vec::with_capacity(10_560);
             for t in tables {

@@ -4,12 +4,18 @@ use jtc_wire::{DataStatus, FrameStatus, Status};
 
 /// State of the controller.
 pub fn state(fsm: u8) -> &'static str {
-    ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"].get(fsm as usize).copied().unwrap_or("unknown")
+    ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"]
+        .get(fsm as usize)
+        .copied()
+        .unwrap_or("unknown")
 }
 
 /// Trajectory execution state.
 pub fn tes(tes: u8) -> &'static str {
-    ["Null", "Stop", "Pause", "Execute", "Finish", "TransNullToStop"].get(tes as usize).copied().unwrap_or("unknown")
+    ["Null", "Stop", "Pause", "Execute", "Finish", "TransNullToStop"]
+        .get(tes as usize)
+        .copied()
+        .unwrap_or("unknown")
 }
 
 /// State of a node; numbers from 10 to 16 are transitions.
@@ -113,14 +119,22 @@ pub fn motor_faults(byte: u8) -> Vec<&'static str> {
 
 /// Error byte of a drive.
 pub fn node_errors(byte: u8) -> Vec<&'static str> {
-    list(u32::from(byte), &["encoder failed", "motor control fault", "over-speed", "hardware fault", "", "", "", ""])
+    list(
+        u32::from(byte),
+        &["encoder failed", "motor control fault", "over-speed", "hardware fault", "", "", "", ""],
+    )
 }
 
 /// Warning byte of a node.
 pub fn node_warnings(byte: u8) -> Vec<&'static str> {
     list(
         u32::from(byte),
-        &["position not accurate", "outside working area", "magnetic field out of range", "safety line active"],
+        &[
+            "position not accurate",
+            "outside working area",
+            "magnetic field out of range",
+            "safety line active",
+        ],
     )
 }
 
@@ -160,13 +174,18 @@ pub fn errors_line(s: &Status) -> String {
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
-    if all.is_empty() { format!("no error bit is set (state {}, trajectory {})", state(s.fsm), tes(s.tes)) } else { all.join(", ") }
+    if all.is_empty() {
+        format!("no error bit is set (state {}, trajectory {})", state(s.fsm), tes(s.tes))
+    } else {
+        all.join(", ")
+    }
 }
 
 /// Why the controller is not further than it is.
 pub fn waiting_for(s: &Status) -> String {
     let head = format!("state {}, trajectory {}", state(s.fsm), tes(s.tes));
-    let mut missing: Vec<String> = missing_parameters(s.jtc_init).into_iter().map(|m| format!("{m} not given")).collect();
+    let mut missing: Vec<String> =
+        missing_parameters(s.jtc_init).into_iter().map(|m| format!("{m} not given")).collect();
     if s.fsm <= 1 {
         missing.extend(missing_nodes(s.node_init).into_iter().map(|n| format!("{n} not ready")));
     }

@@ -109,7 +109,13 @@ fn check_table(j: usize, t: &TableOf<f32>) -> Result<(), ParameterError> {
         values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;
         for (i, w) in values.windows(2).enumerate() {
             if w[1] <= w[0] {
-                return Err(ParameterError::Axis { joint: j + 1, axis, place: i + 2, before: w[0], after: w[1] });
+                return Err(ParameterError::Axis {
+                    joint: j + 1,
+                    axis,
+                    place: i + 2,
+                    before: w[0],
+                    after: w[1],
+                });
             }
         }
     }

@@ -76,11 +76,16 @@ impl Arm {
             Some((joints, [flange])) if joints.len() == JOINTS => (joints, flange),
             _ => {
                 let n = form.joint.len();
-                return Err(FileError::form(format!("{n} [[joint]] entries, not 7 (six joints and the fixed flange)")));
+                return Err(FileError::form(format!(
+                    "{n} [[joint]] entries, not 7 (six joints and the fixed flange)"
+                )));
             }
         };
         if form.link.len() != 7 {
-            return Err(FileError::form(format!("{} [[link]] entries, not 7 (base and six links)", form.link.len())));
+            return Err(FileError::form(format!(
+                "{} [[link]] entries, not 7 (base and six links)",
+                form.link.len()
+            )));
         }
         let mut warnings = Vec::new();
         let mut limits = [JointConfig {
@@ -130,9 +135,10 @@ fn all_or_none<T>(
     }
     match (found.is_empty(), lacking) {
         (true, _) => Ok(None),
-        (false, Some(name)) => {
-            Err(FileError::at(Place::name(format!("joint {name}")), format!("{key} is missing, other joints have it")))
-        }
+        (false, Some(name)) => Err(FileError::at(
+            Place::name(format!("joint {name}")),
+            format!("{key} is missing, other joints have it"),
+        )),
         (false, None) => Ok(found.try_into().ok()),
     }
 }
@@ -170,11 +176,17 @@ impl JointForm {
         }
         if !(config.position_min < config.position_max) {
             let (min, max) = (config.position_min, config.position_max);
-            return Err(FileError::at(place("position_min_rad"), format!("{min} is not below position_max_rad {max}")));
+            return Err(FileError::at(
+                place("position_min_rad"),
+                format!("{min} is not below position_max_rad {max}"),
+            ));
         }
         if !(config.rotor_inertia >= 0.0 && config.rotor_inertia.is_finite()) {
             let v = config.rotor_inertia;
-            return Err(FileError::at(place("rotor_inertia_kg_m2"), format!("{v} is negative or not finite")));
+            return Err(FileError::at(
+                place("rotor_inertia_kg_m2"),
+                format!("{v} is negative or not finite"),
+            ));
         }
         Ok(config)
     }
@@ -194,7 +206,13 @@ impl JointForm {
 
 impl PidForm {
     fn gains(self) -> PidGains {
-        PidGains { kp: self.kp, ki: self.ki, kd: self.kd, int_min: self.int_min_rad_s, int_max: self.int_max_rad_s }
+        PidGains {
+            kp: self.kp,
+            ki: self.ki,
+            kd: self.kd,
+            int_min: self.int_min_rad_s,
+            int_max: self.int_max_rad_s,
+        }
     }
 }
 
@@ -221,7 +239,10 @@ fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, Fi
 impl TableForm {
     fn table(&self, i: usize) -> Result<TableOf<f32>, FileError> {
         let wrong = |key: &str, n: usize| {
-            FileError::at(Place::name(format!("friction_table {}, {key}", i + 1)), format!("{n} values, not 20"))
+            FileError::at(
+                Place::name(format!("friction_table {}, {key}", i + 1)),
+                format!("{n} values, not 20"),
+            )
         };
         let axis = |key: &str, v: &[f32]| <[f32; 20]>::try_from(v).map_err(|_| wrong(key, v.len()));
         let mut torque = [[0.0; 20]; 20];

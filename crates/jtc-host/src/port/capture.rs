@@ -95,7 +95,8 @@ pub fn read_capture(input: impl BufRead) -> io::Result<Vec<Captured>> {
         if line.trim().is_empty() || line.starts_with('#') {
             continue;
         }
-        let wrong = |what: &str| io::Error::new(io::ErrorKind::InvalidData, format!("line {}: {what}", i + 1));
+        let wrong =
+            |what: &str| io::Error::new(io::ErrorKind::InvalidData, format!("line {}: {what}", i + 1));
         let mut words = line.split_whitespace();
         let time_s = words.next().and_then(|w| w.parse().ok()).ok_or_else(|| wrong("no time"))?;
         let direction = match words.next() {

@@ -7,8 +7,8 @@ use super::{Port, PortError};
 
 /// Rates up to 15 MBd that adapters know; any other number may work too.
 pub const STANDARD_RATES: [u32; 16] = [
-    9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 500_000, 921_600, 1_000_000, 1_500_000, 2_000_000,
-    3_000_000, 4_000_000, 12_000_000, 15_000_000,
+    9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 500_000, 921_600, 1_000_000, 1_500_000,
+    2_000_000, 3_000_000, 4_000_000, 12_000_000, 15_000_000,
 ];
 
 /// How long one write may find no room.
@@ -61,7 +61,9 @@ impl SerialPort {
 fn opening(path: &str, baud: u32, error: serialport::Error) -> PortError {
     let named = path.to_owned();
     match error.kind() {
-        serialport::ErrorKind::NoDevice if error.description.contains("busy") => PortError::Busy { path: named },
+        serialport::ErrorKind::NoDevice if error.description.contains("busy") => {
+            PortError::Busy { path: named }
+        }
         // The lock of another program that was opened shared shows as "try again".
         serialport::ErrorKind::Io(io::ErrorKind::WouldBlock) => PortError::Busy { path: named },
         serialport::ErrorKind::NoDevice if cfg!(unix) => PortError::Busy { path: named },
@@ -100,7 +102,10 @@ impl Port for SerialPort {
                     Ok(n) => rest = &rest[n..],
                     Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
                     Err(e) if nothing_yet(&e) => {
-                        return Err(PortError::Stalled { path: self.path.clone(), seconds: STALL.as_secs_f64() });
+                        return Err(PortError::Stalled {
+                            path: self.path.clone(),
+                            seconds: STALL.as_secs_f64(),
+                        });
                     }
                     Err(e) => return Err(PortError::io(&self.path, e)),
                 }

@@ -97,7 +97,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, RecordingError> {
         let mut sample = Sample::default();
         let mut fields = row.split(',');
         for name in &names {
-            let field = fields.next().ok_or_else(|| fail(i + 1, Some(name), "the row ends before this column"))?;
+            let field =
+                fields.next().ok_or_else(|| fail(i + 1, Some(name), "the row ends before this column"))?;
             put(&mut sample, name, field.trim()).ok_or_else(|| fail(i + 1, Some(name), "not a number"))?;
         }
         samples.push(sample);
@@ -122,7 +123,9 @@ fn put(sample: &mut Sample, name: &str, field: &str) -> Option<()> {
                 "fsm" => joint.fsm = field.parse().ok()?,
                 "internal" => joint.internal = field.parse().ok()?,
                 _ => {
-                    let Some((_, value)) = COLUMNS.iter().find(|(c, _)| *c == column) else { return Some(()) };
+                    let Some((_, value)) = COLUMNS.iter().find(|(c, _)| *c == column) else {
+                        return Some(());
+                    };
                     *value(joint) = if field.is_empty() { f64::NAN } else { field.parse().ok()? };
                 }
             }

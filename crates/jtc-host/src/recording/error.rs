@@ -68,7 +68,11 @@ impl fmt::Display for RecordingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             RecordingError::UnknownFormat { path } => {
-                write!(f, "{}: recordings are .mcap or .csv files; choose one of these endings", path.display())
+                write!(
+                    f,
+                    "{}: recordings are .mcap or .csv files; choose one of these endings",
+                    path.display()
+                )
             }
             RecordingError::Io { path, source } => write!(f, "{}: {source}", path.display()),
             RecordingError::Line { path, line, column, problem } => {
@@ -80,7 +84,11 @@ impl fmt::Display for RecordingError {
             }
             RecordingError::Mcap { path, problem } => write!(f, "{}: {problem}", path.display()),
             RecordingError::Message { path, topic, time_s } => {
-                write!(f, "{}: the message on {topic} at {time_s:.3} s is shorter than its schema", path.display())
+                write!(
+                    f,
+                    "{}: the message on {topic} at {time_s:.3} s is shorter than its schema",
+                    path.display()
+                )
             }
         }
     }

@@ -104,7 +104,14 @@ impl<W: Write + Seek> McapWriter<W> {
             .array(j.map(|j| j.temperature));
         self.out.write_to_known_channel(&header(self.control), self.cdr.bytes())?;
 
-        self.cdr.start().header(stamp, "").u8(s.state).u8(s.tes).u32(s.point).u16(s.errors).u32(s.can_current);
+        self.cdr
+            .start()
+            .header(stamp, "")
+            .u8(s.state)
+            .u8(s.tes)
+            .u32(s.point)
+            .u16(s.errors)
+            .u32(s.can_current);
         for joint in j {
             self.cdr.u8(joint.fsm);
         }
@@ -137,7 +144,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     for message in MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())? {
         let message = message?;
         let time_s = message.log_time.saturating_sub(start_ns) as f64 * 1e-9;
-        let sample = samples.entry(message.log_time).or_insert_with(|| Sample { time_s, ..Sample::default() });
+        let sample =
+            samples.entry(message.log_time).or_insert_with(|| Sample { time_s, ..Sample::default() });
         let topic = message.channel.topic.as_str();
         decode(topic, &message.data, sample).ok_or_else(|| RecordingError::Message {
             path: PathBuf::new(),

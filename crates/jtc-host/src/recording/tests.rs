@@ -8,7 +8,8 @@ fn samples(n: usize) -> Vec<Sample> {
         .map(|i| {
             let t = i as f64 * 1e-3;
             let mut s = Sample::default();
-            (s.time_s, s.state, s.tes, s.point, s.errors, s.can_current) = (t, 3, 3, i as u32, 0x8001, 1 << 8);
+            (s.time_s, s.state, s.tes, s.point, s.errors, s.can_current) =
+                (t, 3, 3, i as u32, 0x8001, 1 << 8);
             for (j, joint) in s.joints.iter_mut().enumerate() {
                 joint.set_position = (t + j as f64).sin();
                 joint.position = joint.set_position - 1e-3;
@@ -47,7 +48,10 @@ fn check(name: &str) -> Recording {
     assert_eq!(read.samples.len(), written.len());
     for (a, b) in read.samples.iter().zip(&written) {
         assert!(same(a.time_s, b.time_s));
-        assert_eq!((a.state, a.tes, a.point, a.errors, a.can_current), (3, 3, b.point, b.errors, b.can_current));
+        assert_eq!(
+            (a.state, a.tes, a.point, a.errors, a.can_current),
+            (3, 3, b.point, b.errors, b.can_current)
+        );
         for (a, b) in a.joints.iter().zip(&b.joints) {
             for (x, y) in [
                 (a.set_position, b.set_position),
@@ -91,7 +95,8 @@ fn what_is_no_recording_is_refused_by_name() {
 #[test]
 fn a_cut_off_mcap_file_still_gives_its_whole_chunks_or_an_error() {
     let mut bytes = Vec::new();
-    let mut writer = mcap::McapWriter::new(std::io::Cursor::new(&mut bytes), &RecordingInfo::default()).unwrap();
+    let mut writer =
+        mcap::McapWriter::new(std::io::Cursor::new(&mut bytes), &RecordingInfo::default()).unwrap();
     for s in samples(3000) {
         writer.write(&s).unwrap();
     }

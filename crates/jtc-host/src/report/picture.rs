@@ -54,7 +54,8 @@ impl Panel {
         let y = self.y(v);
         let (l, r) = (self.left, self.left + self.width);
         let _ = writeln!(svg, r#"<path class="g" d="M{l:.1} {y:.1}H{r:.1}"/>"#);
-        let _ = writeln!(svg, r#"<text x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#, l - 7.0, y + 4.0);
+        let _ =
+            writeln!(svg, r#"<text x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#, l - 7.0, y + 4.0);
     }
 }
 

@@ -4,7 +4,8 @@ use super::*;
 use crate::sample::JointSample;
 
 fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
-    let mut info = RecordingInfo { arm: "avena".into(), trajectory: "</script> & Co".into(), ..Default::default() };
+    let mut info =
+        RecordingInfo { arm: "avena".into(), trajectory: "</script> & Co".into(), ..Default::default() };
     for joint in &mut info.joints {
         joint.torque_max_nm = 50.0;
     }

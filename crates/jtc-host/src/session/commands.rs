@@ -103,7 +103,8 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         // Sent again after its confirmation was lost, it is refused although the first one did its work.
-        if not_allowed(&record) && self.statistics.retries > retries && self.last.is_some_and(|s| reached(&s)) {
+        if not_allowed(&record) && self.statistics.retries > retries && self.last.is_some_and(|s| reached(&s))
+        {
             return Ok(());
         }
         Err(self.refused(record))

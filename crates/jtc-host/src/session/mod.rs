@@ -258,7 +258,12 @@ impl<P: Port> Session<P> {
 
     fn refused(&self, record: Response) -> Error {
         let last = self.last.unwrap_or_default();
-        Error::Refused { request: frame_type(record.frame_type), code: record.data, state: last.fsm, tes: last.tes }
+        Error::Refused {
+            request: frame_type(record.frame_type),
+            code: record.data,
+            state: last.fsm,
+            tes: last.tes,
+        }
     }
 
     /// Waits until `reached` says yes; `what` names it in the error.
@@ -276,7 +281,11 @@ impl<P: Port> Session<P> {
             }
             let waited = self.port.now() - start;
             if waited >= timeout {
-                return Err(Error::StateTimeout { what, waited_s: waited.as_secs_f64(), status: Box::new(status) });
+                return Err(Error::StateTimeout {
+                    what,
+                    waited_s: waited.as_secs_f64(),
+                    status: Box::new(status),
+                });
             }
         }
     }

@@ -185,9 +185,11 @@ fn input_released(_: &Status) -> bool {
 
 /// Nodes that report a fault of their own.
 fn faulty(s: &Status) -> u8 {
-    let joints = s.joints.iter().enumerate().filter(|(_, j)| {
-        j.errors != 0 || j.mc_current != 0 || j.mc_occurred != 0 || j.fsm >= 254
-    });
+    let joints = s
+        .joints
+        .iter()
+        .enumerate()
+        .filter(|(_, j)| j.errors != 0 || j.mc_current != 0 || j.mc_occurred != 0 || j.fsm >= 254);
     let mut mask = joints.fold(0, |m, (i, _)| m | 1 << i);
     if s.gripper.is_some_and(|g| g.errors != 0 || g.fsm >= 254) {
         mask |= 1 << 6;

@@ -109,7 +109,13 @@ struct Upload {
 }
 
 impl Upload {
-    fn new(points: &[RawPoint], step_ms: u16, options: &UploadOptions, baud: Option<u32>, now: Duration) -> Self {
+    fn new(
+        points: &[RawPoint],
+        step_ms: u16,
+        options: &UploadOptions,
+        baud: Option<u32>,
+        now: Duration,
+    ) -> Self {
         let per_segment = options.segment_points(points.len());
         let count = points.len().div_ceil(per_segment);
         let frames: Vec<Vec<u8>> = points

@@ -1,7 +1,17 @@
 //! Trajectories: points at a fixed step, from the files that people have.
 
+mod csv;
+pub(crate) mod fit;
+mod structured;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
 use jtc_core::JOINTS;
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
+
+use crate::file::{FileError, read_text};
 
 /// One point of a trajectory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,6 +31,57 @@ pub struct Trajectory {
     pub step_ms: u16,
     /// First to last.
     pub points: Vec<Point>,
+}
+
+/// Form of a trajectory file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Form {
+    /// CSV with a header.
+    Csv,
+    /// 19 columns of integers, scaled as on the wire.
+    Int16,
+    /// 19 columns of floats.
+    Float,
+    /// JSON of our own form.
+    Json,
+    /// `trajectory_msgs/JointTrajectory` as YAML or JSON.
+    JointTrajectory,
+}
+
+/// A trajectory from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The trajectory.
+    pub trajectory: Trajectory,
+    /// What the file was.
+    pub form: Form,
+    /// What was derived, resampled or left out.
+    pub notes: Vec<String>,
+}
+
+impl Loaded {
+    /// From a file of any form; `joint_names` are those of the arm, where they are known.
+    pub fn load(path: &Path, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
+        let text = read_text(path)?;
+        let yaml = path.extension().is_some_and(|e| e == "yaml" || e == "yml");
+        let read =
+            if yaml { structured::read_yaml(&text, joint_names) } else { Self::parse(&text, joint_names) };
+        read.map_err(|e| e.in_file(path))
+    }
+
+    /// From a text, told by its content.
+    pub fn parse(text: &str, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
+        let start = text.trim_start_matches('\u{feff}').trim_start();
+        let keyed = || start.lines().any(|l| l.trim_start_matches([' ', '-']).starts_with("joint_names:"));
+        if start.starts_with('{') {
+            structured::read_json(start, joint_names)
+        } else if keyed() {
+            structured::read_yaml(start, joint_names)
+        } else {
+            csv::read(text)
+        }
+    }
 }
 
 /// A number that a trajectory frame cannot carry.
@@ -60,7 +121,14 @@ impl Point {
             for (j, (to, v)) in out.iter_mut().zip(values).enumerate() {
                 let scaled = (v * 32767.0 / scale).round();
                 if !(-32768.0..=32767.0).contains(&scaled) {
-                    return Err(ScaleError { point: index, joint: j + 1, channel, value: *v, limit: scale, unit });
+                    return Err(ScaleError {
+                        point: index,
+                        joint: j + 1,
+                        channel,
+                        value: *v,
+                        limit: scale,
+                        unit,
+                    });
                 }
                 *to = scaled as i16;
             }

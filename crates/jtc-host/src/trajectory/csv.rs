@@ -1,0 +1,224 @@
+//! Tables of numbers: with a header line, or the header-less 19 columns of existing programs as int16 or float.
+
+use std::fmt::Write as _;
+
+use jtc_core::JOINTS;
+use jtc_wire::RawPoint;
+
+use super::fit::{FitError, Samples};
+use super::{Form, Loaded, Point, Trajectory};
+use crate::file::{FileError, Place, number, rows, short};
+
+/// Columns of the header-less forms: time, 6 positions, 6 velocities, 6 accelerations.
+const COLUMNS: usize = 1 + 3 * JOINTS;
+
+pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
+    let Some((line, first)) = rows(text).next() else {
+        return Err(FileError::form("an empty file is no trajectory"));
+    };
+    let headed = first.iter().any(|c| c.chars().any(|c| c.is_alphabetic()) && c.parse::<f64>().is_err());
+    if headed {
+        return with_header(text, line, &first);
+    }
+    match first.len() {
+        COLUMNS => {}
+        22 => {
+            let problem = "22 columns: the older form for seven axes, which this controller does not speak";
+            return Err(FileError::at(Place::line(line), problem));
+        }
+        n => {
+            let problem = format!(
+                "{n} columns and no header; known without a header: 19 (time, 6 positions, 6 velocities, 6 \
+                 accelerations), with one: t,q1..q6[,qd1..qd6][,qdd1..qdd6]"
+            );
+            return Err(FileError::at(Place::line(line), problem));
+        }
+    }
+    // The float form always has a fraction somewhere; the int16 form never.
+    let whole = rows(text)
+        .all(|(_, cells)| cells.iter().all(|c| c.bytes().all(|b| b.is_ascii_digit() || b"+-".contains(&b))));
+    if whole { int16(text) } else { float(text) }
+}
+
+fn width(line: usize, cells: &[&str], want: usize) -> Result<(), FileError> {
+    if cells.len() == want {
+        return Ok(());
+    }
+    Err(FileError::at(Place::line(line), format!("{} columns, the lines before have {want}", cells.len())))
+}
+
+fn int16(text: &str) -> Result<Loaded, FileError> {
+    let mut points = Vec::new();
+    let mut times: Vec<(usize, i64)> = Vec::new();
+    for (line, cells) in rows(text) {
+        width(line, &cells, COLUMNS)?;
+        let time = cells[0].parse::<i64>().map_err(|_| {
+            FileError::at(
+                Place::cell(line, 1).named("time"),
+                format!("\"{}\" is not a time in ms", short(cells[0])),
+            )
+        })?;
+        times.push((line, time));
+        let mut raw = [0i16; 3 * JOINTS];
+        for (c, (to, cell)) in raw.iter_mut().zip(&cells[1..]).enumerate() {
+            *to = cell.parse().map_err(|_| {
+                let problem = format!("\"{}\" is no int16 (-32768..32767)", short(cell));
+                FileError::at(Place::cell(line, c + 2).named(channel_name(c)), problem)
+            })?;
+        }
+        let part = |from: usize| std::array::from_fn(|j| raw[from + j]);
+        let raw = RawPoint { position: part(0), velocity: part(JOINTS), acceleration: part(2 * JOINTS) };
+        points.push(Point::from(&raw));
+    }
+    let mut notes = Vec::new();
+    let step_ms = match times[..] {
+        [(_, first), (line, second), ..] => match second.checked_sub(first) {
+            Some(step @ 1..=1000) => step as u16,
+            _ => {
+                let problem = format!("{second} ms after {first} ms makes no step of 1 to 1000 ms");
+                return Err(FileError::at(Place::cell(line, 1).named("time"), problem));
+            }
+        },
+        _ => 10,
+    };
+    let odd = times.windows(2).find(|w| w[1].1.checked_sub(w[0].1) != Some(i64::from(step_ms)));
+    if let Some([before, after]) = odd {
+        notes.push(format!(
+            "the time column does not go on by {step_ms} ms at line {} ({} after {}): as in existing programs it is \
+             ignored, the step is {step_ms} ms throughout",
+            after.0, after.1, before.1
+        ));
+    }
+    Ok(Loaded { trajectory: Trajectory { step_ms, points }, form: Form::Int16, notes })
+}
+
+fn float(text: &str) -> Result<Loaded, FileError> {
+    let mut samples =
+        Samples { velocity: Some(Vec::new()), acceleration: Some(Vec::new()), ..Samples::default() };
+    let mut lines = Vec::new();
+    for (line, cells) in rows(text) {
+        width(line, &cells, COLUMNS)?;
+        let mut row = [0.0; COLUMNS];
+        for (c, (to, cell)) in row.iter_mut().zip(&cells).enumerate() {
+            let name = || if c == 0 { "time".to_owned() } else { channel_name(c - 1) };
+            *to = number(cell, || Place::cell(line, c + 1).named(name()))?;
+        }
+        lines.push(line);
+        samples.push(row[0], |c| row[1 + c]);
+    }
+    finish(samples, &lines, Form::Float)
+}
+
+impl Samples {
+    fn push(&mut self, time: f64, value: impl Fn(usize) -> f64) {
+        let part = |from: usize| std::array::from_fn(|j| value(from + j));
+        self.times.push(time);
+        self.position.push(part(0));
+        if let Some(v) = &mut self.velocity {
+            v.push(part(JOINTS));
+        }
+        if let Some(a) = &mut self.acceleration {
+            a.push(part(2 * JOINTS));
+        }
+    }
+}
+
+fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileError> {
+    let times = samples.times.clone();
+    match samples.fit() {
+        Ok(fitted) => Ok(Loaded { trajectory: fitted.trajectory, form, notes: fitted.notes }),
+        Err(FitError::Time(i)) => {
+            let problem = format!("{} s does not lie after {} s of the line before", times[i], times[i - 1]);
+            Err(FileError::at(Place::line(lines[i]).named("time"), problem))
+        }
+        Err(FitError::Duration(d)) => Err(FileError::form(format!("{d} s are longer than a day"))),
+    }
+}
+
+/// Name of column `c` after the time.
+fn channel_name(c: usize) -> String {
+    format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
+}
+
+/// Which value a header names: 0 time, 1.. the columns of the header-less forms.
+fn column_of(name: &str) -> Option<usize> {
+    let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
+    if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
+        return Some(0);
+    }
+    // Units may follow: q1_rad, qd1_rad_s, qdd1_rad_s2.
+    let name = name.split_once("_rad").map_or(name.as_str(), |(head, _)| head).to_owned();
+    (0..3 * JOINTS).find(|c| channel_name(*c) == name).map(|c| c + 1)
+}
+
+fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded, FileError> {
+    let mut place_of = [None; COLUMNS];
+    for (i, name) in header.iter().enumerate() {
+        let at = |problem: &str| {
+            FileError::at(
+                Place::cell(header_line, i + 1).named(format!("\"{}\"", short(name))),
+                problem.to_owned(),
+            )
+        };
+        let column = column_of(name).ok_or_else(|| {
+            at("unknown column; known: t, q1..q6 (rad), qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)")
+        })?;
+        if place_of[column].replace(i).is_some() {
+            return Err(at("this column is there twice"));
+        }
+    }
+    let missing = |from: usize| (from..from + JOINTS).find(|c| place_of[*c].is_none());
+    let none = |from: usize| (from..from + JOINTS).all(|c| place_of[c].is_none());
+    if place_of[0].is_none() {
+        return Err(FileError::at(Place::line(header_line), "column t (time in s) is missing"));
+    }
+    for from in [1, 1 + JOINTS, 1 + 2 * JOINTS] {
+        if let Some(c) = missing(from).filter(|_| from == 1 || !none(from)) {
+            return Err(FileError::at(
+                Place::line(header_line),
+                format!("column {} is missing", channel_name(c - 1)),
+            ));
+        }
+    }
+    let has = |from: usize| (!none(from)).then(Vec::new);
+    let mut samples =
+        Samples { velocity: has(1 + JOINTS), acceleration: has(1 + 2 * JOINTS), ..Samples::default() };
+    if samples.velocity.is_none() && samples.acceleration.is_some() {
+        return Err(FileError::at(Place::line(header_line), "qdd1..qdd6 without qd1..qd6"));
+    }
+    let mut lines = Vec::new();
+    for (line, cells) in rows(text).skip(1) {
+        width(line, &cells, header.len())?;
+        let mut row = [0.0; COLUMNS];
+        for (to, place) in row.iter_mut().zip(&place_of) {
+            if let Some(i) = place {
+                *to = number(cells[*i], || Place::cell(line, i + 1).named(header[*i]))?;
+            }
+        }
+        lines.push(line);
+        samples.push(row[0], |c| row[1 + c]);
+    }
+    if lines.is_empty() {
+        return Err(FileError::at(Place::line(header_line), "a header and no points"));
+    }
+    finish(samples, &lines, Form::Csv)
+}
+
+impl Trajectory {
+    /// As CSV with a header, all channels, full precision.
+    pub fn to_csv(&self) -> String {
+        let mut out = String::from("t");
+        for c in 0..3 * JOINTS {
+            let _ = write!(out, ",{}", channel_name(c));
+        }
+        out.push('\n');
+        for (i, p) in self.points.iter().enumerate() {
+            let _ = write!(out, "{}", (i * usize::from(self.step_ms)) as f64 / 1000.0);
+            for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
+                let _ = write!(out, ",{v}");
+            }
+            out.push('\n');
+        }
+        out
+    }
+}

@@ -1,2 +1,31 @@
-//! The `jtc` command.
-fn main() {}
+//! The `jtc` command: parses, calls the libraries, prints. Results go to stdout, progress and logs to stderr.
+#![forbid(unsafe_code)]
+
+mod args;
+mod commands;
+mod failure;
+mod link;
+mod output;
+#[cfg(unix)]
+mod serve;
+mod signal;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::Cli;
+use output::Output;
+
+fn main() -> ExitCode {
+    // clap itself ends wrong usage with exit code 2.
+    let cli = Cli::parse();
+    let out = Output::new(cli.json);
+    match commands::run(cli.command, &out) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            out.failure(&failure);
+            ExitCode::from(failure.exit)
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! `jtc demo`: the main job from parameters to report, on the simulator in this process.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use jtc_host::arm::Arm;
+use jtc_host::port::Port;
+use jtc_host::port::sim::SimPort;
+use jtc_host::recording::{self, RecordingInfo};
+use jtc_host::report::{self, Facts, ReportInput, Summary};
+use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadOptions, UploadReport};
+use jtc_host::trajectory::{Point, Trajectory};
+use jtc_host::{Sample, Session};
+use jtc_sim::{SimConfig, World};
+use serde_json::json;
+
+use super::run_report;
+use crate::args::{DemoArgs, SimSpeed};
+use crate::failure::{FAULT, Failure};
+use crate::output::Output;
+
+/// Seed of the demo: anyone's demo gives the same figures.
+const SEED: u64 = 1;
+/// Before and after the motion, what is recorded too.
+const MARGIN: Duration = Duration::from_millis(400);
+/// Drives take 4 s for their first enable.
+const BRING_UP: Duration = Duration::from_secs(30);
+
+/// What the run leaves behind.
+struct Run {
+    info: RecordingInfo,
+    samples: Vec<Sample>,
+    upload: UploadReport,
+    link: LinkStatistics,
+    baud: Option<u32>,
+    masses: String,
+    frictions: String,
+}
+
+/// Runs the demo and writes its files.
+pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure::usage(format!("{}: {e}", args.out.display())))?;
+    let begin = Instant::now();
+    let run = execute(args.speed, out)?;
+    let facts = [
+        run_report::link_facts(&run.upload, &run.link, run.baud),
+        Facts {
+            title: "Simulated arm".into(),
+            rows: vec![
+                ("Masses, of what the controller believes".into(), run.masses.clone()),
+                ("Friction, of what the controller believes".into(), run.frictions.clone()),
+                ("Seed".into(), SEED.to_string()),
+            ],
+        },
+    ];
+    let summary = Summary::of(&run.info, &run.samples);
+    let file = |name: &str| args.out.join(name);
+    recording::write_all(&file("recording.mcap"), &run.info, &run.samples)?;
+    recording::write_all(&file("recording.csv"), &run.info, &run.samples)?;
+    let input = ReportInput { info: &run.info, samples: &run.samples, facts: &facts };
+    let save = |name: &str, text: String| {
+        std::fs::write(file(name), text).map_err(|e| Failure::usage(format!("{}: {e}", file(name).display())))
+    };
+    save("report.html", report::html(&input))?;
+    save("picture.svg", report::picture_svg(&input))?;
+    let names = ["report.html", "recording.mcap", "recording.csv", "picture.svg"];
+    let files: Vec<String> = names.iter().map(|n| file(n).display().to_string()).collect();
+    let value = json!({
+        "outcome": "finished",
+        "recorded_s": summary.recorded_s,
+        "executed_s": summary.executed_s,
+        "samples": run.samples.len(),
+        "joints": summary.joints,
+        "upload": run.upload,
+        "link": run.link,
+        "files": files,
+        "wall_s": begin.elapsed().as_secs_f64(),
+    });
+    out.result(&value, || {
+        format!(
+            "\n{}\n{}\n{:.1} s of simulated time in {:.1} s\n\nlook at it:\n  {}   the report: open it in a browser\n  {}   \
+             for Foxglove, PlotJuggler, Rerun\n  {}   for spreadsheets and scripts\nnext: jtc sim --serial /tmp/jtc   and then   \
+             jtc status --port /tmp/jtc",
+            run_report::figures(&summary),
+            run_report::link_line(&run.upload, &run.link),
+            run.link.time_s,
+            begin.elapsed().as_secs_f64(),
+            files[0],
+            files[1],
+            files[2],
+        )
+    });
+    Ok(())
+}
+
+fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
+    let arm = Arm::avena();
+    let trajectory = trajectory();
+    let points = trajectory.raw().map_err(|e| Failure::usage(e.to_string()))?;
+    let world = World::new(SimConfig { seed: SEED, ..SimConfig::new(arm.config(), &arm.parameters()) });
+    let percent = |true_value: f64, believed: f64| {
+        if believed > 0.0 { format!("{:+.0} %", (true_value / believed - 1.0) * 100.0) } else { "0 %".into() }
+    };
+    let masses = (0..7).map(|i| percent(world.true_model().links[i].mass, arm.model.links[i].mass)).collect::<Vec<_>>();
+
+    let samples: Rc<RefCell<Vec<Sample>>> = Rc::default();
+    let recording = Rc::new(Cell::new(false));
+    let mut port = SimPort::new(world);
+    let (taken, on, start) = (Rc::clone(&samples), Rc::clone(&recording), Instant::now());
+    port.observe(move |world| {
+        if on.get() && world.ticked() {
+            taken.borrow_mut().push(Sample::from(world.telemetry()));
+        }
+        if speed == SimSpeed::Realtime {
+            std::thread::sleep(Duration::from_micros(world.now_us()).saturating_sub(start.elapsed()));
+        }
+    });
+    let mut session = Session::new(port);
+
+    out.note("parameters: friction, gains and arm model over the serial protocol");
+    session.push(&arm.parameter_set(), |p| out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes)))?;
+    out.note("drives: waiting until all six hold the arm");
+    session.wait_hold(BRING_UP)?;
+    out.note(format!("  HoldPos after {:.1} s", session.now().as_secs_f64()));
+
+    let bar = out.bar(1, "upload");
+    let upload = session.upload(&points, trajectory.step_ms, &UploadOptions::default(), |p| {
+        bar.set_length(p.segments as u64);
+        bar.set_position(p.segments_done as u64);
+        Flow::Continue
+    })?;
+    bar.finish();
+    out.note(format!(
+        "uploaded: {} points in {} segments, {:.2} s on the line",
+        upload.points, upload.segments, upload.time_s
+    ));
+
+    recording.set(true);
+    wait(&mut session, MARGIN)?;
+    let bar = out.bar((trajectory.duration_s() * 1e3) as u64, "motion");
+    session.execute()?;
+    let outcome = session.follow(|s| {
+        bar.set_position(u64::from(s.point));
+        Flow::Continue
+    })?;
+    bar.finish();
+    if !matches!(outcome, Outcome::Finished(_)) {
+        return Err(Failure { exit: FAULT, code: "stopped".into(), ..Failure::usage("the motion was stopped") });
+    }
+    wait(&mut session, MARGIN)?;
+    recording.set(false);
+    out.note(format!("executed: {:.2} s of motion, recorded at 1 kHz", trajectory.duration_s()));
+
+    let (link, baud) = (session.statistics(), session.port().baud());
+    drop(session);
+    let mut samples = samples.take();
+    let zero = samples.first().map_or(0.0, |s| s.time_s);
+    samples.iter_mut().for_each(|s| s.time_s -= zero);
+    Ok(Run {
+        info: run_report::info(&arm, "simulator", "Six joints, ten seconds", 0),
+        samples,
+        upload,
+        link,
+        baud,
+        masses: masses.join(", "),
+        frictions: "drawn within ±20 %".into(),
+    })
+}
+
+fn wait(session: &mut Session<SimPort>, time: Duration) -> Result<(), Failure> {
+    let end = session.now() + time;
+    while session.now() < end {
+        session.poll(end - session.now())?;
+    }
+    Ok(())
+}
+
+/// Length of the demo's motion, s.
+const TIME: f64 = 10.0;
+/// Step between points, ms.
+const STEP_MS: u16 = 10;
+/// Amplitude (rad) and number of swings of each joint.
+const SWINGS: [(f64, f64); 6] = [(1.25, 1.0), (0.55, 2.0), (-0.85, 1.0), (0.7, 2.0), (1.1, 1.0), (0.5, 3.0)];
+
+/// A smooth motion of all joints from the zero pose and back to it: swings under a window that begins and ends at rest, without a step
+/// in position, velocity or acceleration.
+fn trajectory() -> Trajectory {
+    let count = (TIME * 1e3) as usize / usize::from(STEP_MS) + 1;
+    let omega = std::f64::consts::TAU / TIME;
+    let point = |i: usize| {
+        let t = i as f64 * f64::from(STEP_MS) * 1e-3;
+        let mut p = Point::default();
+        for (j, (amplitude, swings)) in SWINGS.into_iter().enumerate() {
+            // A·sin²(πs)·sin(2πns) is the sum of three sines, whose derivatives are plain.
+            for (share, n) in [(0.5, swings), (-0.25, swings + 1.0), (-0.25, swings - 1.0)] {
+                let (w, a) = (omega * n, amplitude * share);
+                p.position[j] += a * (w * t).sin();
+                p.velocity[j] += a * w * (w * t).cos();
+                p.acceleration[j] -= a * w * w * (w * t).sin();
+            }
+        }
+        p
+    };
+    Trajectory { step_ms: STEP_MS, points: (0..count).map(point).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_motion_begins_and_ends_at_rest_and_keeps_the_limits() {
+        let arm = Arm::avena();
+        let t = trajectory();
+        assert_eq!(t.duration_s(), TIME);
+        for p in [t.points.first().unwrap(), t.points.last().unwrap()] {
+            for j in 0..6 {
+                assert!(p.position[j].abs() < 1e-9 && p.velocity[j].abs() < 1e-9 && p.acceleration[j].abs() < 1e-9);
+            }
+        }
+        for p in &t.points {
+            for (j, limit) in arm.joints.iter().enumerate() {
+                assert!(p.position[j].abs() < 0.95 * limit.position_max, "joint {}: {} rad", j + 1, p.position[j]);
+                assert!(p.velocity[j].abs() < 0.8 * limit.velocity_max, "joint {}: {} rad/s", j + 1, p.velocity[j]);
+                assert!(p.acceleration[j].abs() < 0.5 * limit.acceleration_max);
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! `jtc dynamics`: the controller's own dynamics as a filter of numbers.
+
+use std::io::{BufRead, Write};
+
+use jtc_dynamics::{Dynamics, JOINTS, JointVec};
+use jtc_host::arm::Arm;
+use serde_json::json;
+
+use crate::args::{DynamicsArgs, DynamicsKind};
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Reads lines of numbers until the end of stdin.
+pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
+    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
+    for warning in &arm.warnings {
+        out.note(format!("note: {warning}"));
+    }
+    let gravity = args.gravity.unwrap_or_else(|| arm.config().gravity);
+    let dynamics = Dynamics::new(&arm.model, gravity);
+    let rotor: JointVec = std::array::from_fn(|j| if args.rotors { arm.joints[j].rotor_inertia } else { 0.0 });
+    let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
+    for (number, line) in std::io::stdin().lock().lines().enumerate() {
+        let line = line?;
+        if line.trim().is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let values = numbers(&line, args.what).map_err(|e| Failure::usage(format!("line {}: {e}", number + 1)))?;
+        let result = compute(args.what, &dynamics, &rotor, &values);
+        let written = if out.is_json() {
+            writeln!(stdout, "{}", json!({ key(args.what): result }))
+        } else {
+            // One digit before the point and sixteen after it: 17 significant ones, enough to give the same f64 back.
+            let words: Vec<String> = result.iter().map(|v| format!("{v:.16e}")).collect();
+            writeln!(stdout, "{}", words.join(" "))
+        };
+        if written.is_err() {
+            return Ok(()); // the reader has gone
+        }
+    }
+    stdout.flush().ok();
+    Ok(())
+}
+
+fn key(what: DynamicsKind) -> &'static str {
+    match what {
+        DynamicsKind::Inverse => "torque_nm",
+        DynamicsKind::Forward => "acceleration_rad_s2",
+        DynamicsKind::Mass => "mass_matrix_kg_m2",
+    }
+}
+
+fn numbers(line: &str, what: DynamicsKind) -> Result<Vec<f64>, String> {
+    let need = if what == DynamicsKind::Mass { JOINTS } else { 3 * JOINTS };
+    let words = line.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty());
+    let values = words
+        .map(|w| w.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| format!("\"{w}\" is not a finite number")))
+        .collect::<Result<Vec<f64>, String>>()?;
+    // A mass matrix needs positions only, but takes lines of the other kinds, too.
+    if values.len() == need || (what == DynamicsKind::Mass && values.len() == 3 * JOINTS) {
+        Ok(values)
+    } else {
+        Err(format!("{} numbers, not {need}", values.len()))
+    }
+}
+
+fn compute(what: DynamicsKind, dynamics: &Dynamics, rotor: &JointVec, values: &[f64]) -> Vec<f64> {
+    let part = |k: usize| -> JointVec { std::array::from_fn(|j| values.get(k * JOINTS + j).copied().unwrap_or(0.0)) };
+    let (q, qd, last) = (part(0), part(1), part(2));
+    match what {
+        DynamicsKind::Inverse => {
+            let torque = dynamics.inverse(&q, &qd, &last);
+            (0..JOINTS).map(|j| torque[j] + rotor[j] * last[j]).collect()
+        }
+        DynamicsKind::Forward => dynamics.forward(&q, &qd, &last, rotor).to_vec(),
+        DynamicsKind::Mass => {
+            let mut matrix = dynamics.mass_matrix(&q);
+            for j in 0..JOINTS {
+                matrix[j][j] += rotor[j];
+            }
+            matrix.concat()
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! The commands, one file each or one file a family.
+
+mod decode;
+mod demo;
+mod doctor;
+mod dynamics;
+mod explain;
+mod maintain;
+mod monitor;
+mod pages;
+mod params;
+mod ports;
+mod report;
+mod run_report;
+mod sim;
+mod status;
+mod teach;
+mod traj;
+
+use crate::args::Command;
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Does what the command line asks for.
+pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
+    match command {
+        Command::Demo(args) => demo::demo(&args, out),
+        Command::Sim(args) => sim::sim(&args, out),
+        Command::Ports => ports::ports(out),
+        Command::Doctor(link) => doctor::doctor(&link, out),
+        Command::Status(link) => status::status(&link, out),
+        Command::Monitor(args) => monitor::monitor(&args, out),
+        Command::Params(command) => params::params(&command, out),
+        Command::Traj(command) => traj::traj(&command, out),
+        Command::Teach(command) => teach::teach(&command, out),
+        Command::Clear(args) => maintain::clear(&args, out),
+        Command::Reset(args) => maintain::reset(&args, out),
+        Command::Gripper(args) => maintain::gripper(&args, out),
+        Command::Recover(args) => maintain::recover(&args, out),
+        Command::Dynamics(args) => dynamics::dynamics(&args, out),
+        Command::Explain(args) => explain::explain(&args, out),
+        Command::Decode => decode::decode(out),
+        Command::Report(args) => report::report(&args, out),
+        Command::Completions { shell } => pages::completions(shell),
+        Command::Man { out: dir } => pages::man(dir.as_deref(), out),
+    }
+}

@@ -1,0 +1,146 @@
+//! `jtc params`: friction, gains and arm model from files into the controller.
+
+use std::path::PathBuf;
+
+use jtc_host::arm::{Arm, ParameterSet};
+use jtc_host::words;
+use serde_json::json;
+
+use crate::args::{LinkArgs, ParamsCommand};
+use crate::failure::Failure;
+use crate::output::{Output, table};
+
+/// Does one of the family.
+pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
+    match command {
+        ParamsCommand::Push { files, link } => push(files, link, out),
+        ParamsCommand::UseDefaults(link) => use_defaults(link, out),
+        ParamsCommand::Show { files, port, baud } => {
+            let link = port.as_ref().map(|p| LinkArgs { port: Some(p.clone()), baud: *baud });
+            show(files, link.as_ref(), out)
+        }
+    }
+}
+
+fn push(files: &[PathBuf], link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let set = load(files, out)?;
+    let mut session = link.session()?;
+    let mut pushed = Vec::new();
+    let done = session.push(&set, |p| {
+        out.note(format!("{}: {} bytes, {}confirmed", p.parameter.name(), p.bytes, if p.times > 1 { "twice " } else { "" }));
+        pushed.push(*p);
+    });
+    done?;
+    let status = session.fresh_status()?;
+    let missing = words::missing_parameters(status.jtc_init);
+    out.result(&json!({ "pushed": pushed, "state": words::state(status.fsm), "missing_parameters": missing }), || {
+        if missing.is_empty() {
+            format!("all parameters given; {}", words::waiting_for(&status))
+        } else {
+            format!("still missing: {}", missing.join(", "))
+        }
+    });
+    Ok(())
+}
+
+fn use_defaults(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut session = link.session()?;
+    session.use_defaults()?;
+    let status = session.fresh_status()?;
+    let missing = words::missing_parameters(status.jtc_init);
+    out.result(&json!({ "state": words::state(status.fsm), "missing_parameters": missing }), || {
+        format!("the controller uses its defaults; {}", words::waiting_for(&status))
+    });
+    Ok(())
+}
+
+fn show(files: &[PathBuf], link: Option<&LinkArgs>, out: &Output) -> Result<(), Failure> {
+    let (arm, set) = if files.is_empty() {
+        let arm = Arm::avena();
+        let set = arm.parameter_set();
+        (Some(arm), set)
+    } else {
+        (None, load(files, out)?)
+    };
+    let status = link.map(|l| l.session()?.fresh_status().map_err(Failure::from)).transpose()?;
+    let friction = set.friction.as_ref().map(|f| match f {
+        jtc_core::Friction::Polynomial(c) => json!({ "kind": "polynomial", "coefficients": c }),
+        jtc_core::Friction::Table(t) => json!({ "kind": "table", "tables": t.len() }),
+    });
+    let pid = set.pid.map(|gains| {
+        gains.map(|g| {
+            json!({ "kp_nm_rad": g.kp, "ki_nm_rad_s": g.ki, "kd_nm_s_rad": g.kd,
+                    "integral_min_rad_s": g.int_min, "integral_max_rad_s": g.int_max })
+        })
+    });
+    let masses = set.model.map(|m| m.links.map(|l| l.mass));
+    let value = json!({
+        "arm": arm.as_ref().map(|a| &a.name),
+        "friction": friction,
+        "pid": pid,
+        "link_mass_kg": masses,
+        "controller": status.as_ref().map(|s| json!({
+            "state": words::state(s.fsm), "missing_parameters": words::missing_parameters(s.jtc_init),
+            "friction": if s.friction_type == 0 { "polynomial" } else { "table" },
+        })),
+    });
+    out.result(&value, || {
+        let mut text = arm.as_ref().map_or(String::new(), |a| format!("arm {}\n", a.name));
+        text += &as_text(&set);
+        if let Some(s) = &status {
+            text += &format!("controller: {}\n", words::waiting_for(s));
+        }
+        text
+    });
+    Ok(())
+}
+
+fn as_text(set: &ParameterSet) -> String {
+    let mut text = String::new();
+    if let Some(pid) = &set.pid {
+        let row = |(j, g): (usize, &jtc_core::PidGains)| {
+            let numbers = [g.kp, g.ki, g.kd, g.int_min, g.int_max].map(|v| format!("{v}"));
+            [vec![format!("joint {}", j + 1)], numbers.to_vec()].concat()
+        };
+        let rows: Vec<_> = pid.iter().enumerate().map(row).collect();
+        text += &table(&["gains", "Kp N·m/rad", "Ki N·m/(rad·s)", "Kd N·m·s/rad", "∫min rad·s", "∫max rad·s"], &rows);
+    }
+    match &set.friction {
+        Some(jtc_core::Friction::Polynomial(c)) => {
+            let row = |(j, c): (usize, &[f64; 6])| {
+                [vec![format!("joint {}", j + 1)], c.map(|v| format!("{v:.4}")).to_vec()].concat()
+            };
+            let rows: Vec<_> = c.iter().enumerate().map(row).collect();
+            text += &table(&["friction", "c0", "c1", "c2", "c3", "c4 1/K", "c5 °C"], &rows);
+        }
+        Some(jtc_core::Friction::Table(tables)) => {
+            let row = |(j, t): (usize, &jtc_core::TableOf<f32>)| {
+                let range = |a: &[f32; 20]| format!("{:.2} .. {:.2}", a[0], a[19]);
+                vec![format!("joint {}", j + 1), range(&t.velocity), range(&t.temperature)]
+            };
+            let rows: Vec<_> = tables.iter().enumerate().map(row).collect();
+            text += &table(&["friction table", "rad/s", "°C"], &rows);
+        }
+        None => {}
+    }
+    if let Some(model) = &set.model {
+        let row = |(i, l): (usize, &jtc_dynamics::Link)| vec![format!("link {i}"), format!("{:.3}", l.mass)];
+        let rows: Vec<_> = model.links.iter().enumerate().map(row).collect();
+        text += &table(&["masses", "kg"], &rows);
+    }
+    text
+}
+
+/// What the files hold together; what could not be carried over goes to stderr.
+fn load(files: &[PathBuf], out: &Output) -> Result<ParameterSet, Failure> {
+    let (set, warnings) = todo_load(files)?;
+    for warning in warnings {
+        out.note(format!("note: {warning}"));
+    }
+    Ok(set)
+}
+
+fn todo_load(files: &[PathBuf]) -> Result<(ParameterSet, Vec<jtc_host::arm::Warning>), Failure> {
+    let arm = Arm::load(&files[0])?;
+    Ok((arm.parameter_set(), arm.warnings.clone()))
+}

@@ -1,0 +1,43 @@
+//! `jtc report`: page and picture of a recording made earlier.
+
+use jtc_host::arm::Arm;
+use jtc_host::recording::Recording;
+use jtc_host::report::{ReportInput, Summary, html, picture_svg};
+use serde_json::json;
+
+use super::run_report;
+use crate::args::ReportArgs;
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Writes the page and says the figures.
+pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
+    let recording = Recording::read(&args.file)?;
+    let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let arm = args.arm.as_deref().map(Arm::load).transpose()?;
+    let info = match (arm, recording.info) {
+        (Some(arm), _) => run_report::info(&arm, &args.file.display().to_string(), &name, 0),
+        (None, Some(info)) => info,
+        // A CSV file says nothing about limits.
+        (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
+    };
+    let input = ReportInput { info: &info, samples: &recording.samples, facts: &[] };
+    let page = args.out.clone().unwrap_or_else(|| args.file.with_extension("html"));
+    let picture = page.with_extension("svg");
+    for (path, text) in [(&page, html(&input)), (&picture, picture_svg(&input))] {
+        std::fs::write(path, text).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+    }
+    let summary = Summary::of(&info, &recording.samples);
+    let value = json!({
+        "recorded_s": summary.recorded_s,
+        "executed_s": summary.executed_s,
+        "samples": recording.samples.len(),
+        "joints": summary.joints,
+        "files": [page.display().to_string(), picture.display().to_string()],
+    });
+    out.result(&value, || {
+        let made = format!("{}   open it in a browser\n{}", page.display(), picture.display());
+        format!("{}\n{made}", run_report::figures(&summary))
+    });
+    Ok(())
+}

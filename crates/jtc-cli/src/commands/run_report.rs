@@ -1,0 +1,82 @@
+//! What a run says at its end: figures per joint as a table and as JSON, and the files made of it.
+
+use jtc_host::arm::Arm;
+use jtc_host::recording::{JointInfo, RecordingInfo};
+use jtc_host::report::{Facts, Summary};
+use jtc_host::session::{LinkStatistics, UploadReport};
+
+use crate::output::{figure, table};
+
+/// What a recording of this arm says about itself.
+pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
+    let origin = |i: usize| {
+        let o = &arm.model.joints[i];
+        [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]]
+    };
+    RecordingInfo {
+        arm: arm.name.clone(),
+        source: source.to_owned(),
+        trajectory: trajectory.to_owned(),
+        start_unix_ns,
+        joints: std::array::from_fn(|j| JointInfo {
+            name: arm.joint_names[j].clone(),
+            position_min_rad: arm.joints[j].position_min,
+            position_max_rad: arm.joints[j].position_max,
+            velocity_max_rad_s: arm.joints[j].velocity_max,
+            torque_max_nm: arm.joints[j].torque_max,
+            position_error_max_rad: arm.joints[j].position_error_max,
+            origin: origin(j),
+        }),
+        flange: origin(6),
+    }
+}
+
+/// The figures as a table.
+pub fn figures(summary: &Summary) -> String {
+    let rows: Vec<Vec<String>> = summary
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, s)| {
+            vec![
+                format!("joint {}", j + 1),
+                figure(s.rms_error_mrad, 3),
+                figure(s.max_error_mrad, 3),
+                figure(s.peak_velocity_rad_s, 3),
+                figure(s.peak_torque_nm, 1),
+                figure(s.torque_limit_nm, 0),
+                figure(s.torque_share.map(|v| v * 100.0), 0),
+            ]
+        })
+        .collect();
+    let head = ["", "RMS mrad", "max mrad", "peak rad/s", "peak N·m", "limit N·m", "share %"];
+    table(&head, &rows)
+}
+
+/// Upload and link as facts for the report.
+pub fn link_facts(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32>) -> Facts {
+    let share = upload.line_share.map_or(String::new(), |s| format!(", {:.1} % of what the line can carry", s * 100.0));
+    let row = |name: &str, value: String| (name.to_owned(), value);
+    Facts {
+        title: "Link".into(),
+        rows: vec![
+            row("Rate", baud.map_or("not limited".into(), |b| format!("{b} Bd"))),
+            row("Upload", format!("{} points in {} segments, {} bytes", upload.points, upload.segments, upload.bytes)),
+            row("Upload time", format!("{:.2} s{share}", upload.time_s)),
+            row("Segments sent again", upload.retries.to_string()),
+            row("Statuses", format!("{}, {:.1} a second", link.statuses, link.status_rate())),
+            row("Frames sent", format!("{}, {} of them again", link.frames_sent, link.retries)),
+            row("Frames damaged on the way", link.bad_frames.to_string()),
+            row("Bytes received, in no frame", format!("{}, {}", link.bytes_received, link.bad_bytes)),
+        ],
+    }
+}
+
+/// The link in one line.
+pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
+    let share = upload.line_share.map_or(String::new(), |s| format!(" ({:.1} % of the line)", s * 100.0));
+    format!(
+        "upload {} points in {:.2} s{share}; {} statuses, {} frames sent again, {} damaged",
+        upload.points, upload.time_s, link.statuses, link.retries, link.bad_frames
+    )
+}

@@ -1,0 +1,48 @@
+//! `jtc sim`: a simulated controller for other programs.
+
+use crate::args::SimArgs;
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Serves a simulated controller until SIGINT or SIGTERM.
+#[cfg(unix)]
+pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
+    use jtc_host::arm::Arm;
+    use jtc_sim::{SimConfig, World};
+    use serde_json::json;
+
+    use crate::serve::{Pty, Server};
+    use crate::signal::Stop;
+
+    let stop = Stop::listen()?;
+    let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
+    for warning in &arm.warnings {
+        out.note(format!("note: {warning}"));
+    }
+    let faults = args.faults.as_deref().map(faults).transpose()?.unwrap_or_default();
+    let config = SimConfig {
+        baud: (!args.no_throttle).then_some(args.baud),
+        seed: args.seed,
+        faults,
+        ..SimConfig::new(arm.config(), &arm.parameters())
+    };
+    let world = World::new(config);
+    let pty = Pty::open(args.serial.as_deref()).map_err(Failure::usage)?;
+    let name = pty.name().display().to_string();
+    let ready = || out.result(&json!({ "ready": name }), || format!("ready: {name}"));
+    let time_s = Server::new(world, pty).run(args.speed, &stop, ready).map_err(Failure::usage)?;
+    out.note(format!("ended after {time_s:.1} s of virtual time"));
+    Ok(())
+}
+
+#[cfg(unix)]
+fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+    jtc_sim::FaultPlan::from_toml(&text).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
+}
+
+/// Pseudo-terminals are a thing of Unix.
+#[cfg(not(unix))]
+pub fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
+    Err(Failure::usage("jtc sim needs pseudo-terminals, which this system does not have").hint("jtc demo runs everywhere"))
+}

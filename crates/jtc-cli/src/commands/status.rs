@@ -1,0 +1,119 @@
+//! `jtc status`, and a status as text and as JSON for all commands that show one.
+
+use jtc_host::words;
+use jtc_wire::Status;
+use serde_json::{Value, json};
+
+use crate::args::LinkArgs;
+use crate::failure::Failure;
+use crate::output::{Output, table};
+
+/// Prints one status.
+pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let status = link.session()?.fresh_status()?;
+    out.result(&as_json(&status), || as_text(&status));
+    Ok(())
+}
+
+/// A status as JSON, units in the keys.
+pub fn as_json(s: &Status) -> Value {
+    let joints: Vec<Value> = s
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(i, j)| {
+            json!({
+                "joint": i + 1,
+                "state": words::node_state(j.fsm),
+                "fsm": j.fsm,
+                "position_rad": j.position,
+                "velocity_rad_s": j.velocity,
+                "torque_nm": j.torque,
+                "temperature_c": j.temperature,
+                "internal_errors": words::joint_errors(j.internal),
+                "internal_errors_occurred": words::joint_errors(j.internal_occurred),
+                "node_errors": words::node_errors(j.errors),
+                "warnings": words::node_warnings(j.warnings),
+                "motor_faults": words::motor_faults(j.mc_current),
+                "motor_faults_occurred": words::motor_faults(j.mc_occurred),
+            })
+        })
+        .collect();
+    let gripper = s.gripper.map(|g| {
+        json!({
+            "state": words::node_state(g.fsm),
+            "fsm": g.fsm,
+            "pump": g.pump != 0,
+            "pressure1": g.pressure1 != 0,
+            "pressure2": g.pressure2 != 0,
+            "node_errors": words::node_errors(g.errors),
+            "warnings": words::node_warnings(g.warnings),
+        })
+    });
+    json!({
+        "state": words::state(s.fsm),
+        "fsm": s.fsm,
+        "trajectory": words::tes(s.tes),
+        "tes": s.tes,
+        "point": s.point,
+        "time_s": f64::from(s.point) * 1e-3,
+        "errors": words::errors(s.errors),
+        "error_word": s.errors,
+        "errors_occurred": words::errors(s.occurred),
+        "occurred_word": s.occurred,
+        "missing_parameters": words::missing_parameters(s.jtc_init),
+        "missing_nodes": words::missing_nodes(s.node_init),
+        "friction": if s.friction_type == 0 { "polynomial" } else { "table" },
+        "can_flags": words::can_flags(s.can_current),
+        "can_flags_occurred": words::can_flags(s.can_occurred),
+        "joints": joints,
+        "gripper": gripper,
+        "next": words::next_step(s).replace('`', ""),
+    })
+}
+
+/// A status as text.
+pub fn as_text(s: &Status) -> String {
+    let mut text = format!(
+        "state {}   trajectory {}   point {} ({:.3} s)   friction {}\n",
+        words::state(s.fsm),
+        words::tes(s.tes),
+        s.point,
+        f64::from(s.point) * 1e-3,
+        if s.friction_type == 0 { "polynomial" } else { "table" },
+    );
+    let rows: Vec<Vec<String>> = s
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(i, j)| {
+            vec![
+                format!("joint {}", i + 1),
+                words::node_state(j.fsm).into(),
+                format!("{:.4}", j.position),
+                format!("{:.4}", j.velocity),
+                format!("{:.2}", j.torque),
+                j.temperature.to_string(),
+            ]
+        })
+        .collect();
+    text += &table(&["", "state", "position rad", "velocity rad/s", "torque N·m", "°C"], &rows);
+    if let Some(g) = s.gripper {
+        let is = |level| if level != 0 { "reached" } else { "not reached" };
+        text += &format!(
+            "gripper   {}   pump {}   vacuum 1 {}, 2 {}\n",
+            words::node_state(g.fsm),
+            if g.pump != 0 { "runs" } else { "stands" },
+            is(g.pressure1),
+            is(g.pressure2),
+        );
+    }
+    if s.errors != 0 {
+        text += &format!("errors: {}\n", words::errors_line(s));
+    }
+    if s.fsm <= 1 {
+        text += &format!("{}\n", words::waiting_for(s));
+    }
+    text += &format!("next: {}\n", words::next_step(s).replace('`', ""));
+    text
+}

@@ -1,0 +1,77 @@
+//! Why a command did not do what it was asked for: words, the next command, and the exit code.
+
+use std::fmt::Display;
+
+use jtc_host::port::PortError;
+use jtc_host::recording::RecordingError;
+
+/// Wrong usage or unreadable input.
+pub const USAGE: u8 = 2;
+/// No link to the controller.
+pub const NO_LINK: u8 = 3;
+/// Refused by a check, nothing was sent or moved.
+pub const REFUSED: u8 = 4;
+/// A fault while running.
+pub const FAULT: u8 = 5;
+
+/// The end of a command that failed.
+#[derive(Debug)]
+pub struct Failure {
+    /// Exit code of the process.
+    pub exit: u8,
+    /// Short name for programs.
+    pub code: String,
+    /// What is wrong, with the facts.
+    pub message: String,
+    /// The next command or act; empty when there is none.
+    pub hint: String,
+    /// The result was printed already: only the exit code is left to say.
+    pub printed: bool,
+}
+
+impl Failure {
+    /// Wrong usage or unreadable input.
+    pub fn usage(message: impl Display) -> Self {
+        Self { exit: USAGE, code: "usage".into(), message: message.to_string(), hint: String::new(), printed: false }
+    }
+
+    /// With the next command or act.
+    pub fn hint(self, hint: impl Display) -> Self {
+        Self { hint: hint.to_string(), ..self }
+    }
+
+    /// A verdict that was printed as the command's result.
+    pub fn printed(exit: u8) -> Self {
+        Self { exit, code: String::new(), message: String::new(), hint: String::new(), printed: true }
+    }
+}
+
+impl From<jtc_host::Error> for Failure {
+    fn from(e: jtc_host::Error) -> Self {
+        Self { exit: e.exit_code(), code: e.code().into(), message: e.to_string(), hint: e.hint(), printed: false }
+    }
+}
+
+impl From<PortError> for Failure {
+    fn from(e: PortError) -> Self {
+        jtc_host::Error::from(e).into()
+    }
+}
+
+impl From<jtc_host::file::FileError> for Failure {
+    fn from(e: jtc_host::file::FileError) -> Self {
+        jtc_host::Error::from(e).into()
+    }
+}
+
+impl From<RecordingError> for Failure {
+    fn from(e: RecordingError) -> Self {
+        Self { code: "recording".into(), ..Self::usage(e) }
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(e: std::io::Error) -> Self {
+        Self { code: "io".into(), ..Self::usage(e) }
+    }
+}

@@ -1,0 +1,139 @@
+//! Cuts the controller's bytes into whole statuses, so that a host that comes in the middle of one never sees half of it.
+
+use std::collections::VecDeque;
+
+use jtc_wire::{FRAME_MAX, HEADER, STATUS_LEN};
+
+/// First bytes of each status.
+const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8];
+
+/// Bytes that came, and the pieces that are complete.
+#[derive(Default)]
+pub struct Frames {
+    partial: Vec<u8>,
+    whole: VecDeque<Vec<u8>>,
+}
+
+impl Frames {
+    /// Takes bytes in. What is no status (a damaged line) is passed on as it is.
+    pub fn push(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            let n = self.partial.len();
+            if n < START.len() && byte != START[n] {
+                self.flush();
+                if byte == START[0] {
+                    self.partial.push(byte);
+                } else {
+                    self.whole.push_back(vec![byte]);
+                }
+                continue;
+            }
+            self.partial.push(byte);
+            if self.partial.len() == STATUS_LEN {
+                self.flush();
+            }
+        }
+    }
+
+    fn flush(&mut self) {
+        if !self.partial.is_empty() {
+            self.whole.push_back(std::mem::take(&mut self.partial));
+        }
+    }
+
+    /// Nothing is complete.
+    pub fn is_empty(&self) -> bool {
+        self.whole.is_empty()
+    }
+
+    /// The oldest piece.
+    pub fn pop(&mut self) -> Option<Vec<u8>> {
+        self.whole.pop_front()
+    }
+}
+
+/// Follows the host's bytes just far enough to know whether a frame is under way.
+#[derive(Default)]
+pub struct Incoming {
+    head: Vec<u8>,
+    /// Bytes of the present frame that have not come.
+    missing: usize,
+}
+
+impl Incoming {
+    /// Takes bytes of the host in.
+    pub fn push(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if self.missing > 0 {
+                self.missing -= 1;
+                continue;
+            }
+            if self.head.is_empty() && byte != HEADER {
+                continue;
+            }
+            self.head.push(byte);
+            if self.head.len() == 4 {
+                let length = usize::from(u16::from_be_bytes([self.head[2], self.head[3]]));
+                let sound = (1..=0x11).contains(&self.head[1]) && (6..=FRAME_MAX).contains(&length);
+                self.missing = if sound { length - 4 } else { 0 };
+                self.head.clear();
+            }
+        }
+    }
+
+    /// Bytes of a frame are still to come.
+    pub fn mid_frame(&self) -> bool {
+        self.missing > 0 || !self.head.is_empty()
+    }
+
+    /// The frame will not be completed.
+    pub fn give_up(&mut self) {
+        *self = Self::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(fill: u8) -> Vec<u8> {
+        let mut frame = vec![fill; STATUS_LEN];
+        frame[..4].copy_from_slice(&START);
+        frame
+    }
+
+    #[test]
+    fn statuses_leave_whole_in_any_chunking() {
+        let stream: Vec<u8> = (1..6).flat_map(status).collect();
+        for chunk in [1, 7, 174, 175, 176, 875] {
+            let mut frames = Frames::default();
+            stream.chunks(chunk).for_each(|c| frames.push(c));
+            let out: Vec<Vec<u8>> = std::iter::from_fn(|| frames.pop()).collect();
+            assert_eq!(out, (1..6).map(status).collect::<Vec<_>>(), "chunks of {chunk}");
+        }
+    }
+
+    #[test]
+    fn rubbish_loses_no_byte_and_no_status_after_it() {
+        let mut frames = Frames::default();
+        let mut stream = vec![0x9B, 0x9B, 0x03, 0x00, 0x11];
+        stream.extend(status(9));
+        frames.push(&stream);
+        let out: Vec<Vec<u8>> = std::iter::from_fn(|| frames.pop()).collect();
+        assert_eq!(out.concat(), stream);
+        assert_eq!(out.last(), Some(&status(9)));
+    }
+
+    #[test]
+    fn a_frame_of_the_host_is_followed_to_its_end() {
+        let mut incoming = Incoming::default();
+        for &byte in &[0x00, 0x9B, 0x0B, 0x00, 0x07, 0x03, 0x7D] {
+            incoming.push(&[byte]);
+        }
+        assert!(incoming.mid_frame());
+        incoming.push(&[0x9E]);
+        assert!(!incoming.mid_frame());
+        incoming.push(&[0x9B, 0x0B, 0xFF, 0xFF]);
+        assert!(!incoming.mid_frame(), "no frame has this length");
+    }
+}

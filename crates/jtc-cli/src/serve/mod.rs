@@ -1,0 +1,183 @@
+//! The simulated controller behind a pseudo-terminal: world, terminal and clock in one loop.
+
+mod frames;
+mod pty;
+
+use std::time::{Duration, Instant};
+
+use jtc_sim::World;
+
+use crate::args::SimSpeed;
+use crate::signal::Stop;
+pub use pty::{Pty, PtyError};
+use frames::{Frames, Incoming};
+
+/// Bytes of the host that wait for the line: as much as an adapter's buffer; beyond that its writes block.
+const WAITING_MAX: usize = 4096;
+/// Longest time for which virtual time stands still within a frame while no bytes come.
+const STANDSTILL: Duration = Duration::from_millis(5);
+/// Longest wait for a host to read before statuses are lost, when virtual time runs free.
+const READER_WAIT: Duration = Duration::from_millis(100);
+/// Largest delay that is made up for; after a longer one (a suspended computer) time goes on from here.
+const CATCH_UP_US: u64 = 2_000_000;
+/// A tick, µs.
+const TICK_US: u64 = 1000;
+
+/// The loop's state.
+pub struct Server {
+    world: World,
+    pty: Pty,
+    frames: Frames,
+    incoming: Incoming,
+    /// Bytes of a frame that the terminal did not take at once.
+    rest: Vec<u8>,
+    connected: bool,
+    /// The host did not read for long: statuses are lost until it does.
+    stalled: bool,
+    /// How long virtual time has stood still in the present gap.
+    stood: Duration,
+    /// A status has left the controller.
+    answers: bool,
+}
+
+impl Server {
+    /// A world behind a terminal.
+    pub fn new(world: World, pty: Pty) -> Self {
+        Self {
+            world,
+            pty,
+            frames: Frames::default(),
+            incoming: Incoming::default(),
+            rest: Vec::new(),
+            connected: false,
+            stalled: false,
+            stood: Duration::ZERO,
+            answers: false,
+        }
+    }
+
+    /// Runs until `stop`; calls `ready` when the first status has left the controller. Returns the virtual time, s.
+    pub fn run(&mut self, speed: SimSpeed, stop: &Stop, ready: impl FnOnce()) -> Result<f64, PtyError> {
+        let mut ready = Some(ready);
+        let mut start = Instant::now();
+        let mut start_us = self.world.now_us();
+        while !stop.asked() {
+            self.take_input()?;
+            if speed == SimSpeed::Realtime {
+                let virtual_us = self.world.now_us() - start_us;
+                let due_us = (start.elapsed().as_micros() as u64).saturating_sub(virtual_us);
+                if due_us < TICK_US {
+                    let rest = Duration::from_micros(TICK_US - due_us);
+                    if self.world.host_write_pending() >= WAITING_MAX {
+                        std::thread::sleep(rest); // more input would not be taken now
+                    } else {
+                        self.pty.wait_input(rest)?;
+                    }
+                    continue;
+                }
+                if due_us > CATCH_UP_US {
+                    (start, start_us) = (Instant::now(), self.world.now_us());
+                }
+            }
+            if self.stands_still()? {
+                continue;
+            }
+            self.world.step();
+            self.give_output(speed)?;
+            if self.answers && let Some(ready) = ready.take() {
+                ready();
+            }
+        }
+        Ok(self.world.now_us() as f64 * 1e-6)
+    }
+
+    /// Hands the host's bytes to the line, as many as an adapter would hold.
+    fn take_input(&mut self) -> Result<(), PtyError> {
+        let mut buffer = [0; WAITING_MAX];
+        loop {
+            let room = WAITING_MAX.saturating_sub(self.world.host_write_pending());
+            if room == 0 {
+                return Ok(());
+            }
+            let n = self.pty.read(&mut buffer[..room])?;
+            if n == 0 {
+                return Ok(());
+            }
+            self.stood = Duration::ZERO;
+            self.incoming.push(&buffer[..n]);
+            self.world.host_write(&buffer[..n]);
+        }
+    }
+
+    /// Within a frame whose next bytes are still on their way through the operating system, virtual time waits a little for
+    /// them: such a gap is none of the host's making.
+    fn stands_still(&mut self) -> Result<bool, PtyError> {
+        if !self.incoming.mid_frame() || self.world.host_write_pending() > 0 || self.stood >= STANDSTILL {
+            return Ok(false);
+        }
+        let before = Instant::now();
+        self.pty.wait_input(STANDSTILL - self.stood)?;
+        self.stood += before.elapsed();
+        if self.stood >= STANDSTILL {
+            self.incoming.give_up();
+        }
+        Ok(true)
+    }
+
+    /// Hands statuses to the host; without one they are lost, as on a line that nobody listens to.
+    fn give_output(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
+        let mut buffer = [0; 1024];
+        loop {
+            let n = self.world.host_read(&mut buffer);
+            if n == 0 {
+                break;
+            }
+            self.frames.push(&buffer[..n]);
+        }
+        if self.frames.is_empty() {
+            return Ok(());
+        }
+        self.answers = true;
+        let connected = self.pty.host_is_there()?;
+        if self.connected && !connected {
+            self.rest.clear();
+            self.pty.renew()?;
+        }
+        if !self.connected && connected {
+            self.stalled = false;
+        }
+        self.connected = connected;
+        while let Some(frame) = self.frames.pop() {
+            if !connected {
+                continue;
+            }
+            self.write_rest(speed)?;
+            if self.rest.is_empty() {
+                self.rest = frame;
+                self.write_rest(speed)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is left of a frame. A host that does not read must not hold up the arm: in real time nothing waits, and with
+    /// free-running time only for a while.
+    fn write_rest(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
+        let end = Instant::now() + READER_WAIT;
+        while !self.rest.is_empty() {
+            let n = self.pty.write(&self.rest)?;
+            self.rest.drain(..n);
+            if n > 0 {
+                self.stalled = false;
+                continue;
+            }
+            let now = Instant::now();
+            if speed == SimSpeed::Realtime || self.stalled || now >= end {
+                self.stalled = true;
+                break;
+            }
+            self.pty.wait_room(end - now)?;
+        }
+        Ok(())
+    }
+}

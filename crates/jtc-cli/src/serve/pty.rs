@@ -1,0 +1,202 @@
+//! A pseudo-terminal that looks like a serial port, under a name of the user's choice.
+
+use std::fmt;
+use std::fs;
+use std::io;
+use std::os::fd::OwnedFd;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags};
+use rustix::io::Errno;
+use rustix::pty::OpenptFlags;
+use rustix::termios::{OptionalActions, QueueSelector};
+
+/// Why the terminal cannot be used.
+#[derive(Debug)]
+pub enum PtyError {
+    /// The path is taken by something that is not ours to replace.
+    Taken {
+        /// The path asked for.
+        path: PathBuf,
+        /// What is there.
+        what: &'static str,
+    },
+    /// The operating system refused.
+    Io {
+        /// What was tried.
+        what: &'static str,
+        /// Its words.
+        source: io::Error,
+    },
+}
+
+impl fmt::Display for PtyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PtyError::Taken { path, what } => {
+                write!(f, "{}: {what} is there; it is not replaced, choose another path", path.display())
+            }
+            PtyError::Io { what, source } => write!(f, "{what}: {source}"),
+        }
+    }
+}
+
+impl std::error::Error for PtyError {}
+
+fn fails(what: &'static str) -> impl Fn(Errno) -> PtyError {
+    move |e| PtyError::Io { what, source: e.into() }
+}
+
+/// The controller's end of a pseudo-terminal, and the symbolic link to the host's end.
+pub struct Pty {
+    master: OwnedFd,
+    slave: PathBuf,
+    link: Option<PathBuf>,
+}
+
+impl Pty {
+    /// A new pseudo-terminal in raw mode; `link` becomes a symbolic link to it. A link that an earlier run left behind is
+    /// replaced, anything else is not.
+    pub fn open(link: Option<&Path>) -> Result<Self, PtyError> {
+        if let Some(link) = link {
+            check_free(link)?;
+        }
+        let (master, slave) = pair()?;
+        let pty = Self { master, slave, link: link.map(Path::to_owned) };
+        pty.put_link()?;
+        Ok(pty)
+    }
+
+    /// The name that a host opens.
+    pub fn name(&self) -> &Path {
+        self.link.as_deref().unwrap_or(&self.slave)
+    }
+
+    fn put_link(&self) -> Result<(), PtyError> {
+        let Some(link) = &self.link else { return Ok(()) };
+        // A new link is moved over the old one: at no moment is there none.
+        let name = link.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let new = link.with_file_name(format!(".{name}.{}", std::process::id()));
+        let _ = fs::remove_file(&new);
+        std::os::unix::fs::symlink(&self.slave, &new)
+            .and_then(|()| fs::rename(&new, link))
+            .map_err(|source| PtyError::Io { what: "symbolic link", source })
+    }
+
+    /// Takes what is there; 0 when nothing is, or no host has the port open.
+    pub fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
+        match rustix::io::read(&self.master, buffer) {
+            Ok(n) => Ok(n),
+            // EIO: nobody has the other end open.
+            Err(Errno::AGAIN | Errno::IO | Errno::INTR) => Ok(0),
+            Err(e) => Err(fails("read")(e)),
+        }
+    }
+
+    /// Writes what fits.
+    pub fn write(&self, bytes: &[u8]) -> Result<usize, PtyError> {
+        match rustix::io::write(&self.master, bytes) {
+            Ok(n) => Ok(n),
+            Err(Errno::AGAIN | Errno::IO | Errno::INTR) => Ok(0),
+            Err(e) => Err(fails("write")(e)),
+        }
+    }
+
+    /// A host has the port open.
+    pub fn host_is_there(&self) -> Result<bool, PtyError> {
+        Ok(!self.poll(PollFlags::IN, Duration::ZERO)?.contains(PollFlags::HUP))
+    }
+
+    /// Waits for bytes of the host.
+    pub fn wait_input(&self, timeout: Duration) -> Result<(), PtyError> {
+        self.wait(PollFlags::IN, timeout)
+    }
+
+    /// Waits for room for bytes to the host.
+    pub fn wait_room(&self, timeout: Duration) -> Result<(), PtyError> {
+        self.wait(PollFlags::OUT, timeout)
+    }
+
+    fn wait(&self, flags: PollFlags, timeout: Duration) -> Result<(), PtyError> {
+        let found = self.poll(flags, timeout)?;
+        if found.contains(PollFlags::HUP) && !found.contains(PollFlags::IN) {
+            // Without a host, polling returns at once: sleep instead.
+            std::thread::sleep(timeout);
+        }
+        Ok(())
+    }
+
+    fn poll(&self, flags: PollFlags, timeout: Duration) -> Result<PollFlags, PtyError> {
+        let mut fds = [PollFd::new(&self.master, flags)];
+        let timeout = Timespec { tv_sec: timeout.as_secs() as _, tv_nsec: timeout.subsec_nanos() as _ };
+        match poll(&mut fds, Some(&timeout)) {
+            Ok(_) => Ok(fds[0].revents()),
+            Err(Errno::INTR) => Ok(PollFlags::empty()),
+            Err(e) => Err(fails("poll")(e)),
+        }
+    }
+
+    /// After a host has gone: forgets what it did not read. A host that was killed may have left the port locked; then a new
+    /// pseudo-terminal takes the place of the old one under the same link.
+    pub fn renew(&mut self) -> Result<(), PtyError> {
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
+        match rustix::fs::open(&self.slave, flags, Mode::empty()) {
+            Ok(slave) => rustix::termios::tcflush(&slave, QueueSelector::IOFlush)
+                .and_then(|()| raw(&slave))
+                .map_err(fails("reset of the pseudo-terminal")),
+            Err(_) if self.link.is_some() => {
+                (self.master, self.slave) = pair()?;
+                self.put_link()
+            }
+            Err(_) => Ok(()),
+        }
+    }
+}
+
+impl Drop for Pty {
+    fn drop(&mut self) {
+        if let Some(link) = &self.link
+            && fs::read_link(link).is_ok_and(|to| to == self.slave)
+        {
+            let _ = fs::remove_file(link);
+        }
+    }
+}
+
+fn raw(terminal: &OwnedFd) -> rustix::io::Result<()> {
+    let mut settings = rustix::termios::tcgetattr(terminal)?;
+    settings.make_raw();
+    rustix::termios::tcsetattr(terminal, OptionalActions::Now, &settings)
+}
+
+fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
+    let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
+    let master = rustix::pty::openpt(flags).map_err(fails("open a pseudo-terminal"))?;
+    rustix::pty::grantpt(&master).map_err(fails("grant the pseudo-terminal"))?;
+    rustix::pty::unlockpt(&master).map_err(fails("unlock the pseudo-terminal"))?;
+    let name = rustix::pty::ptsname(&master, Vec::new()).map_err(fails("name of the pseudo-terminal"))?;
+    let slave = PathBuf::from(name.to_string_lossy().into_owned());
+    // Opened once, so that it is raw before any host comes, and so that an absent host is seen as a hang-up.
+    let open = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+    let first = rustix::fs::open(&slave, open, Mode::empty()).map_err(fails("open the host's end"))?;
+    raw(&first).map_err(fails("raw mode"))?;
+    let now = rustix::fs::fcntl_getfl(&master).map_err(fails("flags"))?;
+    rustix::fs::fcntl_setfl(&master, now | OFlags::NONBLOCK).map_err(fails("flags"))?;
+    Ok((master, slave))
+}
+
+/// A free path, or a link that a simulator left behind: one to a pseudo-terminal, or to nothing.
+fn check_free(path: &Path) -> Result<(), PtyError> {
+    let taken = |what| Err(PtyError::Taken { path: path.to_owned(), what });
+    match fs::symlink_metadata(path) {
+        Err(_) => Ok(()),
+        Ok(meta) if meta.is_dir() => taken("a directory"),
+        Ok(meta) if !meta.is_symlink() => taken("a file"),
+        Ok(_) => match fs::read_link(path) {
+            Ok(to) if !to.starts_with("/dev/pts") && path.exists() => taken("a link to something else"),
+            _ => Ok(()),
+        },
+    }
+}

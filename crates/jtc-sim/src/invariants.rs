@@ -116,7 +116,6 @@ pub struct Invariants {
     state: State,
     tes: Tes,
     point: u32,
-    resets: u32,
     controller_ticks: u64,
     since_other: u32,
     cleared: bool,
@@ -130,7 +129,6 @@ impl Default for Invariants {
             state: State::Start,
             tes: Tes::Null,
             point: 0,
-            resets: 0,
             controller_ticks: 0,
             since_other: MOVES_BETWEEN,
             cleared: false,
@@ -141,6 +139,12 @@ impl Default for Invariants {
 }
 
 impl Invariants {
+    /// A checker that joins a world which has been running for a while; what was permitted before counts.
+    pub fn joining(world: &World) -> Self {
+        let t = world.telemetry();
+        Self { state: t.state, tes: t.tes, point: t.point, controller_ticks: t.tick, ..Self::default() }
+    }
+
     /// Look at the millisecond that has just passed.
     pub fn check(&mut self, world: &World) -> Result<(), Violation> {
         self.look(world).map_err(|broken| Violation { time_us: world.now_us(), broken })

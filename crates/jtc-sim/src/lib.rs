@@ -28,6 +28,7 @@ mod gripper;
 pub mod host;
 mod inbox;
 pub mod invariants;
+pub mod matrix;
 mod operator;
 mod serial;
 pub mod soak;

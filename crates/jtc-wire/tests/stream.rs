@@ -1,0 +1,332 @@
+//! The stream parser as the device sees it, story by story.
+use jtc_wire::{
+    Command, DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, HEADER, LinkEvent, RawPoint, Receiver,
+    Response, crc16, fixed, trajectory,
+};
+
+const GAP_US: u32 = 5000;
+
+/// What came out, short enough to write down.
+#[derive(Debug, PartialEq)]
+enum Heard {
+    Good(FrameType, usize),
+    Bad(u8, FrameStatus, u16),
+}
+use FrameStatus::*;
+use Heard::{Bad, Good};
+
+struct Line {
+    receiver: Receiver<Vec<u8>>,
+    now: u64,
+}
+
+impl Line {
+    fn new() -> Self {
+        Line { receiver: Receiver::new(vec![0; FRAME_MAX], GAP_US), now: 1_000_000 }
+    }
+
+    /// All bytes at once, and what is heard of them.
+    fn send(&mut self, bytes: &[u8]) -> Vec<Heard> {
+        self.now += 100;
+        assert_eq!(self.receiver.push(self.now, bytes), bytes.len());
+        self.heard()
+    }
+
+    fn silence(&mut self, us: u64) -> Vec<Heard> {
+        self.now += us;
+        self.heard()
+    }
+
+    fn heard(&mut self) -> Vec<Heard> {
+        let mut all = Vec::new();
+        while self.receiver.poll(self.now) || self.receiver.busy() {
+            match self.receiver.event() {
+                Some(LinkEvent::Frame(frame)) => all.push(Good(frame.frame_type, frame.bytes.len())),
+                Some(LinkEvent::Bad(r)) => {
+                    assert_eq!(r.data, DataStatus::Idle);
+                    all.push(Bad(r.frame_type, r.status, r.length));
+                }
+                None => {}
+            }
+            self.receiver.release();
+        }
+        all
+    }
+}
+
+fn segment(points: usize) -> Vec<u8> {
+    let mut bytes = vec![0; FRAME_MAX];
+    let point = |i| RawPoint { position: [i as i16; 6], ..RawPoint::default() };
+    let n = trajectory(&mut bytes, (0, 0, 1), 10, (0..points).map(point)).expect("it fits");
+    bytes.truncate(n);
+    bytes
+}
+
+const ON: [u8; 6] = fixed::TEACHING_MODE_ENABLE;
+const GOOD_ON: Heard = Good(FrameType::TeachingModeEnable, 6);
+
+#[test]
+fn j03_byte_by_byte() {
+    let mut line = Line::new();
+    for byte in &ON[..5] {
+        assert_eq!(line.send(&[*byte]), []);
+        assert_eq!(line.silence(4800), []);
+        assert!(line.receiver.mid_frame());
+    }
+    assert_eq!(line.send(&ON[5..]), [GOOD_ON]);
+    assert!(!line.receiver.mid_frame());
+}
+
+#[test]
+fn j03_several_frames_in_one_piece() {
+    let mut line = Line::new();
+    let bytes = [&ON[..], &segment(500), &fixed::STOP, &fixed::PUMP_ON[..5]].concat();
+    let expected = [GOOD_ON, Good(FrameType::Trajectory, 18_014), Good(FrameType::TrajSetExecStatus, 7)];
+    assert_eq!(line.send(&bytes), expected);
+    assert_eq!(line.send(&fixed::PUMP_ON[5..]), [Good(FrameType::GripperControl, 10)]);
+}
+
+#[test]
+fn j02_the_longest_frame() {
+    let mut line = Line::new();
+    // In front of it something that leaves no room at the buffer's end.
+    assert_eq!(line.send(&ON), [GOOD_ON]);
+    let frame = segment(1666);
+    assert_eq!(line.send(&frame), [Good(FrameType::Trajectory, 59_990)]);
+    assert_eq!(line.send(&ON), [GOOD_ON]);
+}
+
+#[test]
+fn j05_header() {
+    let mut line = Line::new();
+    assert_eq!(line.send(&[0x00, 0x01, 0x02]), [Bad(0, IncorrectHeader, 0)]);
+    assert_eq!(line.send(&[0x03]), [], "still the same run");
+    line.silence(5000);
+    assert_eq!(line.send(&[0x04]), [Bad(0, IncorrectHeader, 0)], "another run");
+    for n in [0u16, 1, 5, 60_001, 65_535] {
+        line.silence(5000);
+        let [high, low] = n.to_be_bytes();
+        assert_eq!(line.send(&[HEADER, 0x04, high, low]), [Bad(0, IncorrectHeader, 0)], "n = {n}");
+    }
+}
+
+#[test]
+fn j05_frame_type() {
+    let mut line = Line::new();
+    for kind in (0x12..=0xFF).chain([0x00, 0x03]) {
+        let frame = [HEADER, kind, 0, 6];
+        let crc = crc16(&frame).to_be_bytes();
+        assert_eq!(line.send(&[&frame[..], &crc].concat()), [Bad(kind, IncorrectFrameType, 0)]);
+        line.silence(5000);
+    }
+}
+
+/// Also D16 of the old device: a length that the type cannot have is never executed, however right the CRC.
+#[test]
+fn j05_length_of_another_type() {
+    let mut line = Line::new();
+    for kind in FrameType::ALL.into_iter().filter(|t| t.from_host()) {
+        for n in (6..700).chain([10_565, 10_567, 59_999, 60_000]).filter(|n| !kind.can_have(*n)) {
+            let mut frame = vec![0u8; n];
+            frame[..4].copy_from_slice(&[HEADER, kind as u8, (n >> 8) as u8, n as u8]);
+            let crc = crc16(&frame[..n - 2]).to_be_bytes();
+            frame[n - 2..].copy_from_slice(&crc);
+            let heard = line.send(&frame);
+            assert_eq!(heard.first(), Some(&Bad(kind as u8, IncorrectFrameType, n as u16)));
+            assert_eq!(heard.len(), 1);
+            line.silence(5000);
+        }
+    }
+}
+
+#[test]
+fn j05_crc() {
+    let mut line = Line::new();
+    let mut frame = segment(3);
+    for at in 4..frame.len() {
+        frame[at] ^= 0x40;
+        assert_eq!(line.send(&frame), [Bad(4, IncorrectCrc, 122)], "byte {at}");
+        frame[at] ^= 0x40;
+        assert_eq!(line.send(&frame), [Good(FrameType::Trajectory, 122)], "without a gap");
+    }
+}
+
+#[test]
+fn j05_gap() {
+    let mut line = Line::new();
+    let frame = segment(100);
+    assert_eq!(line.send(&frame[..20]), []);
+    assert_eq!(line.silence(4999), []);
+    assert_eq!(line.silence(1), [Bad(4, DiscontinuousFrame, 20)]);
+    assert_eq!(line.send(&ON), [GOOD_ON]);
+    // Counted from the last byte, not from the first or from the last frame.
+    for piece in frame.chunks(100) {
+        line.silence(4800);
+        line.send(piece);
+    }
+    assert_eq!(line.send(&ON), [GOOD_ON], "the frame was heard in the loop");
+    // The type is not known yet.
+    assert_eq!(line.send(&ON[..1]), []);
+    assert_eq!(line.silence(5000), [Bad(0, DiscontinuousFrame, 1)]);
+}
+
+/// D15 of the old device: a glitch of two bytes, and lengths of 0 and 1.
+#[test]
+fn j07_glitches() {
+    let mut line = Line::new();
+    assert_eq!(line.send(&[HEADER, 0x0C]), []);
+    assert_eq!(line.silence(6000), [Bad(0x0C, DiscontinuousFrame, 2)]);
+    assert_eq!(line.send(&[HEADER, 0x0C, 0, 0]), [Bad(0, IncorrectHeader, 0)]);
+    assert_eq!(line.send(&ON), [GOOD_ON]);
+}
+
+#[test]
+fn j03_a_false_header_costs_no_frame() {
+    let mut line = Line::new();
+    // It announces 59,990 bytes and swallows what follows until a gap.
+    assert_eq!(line.send(&[HEADER, 0x04, 0xEA, 0x56]), []);
+    assert_eq!(line.send(&ON), []);
+    assert_eq!(line.send(&fixed::STOP), []);
+    let expected = [Bad(4, DiscontinuousFrame, 17), GOOD_ON, Good(FrameType::TrajSetExecStatus, 7)];
+    assert_eq!(line.silence(5000), expected);
+}
+
+#[test]
+fn j03_a_false_header_that_fills_up_costs_no_frame() {
+    let mut line = Line::new();
+    let bytes = [&[HEADER, 0x07, 0, 126][..], &ON.repeat(30)].concat();
+    let heard = line.send(&bytes);
+    assert_eq!(heard[0], Bad(7, IncorrectCrc, 126));
+    assert_eq!(heard.len(), 31);
+    assert!(heard[1..].iter().all(|h| *h == GOOD_ON));
+}
+
+/// A cut frame, and the whole one behind it without a gap.
+#[test]
+fn j03_a_lost_byte_costs_only_its_frame() {
+    let frame = segment(10);
+    for lost in 4..frame.len() {
+        let mut line = Line::new();
+        let bytes = [&frame[..lost], &frame[lost + 1..], &frame, &ON].concat();
+        let expected = [Bad(4, IncorrectCrc, 374), Good(FrameType::Trajectory, 374), GOOD_ON];
+        assert_eq!(line.send(&bytes), expected, "byte {lost}");
+    }
+}
+
+#[test]
+fn j04_one_record_for_a_bad_frame_and_what_follows_it() {
+    let mut line = Line::new();
+    let mut bad = ON;
+    bad[5] ^= 1;
+    let bytes = [&bad[..], &[1, 2, 3], &bad, &[HEADER, 0x55], &ON].concat();
+    assert_eq!(line.send(&bytes), [Bad(0x0C, IncorrectCrc, 6), GOOD_ON]);
+    assert_eq!(line.send(&bad), [Bad(0x0C, IncorrectCrc, 6)]);
+    line.silence(5000);
+    assert_eq!(line.send(&bad), [Bad(0x0C, IncorrectCrc, 6)]);
+}
+
+#[test]
+fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let mut now = 0;
+    // More frames, each behind a gap, than gaps can be remembered: some are refused, none is lost.
+    let (mut sent, mut heard) = (0, 0);
+    while heard < 500 {
+        if sent < 500 && receiver.push(now, &ON) == ON.len() {
+            sent += 1;
+            now += 10_000;
+        } else {
+            assert!(receiver.poll(now));
+            let Some(LinkEvent::Frame(frame)) = receiver.event() else { panic!("no frame") };
+            assert_eq!(frame.bytes, ON);
+            receiver.release();
+            heard += 1;
+        }
+    }
+    assert!(!receiver.poll(now + 10_000));
+}
+
+/// A reader slower than a gap: the rest of a piece is offered late, the frame is whole all the same.
+#[test]
+fn j03_a_slow_reader_is_no_gap() {
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let frame = segment(1000);
+    let bytes = frame.repeat(2);
+    let taken = receiver.push(0, &bytes);
+    assert_eq!(taken, FRAME_MAX);
+    for now in [1, 100_000] {
+        assert!(receiver.poll(now));
+        let Some(LinkEvent::Frame(heard)) = receiver.event() else { panic!("no frame") };
+        assert_eq!(heard.bytes, frame);
+    }
+    receiver.release();
+    assert!(!receiver.poll(200_000));
+    assert_eq!(receiver.push(200_000, &bytes[taken..]), bytes.len() - taken);
+    assert!(receiver.poll(200_000));
+    let Some(LinkEvent::Frame(heard)) = receiver.event() else { panic!("no frame") };
+    assert_eq!(heard.bytes, frame);
+}
+
+/// 15,000 false headers, each announcing tens of thousands of bytes: a bounded number of bounded steps.
+#[test]
+fn j07_hostile_bytes_cost_little() {
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let bytes: Vec<u8> = (0..FRAME_MAX / 4)
+        .flat_map(|i| {
+            let n = 14 + 36 * (i % 1666) as u16;
+            [HEADER, 0x04, (n >> 8) as u8, n as u8]
+        })
+        .collect();
+    assert_eq!(receiver.push(0, &bytes), FRAME_MAX);
+    let mut polls = 0;
+    loop {
+        polls += 1;
+        let found = receiver.poll(5000);
+        receiver.release();
+        if !found && !receiver.busy() {
+            break;
+        }
+    }
+    assert!(polls <= 15_000 / 30, "{polls} polls");
+    assert_eq!(receiver.push(6000, &ON), 6);
+    assert!(receiver.poll(6000));
+}
+
+/// With a buffer that is too short, long frames are refused; nothing hangs.
+#[test]
+fn a_short_buffer() {
+    let mut receiver = Receiver::new([0; 64], GAP_US);
+    let bytes = [&segment(2)[..], &ON].concat();
+    let mut rest = &bytes[..];
+    let mut heard = Vec::new();
+    for now in 0..100 {
+        rest = &rest[receiver.push(now, rest)..];
+        while receiver.poll(now) || receiver.busy() {
+            match receiver.event() {
+                Some(LinkEvent::Bad(record)) => heard.push(record),
+                Some(LinkEvent::Frame(frame)) => {
+                    assert_eq!(heard, [Response::bad(0, IncorrectHeader, 0)]);
+                    assert_eq!(Command::parse(frame), Ok(Command::TeachingModeEnable));
+                    return;
+                }
+                None => {}
+            }
+            receiver.release();
+        }
+    }
+    panic!("the frame was not found");
+}
+
+#[test]
+fn j06_oddities_of_existing_hosts() {
+    let everything = [0x9B, 0x01, 0x00, 0x06, 0x8F, 0x76];
+    let mut line = Line::new();
+    assert_eq!(line.send(&everything), [Good(FrameType::ClearCurrentErrors, 6)]);
+    let command = Command::parse(FrameRef::new_checked(&everything).expect("a good frame"));
+    assert_eq!(command, Ok(Command::ClearCurrentErrors { jtc: true, nodes: 0x7F }));
+
+    let default = [0x9B, 0x0E, 0x00, 0x06, 0xA3, 0x47];
+    assert_eq!(line.send(&default), [Good(FrameType::FrictionPolynomial, 6)]);
+    let command = Command::parse(FrameRef::new_checked(&default).expect("a good frame"));
+    assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
+}

@@ -6,6 +6,7 @@ pub mod check;
 pub mod error;
 pub mod file;
 pub mod frame;
+pub mod plan;
 pub mod port;
 pub mod recording;
 pub mod report;

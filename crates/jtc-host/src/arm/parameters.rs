@@ -53,7 +53,7 @@ pub enum ParameterError {
         after: f32,
     },
     /// The arm model is not physical.
-    #[error("arm model: {0:?}")]
+    #[error("arm model: {0}")]
     Model(jtc_dynamics::ModelError),
 }
 

@@ -119,8 +119,9 @@ impl Point {
         let channel = |values: &[f64; JOINTS], scale: f64, channel, unit| {
             let mut out = [0i16; JOINTS];
             for (j, (to, v)) in out.iter_mut().zip(values).enumerate() {
-                let scaled = (v * 32767.0 / scale).round();
-                if !(-32768.0..=32767.0).contains(&scaled) {
+                let exact = v * 32767.0 / scale;
+                // Neither clipped nor wrapped; a hair for the rounding of the multiplication. NaN is in no range.
+                if !(-32768.0 - 1e-9..=32767.0 + 1e-9).contains(&exact) {
                     return Err(ScaleError {
                         point: index,
                         joint: j + 1,
@@ -130,7 +131,7 @@ impl Point {
                         unit,
                     });
                 }
-                *to = scaled as i16;
+                *to = exact.round() as i16;
             }
             Ok(out)
         };

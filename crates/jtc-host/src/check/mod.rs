@@ -1,0 +1,201 @@
+//! Verdicts on a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, start pose.
+//!
+//! Between points the controller's own interpolation runs, on the numbers as the wire carries them, once a millisecond: what
+//! passes here is what the controller will compute.
+
+mod verdict;
+
+use jtc_core::{
+    Config, Friction, JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX, SetPoint, interpolate,
+};
+use jtc_dynamics::{ArmModel, Dynamics};
+
+pub use verdict::{JointFigures, Problem, ProblemKind, Verdict};
+
+use crate::session::UploadOptions;
+use crate::trajectory::Trajectory;
+
+/// What a trajectory is checked against.
+#[derive(Clone, Debug)]
+pub struct Checker<'a> {
+    /// Limits, rotor inertia, gravity, start tolerance.
+    pub config: &'a Config,
+    /// Model for the torque along the path; `None`: torque is not checked.
+    pub model: Option<&'a ArmModel>,
+    /// Friction compensation that the controller will add to it.
+    pub friction: Option<&'a Friction>,
+    /// Bearing temperature for the friction, °C.
+    pub temperature: f64,
+    /// Where the arm is, rad; `None`: the start pose is not checked.
+    pub start: Option<[f64; JOINTS]>,
+    /// Segments that it will be sent in.
+    pub upload: UploadOptions,
+}
+
+/// Least significant bit of positions and velocities on the wire.
+const POSITION_BIT: f64 = jtc_wire::POSITION_SCALE / 32767.0;
+const VELOCITY_BIT: f64 = jtc_wire::VELOCITY_SCALE / 32767.0;
+/// Speed at the first and last point that standing still means, rad/s.
+const REST: f64 = 0.02;
+
+impl<'a> Checker<'a> {
+    /// Against the limits of `config` alone.
+    pub fn new(config: &'a Config) -> Self {
+        let upload = UploadOptions::default();
+        Self { config, model: None, friction: None, temperature: 30.0, start: None, upload }
+    }
+
+    /// Looks at all of it and says all that is wrong.
+    pub fn check(&self, trajectory: &Trajectory) -> Verdict {
+        let mut verdict = Verdict::new(trajectory);
+        self.counts(trajectory, &mut verdict);
+        // As the controller will have them; a number that no frame carries is a problem, and the check goes on without rounding.
+        let points: Vec<SetPoint> = trajectory
+            .points
+            .iter()
+            .enumerate()
+            .map(|(i, p)| match p.raw(i) {
+                Ok(raw) => SetPoint::from(&raw),
+                Err(e) => {
+                    let kind = ProblemKind::scale(e.channel);
+                    verdict.add(kind, Some(e.joint - 1), i, 0.0, e.value, e.limit);
+                    SetPoint { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
+                }
+            })
+            .collect();
+        let Some(first) = points.first() else { return verdict.done() };
+        self.start_pose(first, &mut verdict);
+        self.ends(&points, &mut verdict);
+        self.path(trajectory.step_ms, &points, &mut verdict);
+        verdict.done()
+    }
+
+    fn counts(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
+        let n = trajectory.points.len();
+        let mut count = |kind, value: usize, limit: usize| {
+            verdict.add(kind, None, 0, 0.0, value as f64, limit as f64);
+        };
+        if n == 0 {
+            count(ProblemKind::Empty, 0, 1);
+        }
+        if n > POINTS_MAX {
+            count(ProblemKind::TooManyPoints, n, POINTS_MAX);
+        }
+        if trajectory.step_ms == 0 {
+            count(ProblemKind::StepTime, 0, 1);
+        }
+        let per_segment = self.upload.segment_points(n);
+        if n.div_ceil(per_segment) > SEGMENTS_MAX {
+            count(ProblemKind::TooManySegments, n.div_ceil(per_segment), SEGMENTS_MAX);
+        }
+        if self.upload.points_per_segment.is_some_and(|p| p == 0 || p > SEGMENT_POINTS_MAX) {
+            let given = self.upload.points_per_segment.unwrap_or(0);
+            count(ProblemKind::SegmentPoints, given, SEGMENT_POINTS_MAX);
+        }
+    }
+
+    /// J-34.
+    fn start_pose(&self, first: &SetPoint, verdict: &mut Verdict) {
+        for (j, measured) in self.start.into_iter().flatten().enumerate() {
+            let away = measured - first.position[j];
+            // Not `>`: a measured NaN is a problem too.
+            if !(away.abs() <= self.config.start_tolerance_rad) {
+                verdict.add(ProblemKind::StartPose, Some(j), 0, 0.0, away, self.config.start_tolerance_rad);
+            }
+        }
+    }
+
+    /// The arm stands before and after.
+    fn ends(&self, points: &[SetPoint], verdict: &mut Verdict) {
+        for i in [0, points.len() - 1] {
+            for (j, v) in points[i].velocity.iter().enumerate() {
+                if v.abs() > REST {
+                    verdict.add(ProblemKind::NotAtRest, Some(j), i, 0.0, *v, REST);
+                }
+            }
+            if points.len() == 1 {
+                break;
+            }
+        }
+    }
+
+    fn path(&self, step_ms: u16, points: &[SetPoint], verdict: &mut Verdict) {
+        let h = f64::from(step_ms) * 1e-3;
+        let dynamics = self.model.map(|m| Dynamics::new(m, self.config.gravity));
+        for (i, a) in points.iter().enumerate() {
+            self.moment(a, i, 0.0, dynamics.as_ref(), verdict);
+            let Some(b) = points.get(i + 1) else { break };
+            if self.step(a, b, i, h, verdict) {
+                continue;
+            }
+            for ms in 1..step_ms {
+                let u = f64::from(ms) / f64::from(step_ms);
+                self.moment(&interpolate(a, b, h, u), i, f64::from(ms), dynamics.as_ref(), verdict);
+            }
+        }
+    }
+
+    /// Jumps and contradictions between two points; true when what lies between them makes no sense.
+    fn step(&self, a: &SetPoint, b: &SetPoint, i: usize, h: f64, verdict: &mut Verdict) -> bool {
+        let mut senseless = false;
+        for (j, limit) in self.config.joints.iter().enumerate() {
+            let (moved, v0, v1) = (b.position[j] - a.position[j], a.velocity[j], b.velocity[j]);
+            let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
+            // What the velocities of both points allow, with rounding; a fifth of the speed limit for rough files.
+            let expected = 0.5 * h * (v0 + v1);
+            let slack = 3.0 * POSITION_BIT
+                + h * (0.5 * (v1 - v0).abs() + 2.0 * VELOCITY_BIT)
+                + h * h * 0.25 * (a0.abs() + a1.abs());
+            let beyond = (moved - expected).abs() - slack;
+            if moved.abs() > 2.0 * limit.velocity_max * h + 3.0 * POSITION_BIT {
+                verdict.add(ProblemKind::Jump, Some(j), i, 0.0, moved, limit.velocity_max * h);
+                senseless = true;
+            } else if beyond > 0.05 * limit.velocity_max * h {
+                verdict.add(ProblemKind::VelocityMismatch, Some(j), i, 0.0, moved / h, expected / h);
+            }
+            let (sped, expected) = (v1 - v0, 0.5 * h * (a0 + a1));
+            let slack = 3.0 * VELOCITY_BIT + h * 0.5 * (a1 - a0).abs();
+            let beyond = (sped - expected).abs() - slack;
+            if !senseless && beyond > 0.1 * limit.acceleration_max * h {
+                verdict.add(ProblemKind::AccelerationMismatch, Some(j), i, 0.0, sped / h, expected / h);
+            }
+        }
+        senseless
+    }
+
+    /// Limits at one millisecond.
+    fn moment(&self, s: &SetPoint, i: usize, ms: f64, dynamics: Option<&Dynamics>, verdict: &mut Verdict) {
+        let torque = dynamics.map(|d| d.inverse(&s.position, &s.velocity, &s.acceleration));
+        for (j, limit) in self.config.joints.iter().enumerate() {
+            let (q, v, a) = (s.position[j], s.velocity[j], s.acceleration[j]);
+            let mut over = |kind, value: f64, min: f64, max: f64| {
+                if !(min..=max).contains(&value) {
+                    verdict.add(kind, Some(j), i, ms, value, if value < min { min } else { max });
+                }
+            };
+            over(ProblemKind::Position, q, limit.position_min, limit.position_max);
+            over(ProblemKind::Velocity, v, -limit.velocity_max, limit.velocity_max);
+            over(ProblemKind::Acceleration, a, -limit.acceleration_max, limit.acceleration_max);
+            let mut whole = None;
+            if let Some(torque) = torque {
+                let tau = torque[j] + limit.rotor_inertia * a + self.friction_torque(j, v);
+                over(ProblemKind::Torque, tau, -limit.torque_max, limit.torque_max);
+                whole = Some(tau);
+            }
+            verdict.joints[j].take(q, v, a, whole);
+        }
+    }
+
+    fn friction_torque(&self, j: usize, v: f64) -> f64 {
+        match self.friction {
+            Some(Friction::Polynomial(c)) => {
+                jtc_core::friction::polynomial(&c[j], v, self.temperature, self.config.friction_sign_width)
+            }
+            Some(Friction::Table(t)) => jtc_core::friction::table(&t[j], v, self.temperature).unwrap_or(0.0),
+            None => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,4 +1,6 @@
 //! The joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors and bus-off.
+use std::collections::VecDeque;
+
 use jtc_bus::{Answer, Frame, JOINTS, NODES, Request, Scale};
 use jtc_core::BusState;
 
@@ -15,6 +17,11 @@ const ERROR_FRAME_US: u32 = 23;
 const BUS_OFF: u16 = 255;
 /// 128 times 11 recessive bits: what a controller waits before it comes back, µs.
 const RECOVERY_US: u32 = 1408;
+
+/// Bit of an answer's id.
+const RESPONSE: u16 = 0x200;
+/// Frames of others that may wait.
+const FOREIGN_MAX: usize = 64;
 
 /// Time of a CAN FD frame with `len` bytes at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
 pub fn frame_us(len: usize) -> u32 {
@@ -111,6 +118,8 @@ pub struct Bus {
     off_us: Option<u32>,
     rng: fastrand::Rng,
     log: Vec<TimedFrame>,
+    /// Frames of members that are not of this world, oldest first.
+    foreign: VecDeque<Frame>,
     /// Something else on the bus, such as an analyser, acknowledges frames too.
     pub monitored: bool,
     /// What is wrong with it.
@@ -129,6 +138,7 @@ impl Bus {
             off_us: None,
             rng: fastrand::Rng::with_seed(seed),
             log: Vec::new(),
+            foreign: VecDeque::new(),
             monitored: false,
             fault: BusFault::default(),
             statistics: BusStatistics::default(),
@@ -161,6 +171,9 @@ impl Bus {
         };
         if self.off_us.is_none() {
             self.answers(&mut time, received);
+            if !self.foreign.is_empty() {
+                self.carry_foreign(now_us, nodes, &mut time, received);
+            }
         }
         BusState { acknowledged, bus_off: self.off_us.is_some() }
     }
@@ -197,19 +210,25 @@ impl Bus {
         if !self.carry(frame, time, true) {
             return false;
         }
-        let Ok(request) = Request::parse(frame) else { return true };
+        if let Ok(request) = Request::parse(frame) {
+            self.reach_nodes(now_us, &request, nodes, *time);
+        }
+        true
+    }
+
+    /// Every node gets a request, and may answer.
+    fn reach_nodes(&mut self, now_us: u64, request: &Request, nodes: &mut Nodes, time: u32) {
         for node in 0..NODES {
             if self.fault.lost > 0.0 && self.rng.f64() < self.fault.lost {
                 self.statistics.lost += 1;
                 continue;
             }
-            if let Some(answer) = nodes.receive(node, now_us + u64::from(*time), &request) {
+            if let Some(answer) = nodes.receive(node, now_us + u64::from(time), request) {
                 let frame = answer.emit(*self.scales.get(node).unwrap_or(&self.scales[0]));
-                let ready_us = *time + ANSWER_US.0 + ANSWER_US.1 * node as u32;
+                let ready_us = time + ANSWER_US.0 + ANSWER_US.1 * node as u32;
                 self.pending.push(Pending { ready_us, frame });
             }
         }
-        true
     }
 
     /// Put a frame on the wire, again after each error; false when there was no time left for it.
@@ -271,6 +290,30 @@ impl Bus {
         for p in &mut self.pending {
             p.ready_us = 0;
         }
+    }
+
+    /// Frames of others, as many as still fit: answers are for the controller, everything else is for the nodes.
+    fn carry_foreign(&mut self, now_us: u64, nodes: &mut Nodes, time: &mut u32, received: &mut Vec<Frame>) {
+        while let Some(frame) = self.foreign.front().copied() {
+            if !self.carry(&frame, time, false) {
+                break;
+            }
+            self.foreign.pop_front();
+            if frame.id & RESPONSE != 0 {
+                received.push(frame);
+            } else if let Ok(request) = Request::parse(&frame) {
+                self.reach_nodes(now_us, &request, nodes, *time);
+            }
+        }
+    }
+
+    /// A frame of a member that is not of this world waits for its turn; false when too many wait already.
+    pub fn put(&mut self, frame: Frame) -> bool {
+        let room = self.foreign.len() < FOREIGN_MAX;
+        if room {
+            self.foreign.push_back(frame);
+        }
+        room
     }
 
     /// A frame as a receiver with broken memory sees it.

@@ -76,6 +76,8 @@ pub struct SimConfig {
     pub drives: [DriveConfig; JOINTS],
     /// A gripper is on the bus.
     pub gripper: bool,
+    /// Joints (bit n = joint n) whose drive is not simulated: it is somewhere else, see [`BusTap`](crate::BusTap).
+    pub absent_drives: u8,
     /// Something else on the joint bus, such as an analyser, acknowledges frames even while no node does.
     pub bus_monitored: bool,
     /// Rate of the serial line, bit/s; `None`: bytes take no time.
@@ -113,6 +115,7 @@ impl SimConfig {
             start: [0.0; JOINTS],
             support: Support::Brakes,
             drives: [drive; JOINTS],
+            absent_drives: 0,
             bus_monitored: false,
             baud: Some(115_200),
             gap_us: 5_000,

@@ -141,6 +141,8 @@ pub struct Drive {
     temperature: f64,
     torque: f64,
     inbox: Inbox,
+    /// It is not there at all.
+    pub absent: bool,
     /// What is wrong with it.
     pub fault: DriveFault,
 }
@@ -171,6 +173,7 @@ impl Drive {
             temperature: 0.0,
             torque: 0.0,
             inbox: Inbox::new(config.one_message_per_interrupt),
+            absent: false,
             fault: DriveFault::default(),
         };
         drive.reset();
@@ -215,7 +218,7 @@ impl Drive {
 
     /// It can hear and acknowledge frames.
     pub fn on_bus(&self) -> bool {
-        self.booting == 0 && !self.fault.silent
+        self.booting == 0 && !self.fault.silent && !self.absent
     }
 
     /// A request arrives at `now_us`; the answer, if it gives one.

@@ -32,6 +32,7 @@ pub mod matrix;
 mod operator;
 mod serial;
 pub mod soak;
+mod tap;
 mod world;
 
 pub use arm::{Arm, SimArm, SimFriction};
@@ -45,4 +46,5 @@ pub use faults::{Fault, FaultKind, FaultPlan, Trigger};
 pub use gripper::Gripper;
 pub use operator::{Operator, OperatorError};
 pub use serial::{Line, LineFault};
+pub use tap::BusTap;
 pub use world::{Statistics, Truth, World};

@@ -103,7 +103,11 @@ impl World {
         let (parts, friction) = config.model_error.apply(&config.arm, config.seed);
         let ceiling = parts.torque_ceiling;
         let model = parts.model;
-        let drives = core::array::from_fn(|j| Drive::new(j as u8, config.drives[j], ceiling[j]));
+        let drives = core::array::from_fn(|j| {
+            let mut drive = Drive::new(j as u8, config.drives[j], ceiling[j]);
+            drive.absent = config.absent_drives & (1 << j) != 0;
+            drive
+        });
         let older = config.drives[0].one_message_per_interrupt;
         let nodes = Nodes { drives, gripper: config.gripper.then(|| Gripper::new(older)) };
         let scales = config.drives.map(|d| Scale { velocity: d.velocity_full_scale });
@@ -450,6 +454,12 @@ impl World {
     /// All frames on the joint bus in the last millisecond.
     pub fn bus_frames(&self) -> &[TimedFrame] {
         self.bus.frames()
+    }
+
+    /// A member of the joint bus that is not of this world sends a frame: an answer for the controller, or a request for the nodes.
+    /// False when too many such frames wait already.
+    pub fn put_bus_frame(&mut self, frame: Frame) -> bool {
+        self.bus.put(frame)
     }
 
     /// State bytes of joints and gripper (255: no gripper).

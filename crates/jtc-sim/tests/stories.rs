@@ -1,0 +1,151 @@
+//! Short stories of an operator and an arm.
+use jtc_core::{State, Tes};
+use jtc_sim::{BusTap, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
+use jtc_wire::{DataStatus, ExecCommand, FrameType};
+
+const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
+const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
+
+fn held() -> Operator {
+    let mut operator = Operator::new(SimConfig { start: FROM, baud: None, ..SimConfig::default() });
+    operator.bring_up().unwrap();
+    operator
+}
+
+fn loaded() -> Operator {
+    let mut operator = held();
+    operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
+    operator
+}
+
+#[test]
+fn j33_pause_and_resume_stay_on_the_path() {
+    let mut operator = loaded();
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    operator.run(1500);
+    operator.ask(&host::exec(ExecCommand::Pause)).unwrap();
+    operator.wait("standstill", 1000, |w| w.telemetry().tes == Tes::Pause).unwrap();
+    let point = operator.world.telemetry().point;
+    assert!(point > 1000, "{point}");
+    operator.run(500);
+    let still = operator.world.truth().qd;
+    assert!(still.iter().all(|v| v.abs() < 5e-3), "{still:?}");
+    assert_eq!(operator.world.telemetry().point, point);
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    let mut last = point;
+    while operator.world.telemetry().tes == Tes::Execute {
+        operator.step();
+        let t = operator.world.telemetry();
+        assert!(t.point >= last && t.errors == 0, "{t:?}");
+        assert!(t.joints.iter().all(|j| j.position_error().abs() < 5e-3), "{t:?}");
+        last = t.point;
+    }
+    assert_eq!(operator.world.telemetry().tes, Tes::Finish);
+}
+
+#[test]
+fn j34_execute_away_from_the_start_is_refused_and_nothing_moves() {
+    let mut operator = held();
+    operator.upload(&host::there_and_back(&TO, &FROM, 3.0, 1, 10), 10).unwrap();
+    let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
+    assert_eq!(response.data, DataStatus::StartPositionMismatch);
+    let before = operator.world.truth().q;
+    operator.run(500);
+    let moved = operator.world.truth().q.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(moved < 1e-3, "{moved}");
+}
+
+#[test]
+fn j24_after_a_node_error_the_trajectory_is_not_resumed() {
+    let mut operator = loaded();
+    let silent = FaultKind::NodeSilent { node: 3 };
+    operator.world.inject(Fault { kind: silent, trigger: Trigger::AtPoint(2000), duration_ms: Some(100) });
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    operator.wait("the error", 4000, |w| w.telemetry().state == State::Error).unwrap();
+    operator.run(3000);
+    assert_eq!(operator.state(), State::Error, "errors latch");
+    operator.recover().unwrap();
+    let held = operator.world.truth().q;
+    operator.run(3000);
+    assert_eq!((operator.state(), operator.world.telemetry().tes), (State::HoldPos, Tes::Null));
+    let moved = operator.world.truth().q.iter().zip(&held).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(moved < 2e-3, "{moved}");
+}
+
+#[test]
+fn j12_a_stopped_tick_resets_the_controller_and_the_arm_is_let_go() {
+    let mut operator = loaded();
+    operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
+    let at = Trigger::At(operator.world.now_us() / 1000 + 1000);
+    operator.world.inject(Fault { kind: FaultKind::TickOverrun, trigger: at, duration_ms: Some(40) });
+    operator.run(1500);
+    assert!(operator.world.statistics().watchdog_resets >= 1);
+    assert_eq!(operator.state(), State::Init, "parameters are wanted again");
+    assert_eq!(operator.world.truth().torque, [0.0; 6]);
+    operator.bring_up().unwrap();
+}
+
+#[test]
+fn j25_taught_by_hand_the_arm_floats() {
+    let mut operator = held();
+    operator.teach().unwrap();
+    let before = operator.world.truth().q;
+    operator.run(1000);
+    let t = operator.world.telemetry();
+    assert_eq!((t.state, t.errors), (State::Teaching, 0));
+    // Wrong masses make it drift slowly; it does not fall.
+    let moved = operator.world.truth().q.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(moved < 0.2, "{moved}");
+    operator.ask(&host::frame(FrameType::TeachingModeDisable, &[])).unwrap();
+    operator.wait("HoldPos", 100, |w| w.telemetry().state == State::HoldPos).unwrap();
+}
+
+#[test]
+fn gripper_holds_a_part() {
+    let mut operator = held();
+    operator.ask(&host::frame(FrameType::GripperControl, &[1, 0, 0, 0])).unwrap();
+    operator.run(1000);
+    let gripper = operator.listener.last.and_then(|s| s.gripper).unwrap();
+    assert_eq!((gripper.pump, gripper.pressure1, gripper.pressure2), (1, 1, 1));
+    operator.world.set_part_present(false);
+    operator.run(1000);
+    let gripper = operator.listener.last.and_then(|s| s.gripper).unwrap();
+    assert_eq!((gripper.pump, gripper.pressure1), (1, 0), "the part fell off");
+}
+
+#[test]
+fn without_brakes_an_error_lets_the_arm_fall() {
+    let config = SimConfig { start: FROM, baud: None, support: Support::Stand, ..SimConfig::default() };
+    let mut operator = Operator::new(config);
+    operator.bring_up().unwrap();
+    let at = Trigger::At(operator.world.now_us() / 1000 + 10);
+    operator.world.inject(Fault { kind: FaultKind::SafetyInput, trigger: at, duration_ms: Some(5) });
+    operator.run(3000);
+    assert_eq!(operator.state(), State::Error);
+    assert!((operator.world.truth().q[1] - FROM[1]).abs() > 0.3, "{:?}", operator.world.truth().q);
+}
+
+#[test]
+fn others_on_the_bus_see_every_frame_and_take_part() {
+    let hub = can_link::VirtualHub::new();
+    let mut other = hub.join();
+    let mut tap = BusTap::new(hub.join());
+    let mut operator = held();
+    let mut ids = std::collections::BTreeSet::new();
+    for _ in 0..50 {
+        operator.step();
+        tap.exchange(&mut operator.world).unwrap();
+        while let Some(frame) = can_link::CanBus::receive(&mut other, std::time::Duration::ZERO).unwrap() {
+            ids.insert(frame.id().value());
+        }
+    }
+    assert_eq!(ids.into_iter().collect::<Vec<_>>(), [0x000, 0x200, 0x201, 0x202, 0x203, 0x204, 0x205, 0x206]);
+    // A reset from elsewhere: the drive reboots, the controller notices.
+    let reset = can_link::CanFrame::fd(can_link::Id::standard(0x1A2).unwrap(), &[]).unwrap();
+    can_link::CanBus::send(&mut other, &reset).unwrap();
+    for _ in 0..20 {
+        tap.exchange(&mut operator.world).unwrap();
+        operator.step();
+    }
+    assert_eq!((tap.taken, operator.state()), (1, State::Error));
+}

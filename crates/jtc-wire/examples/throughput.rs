@@ -8,24 +8,19 @@ use jtc_wire::{FRAME_MAX, RawPoint, Receiver, crc16, trajectory};
 static ONE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_XMODEM);
 static SIXTEEN: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_XMODEM);
 
-/// Median GB/s of rounds that take `bytes` bytes each; all contenders take turns, so that a slow moment hits each.
+/// GB/s in the fastest of many short rounds of `bytes` bytes each: other programs can only slow one down. All contenders
+/// take turns, so that a slow moment hits each.
 fn measure(bytes: usize, contenders: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     const ROUNDS: usize = 301;
-    let mut times = vec![Vec::new(); contenders.len()];
+    let mut best = vec![f64::INFINITY; contenders.len()];
     for _ in 0..ROUNDS {
-        for (contender, times) in contenders.iter_mut().zip(&mut times) {
+        for (contender, best) in contenders.iter_mut().zip(&mut best) {
             let start = Instant::now();
             contender();
-            times.push(start.elapsed().as_secs_f64());
+            *best = best.min(start.elapsed().as_secs_f64());
         }
     }
-    times
-        .iter_mut()
-        .map(|times| {
-            times.sort_by(f64::total_cmp);
-            bytes as f64 / times[ROUNDS / 2] * 1e-9
-        })
-        .collect()
+    best.iter().map(|seconds| bytes as f64 / seconds * 1e-9).collect()
 }
 
 fn main() {

@@ -1,9 +1,9 @@
 //! Frames from the host: every command into a caller's buffer, numbers checked and scaled, never wrapped or clipped.
 use core::fmt;
 
-use crate::command::{Command, ExecCommand, Floats};
-use crate::crc::crc16_const;
+use crate::command::{Command, Floats};
 use crate::crc16;
+use crate::fixed;
 use crate::frame::{
     FRAME_POINTS_MAX, FrameType, HEADER, JOINTS, POINT_LEN, TRAJECTORY_OVERHEAD, field as frame_field,
 };
@@ -348,76 +348,4 @@ impl Command<'_> {
 
 fn segment(out: &mut [u8], s: Segment<'_>) -> Result<usize, EncodeError> {
     trajectory(out, (s.trajectory, s.segment, s.segments), s.step_time, s.points())
-}
-
-/// Frames of few bytes, as constants.
-pub mod fixed {
-    use super::*;
-
-    const fn sealed<const N: usize>(frame_type: FrameType, body: &[u8]) -> [u8; N] {
-        let mut bytes = [0; N];
-        bytes[0] = HEADER;
-        bytes[1] = frame_type as u8;
-        bytes[2] = (N >> 8) as u8;
-        bytes[3] = N as u8;
-        let mut i = 0;
-        while i < body.len() {
-            bytes[4 + i] = body[i];
-            i += 1;
-        }
-        let crc = crc16_const(bytes.split_at(N - 2).0);
-        bytes[N - 2] = (crc >> 8) as u8;
-        bytes[N - 1] = crc as u8;
-        bytes
-    }
-
-    /// A frame without body.
-    pub const fn empty(frame_type: FrameType) -> [u8; 6] {
-        sealed(frame_type, &[])
-    }
-
-    /// ClearCurrentErrors: the controller's own errors, and those of the nodes in `nodes` (bits 0..6).
-    pub const fn clear_current_errors(jtc: bool, nodes: u8) -> [u8; 10] {
-        sealed(FrameType::ClearCurrentErrors, &[jtc as u8, nodes])
-    }
-
-    /// TrajSetExecStatus.
-    pub const fn exec(command: ExecCommand) -> [u8; 7] {
-        sealed(FrameType::TrajSetExecStatus, &[command as u8])
-    }
-
-    /// ResetCanDevices: the nodes in `nodes` (bits 0..6).
-    pub const fn reset_can_devices(nodes: u8) -> [u8; 10] {
-        sealed(FrameType::ResetCanDevices, &[nodes])
-    }
-
-    /// GripperControl.
-    pub const fn gripper_control(pump: bool) -> [u8; 10] {
-        sealed(FrameType::GripperControl, &[pump as u8])
-    }
-
-    /// ClearOccurredErrors.
-    pub const CLEAR_OCCURRED_ERRORS: [u8; 6] = empty(FrameType::ClearOccurredErrors);
-    /// FrictionTableUseDefault.
-    pub const FRICTION_TABLE_USE_DEFAULT: [u8; 6] = empty(FrameType::FrictionTableUseDefault);
-    /// PidParamUseDefault.
-    pub const PID_PARAM_USE_DEFAULT: [u8; 6] = empty(FrameType::PidParamUseDefault);
-    /// ArmModelUseDefault.
-    pub const ARM_MODEL_USE_DEFAULT: [u8; 6] = empty(FrameType::ArmModelUseDefault);
-    /// TeachingModeEnable.
-    pub const TEACHING_MODE_ENABLE: [u8; 6] = empty(FrameType::TeachingModeEnable);
-    /// TeachingModeDisable.
-    pub const TEACHING_MODE_DISABLE: [u8; 6] = empty(FrameType::TeachingModeDisable);
-    /// FrictionPolynomialUseDefault.
-    pub const FRICTION_POLYNOMIAL_USE_DEFAULT: [u8; 6] = empty(FrameType::FrictionPolynomialUseDefault);
-    /// TrajSetExecStatus: stop.
-    pub const STOP: [u8; 7] = exec(ExecCommand::Stop);
-    /// TrajSetExecStatus: pause.
-    pub const PAUSE: [u8; 7] = exec(ExecCommand::Pause);
-    /// TrajSetExecStatus: execute.
-    pub const EXECUTE: [u8; 7] = exec(ExecCommand::Execute);
-    /// GripperControl: pump on.
-    pub const PUMP_ON: [u8; 10] = gripper_control(true);
-    /// GripperControl: pump off.
-    pub const PUMP_OFF: [u8; 10] = gripper_control(false);
 }

@@ -89,6 +89,15 @@ pub enum FaultFileError {
         /// Smallest and largest.
         allowed: (f64, f64),
     },
+    /// A whole number is needed.
+    NotWhole {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// The key.
+        key: &'static str,
+        /// As written.
+        value: f64,
+    },
     /// There is no such state.
     UnknownState {
         /// Number of the fault in the file, from 1.
@@ -116,6 +125,9 @@ impl fmt::Display for FaultFileError {
             }
             Self::Range { fault, key, value, allowed: (low, high) } => {
                 write!(f, "fault {fault}: {key} = {value} is outside {low}..{high}")
+            }
+            Self::NotWhole { fault, key, value } => {
+                write!(f, "fault {fault}: {key} = {value} is not a whole number")
             }
             Self::UnknownState { fault, state } => {
                 let names: Vec<_> = STATES.iter().map(|(name, _)| *name).collect();
@@ -272,19 +284,33 @@ impl Reader {
     }
 
     fn node(&mut self) -> Result<u8, FaultFileError> {
-        self.take("node", |e| &mut e.node, 0.0, 6.0).map(|x| x as u8)
+        self.whole("node", |e| &mut e.node, 0.0, 6.0)
     }
 
     fn joint(&mut self) -> Result<u8, FaultFileError> {
-        self.take("joint", |e| &mut e.joint, 0.0, 5.0).map(|x| x as u8)
+        self.whole("joint", |e| &mut e.joint, 0.0, 5.0)
     }
 
     fn bits(&mut self) -> Result<u8, FaultFileError> {
-        self.take("bits", |e| &mut e.bits, 1.0, 255.0).map(|x| x as u8)
+        self.whole("bits", |e| &mut e.bits, 1.0, 255.0)
     }
 
     fn probability(&mut self) -> Result<f64, FaultFileError> {
         self.take("probability", |e| &mut e.probability, 0.0, 1.0)
+    }
+
+    fn whole(
+        &mut self,
+        key: &'static str,
+        field: impl Fn(&mut Entry) -> &mut Option<f64>,
+        low: f64,
+        high: f64,
+    ) -> Result<u8, FaultFileError> {
+        let value = self.take(key, field, low, high)?;
+        if value.fract() != 0.0 {
+            return Err(FaultFileError::NotWhole { fault: self.number, key, value });
+        }
+        Ok(value as u8)
     }
 
     fn take(

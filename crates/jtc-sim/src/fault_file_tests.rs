@@ -56,6 +56,7 @@ fn mistakes_are_named() {
         ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\nafter_s = 2", "`after_s` means nothing"),
         ("[[fault]]\nkind = \"frames-lost\"\nprobability = 2\nat_s = 1", "probability = 2 is outside 0..1"),
         ("[[fault]]\nkind = \"node-silent\"\nnode = 7\nat_s = 1", "node = 7 is outside 0..6"),
+        ("[[fault]]\nkind = \"node-silent\"\nnode = 1.5\nat_s = 1", "node = 1.5 is not a whole number"),
         ("[[fault]]\nkind = \"bus-off\"\nat_s = nan", "at_s = NaN is outside"),
         ("[[fault]]\nkind = \"bus-off\"\nwhen = 3", "unknown field `when`"),
         ("fault = 3", "invalid type"),

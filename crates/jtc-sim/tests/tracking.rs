@@ -1,7 +1,7 @@
 //! How well the arm follows when it is not quite the arm that the controller believes in.
 use jtc_core::{State, Tes};
 use jtc_sim::{ModelError, Operator, SimConfig, host};
-use jtc_wire::ExecCommand;
+use jtc_wire::{ExecCommand, RawPoint};
 
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
@@ -46,6 +46,38 @@ fn j40_tracking_within_two_milliradians_rms_with_wrong_masses_and_friction() {
         let rms = run(&mut operator);
         println!("seed {seed}: {:?} mrad RMS", rms.map(|x| (x * 1e6).round() / 1e3));
         assert_eq!(operator.world.telemetry().tes, Tes::Finish);
+        assert!(rms.iter().all(|&x| x <= 2e-3), "seed {seed}: {rms:?}");
+    }
+}
+
+/// The measured trajectory beside the checkout, if it is there: 19 integers a line, the first is the time.
+fn recorded() -> Option<Vec<RawPoint>> {
+    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena");
+    let directory = std::env::var("OPENJTC_DATA").unwrap_or_else(|_| beside.into());
+    let text = std::fs::read_to_string(format!("{directory}/TrajectoryInt.csv")).ok()?;
+    let point = |line: &str| {
+        let n: Vec<i16> = line.split(',').skip(1).map(|x| x.trim().parse().unwrap()).collect();
+        let six = |at: usize| std::array::from_fn(|j| n[at + j]);
+        RawPoint { position: six(0), velocity: six(6), acceleration: six(12) }
+    };
+    Some(text.lines().filter(|line| !line.trim().is_empty()).map(point).collect())
+}
+
+#[test]
+fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
+    let Some(points) = recorded() else {
+        println!("skipped: no TrajectoryInt.csv; OPENJTC_DATA names the directory");
+        return;
+    };
+    for seed in [1, 2, 3] {
+        let config = SimConfig { start: points[0].position_rad(), seed, baud: None, ..SimConfig::default() };
+        let mut operator = Operator::new(config);
+        operator.bring_up().unwrap();
+        operator.upload(&points, 10).unwrap();
+        let rms = run(&mut operator);
+        let telemetry = operator.world.telemetry();
+        println!("seed {seed}: {:?} mrad RMS", rms.map(|x| (x * 1e6).round() / 1e3));
+        assert_eq!((telemetry.tes, telemetry.errors), (Tes::Finish, 0));
         assert!(rms.iter().all(|&x| x <= 2e-3), "seed {seed}: {rms:?}");
     }
 }

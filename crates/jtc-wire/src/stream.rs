@@ -31,7 +31,7 @@ const REGISTERS: usize = FRAME_MAX.div_ceil(GRID) + 1;
 /// Gaps among the held bytes that are remembered.
 const GAPS: usize = 64;
 /// Work of one `poll`: a byte passed over costs one, a candidate whose CRC is taken `CANDIDATE`.
-const BUDGET: usize = 4096;
+const BUDGET: usize = 2048;
 const CANDIDATE: usize = 128;
 
 /// Stream parser of rule J-03 over a buffer of at least [`FRAME_MAX`] bytes (with a shorter one, frames that do not fit into it

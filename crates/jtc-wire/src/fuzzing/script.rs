@@ -121,7 +121,7 @@ impl Driver {
         assert_eq!(found, self.receiver.event().is_some());
         if !found && self.receiver.busy() {
             self.busy_polls += 1;
-            assert!(self.busy_polls <= self.bytes / 30 + 1, "too much work for so few bytes");
+            assert!(self.busy_polls <= self.bytes / 15 + 1, "too much work for so few bytes");
         }
         found
     }

@@ -1,16 +1,23 @@
 //! Arms: kinematics, masses, limits, gains and friction of one arm, from the files that people have.
 
+mod collect;
+mod csv;
+mod frames;
 mod parameters;
+#[cfg(test)]
+mod tests;
 mod toml_form;
+mod urdf;
 
 use std::path::Path;
 
 use jtc_core::{Config, Friction, JOINTS, JointConfig, Parameters, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 
+pub use collect::{FrictionChoice, ParameterFile};
 pub use parameters::{ParameterError, ParameterSet};
 
-use crate::file::{FileError, read_text};
+use crate::file::{FileError, Place, read_text};
 
 /// The default arm's file, as delivered.
 pub const AVENA_TOML: &str = include_str!("../../../../arms/avena.toml");
@@ -67,7 +74,10 @@ impl Arm {
 
     /// From the text of a TOML or URDF file.
     pub fn parse(text: &str) -> Result<Self, FileError> {
-        Self::from_toml(text)
+        let xml = text.trim_start_matches('\u{feff}').trim_start().starts_with('<');
+        let arm = if xml { Self::from_urdf(text)? } else { Self::from_toml(text)? };
+        arm.model.check().map_err(|e| FileError::at(Place::name("arm model"), e.to_string()))?;
+        Ok(arm)
     }
 
     /// Settings of a controller for this arm; what the file does not say is as for the default arm.

@@ -141,7 +141,7 @@ impl<'a> Checker<'a> {
         for (j, limit) in self.config.joints.iter().enumerate() {
             let (moved, v0, v1) = (b.position[j] - a.position[j], a.velocity[j], b.velocity[j]);
             let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
-            // What the velocities of both points allow, with rounding; a fifth of the speed limit for rough files.
+            // What the velocities of both points allow, with rounding.
             let expected = 0.5 * h * (v0 + v1);
             let slack = 3.0 * POSITION_BIT
                 + h * (0.5 * (v1 - v0).abs() + 2.0 * VELOCITY_BIT)
@@ -150,6 +150,8 @@ impl<'a> Checker<'a> {
             if moved.abs() > 2.0 * limit.velocity_max * h + 3.0 * POSITION_BIT {
                 verdict.add(ProblemKind::Jump, Some(j), i, 0.0, moved, limit.velocity_max * h);
                 senseless = true;
+            } else if moved.abs() > 1.05 * limit.velocity_max * h + 3.0 * POSITION_BIT {
+                verdict.add(ProblemKind::PositionSpeed, Some(j), i, 0.0, moved / h, limit.velocity_max);
             } else if beyond > 0.05 * limit.velocity_max * h {
                 verdict.add(ProblemKind::VelocityMismatch, Some(j), i, 0.0, moved / h, expected / h);
             }

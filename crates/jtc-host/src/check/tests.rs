@@ -93,7 +93,15 @@ fn all_problems_are_reported_with_their_worst_place() {
         kinds.contains(&ProblemKind::Velocity) && kinds.contains(&ProblemKind::AccelerationScale),
         "{kinds:?}"
     );
-    assert!(kinds.contains(&ProblemKind::VelocityMismatch), "{kinds:?}");
+}
+
+/// A file whose velocities say nothing would stop and go at every point.
+#[test]
+fn channels_that_contradict_each_other_all_along_are_refused() {
+    let mut t = smooth();
+    t.points.iter_mut().for_each(|p| p.velocity = [0.0; 6]);
+    let verdict = check(&t);
+    assert!(verdict.refusals().any(|p| p.kind == ProblemKind::VelocityMismatch), "{verdict}");
 }
 
 /// J-30.
@@ -144,7 +152,12 @@ fn the_existing_trajectories_pass() {
         let checker =
             Checker { model: Some(&arm.model), friction: friction.as_ref(), ..Checker::new(&config) };
         let verdict = checker.check(&t);
-        assert!(verdict.problems.is_empty(), "{name}: {verdict}");
+        // Five seams where the positions are a sample ahead of the velocities.
+        assert!(verdict.is_ok(), "{name}: {verdict}");
+        assert!(
+            verdict.warnings().all(|p| p.kind == ProblemKind::VelocityMismatch && p.count == 5),
+            "{verdict}"
+        );
     }
 }
 

@@ -37,7 +37,9 @@ pub enum ProblemKind {
     Acceleration,
     /// Torque by the arm model over its limit.
     Torque,
-    /// Positions move at another speed than the velocities say.
+    /// Positions move faster than the velocity limit, whatever the velocities say.
+    PositionSpeed,
+    /// Positions move at another speed than the velocities say; a warning at single places.
     VelocityMismatch,
     /// The first or last point is not at rest.
     NotAtRest,
@@ -56,16 +58,11 @@ impl ProblemKind {
         }
     }
 
-    /// The trajectory can run all the same: the feed-forward is not what it could be.
-    pub fn is_warning(self) -> bool {
-        self == ProblemKind::AccelerationMismatch
-    }
-
     fn unit(self) -> &'static str {
         use ProblemKind::*;
         match self {
             Jump | Position | StartPose | PositionScale => "rad",
-            Velocity | VelocityScale | VelocityMismatch | NotAtRest => "rad/s",
+            Velocity | VelocityScale | PositionSpeed | VelocityMismatch | NotAtRest => "rad/s",
             Acceleration | AccelerationScale | AccelerationMismatch => "rad/s²",
             Torque => "N·m",
             _ => "",
@@ -88,6 +85,7 @@ impl ProblemKind {
             Velocity => "velocity over its limit",
             Acceleration => "acceleration over its limit",
             Torque => "torque over its limit",
+            PositionSpeed => "positions move faster than the velocity limit",
             VelocityMismatch => "positions and velocities disagree",
             NotAtRest => "not at rest at an end",
             StartPose => "the arm is not at the first point",
@@ -115,7 +113,12 @@ pub struct Problem {
     pub limit: f64,
     /// Milliseconds (or points, or steps) in which it is.
     pub count: usize,
+    /// The trajectory can run all the same; only the feed-forward is not what it could be.
+    pub warning: bool,
 }
+
+/// Places with contradicting channels that existing files have where their pieces meet.
+const SEAMS: usize = 20;
 
 impl Problem {
     fn excess(&self) -> f64 {
@@ -150,7 +153,11 @@ impl fmt::Display for Problem {
                 );
             }
             StartPose => {
-                return write!(f, "{} away from the first point by {value:+.4} rad (tolerance {limit})", "is");
+                return write!(
+                    f,
+                    "{} away from the first point by {value:+.4} rad (tolerance {limit})",
+                    "is"
+                );
             }
             NotAtRest => write!(f, "{}: {value:+.4} {unit} at point {point}", kind.words())?,
             VelocityMismatch | AccelerationMismatch => write!(
@@ -245,7 +252,8 @@ impl Verdict {
         limit: f64,
     ) {
         let joint = joint.map(|j| j + 1);
-        let new = Problem { kind, joint, first_point: point, point, ms, value, limit, count: 1 };
+        let new =
+            Problem { kind, joint, first_point: point, point, ms, value, limit, count: 1, warning: false };
         let same = |p: &&mut Problem| p.kind == kind && p.joint == joint && kind != ProblemKind::Jump;
         match self.problems.iter_mut().find(same) {
             Some(known) => {
@@ -261,29 +269,37 @@ impl Verdict {
 
     /// Kinds in the order of what they do to an arm, jumps in the order of the path, others by how far they are over.
     pub(super) fn done(mut self) -> Self {
+        let seams = SEAMS.max(self.points / 50);
+        for p in &mut self.problems {
+            p.warning = match p.kind {
+                ProblemKind::AccelerationMismatch => true,
+                ProblemKind::VelocityMismatch => p.count <= seams,
+                _ => false,
+            };
+        }
         self.problems.sort_by(|a, b| {
             let within = match a.kind {
                 ProblemKind::Jump => a.point.cmp(&b.point).then(b.excess().total_cmp(&a.excess())),
                 _ => b.excess().total_cmp(&a.excess()),
             };
-            a.kind.cmp(&b.kind).then(within)
+            a.warning.cmp(&b.warning).then(a.kind.cmp(&b.kind)).then(within)
         });
         self
     }
 
     /// Nothing forbids to run it.
     pub fn is_ok(&self) -> bool {
-        self.problems.iter().all(|p| p.kind.is_warning())
+        self.problems.iter().all(|p| p.warning)
     }
 
     /// What forbids to run it.
     pub fn refusals(&self) -> impl Iterator<Item = &Problem> {
-        self.problems.iter().filter(|p| !p.kind.is_warning())
+        self.problems.iter().filter(|p| !p.warning)
     }
 
     /// What does not.
     pub fn warnings(&self) -> impl Iterator<Item = &Problem> {
-        self.problems.iter().filter(|p| p.kind.is_warning())
+        self.problems.iter().filter(|p| p.warning)
     }
 
     /// The next command or act that helps.
@@ -301,6 +317,7 @@ impl Verdict {
             "positions do not change with the speed: correct the path (are all numbers in rad?)".into()
         } else if only(&[
             ProblemKind::Velocity,
+            ProblemKind::PositionSpeed,
             ProblemKind::Acceleration,
             ProblemKind::Torque,
             ProblemKind::VelocityScale,
@@ -326,7 +343,7 @@ impl fmt::Display for Verdict {
             write!(f, "; jumps at {} places, up to {worst:.2} rad", places.len())?;
         }
         for p in self.problems.iter().take(LINES) {
-            write!(f, "\n  {}{p}", if p.kind.is_warning() { "warning: " } else { "" })?;
+            write!(f, "\n  {}{p}", if p.warning { "warning: " } else { "" })?;
         }
         if self.problems.len() > LINES {
             write!(f, "\n  and {} more", self.problems.len() - LINES)?;

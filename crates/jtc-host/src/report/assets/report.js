@@ -200,8 +200,9 @@
   if (has("torque_nm")) {
     const split = has("torque_model_nm");
     const parts = [
-      ["model", "torque_model_nm", "--model", 1.3], ["feedback (PID)", "torque_pid_nm", "--pid", 1.1],
-      ["friction", "torque_friction_nm", "--friction", 1.3], [split ? "total" : "torque", "torque_nm", "--total", 1.7],
+      // The total, with the feedback's noise on it, lies below its parts.
+      [split ? "total" : "torque", "torque_nm", "--total", 1, split ? 0.4 : 1], ["feedback (PID)", "torque_pid_nm", "--pid", 1, 0.8],
+      ["friction", "torque_friction_nm", "--friction", 1.5, 1], ["model", "torque_model_nm", "--model", 1.5, 1],
     ].filter(([, name]) => has(name));
     const keys = make("div", { class: "keys" });
     main.append(make("div", { class: "section" }, make("h2", {}, "Torque", make("small", {}, "N·m, and its parts; bars: peak as a share of the limit")), keys));
@@ -235,7 +236,7 @@
         }
         ctx.restore();
       };
-      const item = plot(body, parts.map(([kind, name, stroke, width]) => ({ y: column[name][j], kind, stroke, width })), {
+      const item = plot(body, parts.map(([kind, name, stroke, width, alpha]) => ({ y: column[name][j], kind, stroke, width, alpha })), {
         height: 190, draw: limits,
         range: (u, min, max) => (toLimit && known(limit) ? [-limit * 1.08, limit * 1.08] : uPlot.rangeNum(min ?? -1, max ?? 1, 0.1, true)),
         onCursor: (idx) => { text.textContent = idx === null ? atRest : `${round(column.torque_nm[j][idx], 2)} N·m`; },

@@ -1,0 +1,202 @@
+//! Files of arms and parameters, and what is said about broken ones.
+
+use std::path::PathBuf;
+
+use jtc_dynamics::Dynamics;
+
+use super::*;
+
+fn data(name: &str) -> Option<PathBuf> {
+    let dir = std::env::var("OPENJTC_DATA")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
+    let path = Path::new(&dir).join(name);
+    if !path.exists() {
+        println!("skipped: {} is not there", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+/// The host's reading of the arm file and the controller's built-in defaults are the same numbers.
+#[test]
+fn the_delivered_arm_is_the_controller_s_default() {
+    let arm = Arm::avena();
+    assert_eq!(arm.config(), Config::avena());
+    assert_eq!(arm.parameters(), Parameters::avena());
+    assert!(arm.warnings.is_empty());
+    arm.parameter_set().check().unwrap();
+}
+
+/// The six joints in a plain description.
+fn urdf(axis: &str, joint: &str) -> String {
+    let arm = Arm::avena();
+    let mut text = String::from("<robot name=\"t\"><link name=\"world\"/>");
+    let three = |v: [f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
+    for (i, l) in arm.model.links.iter().enumerate() {
+        let [xx, xy, xz, yy, yz, zz] = l.inertia;
+        text += &format!(
+            "<link name=\"l{i}\"><inertial><origin xyz=\"{}\" rpy=\"{}\"/><mass value=\"{}\"/><inertia ixx=\"{xx}\" \
+             ixy=\"{xy}\" ixz=\"{xz}\" iyy=\"{yy}\" iyz=\"{yz}\" izz=\"{zz}\"/></inertial></link>",
+            three(l.origin.xyz),
+            three(l.origin.rpy),
+            l.mass
+        );
+    }
+    text += "<link name=\"flange\"/>";
+    text += "<joint name=\"base\" type=\"fixed\"><parent link=\"world\"/><child link=\"l0\"/></joint>";
+    for (i, o) in arm.model.joints.iter().enumerate() {
+        let (kind, child) = if i < 6 { (joint, format!("l{}", i + 1)) } else { ("fixed", "flange".into()) };
+        text += &format!(
+            "<joint name=\"j{}\" type=\"{kind}\"><origin xyz=\"{}\" rpy=\"{}\"/><parent link=\"l{i}\"/><child link=\"{child}\"/>\
+             <axis xyz=\"{axis}\"/><limit lower=\"-1.5\" upper=\"1.5\" effort=\"50\" velocity=\"1.2\"/></joint>",
+            i + 1,
+            three(o.xyz),
+            three(o.rpy)
+        );
+    }
+    text + "</robot>"
+}
+
+#[test]
+fn a_plain_urdf_is_carried_over_exactly() {
+    let arm = Arm::parse(&urdf("0 0 1", "revolute")).unwrap();
+    assert_eq!(arm.model, Arm::avena().model);
+    assert_eq!(arm.joint_names[5], "j6");
+    assert_eq!(
+        (arm.joints[2].position_max, arm.joints[2].torque_max, arm.joints[2].velocity_max),
+        (1.5, 50.0, 1.2)
+    );
+    assert!(arm.warnings.is_empty(), "{:?}", arm.warnings);
+}
+
+/// An axis of −z turns the sense of each joint: torques of the mirrored motion, mirrored back.
+#[test]
+fn joints_about_minus_z_keep_positions_and_torques() {
+    let (plain, turned) = (Arm::avena(), Arm::parse(&urdf("0 0 -1", "revolute")).unwrap());
+    assert_eq!(turned.warnings.len(), 6);
+    let gravity = [0.3, -0.2, -9.81];
+    let (a, b) = (Dynamics::new(&plain.model, gravity), Dynamics::new(&turned.model, gravity));
+    let q = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];
+    let (v, acc) = ([0.5, -0.4, 0.3, 0.2, 0.7, -0.6], [1.0, 2.0, -3.0, 0.5, 0.1, 4.0]);
+    let minus = |x: [f64; 6]| x.map(|x| -x);
+    let expected = minus(a.inverse(&minus(q), &minus(v), &minus(acc)));
+    for (x, y) in expected.iter().zip(b.inverse(&q, &v, &acc)) {
+        assert!((x - y).abs() < 1e-9, "{x} {y}");
+    }
+}
+
+/// A tool screwed to the last link and a plate between two joints are the same arm as their masses put together.
+#[test]
+fn fixed_bodies_become_part_of_their_link() {
+    let tool = "<link name=\"tool\"><inertial><origin xyz=\"0 0 0.1\"/><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" \
+                iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial></link><joint name=\"t\" type=\"fixed\"><origin xyz=\"0.2 0 0\"/>\
+                <parent link=\"flange\"/><child link=\"tool\"/></joint></robot>";
+    let arm = Arm::parse(&urdf("0 0 1", "revolute").replace("</robot>", tool)).unwrap();
+    let link = arm.model.links[6];
+    assert!((link.mass - 1.082).abs() < 1e-12);
+    assert!((link.origin.xyz[0] - 0.2 / 1.082).abs() < 1e-12);
+    assert!((link.origin.xyz[2] - (0.0181 + 0.1) / 1.082).abs() < 1e-12);
+    // Steiner about z: reduced mass times distance squared.
+    let izz = 8e-5 + 0.01 + 0.082 / 1.082 * 0.04;
+    assert!((link.inertia[5] - izz).abs() < 1e-12, "{} {izz}", link.inertia[5]);
+    assert!(arm.warnings.iter().any(|w| w.place == "link tool"));
+}
+
+#[test]
+fn what_no_arm_of_ours_can_be_is_refused_by_name() {
+    let say = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
+    assert!(say(&urdf("0 0 1", "continuous")).contains("joint j1: continuous"));
+    assert!(say(&urdf("0 0 0", "revolute")).contains("no direction"));
+    assert!(say("<robot name=\"x\"></robot>").contains("0 revolute joints"));
+    assert!(say(&"<a>".repeat(100_000)).contains("nested"));
+    assert!(
+        say(&urdf("0 0 1", "revolute").replace("<mass value=\"7.5\"/>", "<mass value=\"-7.5\"/>"))
+            .contains("arm model")
+    );
+    let toml = AVENA_TOML;
+    assert!(say(&toml.replacen("mass_kg = 7.5", "mass_kg = -7.5", 1)).contains("arm model"));
+    assert!(say(&toml.replacen("kp = ", "kq = ", 1)).contains("line"));
+    assert!(
+        say(&toml.replacen("torque_max_nm = 80.0", "torque_max_nm = -80.0", 1)).contains("torque_max_nm")
+    );
+    assert!(
+        say(&toml.replacen("position_min_rad = -3.05", "position_min_rad = 4", 1))
+            .contains("position_min_rad")
+    );
+}
+
+#[test]
+fn parts_of_an_arm_file_may_be_missing() {
+    let no_gains: String = AVENA_TOML
+        .lines()
+        .filter(|l| !l.starts_with("pid") && !l.starts_with("friction_polynomial"))
+        .map(|l| format!("{l}\n"))
+        .collect();
+    let arm = Arm::parse(&no_gains).unwrap();
+    assert!(arm.pid.is_none() && arm.polynomial.is_none() && arm.table.is_some());
+    let one: String = AVENA_TOML.replacen("pid = ", "# pid = ", 1);
+    assert!(Arm::parse(&one).unwrap_err().to_string().contains("pid is missing"));
+}
+
+#[test]
+fn a_reversed_polynomial_file_is_noticed() {
+    let Some(c) = Arm::avena().polynomial else { panic!() };
+    let text = |rows: &[[f64; 6]], n: usize, reverse: bool| -> String {
+        rows.iter()
+            .map(|r| {
+                let mut cells: Vec<String> = r[..n].iter().map(f64::to_string).collect();
+                if reverse {
+                    cells.reverse();
+                }
+                cells.join(",") + "\n"
+            })
+            .collect()
+    };
+    for n in [4, 6] {
+        assert!(csv::read(&text(&c, n, false)).is_ok());
+        let error = csv::read(&text(&c, n, true)).expect_err("accepted").to_string();
+        assert!(error.contains("descending"), "{error}");
+    }
+}
+
+#[test]
+fn the_existing_parameter_files_are_read() {
+    let arm = Arm::avena();
+    let load = |name| data(name).map(|p| ParameterFile::load(&p).unwrap());
+    if let Some(file) = load("FricPolynomialCoeffs.csv") {
+        assert_eq!(file.polynomial, arm.polynomial);
+    }
+    if let Some(file) = load("FricTableJoint3.csv") {
+        assert_eq!((file.table, file.warnings.len()), (arm.table.clone(), 0));
+    }
+    if let Some(file) = load("friction_table_default.csv") {
+        assert_eq!(file.table, arm.table);
+    }
+    if let Some(file) = load("PidParamJoint0.csv") {
+        assert_eq!(file.pid, arm.pid);
+    }
+    if let Some(file) = load("model_default.txt") {
+        let model = file.model.unwrap();
+        // The one number that the old default has with the other sign.
+        assert_eq!((model.joints[3].xyz[2], model.links), (0.005, arm.model.links));
+    }
+    if let Some(file) = load("avena_arm_id.urdf") {
+        let found = file.arm.unwrap();
+        assert_eq!(found.joint_names[0], "avena_joint_1");
+        assert_eq!((found.model.links[2].mass, found.joints[1].torque_max), (9.0, 180.0));
+        let limits = file.warnings.iter().filter(|w| w.problem.contains("velocity limit 0: 1.5")).count();
+        assert_eq!((limits, file.warnings.len()), (6, 6), "{:?}", file.warnings);
+    }
+    if let Some(file) = load("Avena.urdf") {
+        let found = file.arm.unwrap();
+        assert_eq!(found.model.joints[6].xyz, [0.0, 0.0, 0.0181]);
+        assert_eq!(found.joints[2].position_max, 2.9);
+        assert!(file.warnings.iter().any(|w| w.problem.contains("no position limits")));
+    }
+    if let Some(dir) = data("Avena.urdf").and_then(|p| p.parent().map(Path::to_owned)) {
+        let file = ParameterFile::load(&dir).unwrap();
+        assert!(
+            file.polynomial.is_some() && file.table.is_some() && file.pid.is_some() && file.model.is_none()
+        );
+    }
+}

@@ -1,13 +1,14 @@
-//! The arm made ready to compute with: link frames and inertial parameters chosen so that little work is left per call.
+//! The arm made ready to compute with: link frames and inertial parameters chosen so that little work is left
+//! per call.
 //!
 //! Two choices of ours, neither of which changes a joint torque:
 //!
-//! * **Frames.** Each constant rotation between joints is Rz(a)·Rx(α)·Rz(b). Rz(b) is added to the joint's position and
-//!   Rz(a) is given to the frame before, so Rx(α)·Rz(q + offset) is left: two plane rotations. The frame's origin
-//!   may sit anywhere on its joint axis; it sits where the vector from the frame before is perpendicular to the axis.
-//! * **Inertia.** What of a link is symmetric about its joint axis (its mass, the first and second
-//!   moment along the axis) moves in the same way whether it turns with the link or not, so it is carried by the link
-//!   before. Going from the wrist to the base, every link keeps seven numbers and no mass at all.
+//! * **Frames.** Each constant rotation between joints is Rz(a)·Rx(α)·Rz(b). Rz(b) is added to the joint's
+//!   position and Rz(a) is given to the frame before, so Rx(α)·Rz(q + offset) is left: two plane rotations. A
+//!   frame's origin may sit anywhere on its joint axis; it sits where the vector to the next origin is
+//!   perpendicular to the axis.
+//! * **Inertia.** What of a link is symmetric about its joint axis (its mass, the first and second moment along the
+//!   axis) moves in the same way whether it turns with the link or not, so it is carried by the link before. Going from the wrist to the base, every link keeps seven numbers and no mass at all.
 
 use crate::model::{ArmModel, JOINTS, symmetric};
 use crate::rotation::{Mat3, about_x, about_z, apply, congruent, from_rpy, product, unit};
@@ -19,20 +20,19 @@ pub(crate) struct Twist {
     pub sin: f64,
     pub cos: f64,
     pub offset: f64,
-    /// Origin of frame k in frame k−1, m.
-    pub p: [f64; 3],
-    /// The same seen after Rx(α); its z is 0 by choice of the origin.
-    pub mid: [f64; 2],
+    /// Origin of frame k in frame k−1, m; its z is 0 by choice of the origin of frame k−1.
+    pub p: [f64; 2],
 }
 
-/// A link: what is left of its inertia in its own frame (mass, first moment along z and the integral of z² are zero).
+/// A link: what is left of its inertia in its own frame (mass, first moment along z and the integral of z²
+/// are zero).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
     /// First moment of mass: integrals of x and y over the mass, kg·m.
     pub hx: f64,
     pub hy: f64,
-    /// Second moments of mass: integrals of x², y² and of the products, kg·m². Unlike moments of inertia these enter
-    /// the torque with the acceleration of each axis alone.
+    /// Second moments of mass: integrals of x², y² and of the products, kg·m². Unlike moments of inertia
+    /// these enter the torque with the acceleration of each axis alone.
     pub xx: f64,
     pub yy: f64,
     pub xy: f64,
@@ -111,34 +111,35 @@ pub(crate) struct Chain {
 impl Chain {
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
         let placements = model.joints.map(|o| Placement { rotation: from_rpy(&o.rpy), xyz: o.xyz });
-        let zero = Twist { sin: 0.0, cos: 1.0, offset: 0.0, p: [0.0; 3], mid: [0.0; 2] };
-        let mut twists = [zero; JOINTS];
+        let mut twists = [Twist { sin: 0.0, cos: 1.0, offset: 0.0, p: [0.0; 2] }; JOINTS];
         // Sine and cosine of the turn about z, and the shift along it, of our frame k from the model's.
         let mut turns = [(0.0, 1.0); JOINTS];
         let mut shifts = [0.0; JOINTS];
         let mut lift = gravity.map(|g| -g);
+        let mut origins = [[0.0; 3]; JOINTS];
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
             // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α).
             let (cos_a, sin_a) =
                 if c[0][2] == 0.0 && c[1][2] == 0.0 { (1.0, 0.0) } else { unit(-c[1][2], c[0][2]) };
-            let rest = product(&about_z(-sin_a, cos_a), c);
+            let back = about_z(-sin_a, cos_a);
+            let rest = product(&back, c);
             let (cos, sin) = unit(rest[2][2], -rest[1][2]);
             let (cos_b, sin_b) = unit(rest[0][0], -rest[0][1]);
-            let mut p = apply(&about_z(-sin_a, cos_a), &placements[k].xyz);
-            if k > 0 {
+            origins[k] = apply(&back, &placements[k].xyz);
+            if k == 0 {
+                lift = apply(&about_x(-sin, cos), &apply(&back, &lift));
+            } else {
                 turns[k - 1] = (sin_a, cos_a);
                 twists[k - 1].offset += angle(sin_a, cos_a);
-                p[2] -= shifts[k - 1];
-            } else {
-                lift = apply(&about_x(-sin, cos), &apply(&about_z(-sin_a, cos_a), &lift));
             }
-            let mid = apply(&about_x(-sin, cos), &p);
-            shifts[k] = -mid[2];
-            p = apply(&about_x(sin, cos), &[mid[0], mid[1], 0.0]);
-            let twist = &mut twists[k];
-            (twist.sin, twist.cos, twist.p, twist.mid) = (sin, cos, p, [mid[0], mid[1]]);
-            twist.offset += angle(sin_b, cos_b);
+            (twists[k].sin, twists[k].cos) = (sin, cos);
+            twists[k].offset += angle(sin_b, cos_b);
+        }
+        for k in (1..JOINTS).rev() {
+            let [x, y, z] = origins[k];
+            shifts[k - 1] = z + shifts[k] * twists[k].cos;
+            twists[k].p = [x, y - shifts[k] * twists[k].sin];
         }
         let bodies = regroup(model, &twists, &turns, &shifts);
         Self { twists, bodies, lift, placements }
@@ -164,7 +165,8 @@ fn regroup(
         total.add(&handed);
         let (rest, symmetric) = total.split();
         bodies[k] = rest;
-        handed = symmetric.placed(&about_x(twists[k].sin, twists[k].cos), &twists[k].p);
+        let [x, y] = twists[k].p;
+        handed = symmetric.placed(&about_x(twists[k].sin, twists[k].cos), &[x, y, 0.0]);
     }
     bodies
 }

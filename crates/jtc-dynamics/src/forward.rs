@@ -1,7 +1,7 @@
 //! Mass matrix by composite rigid bodies, and forward dynamics by its LDLᵀ factors.
 
-// Matrix elements are named by their indices, as in the formulas.
-#![allow(clippy::needless_range_loop)]
+// Matrix elements are named by their indices, as in the formulas; written-out triangles have empty corners.
+#![allow(clippy::needless_range_loop, clippy::absurd_extreme_comparisons)]
 
 use crate::chain::{Body, Chain, Twist};
 use crate::inverse::{Turns, Wrench, inverse, inwards, rx, rz};
@@ -11,8 +11,8 @@ use crate::unroll::unroll;
 /// A square matrix over the joints.
 pub(crate) type JointMat = [[f64; JOINTS]; JOINTS];
 
-/// A link and all that it carries: first and second moments of mass about the link's origin. There is no mass: see
-/// [`crate::chain`].
+/// A link and all that it carries: first and second moments of mass about the link's origin. There is no
+/// mass: see [`crate::chain`].
 #[derive(Clone, Copy)]
 struct Composite {
     h: [f64; 3],
@@ -24,7 +24,8 @@ struct Composite {
     yz: f64,
 }
 
-/// The plane part of a symmetric matrix turned by (s, c): its two diagonal entries and the product between them.
+/// The plane part of a symmetric matrix turned by (s, c): its two diagonal entries and the product between
+/// them.
 #[inline(always)]
 fn turn(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
     let w = s * (a - b) + (c + c) * ab;
@@ -42,15 +43,15 @@ impl Composite {
     #[inline(always)]
     fn inwards(&self, t: &Twist, (s, c): (f64, f64)) -> Self {
         let (xx, yy, xy) = turn(s, c, self.xx, self.yy, self.xy);
-        let [xz, yz, zz] = rz(s, c, [self.xz, self.yz, self.zz]);
+        let [xz, yz, _] = rz(s, c, [self.xz, self.yz, 0.0]);
         let h = rz(s, c, self.h);
-        let [a, b] = t.mid;
-        let (ax, by) = (a * h[0], b * h[1]);
-        let (xx, yy) = (xx + (ax + ax), yy + (by + by));
-        let (xy, xz, yz) = (xy + (a * h[1] + b * h[0]), xz + a * h[2], yz + b * h[2]);
-        let (yy, zz, yz) = turn(t.sin, t.cos, yy, zz, yz);
+        let (yy, zz, yz) = turn(t.sin, t.cos, yy, self.zz, yz);
         let [_, xy, xz] = rx(t, [0.0, xy, xz]);
-        Self { h: rx(t, h), xx, yy, zz, xy, xz, yz }
+        let h = rx(t, h);
+        let [x, y] = t.p;
+        let (xh, yh) = (x * h[0], y * h[1]);
+        let (xx, yy) = (xx + (xh + xh), yy + (yh + yh));
+        Self { h, xx, yy, zz, xy: xy + (x * h[1] + y * h[0]), xz: xz + x * h[2], yz: yz + y * h[2] }
     }
 
     #[inline(always)]
@@ -112,8 +113,8 @@ pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
 /// Smallest pivot, relative to its diagonal entry, that is not taken for rounding.
 const PIVOT_MIN: f64 = 1.0e-14;
 
-/// Solves M·x = b for a symmetric positive definite M given by its lower triangle. A joint whose pivot is zero or
-/// lost in rounding gets 0.
+/// Solves M·x = b for a symmetric positive definite M given by its lower triangle. A joint whose pivot is
+/// zero or lost in rounding gets 0.
 #[inline(always)]
 fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     let mut inverse = [0.0; JOINTS];

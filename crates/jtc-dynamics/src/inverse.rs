@@ -131,7 +131,7 @@ impl Motion {
     #[inline(always)]
     fn next(&self, u: &Swing, t: &Twist, (s, c): (f64, f64), qd: f64, qdd: f64) -> Self {
         let p = &t.p;
-        let reach = |k: usize| self.acc[k] + (u[k][0] * p[0] + u[k][1] * p[1] + u[k][2] * p[2]);
+        let reach = |k: usize| self.acc[k] + (u[k][0] * p[0] + u[k][1] * p[1]);
         let acc = rz_back(s, c, rx_back(t, [reach(0), reach(1), reach(2)]));
         let mut turn = rz_pair_back(s, c, &rx_pair_back(t, &self.turn));
         let (wx, wy) = (turn[0][0], turn[1][0]);
@@ -160,16 +160,16 @@ impl Body {
 /// A wrench on frame k as the frame k−1 sees it.
 #[inline(always)]
 pub(crate) fn inwards(t: &Twist, (s, c): (f64, f64), wrench: &Wrench) -> Wrench {
-    let mut v = rz_pair(s, c, wrench);
-    let [a, b] = t.mid;
-    v[0][1] += b * v[2][0];
-    v[1][1] -= a * v[2][0];
-    v[2][1] += a * v[1][0] - b * v[0][0];
-    rx_pair(t, &v)
+    let mut v = rx_pair(t, &rz_pair(s, c, wrench));
+    let [x, y] = t.p;
+    v[0][1] += y * v[2][0];
+    v[1][1] -= x * v[2][0];
+    v[2][1] += x * v[1][0] - y * v[0][0];
+    v
 }
 
-/// The wrench of each link alone, under the motion `qd`, `qdd`. Of the first only the moment about its axis is filled in:
-/// the rest goes into the base.
+/// The wrench of each link alone, under the motion `qd`, `qdd`. Of the first only the moment about its axis
+/// is filled in: the rest goes into the base.
 #[inline(always)]
 fn wrenches(chain: &Chain, turns: &Turns, qd: &JointVec, qdd: &JointVec) -> [Wrench; JOINTS] {
     let mut out = [[[0.0; 2]; 3]; JOINTS];

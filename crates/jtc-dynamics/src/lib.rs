@@ -26,12 +26,14 @@ pub struct Dynamics {
 impl Dynamics {
     /// Prepares `model`; `gravity`: acceleration of gravity in the base frame, m/s².
     ///
-    /// The model should have passed [`ArmModel::check`]; one that has not leads to useless numbers, never to a panic.
+    /// The model should have passed [`ArmModel::check`]; one that has not leads to useless numbers, never to
+    /// a panic.
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
         Self { chain: chain::Chain::new(model, gravity) }
     }
 
-    /// Joint torques (N·m) for positions (rad), velocities (rad/s) and accelerations (rad/s²); recursive Newton-Euler.
+    /// Joint torques (N·m) for positions (rad), velocities (rad/s) and accelerations (rad/s²); recursive
+    /// Newton-Euler.
     pub fn inverse(&self, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
         inverse::inverse(&self.chain, &Turns::new(&self.chain, q), qd, qdd)
     }
@@ -46,8 +48,8 @@ impl Dynamics {
         forward::mass_matrix(&self.chain, q)
     }
 
-    /// Joint accelerations (rad/s²) under torques `tau` (N·m); `rotor` is added to the diagonal of the mass matrix
-    /// (kg·m²).
+    /// Joint accelerations (rad/s²) under torques `tau` (N·m); `rotor` is added to the diagonal of the mass
+    /// matrix (kg·m²).
     ///
     /// A joint without any inertia (its row of the mass matrix is lost in rounding) gets the acceleration 0.
     pub fn forward(&self, q: &JointVec, qd: &JointVec, tau: &JointVec, rotor: &JointVec) -> JointVec {

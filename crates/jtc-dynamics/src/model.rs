@@ -1,4 +1,5 @@
-//! The arm as it is described from outside (joint origins, link masses and inertias), and what makes it physical.
+//! The arm as it is described from outside (joint origins, link masses and inertias), and what makes it
+//! physical.
 
 use core::fmt;
 
@@ -172,8 +173,8 @@ const ANGLE_MAX: f64 = 1.0e6;
 const INERTIA_TOLERANCE: f64 = 1.0e-6;
 
 impl ArmModel {
-    /// Physical checks of rule J-06: all numbers finite, no negative mass, links 1 to 5 have a mass, and the inertia
-    /// of every link with mass is one that a body can have (up to the rounding of f32).
+    /// Physical checks of rule J-06: all numbers finite, no negative mass, links 1 to 5 have a mass, and the
+    /// inertia of every link with mass is one that a body can have (up to the rounding of f32).
     pub fn check(&self) -> Result<(), ModelError> {
         for (index, joint) in self.joints.iter().enumerate() {
             finite(index, &joint.xyz, Field::JointXyz)?;

@@ -1,4 +1,5 @@
-//! Rotation matrices, and the principal moments of a symmetric one: what set-up and kinematics need of 3×3 algebra.
+//! Rotation matrices, and the principal moments of a symmetric one: what set-up and kinematics need of 3×3
+//! algebra.
 
 use crate::trig::{sin_cos, sqrt};
 

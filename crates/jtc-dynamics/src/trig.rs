@@ -2,8 +2,8 @@
 
 use core::f64::consts::FRAC_2_PI;
 
-/// π/2 in three parts. The first two have 33 significant bits, so that their products with a quotient below 2^20
-/// are exact.
+/// π/2 in three parts. The first two have 33 significant bits, so that their products with a quotient below
+/// 2^20 are exact.
 const HALF_PI: [f64; 3] = [1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21];
 /// 1.5·2^52: adding it rounds to an integer and leaves that integer in the low bits of the sum.
 const ROUND: f64 = 6755399441055744.0;
@@ -31,22 +31,24 @@ pub const SIN_COS_MAX: f64 = 1.0e9;
 
 /// Sine and cosine of `x` (rad).
 ///
-/// The absolute error of each is at most 2^-52 (2.3e-16) for |x| ≤ 1e6 and grows to half the spacing of numbers
-/// around `x` beyond. Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same
-/// instructions, whatever `x` is.
+/// The absolute error of each is at most 2^-52 (2.3e-16) for |x| ≤ 1e6 and grows to half the spacing of
+/// numbers around `x` beyond. Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes
+/// the same instructions, whatever `x` is.
 #[inline(always)]
 pub fn sin_cos(x: f64) -> (f64, f64) {
-    // NaN rather than rubbish where the reduction below has no digits left (and for infinities).
-    let x = if x.abs() <= SIN_COS_MAX { x } else { f64::NAN };
     let rounded = x * FRAC_2_PI + ROUND;
     let quadrant = rounded.to_bits();
-    let k = rounded - ROUND;
+    // NaN rather than rubbish where the reduction has no digits left (and for infinities).
+    let k = if x.abs() <= SIN_COS_MAX { rounded - ROUND } else { f64::NAN };
     let r = ((x - k * HALF_PI[0]) - k * HALF_PI[1]) - k * HALF_PI[2];
+    // The polynomials in pairs of terms: shorter to wait for than one term after the other.
     let z = r * r;
-    let s = SIN[0] + z * (SIN[1] + z * (SIN[2] + z * (SIN[3] + z * (SIN[4] + z * SIN[5]))));
-    let c = COS[0] + z * (COS[1] + z * (COS[2] + z * (COS[3] + z * (COS[4] + z * COS[5]))));
-    let s = (r + (r * z) * s).to_bits();
-    let c = ((1.0 - 0.5 * z) + (z * z) * c).to_bits();
+    let zz = z * z;
+    let rz = r * z;
+    let s = ((SIN[0] + z * SIN[1]) + zz * (SIN[2] + z * SIN[3])) + (zz * zz) * (SIN[4] + z * SIN[5]);
+    let c = ((COS[0] + z * COS[1]) + zz * (COS[2] + z * COS[3])) + (zz * zz) * (COS[4] + z * COS[5]);
+    let s = (r + rz * s).to_bits();
+    let c = ((1.0 - 0.5 * z) + zz * c).to_bits();
     // Odd quadrants swap sine and cosine; bit 1 of the quadrant (of the next one for the cosine) is the sign.
     let swap = (quadrant & 1).wrapping_neg();
     let mixed = (s ^ c) & swap;
@@ -55,8 +57,8 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     (f64::from_bits((s ^ mixed) ^ sign_s), f64::from_bits((c ^ mixed) ^ sign_c))
 }
 
-/// Square root of a finite `x` ≥ 0 by Newton's method; 0 for anything below the normal numbers. For set-up, not for
-/// the tick.
+/// Square root of a finite `x` ≥ 0 by Newton's method; 0 for anything below the normal numbers. For set-up,
+/// not for the tick.
 pub(crate) fn sqrt(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return 0.0;

@@ -1,4 +1,5 @@
-//! Loops written out: with constant indices the compiler keeps the recursion in registers and drops unused parts.
+//! Loops written out: with constant indices the compiler keeps the recursion in registers and drops unused
+//! parts.
 
 /// Repeats the block with the name standing for each of the numbers in turn.
 macro_rules! unroll {

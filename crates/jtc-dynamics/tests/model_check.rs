@@ -1,0 +1,151 @@
+//! What makes an arm model physical (J-06).
+mod arms;
+
+use jtc_dynamics::{ArmModel, Field, ModelError};
+use proptest::prelude::*;
+
+/// The number at place `i` of the 133 of a model, in the order of the ArmModel frame.
+fn number(model: &mut ArmModel, i: usize) -> &mut f64 {
+    if i < 42 {
+        let joint = &mut model.joints[i / 6];
+        return if i % 6 < 3 { &mut joint.xyz[i % 6] } else { &mut joint.rpy[i % 6 - 3] };
+    }
+    let (link, i) = (&mut model.links[(i - 42) / 13], (i - 42) % 13);
+    match i {
+        0..3 => &mut link.origin.xyz[i],
+        3..6 => &mut link.origin.rpy[i - 3],
+        6..12 => &mut link.inertia[i - 6],
+        _ => &mut link.mass,
+    }
+}
+
+#[test]
+fn j06_the_default_arm_is_physical() {
+    assert_eq!(arms::avena().check(), Ok(()));
+}
+
+#[test]
+fn j06_the_default_arm_is_physical_after_rounding_to_f32() {
+    let mut model = arms::avena();
+    for i in 0..133 {
+        let v = number(&mut model, i);
+        *v = f64::from(*v as f32);
+    }
+    assert_eq!(model.check(), Ok(()));
+}
+
+#[test]
+fn j06_any_number_that_is_not_finite_is_refused_and_named() {
+    for i in 0..133 {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let mut model = arms::avena();
+            *number(&mut model, i) = bad;
+            let Err(ModelError::NotFinite { index, field, value }) = model.check() else {
+                panic!("place {i}: {bad}")
+            };
+            assert_eq!(value.to_bits(), bad.to_bits());
+            let place = match field {
+                Field::JointXyz(k) => 6 * index + k,
+                Field::JointRpy(k) => 6 * index + 3 + k,
+                Field::LinkXyz(k) => 42 + 13 * index + k,
+                Field::LinkRpy(k) => 42 + 13 * index + 3 + k,
+                Field::Inertia(k) => 42 + 13 * index + 6 + k,
+                _ => 42 + 13 * index + 12,
+            };
+            assert_eq!(place, i, "{field:?} of {index}");
+        }
+    }
+}
+
+#[test]
+fn j06_mass_is_not_negative_and_zero_only_in_links_0_and_6() {
+    for link in 0..7 {
+        let mut model = arms::avena();
+        model.links[link].mass = -0.001;
+        assert_eq!(model.check(), Err(ModelError::MassNegative { link, mass: -0.001 }));
+        model.links[link].mass = 0.0;
+        let wanted = if (1..=5).contains(&link) { Err(ModelError::MassZero { link }) } else { Ok(()) };
+        assert_eq!(model.check(), wanted, "link {link}");
+    }
+}
+
+#[test]
+fn j06_a_link_without_mass_may_have_any_inertia() {
+    let mut model = arms::avena();
+    model.links[6].mass = 0.0;
+    model.links[6].inertia = [-1.0, 0.0, 0.0, 5.0, 0.0, 1.0];
+    assert_eq!(model.check(), Ok(()));
+}
+
+#[test]
+fn j06_inertia_must_be_positive_semidefinite() {
+    for link in 0..7 {
+        let mut model = arms::avena();
+        // Moments 3, 1 and, by the product, −1 in the plane of y and z.
+        model.links[link].inertia = [3.0, 0.0, 0.0, 1.0, 2.0, 1.0];
+        let Err(ModelError::InertiaNegative { link: at, moment }) = model.check() else {
+            panic!("link {link}")
+        };
+        assert_eq!(at, link);
+        assert!((moment + 1.0).abs() < 1e-12, "{moment}");
+    }
+}
+
+#[test]
+fn j06_inertia_must_hold_the_triangle_inequality() {
+    for link in 0..7 {
+        let mut model = arms::avena();
+        // Moments 1, 1 and 3: the axes of the largest are not those of the frame.
+        model.links[link].inertia = [2.0, 1.0, 0.0, 2.0, 0.0, 1.0];
+        let Err(ModelError::InertiaTriangle { link: at, moment, limit }) = model.check() else {
+            panic!("link {link}")
+        };
+        assert_eq!(at, link);
+        assert!((moment - 3.0).abs() < 1e-12 && (limit - 2.0).abs() < 1e-12, "{moment} {limit}");
+    }
+}
+
+#[test]
+fn j06_bodies_at_the_limit_pass() {
+    let mut model = arms::avena();
+    for inertia in [[0.0; 6], [0.0, 0.0, 0.0, 1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0, 0.0, 2.0]] {
+        model.links[3].inertia = inertia;
+        assert_eq!(model.check(), Ok(()), "point, rod, plate: {inertia:?}");
+    }
+}
+
+#[test]
+fn j06_angles_without_a_meaning_are_refused() {
+    let mut model = arms::avena();
+    model.joints[2].rpy[1] = 1e7;
+    let Err(error) = model.check() else { panic!("accepted") };
+    assert!(matches!(error, ModelError::AngleTooLarge { index: 2, field: Field::JointRpy(1), .. }));
+    assert_eq!(error.to_string(), "joint 2: origin pitch is 10000000 rad, limit 1000000 rad; degrees?");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Inertia made of point masses passes in every orientation, and fails once a moment is taken from it
+    /// that it does not have.
+    #[test]
+    fn j06_what_points_of_mass_make_is_accepted(
+        points in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 1..6)
+    ) {
+        let mut inertia = [0.0; 6];
+        for [x, y, z, m] in points {
+            let m = m.abs();
+            let (xx, yy, zz) = (m * x * x, m * y * y, m * z * z);
+            let add = [yy + zz, -m * x * y, -m * x * z, xx + zz, -m * y * z, xx + yy];
+            inertia.iter_mut().zip(add).for_each(|(i, a)| *i += a);
+        }
+        let mut model = arms::avena();
+        model.links[4].inertia = inertia;
+        prop_assert_eq!(model.check(), Ok(()));
+        // The trace is twice the sum of the second moments, so this is more than any axis has.
+        let too_much = 0.6 * (inertia[0] + inertia[3] + inertia[5]) + 1e-3;
+        model.links[4].inertia[0] += too_much;
+        model.links[4].inertia[3] -= too_much;
+        prop_assert!(model.check().is_err());
+    }
+}

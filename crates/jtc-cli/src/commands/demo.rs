@@ -122,7 +122,8 @@ fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
     session.push(&arm.parameter_set(), |p| out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes)))?;
     out.note("drives: waiting until all six hold the arm");
     session.wait_hold(BRING_UP)?;
-    out.note(format!("  HoldPos after {:.1} s", session.now().as_secs_f64()));
+    session.wait_for("all drives enabled", BRING_UP, |s| s.joints.iter().all(|j| j.fsm == 3))?;
+    out.note(format!("  HoldPos, drives enabled after {:.1} s", session.now().as_secs_f64()));
 
     let bar = out.bar(1, "upload");
     let upload = session.upload(&points, trajectory.step_ms, &UploadOptions::default(), |p| {
@@ -180,24 +181,33 @@ fn wait(session: &mut Session<SimPort>, time: Duration) -> Result<(), Failure> {
 const TIME: f64 = 10.0;
 /// Step between points, ms.
 const STEP_MS: u16 = 10;
-/// Amplitude (rad) and number of swings of each joint.
-const SWINGS: [(f64, f64); 6] = [(1.25, 1.0), (0.55, 2.0), (-0.85, 1.0), (0.7, 2.0), (1.1, 1.0), (0.5, 3.0)];
+/// Of each joint: a bend there and back (rad), the amplitude of its swings (rad) and their number.
+const MOTION: [(f64, f64, f64); 6] =
+    [(0.0, 1.5, 1.0), (0.45, 0.4, 2.0), (-1.5, 0.35, 2.0), (0.5, 0.6, 2.0), (0.9, 0.7, 1.0), (0.0, 0.5, 3.0)];
 
-/// A smooth motion of all joints from the zero pose and back to it: swings under a window that begins and ends at rest, without a step
-/// in position, velocity or acceleration.
+/// A smooth motion of all joints from the zero pose and back to it: a bend and swings under a window that begins and ends at rest,
+/// without a step in position, velocity or acceleration.
 fn trajectory() -> Trajectory {
     let count = (TIME * 1e3) as usize / usize::from(STEP_MS) + 1;
     let omega = std::f64::consts::TAU / TIME;
     let point = |i: usize| {
         let t = i as f64 * f64::from(STEP_MS) * 1e-3;
         let mut p = Point::default();
-        for (j, (amplitude, swings)) in SWINGS.into_iter().enumerate() {
-            // A·sin²(πs)·sin(2πns) is the sum of three sines, whose derivatives are plain.
-            for (share, n) in [(0.5, swings), (-0.25, swings + 1.0), (-0.25, swings - 1.0)] {
-                let (w, a) = (omega * n, amplitude * share);
-                p.position[j] += a * (w * t).sin();
-                p.velocity[j] += a * w * (w * t).cos();
-                p.acceleration[j] -= a * w * w * (w * t).sin();
+        for (j, (bend, swing, n)) in MOTION.into_iter().enumerate() {
+            p.position[j] = bend * 0.375;
+            // B·sin⁴(πs) + A·sin²(πs)·sin(2πns), written as sines and cosines, whose derivatives are plain.
+            for (a, b, n) in [
+                (0.0, -0.5 * bend, 1.0),
+                (0.0, 0.125 * bend, 2.0),
+                (0.5 * swing, 0.0, n),
+                (-0.25 * swing, 0.0, n + 1.0),
+                (-0.25 * swing, 0.0, n - 1.0),
+            ] {
+                let w = omega * n;
+                let (sin, cos) = (w * t).sin_cos();
+                p.position[j] += a * sin + b * cos;
+                p.velocity[j] += w * (a * cos - b * sin);
+                p.acceleration[j] -= w * w * (a * sin + b * cos);
             }
         }
         p

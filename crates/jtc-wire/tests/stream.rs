@@ -287,7 +287,7 @@ fn j07_hostile_bytes_cost_little() {
             break;
         }
     }
-    assert!(polls <= 15_000 / 15, "{polls} polls");
+    assert!(polls <= 15_000 / 14, "{polls} polls");
     assert_eq!(receiver.push(6000, &ON), 6);
     assert!(receiver.poll(6000));
 }

@@ -10,9 +10,17 @@ pub const LIMIT: u64 = 448 * 1024;
 
 /// Bytes of the controller with the memory of 12 000 points, as the compiler lays it out.
 pub fn controller_bytes() -> Result<u64> {
-    let text = shell::read(&mut cargo(&["run", "--quiet", "--package", "xtask", "--example", "memory"]))?;
+    let text = shell::read(&mut cargo(&[
+        "run",
+        "--quiet",
+        "--release",
+        "--package",
+        "jtc-core",
+        "--example",
+        "time",
+    ]))?;
     let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));
-    line.context("the example `memory` printed no controller_bytes")?
+    line.context("the example `time` of jtc-core printed no controller_bytes")?
         .trim()
         .parse()
         .context("controller_bytes")

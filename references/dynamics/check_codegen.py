@@ -1,0 +1,81 @@
+"""Looks at the machine code of jtc-dynamics for the board: no panic, no branch, how many instructions.
+
+    python check_codegen.py
+
+Builds the crate for thumbv7em-none-eabihf with target-cpu=cortex-m7 (with it f64 is done in hardware) and reads the
+assembly: the crate may not mention `panicking` anywhere, and the per-tick functions may not contain a call, a fused
+multiply-add or a conditional branch, but for one that closes a loop over the six joints. So every call executes the
+same instructions: constant by construction, and the count printed is exact. Exit code 1 on a finding.
+"""
+
+import glob
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+TARGET = "thumbv7em-none-eabihf"
+STRAIGHT = ["inverse", "gravity_torque", "mass_matrix", "forward"]
+JOINTS = 6
+
+
+def assembly():
+    command = ["cargo", "rustc", "--release", "--quiet", "--package", "jtc-dynamics", "--lib", "--target", TARGET]
+    command += ["--", "--emit", "asm", "-C", "lto=off", "-C", "codegen-units=1"]
+    target_dir = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "codegen"
+    environment = os.environ | {"CARGO_TARGET_DIR": str(target_dir), "RUSTFLAGS": "-C target-cpu=cortex-m7"}
+    subprocess.run(command, cwd=ROOT, env=environment, check=True)
+    files = glob.glob(str(target_dir / TARGET / "release/deps/jtc_dynamics-*.s"))
+    return pathlib.Path(max(files, key=os.path.getmtime)).read_text()
+
+
+def functions(text):
+    """Instructions and labels of each function `Dynamics::name`."""
+    for match in re.finditer(r"^(_ZN12jtc_dynamics8Dynamics\d+(\w+?)17h\w+):\n(.*?)^\.Lfunc_end", text, re.M | re.S):
+        lines = (line.strip() for line in match[3].splitlines())
+        yield match[2], [line for line in lines if line and (line[0] not in ".@" or re.match(r"\.LBB\w+:", line))]
+
+
+def is_instruction(line):
+    return not line.endswith(":") and ":" not in line.split()[0]
+
+
+def inspect(body):
+    """Instructions that a call executes, and what is wrong."""
+    count, findings, loops = sum(map(is_instruction, body)), [], 0
+    for place, line in enumerate(body):
+        word, *operands = line.split()
+        target = operands[-1] + ":" if operands else ""
+        if re.fullmatch(r"vfn?m[as].*", word):
+            findings.append(f"fused multiply-add: {line}")
+        elif re.fullmatch(r"blx?(\.[nw])?", word):
+            findings.append(f"call: {line}")
+        elif re.fullmatch(r"cbn?z|b(eq|ne|[lg][te]|[mv][is]|[mv]c|pl|hi|ls|hs|lo|cc|cs)(\.[nw])?", word):
+            loops += 1
+            if target in body[:place] and loops == 1:
+                count += (JOINTS - 1) * sum(map(is_instruction, body[body.index(target) : place]))
+            else:
+                findings.append(f"branch: {line}")
+    return count, findings
+
+
+def main():
+    text = assembly()
+    findings = ["the crate mentions panicking"] if "panicking" in text else []
+    found = dict(functions(text))
+    for name in STRAIGHT:
+        if name not in found:
+            findings.append(f"{name}: not found in the assembly")
+            continue
+        count, wrong = inspect(found[name])
+        findings += [f"{name}: {w}" for w in wrong]
+        print(f"{name} {count} instructions")
+    for finding in findings:
+        print("FAILED", finding)
+    sys.exit(1 if findings else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,33 @@
+//! Trajectories to measure with.
+use jtc_host::Point;
+use jtc_wire::RawPoint;
+
+/// ms between points.
+pub const STEP_MS: u16 = 10;
+
+/// A smooth motion of all joints from rest at zero to rest at zero, `points` long, in 10 s swings.
+pub fn smooth(points: usize) -> Vec<Point> {
+    const AMPLITUDE: [f64; 6] = [0.8, -0.5, 0.9, 0.7, -0.8, 1.0];
+    let omega = std::f64::consts::TAU / 10.0;
+    (0..points)
+        .map(|i| {
+            // (1 − cos ωt)²/4 starts and ends each swing with velocity and acceleration zero.
+            let t = i as f64 * f64::from(STEP_MS) * 1e-3;
+            let (s, c) = (omega * t).sin_cos();
+            let u = 1.0 - c;
+            let position = u * u / 4.0;
+            let velocity = omega * u * s / 2.0;
+            let acceleration = omega * omega * (s * s + u * c) / 2.0;
+            Point {
+                position: AMPLITUDE.map(|a| a * position),
+                velocity: AMPLITUDE.map(|a| a * velocity),
+                acceleration: AMPLITUDE.map(|a| a * acceleration),
+            }
+        })
+        .collect()
+}
+
+/// Points as the wire carries them.
+pub fn raw(points: &[Point]) -> Result<Vec<RawPoint>, Box<dyn std::error::Error>> {
+    Ok(points.iter().enumerate().map(|(i, point)| point.raw(i)).collect::<Result<_, _>>()?)
+}

@@ -1,0 +1,101 @@
+//! The longest tick: a run against the simulator, with a friction table and a segment taken over on the way, is kept and
+//! given again to fresh controllers.
+use std::hint::black_box;
+use std::time::Instant;
+
+use jtc_bus::Frame;
+use jtc_core::{BusState, Config, Controller, Inputs, POINTS_MAX, State};
+use jtc_host::frame;
+use jtc_sim::{SimConfig, World};
+use jtc_wire::{ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint};
+
+use crate::world::Result;
+use crate::{path, print};
+
+/// Ticks of the motion.
+const MOVING: usize = 5_000;
+/// Times that the whole run is given again.
+const ROUNDS: usize = 15;
+
+/// What the controller saw in one tick.
+struct Seen {
+    bus: Vec<Frame>,
+    /// Index of the host's frame that was offered.
+    host: Option<usize>,
+}
+
+/// Frames that a host sends, and the state in which each is offered.
+fn script() -> Result<Vec<(State, Vec<u8>)>> {
+    use FrameType::*;
+    let parameters = [FrictionTableUseDefault, PidParamUseDefault, ArmModelUseDefault];
+    let mut frames: Vec<_> = parameters.map(|kind| (State::Init, frame::frame(kind, &[]))).into();
+    let avena = jtc_host::Arm::avena();
+    let points = path::raw(&path::smooth(MOVING / usize::from(path::STEP_MS) + 200))?;
+    frames.push((State::HoldPos, frame::segment(1, 0, 1, path::STEP_MS, &points)));
+    frames.push((State::HoldPos, frame::exec(ExecCommand::Execute)));
+    if let Some(friction) = avena.friction() {
+        frames.insert(3, (State::HoldPos, frame::friction(&friction)));
+    }
+    Ok(frames)
+}
+
+fn controller() -> Controller<Vec<RawPoint>> {
+    Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX])
+}
+
+fn event(bytes: &[u8]) -> Option<LinkEvent<'_>> {
+    Some(LinkEvent::Frame(FrameRef::new_checked(bytes)?))
+}
+
+fn inputs<'a>(bus: &'a [Frame], host: Option<LinkEvent<'a>>) -> Inputs<'a> {
+    let bus_state = BusState { acknowledged: true, bus_off: false };
+    Inputs { bus, bus_state, safety_input: true, host, status_free: true }
+}
+
+/// A whole run: bring-up, parameters, upload, motion. The world answers a controller of its own, which sees the same.
+fn record(frames: &[(State, Vec<u8>)]) -> Vec<Seen> {
+    let mut world = World::new(SimConfig { baud: None, ..SimConfig::default() });
+    let mut shadow = controller();
+    let (mut seen, mut next, mut moving) = (Vec::new(), 0, 0);
+    let mut sent = 0;
+    while moving < MOVING {
+        let state = shadow.telemetry().state;
+        let offered = (next < frames.len() && frames[next].0 == state).then_some(next);
+        if let Some(index) = offered
+            && index >= sent
+        {
+            world.host_write(&frames[index].1);
+            sent = index + 1;
+        }
+        let bus: Vec<Frame> =
+            world.bus_frames().iter().map(|timed| timed.frame).filter(|frame| frame.id >= 0x200).collect();
+        let outputs = shadow.tick(&inputs(&bus, offered.and_then(|index| event(&frames[index].1))));
+        next += usize::from(outputs.host_done);
+        seen.push(Seen { bus, host: offered });
+        world.step();
+        moving += usize::from(state == State::Operate);
+        assert!(seen.len() < 60_000, "the run does not get to its motion: {:?}", shadow.telemetry());
+    }
+    seen
+}
+
+pub fn figures() -> Result<()> {
+    let frames = script()?;
+    let seen = record(&frames);
+    // The least of all rounds leaves out what the machine did meanwhile.
+    let mut least = vec![f64::INFINITY; seen.len()];
+    for _ in 0..ROUNDS {
+        let mut controller = controller();
+        for (tick, least) in seen.iter().zip(&mut least) {
+            let host = tick.host.and_then(|index| event(&frames[index].1));
+            let start = Instant::now();
+            black_box(controller.tick(&inputs(&tick.bus, host)));
+            *least = least.min(start.elapsed().as_secs_f64() * 1e9);
+        }
+        assert_eq!(controller.telemetry().state, State::Operate, "the run given again ends as the first did");
+    }
+    let (quiet, moving) = least.split_at(seen.len() - MOVING);
+    print("tick_longest_moving_ns", moving.iter().copied().fold(0.0, f64::max));
+    print("tick_longest_with_host_frames_ns", quiet.iter().copied().fold(0.0, f64::max));
+    Ok(())
+}

@@ -53,7 +53,9 @@ pub struct Config {
     pub start_tolerance_rad: f64,
     /// Time scale ramp for pause, stop and resume, ms (J-33); made longer where acceleration or torque limits ask for it.
     pub ramp_ms: u16,
-    /// How long a computed torque may stay beyond its limit, saturated there, before it is an error, ms; 0: at once (J-43).
+    /// How long a computed torque may ask for more than its limit before it is an error, ms (J-43). Meanwhile the limit is
+    /// commanded and the integral held; 0: an error in the tick that finds it. A single point missing in a recorded
+    /// trajectory makes a peak of a few milliseconds, for which a loaded arm should not be dropped.
     pub torque_over_ms: u16,
     /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).
     pub blend_ms: u16,

@@ -36,7 +36,7 @@ impl Config {
             position_jump_max: 0.1,
             start_tolerance_rad: 0.02,
             ramp_ms: 200,
-            torque_over_ms: 0,
+            torque_over_ms: 10,
             blend_ms: 100,
             teach_velocity_max: 1.0,
             teach_damping: 40.0,

@@ -1,4 +1,5 @@
-//! Hours of virtual time with random commands and faults: `soak --hours 24 --seed 1`. Ends with 1 when an invariant is broken.
+//! Hours of virtual time with random commands and faults: `soak --hours 24 --seed 1`. Ends with 1 when an
+//! invariant is broken.
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -43,7 +44,8 @@ fn main() -> Result<ExitCode, String> {
     }
     let took = start.elapsed().as_secs_f64();
     println!(
-        "{:.2} h of virtual time in {took:.1} s ({:.0} times real time): {commands} commands, {faults} faults, {finished} motions finished; every invariant held",
+        "{:.2} h of virtual time in {took:.1} s ({:.0} times real time): {commands} commands, {faults} faults, \
+         {finished} motions finished; every invariant held",
         total / 3600.0,
         total / took
     );

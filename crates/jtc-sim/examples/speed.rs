@@ -1,4 +1,5 @@
-//! Prints how long a simulated millisecond takes, as one JSON object: arm, drives, bus and controller while the arm follows a motion.
+//! Prints how long a simulated millisecond takes, as one JSON object: arm, drives, bus and controller while
+//! the arm follows a motion.
 use std::time::Instant;
 
 use jtc_sim::{ModelError, Operator, SimConfig, host};
@@ -29,7 +30,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     times.sort_by(f64::total_cmp);
     let median = times[times.len() / 2];
     println!(
-        "{{\"name\":\"simulated_millisecond\",\"median_ns\":{median:.1},\"least_ns\":{:.1},\"real_time_factor\":{:.0},\"state\":\"{:?}\"}}",
+        "{{\"name\":\"simulated_millisecond\",\"median_ns\":{median:.1},\"least_ns\":{:.1},\
+         \"real_time_factor\":{:.0},\"state\":\"{:?}\"}}",
         times[0],
         1e6 / median,
         world.telemetry().state,

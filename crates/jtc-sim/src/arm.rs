@@ -1,4 +1,5 @@
-//! The true arm: rigid bodies, rotors behind their gears, friction and end stops, integrated by Runge-Kutta at 1 ms.
+//! The true arm: rigid bodies, rotors behind their gears, friction and end stops, integrated by Runge-Kutta
+//! at 1 ms.
 //!
 //! It is deliberately not the arm that the controller believes in: see [`ModelError`](crate::ModelError).
 use jtc_core::{Config, Friction, Parameters, TableOf};
@@ -23,7 +24,8 @@ const HEAT_FLOW: f64 = 1.2;
 pub enum SimFriction {
     /// None.
     Frictionless,
-    /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = v/√(v² + w²), which RK4 at 1 ms can integrate.
+    /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = v/√(v² + w²), which RK4 at 1 ms can
+    /// integrate.
     Polynomial([f64; 6]),
     /// A measured table; beyond its velocities it goes on in a straight line.
     Table(TableOf<f32>),
@@ -223,7 +225,8 @@ impl Arm {
                     self.curves[j] = Curve::Polynomial([k * c[0], k * c[1], k * c[2], k * c[3]]);
                 }
                 SimFriction::Table(table) => {
-                    // A table is slow to cut: only when the temperature has changed a little (also from NaN at the start).
+                    // A table is slow to cut: only when the temperature has changed a little (also from NaN
+                    // at the start).
                     if (t - self.curve_temperature[j]).abs() < 0.02 {
                         continue;
                     }

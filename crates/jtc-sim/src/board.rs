@@ -1,4 +1,5 @@
-//! The controller's board: the controller itself, the host link's receive buffer and the watchdog, glued as the firmware does it.
+//! The controller's board: the controller itself, the host link's receive buffer and the watchdog, glued as
+//! the firmware does it.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Config, Controller, Inputs, Outputs, POINTS_MAX, Telemetry};
 use jtc_wire::{FRAME_MAX, FrameStatus, LinkEvent, RawPoint, Receiver};
@@ -74,7 +75,8 @@ impl Board {
         self.controller.telemetry()
     }
 
-    /// Between ticks: bytes that arrived by `now_us` go through the parser; those taken are removed from `bytes`.
+    /// Between ticks: bytes that arrived by `now_us` go through the parser; those taken are removed from
+    /// `bytes`.
     pub fn receive(&mut self, now_us: u64, bytes: &mut Vec<u8>) {
         let mut taken = 0;
         while !self.has_event {

@@ -1,4 +1,5 @@
-//! The joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors and bus-off.
+//! The joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors
+//! and bus-off.
 use std::collections::VecDeque;
 
 use jtc_bus::{Answer, Frame, JOINTS, NODES, Request, Scale};
@@ -25,7 +26,8 @@ const FOREIGN_MAX: usize = 64;
 
 /// Time of a CAN FD frame with `len` bytes at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
 pub fn frame_us(len: usize) -> u32 {
-    // 31 bits at the nominal rate; the rest at five times that: ESI, DLC and data with stuff bits, then stuff count and CRC.
+    // 31 bits at the nominal rate; the rest at five times that: ESI, DLC and data with stuff bits, then stuff
+    // count and CRC.
     let fast = (5 + 8 * len) as f64 * 1.1 + if len > 16 { 31.0 } else { 27.0 };
     (31.0 + fast / 5.0).round() as u32
 }
@@ -292,7 +294,8 @@ impl Bus {
         }
     }
 
-    /// Frames of others, as many as still fit: answers are for the controller, everything else is for the nodes.
+    /// Frames of others, as many as still fit: answers are for the controller, everything else is for the
+    /// nodes.
     fn carry_foreign(&mut self, now_us: u64, nodes: &mut Nodes, time: &mut u32, received: &mut Vec<Frame>) {
         while let Some(frame) = self.foreign.front().copied() {
             if !self.carry(&frame, time, false) {

@@ -54,8 +54,8 @@ pub enum Support {
     Limp,
     /// A stand, until every joint has been enabled once; afterwards nothing.
     Stand,
-    /// Holding brakes, open only while their drive is enabled. The known drives have none; with brakes the simulated arm stays where it
-    /// can be used again after an error.
+    /// Holding brakes, open only while their drive is enabled. The known drives have none; with brakes the
+    /// simulated arm stays where it can be used again after an error.
     Brakes,
 }
 
@@ -76,7 +76,8 @@ pub struct SimConfig {
     pub drives: [DriveConfig; JOINTS],
     /// A gripper is on the bus.
     pub gripper: bool,
-    /// Joints (bit n = joint n) whose drive is not simulated: it is somewhere else, see [`BusTap`](crate::BusTap).
+    /// Joints (bit n = joint n) whose drive is not simulated: it is somewhere else, see
+    /// [`BusTap`](crate::BusTap).
     pub absent_drives: u8,
     /// Something else on the joint bus, such as an analyser, acknowledges frames even while no node does.
     pub bus_monitored: bool,

@@ -1,4 +1,5 @@
-//! A joint's drive with the habits of the real ones: slow first enable, coarse encoder, late speed, torques that never time out.
+//! A joint's drive with the habits of the real ones: slow first enable, coarse encoder, late speed, torques
+//! that never time out.
 use jtc_bus::{Answer, JointReport, Request, fsm, warning};
 
 use crate::inbox::Inbox;
@@ -57,7 +58,8 @@ pub struct DriveConfig {
     pub working_area: f64,
     /// The drive takes one message per interrupt: requests back to back leave it one behind for good.
     pub one_message_per_interrupt: bool,
-    /// ChangeFsm is executed in the interrupt and answered with the transition's code; else with the state before.
+    /// ChangeFsm is executed in the interrupt and answered with the transition's code; else with the state
+    /// before.
     pub answers_transition: bool,
     /// Answers to Move have 20 bytes; else 16.
     pub long_answers: bool,

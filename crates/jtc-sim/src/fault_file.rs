@@ -11,8 +11,8 @@
 //! kind = "encoder-jump"
 //! joint = 1
 //! rad = 0.3
-//! in_state = "operate"   # … or when this state is first entered (start, init, hold, operate, teaching, error) …
-//! after_s = 1.0          # … and this much later …
+//! in_state = "operate"   # … or when this state is first entered (start, init, hold, operate, teaching,
+//! error) … after_s = 1.0          # … and this much later …
 //!
 //! [[fault]]
 //! kind = "frames-lost"

@@ -1,4 +1,5 @@
-//! A small host for tests, soak runs and the fault matrix: it makes frames, hears statuses, and plans simple motions.
+//! A small host for tests, soak runs and the fault matrix: it makes frames, hears statuses, and plans simple
+//! motions.
 //!
 //! The real client library is `jtc-host`; this one exists so that the world can be exercised without it.
 use jtc_dynamics::{JOINTS, JointVec};
@@ -54,8 +55,8 @@ pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<
     segments.iter().enumerate().map(make).collect()
 }
 
-/// A motion from standstill to standstill along the quintic with zero accelerations at its ends, which leads from `from` to `to` (rad) in
-/// `seconds` and back again, `times` times; points every `step_ms`.
+/// A motion from standstill to standstill along the quintic with zero accelerations at its ends, which leads
+/// from `from` to `to` (rad) in `seconds` and back again, `times` times; points every `step_ms`.
 pub fn there_and_back(
     from: &JointVec,
     to: &JointVec,

@@ -1,8 +1,10 @@
-//! The physical world around the controller, in virtual time: a six-axis arm with friction, drives, gripper, joint bus, serial line, and
-//! everything that can go wrong with them. The controller inside is the very code of the board.
+//! The physical world around the controller, in virtual time: a six-axis arm with friction, drives, gripper,
+//! joint bus, serial line, and everything that can go wrong with them. The controller inside is the very code
+//! of the board.
 //!
-//! One [`World::step`] is one millisecond of everything, always in the same order: host bytes reach the parser, the controller ticks, its
-//! frame goes over the bus and is answered, drives do their millisecond, the arm moves. The same seed gives the same bytes.
+//! One [`World::step`] is one millisecond of everything, always in the same order: host bytes reach the
+//! parser, the controller ticks, its frame goes over the bus and is answered, drives do their millisecond,
+//! the arm moves. The same seed gives the same bytes.
 //!
 //! ```no_run
 //! use jtc_sim::{SimConfig, World};

@@ -1,4 +1,5 @@
-//! The fault matrix: each fault in each state, what the controller makes of it and after how many ticks, as a table for the docs.
+//! The fault matrix: each fault in each state, what the controller makes of it and after how many ticks, as a
+//! table for the docs.
 use core::fmt;
 
 use jtc_core::{JOINTS, State, error, joint_error};
@@ -155,7 +156,8 @@ impl From<OperatorError> for MatrixError {
     }
 }
 
-/// One cell: what happened, and whether the arm was held again after ClearCurrentErrors and, where they were lost, new parameters.
+/// One cell: what happened, and whether the arm was held again after ClearCurrentErrors and, where they were
+/// lost, new parameters.
 struct Cell {
     reaction: Reaction,
     back: Back,
@@ -172,10 +174,11 @@ enum Back {
 /// The table, as Markdown.
 pub fn fault_matrix() -> Result<String, MatrixError> {
     let mut out = format!(
-        "A cell says which state the controller goes to, in which tick, and why; tick 1 is the first that begins after the fault. \
-         In that\ntick the torque is zero already. “–”: no reaction within {WATCH_MS} ms. Faults without a time last {LASTING_MS} ms. \
-         The last column says\nwhat the host has to send, once the cause is gone, until the arm is held again: nothing (–), \
-         ClearCurrentErrors, or all parameters.\nStart lasts a single tick.\n\n| fault |"
+        "A cell says which state the controller goes to, in which tick, and why; tick 1 is the first that begins\n\
+         after the fault. In that tick the torque is zero already. “–”: no reaction within {WATCH_MS} ms. Faults\n\
+         without a time last {LASTING_MS} ms. The last column says what the host has to send, once the cause is\n\
+         gone, until the arm is held again: nothing (–), ClearCurrentErrors, or all parameters. Start lasts a\n\
+         single tick.\n\n| fault |"
     );
     for state in STATES {
         out += &format!(" {state:?} |");

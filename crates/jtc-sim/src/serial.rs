@@ -1,4 +1,5 @@
-//! The serial line to the host: two directions, each as slow as its baud rate, with faults on the way to the device.
+//! The serial line to the host: two directions, each as slow as its baud rate, with faults on the way to the
+//! device.
 use std::collections::VecDeque;
 
 /// Picoseconds in a microsecond: at that resolution a byte's time at any usual rate is exact enough for days.
@@ -38,10 +39,9 @@ impl Line {
         if self.queue.is_empty() || self.front_ps > now_ps {
             return;
         }
-        let by_time = if self.byte_ps == 0 {
-            usize::MAX
-        } else {
-            usize::try_from((now_ps - self.front_ps) / self.byte_ps + 1).unwrap_or(usize::MAX)
+        let by_time = match (now_ps - self.front_ps).checked_div(self.byte_ps) {
+            Some(more) => usize::try_from(more + 1).unwrap_or(usize::MAX),
+            None => usize::MAX,
         };
         let count = self.queue.len().min(by_time).min(most);
         out.extend(self.queue.drain(..count));

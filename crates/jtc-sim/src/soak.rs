@@ -46,7 +46,8 @@ impl core::fmt::Display for SoakReport {
         let s = &self.statistics;
         writeln!(
             f,
-            "  bus: {} frames, load {:.1} %, {} lost, {} repeated, {} bus-offs; host: {} good and {} bad frames; {} watchdog resets",
+            "  bus: {} frames, load {:.1} %, {} lost, {} repeated, {} bus-offs; host: {} good and {} bad frames; \
+             {} watchdog resets",
             s.bus.frames,
             100.0 * s.bus_load(),
             s.bus.lost,

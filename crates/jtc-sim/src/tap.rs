@@ -1,4 +1,5 @@
-//! Ties the simulated joint bus to a bus that others can join: they see every frame, and what they send takes part.
+//! Ties the simulated joint bus to a bus that others can join: they see every frame, and what they send takes
+//! part.
 use core::time::Duration;
 
 use can_link::{CanBus, CanError, CanFrame, Id};
@@ -26,7 +27,8 @@ impl<B: CanBus> BusTap<B> {
         Self { bus, sent: 0, taken: 0, refused: 0 }
     }
 
-    /// After each `World::step`: what was on the bus goes out, what others sent comes in and is carried in the next millisecond.
+    /// After each `World::step`: what was on the bus goes out, what others sent comes in and is carried in
+    /// the next millisecond.
     pub fn exchange(&mut self, world: &mut World) -> Result<(), CanError> {
         for timed in world.bus_frames() {
             let frame = &timed.frame;

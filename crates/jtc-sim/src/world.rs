@@ -456,8 +456,8 @@ impl World {
         self.bus.frames()
     }
 
-    /// A member of the joint bus that is not of this world sends a frame: an answer for the controller, or a request for the nodes.
-    /// False when too many such frames wait already.
+    /// A member of the joint bus that is not of this world sends a frame: an answer for the controller, or a
+    /// request for the nodes. False when too many such frames wait already.
     pub fn put_bus_frame(&mut self, frame: Frame) -> bool {
         self.bus.put(frame)
     }

@@ -20,7 +20,7 @@ fn j12_j14_j16_j21_j22_each_fault_in_each_state_has_the_documented_reaction() {
     } else {
         assert!(
             text[begin..end] == matrix,
-            "docs/safety.md does not say what the controller does; look at the difference, then `cargo xtask docs`"
+            "docs/safety.md does not say what the controller does: look at the difference, then `cargo xtask docs`"
         );
     }
 }

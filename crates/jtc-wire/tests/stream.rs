@@ -170,6 +170,19 @@ fn j05_gap() {
     assert_eq!(line.silence(5000), [Bad(0, DiscontinuousFrame, 1)]);
 }
 
+/// The bytes after a gap may come before anyone looked.
+#[test]
+fn j05_gap_seen_with_the_next_bytes() {
+    for (us, expected) in
+        [(4999, vec![GOOD_ON]), (5000, vec![Bad(0x0C, DiscontinuousFrame, 4), Bad(0, IncorrectHeader, 0)])]
+    {
+        let mut line = Line::new();
+        assert_eq!(line.send(&ON[..4]), []);
+        line.now += us - 100;
+        assert_eq!(line.send(&ON[4..]), expected, "{us} µs");
+    }
+}
+
 /// D15 of the old device: a glitch of two bytes, and lengths of 0 and 1.
 #[test]
 fn j07_glitches() {

@@ -52,7 +52,8 @@ impl<'a> Reader<'a> {
     }
     fn step(&mut self) -> Step {
         Step::Bytes(match self.byte() % 16 {
-            0 => return Step::Silence(GAP_US + u64::from(self.byte()) * 100),
+            // With 0 exactly a gap: 200 µs are gone already.
+            0 => return Step::Silence(GAP_US - 200 + u64::from(self.byte()) * 100),
             1 => return Step::Silence(GAP_US - 201),
             2 => return Step::Hold(self.byte() % 40),
             3 => return Step::Pieces(usize::from(self.byte()) * 3 + 1),

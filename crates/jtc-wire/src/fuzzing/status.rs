@@ -60,17 +60,18 @@ pub fn status_stream(data: &[u8]) {
     for mut piece in stream.chunks(usize::from(*piece) + 1) {
         while let Some(status) = receiver.next(&mut piece) {
             let again = Status::parse(&status.emit()).expect("what is sent is understood");
-            assert_eq!(
-                format!("{:?}", Status { gripper: None, ..again }),
-                format!("{:?}", Status { gripper: None, ..status })
-            );
-            let _ = format!("{status} {status:#}");
+            assert_eq!(again.emit(), status.emit());
+            if found.is_empty() {
+                let _ = format!("{status} {status:#}");
+            }
             found.push(status);
         }
         assert!(piece.is_empty());
     }
     let (expected, skipped) = reference(&stream);
-    assert_eq!(format!("{found:?}"), format!("{expected:?}"));
+    // Bytes, because a float that is no number equals nothing.
+    let bytes = |all: &[Status]| all.iter().map(|s| (s.emit(), s.gripper.is_some())).collect::<Vec<_>>();
+    assert_eq!(bytes(&found), bytes(&expected));
     assert_eq!(receiver.counters().frames, expected.len() as u64);
     assert_eq!(receiver.counters().skipped_bytes + receiver.held() as u64, skipped);
 }

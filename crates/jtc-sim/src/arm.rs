@@ -13,6 +13,8 @@ const STOP_DAMPING: f64 = 200.0;
 const BRAKE_DECELERATION: f64 = 40.0;
 /// Inertia that stands for a closed brake, kg·m².
 const BRAKED: f64 = 1e9;
+/// Seconds between two updates of the temperatures.
+const WARMING: f64 = 0.05;
 /// Heat capacity of a joint's bearing, J/K.
 const HEAT_CAPACITY: f64 = 900.0;
 /// Heat flow from a bearing to the air, W/K.
@@ -80,30 +82,41 @@ impl Default for SimArm {
     }
 }
 
-/// Friction of one joint at its present temperature.
+/// Friction of all joints at their present temperatures.
 #[derive(Clone, Debug)]
-enum Curve {
-    None,
-    Polynomial([f64; 4]),
-    /// Torques at the table's velocities.
-    Points(Box<([f64; 20], [f64; 20])>),
+struct Curves {
+    /// Polynomial coefficients, a row per power, a column per joint; zero for joints with a table.
+    k: [JointVec; 4],
+    /// Velocities and torques of joints with a table.
+    tables: [Option<Box<([f64; 20], [f64; 20])>>; JOINTS],
+    any_table: bool,
 }
 
-impl Curve {
-    fn at(&self, v: f64, width: f64) -> f64 {
-        match self {
-            Self::None => 0.0,
-            Self::Polynomial(k) => {
-                let s = v / (v * v + width * width).sqrt();
-                k[0] * s + v * (k[1] + v * (k[2] * s + k[3] * v))
-            }
-            Self::Points(points) => {
-                let (x, y) = (&points.0, &points.1);
-                let i = x[1..19].iter().filter(|&&start| v >= start).count();
-                y[i] + (v - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i])
+impl Curves {
+    /// N·m against the motion.
+    #[inline]
+    fn at(&self, v: &JointVec, width: f64) -> JointVec {
+        let [k0, k1, k2, k3] = &self.k;
+        let mut out: JointVec = core::array::from_fn(|j| {
+            let v = v[j];
+            let s = v / (v * v + width * width).sqrt();
+            k0[j] * s + v * (k1[j] + v * (k2[j] * s + k3[j] * v))
+        });
+        if self.any_table {
+            for (j, table) in self.tables.iter().enumerate() {
+                if let Some(table) = table {
+                    out[j] += straight(&table.0, &table.1, v[j]);
+                }
             }
         }
+        out
     }
+}
+
+/// Straight lines between the points, and on beyond the ends.
+fn straight(x: &[f64; 20], y: &[f64; 20], v: f64) -> f64 {
+    let i = x[1..19].iter().filter(|&&start| v >= start).count();
+    y[i] + (v - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i])
 }
 
 /// The arm in motion.
@@ -112,9 +125,12 @@ pub struct Arm {
     dynamics: Dynamics,
     parts: SimArm,
     friction_scale: JointVec,
-    curves: [Curve; JOINTS],
-    /// Temperature that `curves` hold for, °C.
-    curve_temperature: JointVec,
+    curves: Curves,
+    /// Temperature that the tables in `curves` hold for, °C.
+    table_temperature: JointVec,
+    /// Heat of friction since the temperatures were brought up to date, J, and how long ago that was, s.
+    heat: JointVec,
+    since: f64,
     /// Position, rad.
     pub q: JointVec,
     /// Velocity, rad/s.
@@ -134,8 +150,10 @@ impl Arm {
         let mut arm = Self {
             dynamics,
             temperature: [parts.ambient; JOINTS],
-            curves: core::array::from_fn(|_| Curve::None),
-            curve_temperature: [f64::NAN; JOINTS],
+            curves: Curves { k: [[0.0; JOINTS]; 4], tables: [const { None }; JOINTS], any_table: false },
+            table_temperature: [f64::NAN; JOINTS],
+            heat: [0.0; JOINTS],
+            since: 0.0,
             parts,
             friction_scale,
             q,
@@ -168,11 +186,20 @@ impl Arm {
         if free {
             self.runge_kutta(tau, &rotor, dt);
         }
-        for j in 0..JOINTS {
-            let heat = self.qd[j] * self.curves[j].at(self.qd[j], self.parts.friction_width);
-            let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient);
-            self.temperature[j] += (heat - loss) / HEAT_CAPACITY * dt;
+        self.since += dt;
+        if self.since >= WARMING {
+            self.warm();
         }
+    }
+
+    /// Bring temperatures and friction up to date: they change so slowly that not every millisecond has to.
+    fn warm(&mut self) {
+        for j in 0..JOINTS {
+            let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;
+            self.temperature[j] += (self.heat[j] - loss) / HEAT_CAPACITY;
+        }
+        self.heat = [0.0; JOINTS];
+        self.since = 0.0;
         self.refresh_friction();
     }
 
@@ -180,7 +207,11 @@ impl Arm {
     fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, dt: f64) {
         let (q0, v0) = (self.q, self.qd);
         let half = 0.5 * dt;
-        let a1 = self.acceleration(&q0, &v0, tau, rotor);
+        let friction = self.curves.at(&v0, self.parts.friction_width);
+        for j in 0..JOINTS {
+            self.heat[j] += v0[j] * friction[j] * dt;
+        }
+        let a1 = self.accelerate(&q0, &v0, tau, &friction, rotor);
         let v2 = along(&v0, &a1, half);
         let a2 = self.acceleration(&along(&q0, &v0, half), &v2, tau, rotor);
         let v3 = along(&v0, &a2, half);
@@ -194,10 +225,18 @@ impl Arm {
     }
 
     fn acceleration(&self, q: &JointVec, qd: &JointVec, tau: &JointVec, rotor: &JointVec) -> JointVec {
-        let mut sum = *tau;
-        for j in 0..JOINTS {
-            sum[j] += self.stop_torque(j, q[j], qd[j]) - self.curves[j].at(qd[j], self.parts.friction_width);
-        }
+        self.accelerate(q, qd, tau, &self.curves.at(qd, self.parts.friction_width), rotor)
+    }
+
+    fn accelerate(
+        &self,
+        q: &JointVec,
+        qd: &JointVec,
+        tau: &JointVec,
+        friction: &JointVec,
+        rotor: &JointVec,
+    ) -> JointVec {
+        let sum = core::array::from_fn(|j| tau[j] + self.stop_torque(j, q[j], qd[j]) - friction[j]);
         self.dynamics.forward(q, qd, &sum, rotor)
     }
 
@@ -222,16 +261,18 @@ impl Arm {
                 SimFriction::Frictionless => {}
                 SimFriction::Polynomial(c) => {
                     let k = scale * (1.0 + c[4] * (t - c[5])).clamp(0.2, 2.0);
-                    self.curves[j] = Curve::Polynomial([k * c[0], k * c[1], k * c[2], k * c[3]]);
+                    for (row, c) in self.curves.k.iter_mut().zip(c) {
+                        row[j] = k * c;
+                    }
                 }
                 SimFriction::Table(table) => {
-                    // A table is slow to cut: only when the temperature has changed a little (also from NaN
-                    // at the start).
-                    if (t - self.curve_temperature[j]).abs() < 0.02 {
+                    // Also from NaN at the start.
+                    if (t - self.table_temperature[j]).abs() < 0.02 {
                         continue;
                     }
-                    self.curve_temperature[j] = t;
-                    self.curves[j] = Curve::Points(Box::new(cut(table, t, scale)));
+                    self.table_temperature[j] = t;
+                    self.curves.tables[j] = Some(Box::new(cut(table, t, scale)));
+                    self.curves.any_table = true;
                 }
             }
         }
@@ -239,7 +280,7 @@ impl Arm {
 
     /// Make a change of `friction_fault` act at once.
     pub fn friction_changed(&mut self) {
-        self.curve_temperature = [f64::NAN; JOINTS];
+        self.table_temperature = [f64::NAN; JOINTS];
         self.refresh_friction();
     }
 }

@@ -24,12 +24,25 @@ const RESPONSE: u16 = 0x200;
 /// Frames of others that may wait.
 const FOREIGN_MAX: usize = 64;
 
-/// Time of a CAN FD frame with `len` bytes at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
-pub fn frame_us(len: usize) -> u32 {
-    // 31 bits at the nominal rate; the rest at five times that: ESI, DLC and data with stuff bits, then stuff
-    // count and CRC.
-    let fast = (5 + 8 * len) as f64 * 1.1 + if len > 16 { 31.0 } else { 27.0 };
-    (31.0 + fast / 5.0).round() as u32
+/// Most bytes of a frame on this bus.
+const LEN_MAX: usize = 24;
+
+/// Time of a CAN FD frame with `len` bytes (up to 24) at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
+pub const fn frame_us(len: usize) -> u32 {
+    const TIMES: [u32; LEN_MAX + 1] = {
+        let mut times = [0; LEN_MAX + 1];
+        let mut len = 0;
+        while len <= LEN_MAX {
+            // 31 bits at the nominal rate; at five times that ESI, DLC and data, of which every tenth makes a stuff bit, then
+            // stuff count and CRC.
+            let crc = if len > 16 { 31 } else { 27 };
+            let tenths = (5 + 8 * len as u32) * 11 + crc * 10;
+            times[len] = 31 + (tenths + 25) / 50;
+            len += 1;
+        }
+        times
+    };
+    TIMES[if len < LEN_MAX { len } else { LEN_MAX }]
 }
 
 /// What is wrong with the bus at the moment.

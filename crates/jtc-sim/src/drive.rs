@@ -326,7 +326,7 @@ impl Drive {
 
     fn read_encoder(&mut self, q: f64) {
         // The speed comes from the motor's own encoder, which is much finer than the joint's.
-        let motor = (q * MOTOR_COUNTS_PER_RAD).floor() as i64;
+        let motor = floor(q * MOTOR_COUNTS_PER_RAD);
         let oldest = core::mem::replace(&mut self.history[self.oldest], motor);
         self.oldest = (self.oldest + 1) % SPEED_WINDOW;
         self.velocity = (motor - oldest) as f64 / (MOTOR_COUNTS_PER_RAD * SPEED_WINDOW as f64 * 0.001);
@@ -336,8 +336,8 @@ impl Drive {
         }
         // Whole turns are lost: the encoder is absolute within one.
         let turns = (q + self.fault.encoder_offset) / core::f64::consts::TAU;
-        let count = (turns - turns.floor()) * ENCODER_COUNTS;
-        self.position = f64::from(count.round() as i32 as i16) * (HALF_TURN / 32_768.0);
+        let count = floor(turns * ENCODER_COUNTS + 0.5) as i16;
+        self.position = f64::from(count) * (HALF_TURN / 32_768.0);
     }
 
     fn check(&mut self) {
@@ -438,7 +438,13 @@ impl Drive {
 
 /// °C as the bus carries them: negative values wrap.
 fn byte(celsius: f64) -> u8 {
-    celsius.floor() as i32 as u8
+    floor(celsius) as u8
+}
+
+/// The next whole number below; `f64::floor` is a call where the processor's own instruction may not be used.
+fn floor(x: f64) -> i64 {
+    let near = x as i64;
+    near - i64::from(near as f64 > x)
 }
 
 #[cfg(test)]

@@ -11,8 +11,9 @@
 //! kind = "encoder-jump"
 //! joint = 1
 //! rad = 0.3
-//! in_state = "operate"   # … or when this state is first entered (start, init, hold, operate, teaching,
-//! error) … after_s = 1.0          # … and this much later …
+//! # … or when this state is first entered: start, init, hold, operate, teaching, error …
+//! in_state = "operate"
+//! after_s = 1.0          # … and this much later …
 //!
 //! [[fault]]
 //! kind = "frames-lost"

@@ -2,10 +2,10 @@
 
     python check_pinocchio.py PROGRAM [--models 100] [--states 20] [--seed N]
 
-PROGRAM is the example `reference` of the crate jtc-dynamics (`cargo build --release -p jtc-dynamics --example reference`).
-Every model has random joint origins, masses, inertias and gravity; a share of them has parallel, nearly parallel, antiparallel
-or crossing axes. Each result has to agree to 1e-9 relative to the largest entry of its vector or matrix. Needs `pin` from PyPI.
-Exit code 1 and the worst case on failure.
+PROGRAM is the example `reference` of the crate jtc-dynamics (`cargo build --release -p jtc-dynamics --example
+reference`). Every model has random joint origins, masses, inertias and gravity; a share of them has parallel, nearly
+parallel, antiparallel or crossing axes. Each result has to agree to 1e-9 relative to the largest entry of its vector
+or matrix. Needs `pin` from PyPI. Exit code 1 and the worst case on failure.
 """
 
 import argparse

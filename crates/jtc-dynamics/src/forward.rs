@@ -136,7 +136,9 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
             }
         });
         let reciprocal = 1.0 / m[K][K];
-        inverse[K] = if m[K][K] > floor { reciprocal } else { 0.0 };
+        // A mask instead of a choice: no branch.
+        let mask = u64::from(m[K][K] > floor).wrapping_neg();
+        inverse[K] = f64::from_bits(reciprocal.to_bits() & mask);
     });
     unroll!(K in [5, 4, 3, 2, 1, 0] {
         x[K] *= inverse[K];

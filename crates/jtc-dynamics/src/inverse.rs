@@ -24,7 +24,8 @@ impl Turns {
         for k in 0..JOINTS {
             angle[k] += chain.twists[k].offset;
         }
-        let (mut sin, mut cos) = ([0.0; JOINTS], [0.0; JOINTS]);
+        // One loop over all six: it becomes SIMD code where there is SIMD.
+        let (mut sin, mut cos) = (angle, angle);
         for k in 0..JOINTS {
             (sin[k], cos[k]) = sin_cos(angle[k]);
         }

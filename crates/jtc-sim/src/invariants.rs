@@ -1,15 +1,36 @@
 //! What must hold in every millisecond, whatever happens: the checker to run beside a world.
 use core::fmt;
 
-use jtc_bus::{Request, Target};
-use jtc_core::{JOINTS, State, Tes};
+use jtc_bus::{Frame, Request, Target};
+use jtc_core::{JOINTS, State, Telemetry, Tes};
 use jtc_wire::FrameType;
 
 use crate::board::Worked;
-use crate::world::World;
+use crate::world::{Truth, World};
 
 /// Ticks between two frames that take the place of Move.
 const MOVES_BETWEEN: u32 = 3;
+
+/// A millisecond as the checker sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// µs since the start.
+    pub time_us: u64,
+    /// The controller had its tick.
+    pub ticked: bool,
+    /// What it computed.
+    pub telemetry: &'a Telemetry,
+    /// How the arm really is.
+    pub truth: &'a Truth,
+    /// The frame that it gave out.
+    pub sent: Option<&'a Frame>,
+    /// The host frame that it worked off.
+    pub worked: Option<Worked>,
+    /// Level of its safety output.
+    pub safety_output: bool,
+    /// Largest torque per joint, N·m.
+    pub torque_max: [f64; JOINTS],
+}
 
 /// An invariant that was broken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,26 +168,31 @@ impl Invariants {
 
     /// Look at the millisecond that has just passed.
     pub fn check(&mut self, world: &World) -> Result<(), Violation> {
-        self.look(world).map_err(|broken| Violation { time_us: world.now_us(), broken })
+        self.check_moment(&world.moment())
     }
 
-    fn look(&mut self, world: &World) -> Result<(), Broken> {
-        if !world.ticked() {
+    /// Look at a millisecond.
+    pub fn check_moment(&mut self, moment: &Moment<'_>) -> Result<(), Violation> {
+        self.look(moment).map_err(|broken| Violation { time_us: moment.time_us, broken })
+    }
+
+    fn look(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
+        if !moment.ticked {
             return Ok(());
         }
-        let telemetry = world.telemetry();
+        let telemetry = moment.telemetry;
         if telemetry.tick <= self.controller_ticks {
             // A fresh controller after a reset.
             *self = Self::default();
         }
         self.controller_ticks = telemetry.tick;
-        self.hear(world);
-        self.finite(world)?;
-        self.states(world)?;
-        self.frame(world)?;
+        self.hear(moment);
+        self.finite(moment)?;
+        self.states(moment)?;
+        self.frame(moment)?;
         let internal = telemetry.errors & jtc_core::error::INTERNAL != 0;
-        if world.safety_output() != (telemetry.state != State::Start && !internal) {
-            return Err(Broken::SafetyOutput { level: world.safety_output(), errors: telemetry.errors });
+        if moment.safety_output != (telemetry.state != State::Start && !internal) {
+            return Err(Broken::SafetyOutput { level: moment.safety_output, errors: telemetry.errors });
         }
         self.state = telemetry.state;
         self.tes = telemetry.tes;
@@ -175,8 +201,8 @@ impl Invariants {
     }
 
     /// Commands that permit something.
-    fn hear(&mut self, world: &World) {
-        let Some(Worked::Frame(frame_type)) = world.worked() else { return };
+    fn hear(&mut self, moment: &Moment<'_>) {
+        let Some(Worked::Frame(frame_type)) = moment.worked else { return };
         const CLEAR_CURRENT: u8 = FrameType::ClearCurrentErrors as u8;
         const CLEAR_OCCURRED: u8 = FrameType::ClearOccurredErrors as u8;
         const EXECUTE: u8 = FrameType::TrajSetExecStatus as u8;
@@ -189,9 +215,9 @@ impl Invariants {
         }
     }
 
-    fn finite(&self, world: &World) -> Result<(), Broken> {
-        let truth = world.truth();
-        for (joint, t) in world.telemetry().joints.iter().enumerate() {
+    fn finite(&self, moment: &Moment<'_>) -> Result<(), Broken> {
+        let truth = moment.truth;
+        for (joint, t) in moment.telemetry.joints.iter().enumerate() {
             let commanded = [t.set_position, t.set_velocity, t.set_acceleration, t.torque];
             let parts =
                 [t.torque_model, t.torque_p, t.torque_i, t.torque_d, t.torque_friction, t.torque_other];
@@ -215,8 +241,8 @@ impl Invariants {
     }
 
     /// J-24: nothing moves by itself. J-31: the index goes forward.
-    fn states(&mut self, world: &World) -> Result<(), Broken> {
-        let telemetry = world.telemetry();
+    fn states(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
+        let telemetry = moment.telemetry;
         let (from, to) = (self.state, telemetry.state);
         if from == State::Error && to != State::Error && !self.cleared {
             return Err(Broken::LeftErrorAlone { to });
@@ -247,9 +273,9 @@ impl Invariants {
     }
 
     /// J-12, J-13, J-16, J-21 on the bus.
-    fn frame(&mut self, world: &World) -> Result<(), Broken> {
-        let state = world.telemetry().state;
-        let Some(frame) = world.sent() else {
+    fn frame(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
+        let state = moment.telemetry.state;
+        let Some(frame) = moment.sent else {
             return if state == State::Start { Ok(()) } else { Err(Broken::Silent { state }) };
         };
         let Ok(request) = Request::parse(frame) else { return Err(Broken::UnknownFrame { id: frame.id }) };
@@ -269,7 +295,7 @@ impl Invariants {
             if torque[joint] != 0.0 && !powered {
                 return Err(Broken::Torque { state, joint, torque: torque[joint] });
             }
-            let limit = world.controller_config().joints[joint].torque_max;
+            let limit = moment.torque_max[joint];
             // A step of the bus' grid may round up.
             if torque[joint].abs() > limit + 0.02 {
                 return Err(Broken::TorqueLimit { joint, torque: torque[joint], limit });
@@ -287,3 +313,7 @@ impl Invariants {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "invariants_tests.rs"]
+mod tests;

@@ -1,0 +1,200 @@
+//! What users of the world see and do.
+use jtc_bus::{Frame, NODES};
+use jtc_core::{BusState, Config, Telemetry};
+use jtc_dynamics::{ArmModel, JointVec};
+
+use super::{TICK_US, World};
+use crate::board::Worked;
+use crate::bus::{BusStatistics, TimedFrame};
+use crate::config::SimConfig;
+use crate::event::{Event, Log};
+use crate::faults::Fault;
+use crate::invariants::Moment;
+
+/// How the arm really is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Truth {
+    /// Position, rad.
+    pub q: JointVec,
+    /// Velocity, rad/s.
+    pub qd: JointVec,
+    /// Torque of the drives, N·m.
+    pub torque: JointVec,
+    /// Bearing temperature, °C.
+    pub temperature: JointVec,
+}
+
+/// Counted since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Statistics {
+    /// Joint bus.
+    pub bus: BusStatistics,
+    /// Bytes that reached the controller's end of the line.
+    pub serial_to_device: u64,
+    /// Bytes that reached the host.
+    pub serial_to_host: u64,
+    /// Good host frames that the controller worked off.
+    pub good_frames: u64,
+    /// Bad frames and rubbish.
+    pub bad_frames: u64,
+    /// Resets by the watchdog.
+    pub watchdog_resets: u32,
+    /// Milliseconds simulated.
+    pub ticks: u64,
+}
+
+impl Statistics {
+    /// Share of the time in which the joint bus was busy, 0..1.
+    pub fn bus_load(&self) -> f64 {
+        if self.ticks == 0 { 0.0 } else { self.bus.busy_us as f64 / (self.ticks * TICK_US) as f64 }
+    }
+}
+
+impl World {
+    /// Virtual time since the start, µs.
+    pub fn now_us(&self) -> u64 {
+        self.ticks * TICK_US
+    }
+
+    /// Bytes from the host enter the line; the device gets them at the rate of the line.
+    pub fn host_write(&mut self, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.to_device.write(self.now_us(), bytes);
+        }
+    }
+
+    /// Bytes of the host that are not yet at the device.
+    pub fn host_write_pending(&self) -> usize {
+        self.to_device.pending()
+    }
+
+    /// Take bytes that have reached the host by now; returns how many.
+    pub fn host_read(&mut self, buffer: &mut [u8]) -> usize {
+        let count = buffer.len().min(self.host_inbox.len());
+        buffer[..count].copy_from_slice(&self.host_inbox[..count]);
+        self.host_inbox.drain(..count);
+        count
+    }
+
+    /// What the controller's last tick computed.
+    pub fn telemetry(&self) -> &Telemetry {
+        self.board.telemetry()
+    }
+
+    /// How the arm really is.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    /// The arm as it is after model errors.
+    pub fn true_model(&self) -> &ArmModel {
+        &self.model
+    }
+
+    /// Settings of the world.
+    pub fn config(&self) -> &SimConfig {
+        &self.config
+    }
+
+    /// Settings of the controller.
+    pub fn controller_config(&self) -> &Config {
+        &self.config.controller
+    }
+
+    /// The frame that the controller gave out in the last tick.
+    pub fn sent(&self) -> Option<&Frame> {
+        self.sent.as_ref()
+    }
+
+    /// The controller had its tick in the last millisecond.
+    pub fn ticked(&self) -> bool {
+        self.ticked
+    }
+
+    /// The bus in the last millisecond.
+    pub fn bus_state(&self) -> BusState {
+        self.bus_state
+    }
+
+    /// All frames on the joint bus in the last millisecond.
+    pub fn bus_frames(&self) -> &[TimedFrame] {
+        self.bus.frames()
+    }
+
+    /// A member of the joint bus that is not of this world sends a frame: an answer for the controller, or a
+    /// request for the nodes. False when too many such frames wait already.
+    pub fn put_bus_frame(&mut self, frame: Frame) -> bool {
+        self.bus.put(frame)
+    }
+
+    /// State bytes of joints and gripper (255: no gripper).
+    pub fn node_states(&self) -> [u8; NODES] {
+        self.node_states
+    }
+
+    /// The host frame that the last tick worked off.
+    pub fn worked(&self) -> Option<Worked> {
+        self.board.worked
+    }
+
+    /// Level of the controller's safety output: true = no error.
+    pub fn safety_output(&self) -> bool {
+        self.safety_output
+    }
+
+    /// Set the level of the controller's safety input: true = no error.
+    pub fn set_safety_input(&mut self, level: bool) {
+        self.safety_input = level;
+    }
+
+    /// Something is where the gripper can hold it (from the start it is).
+    pub fn set_part_present(&mut self, present: bool) {
+        if let Some(gripper) = &mut self.nodes.gripper {
+            gripper.part_present = present;
+        }
+    }
+
+    /// One more fault; `Trigger::At` counts from the start of the world.
+    pub fn inject(&mut self, fault: Fault) {
+        self.faults.add(fault);
+    }
+
+    /// Switch the controller's board off and on.
+    pub fn power_cycle_controller(&mut self) {
+        self.log.push(self.now_us(), Event::PowerCycle);
+        self.board.reset();
+        self.restart();
+    }
+
+    /// The millisecond that has just passed, for the checker of invariants.
+    pub fn moment(&self) -> Moment<'_> {
+        Moment {
+            time_us: self.now_us(),
+            ticked: self.ticked,
+            telemetry: self.board.telemetry(),
+            truth: &self.truth,
+            sent: self.sent.as_ref(),
+            worked: self.board.worked,
+            safety_output: self.safety_output,
+            torque_max: self.config.controller.joints.map(|joint| joint.torque_max),
+        }
+    }
+
+    /// What happened.
+    pub fn log(&self) -> &Log {
+        &self.log
+    }
+
+    /// Counted since the start.
+    pub fn statistics(&self) -> Statistics {
+        Statistics {
+            bus: self.bus.statistics,
+            serial_to_device: self.to_device.carried,
+            serial_to_host: self.to_host.carried,
+            good_frames: self.good_frames,
+            bad_frames: self.bad_frames,
+            watchdog_resets: self.board.watchdog_resets,
+            ticks: self.ticks,
+        }
+    }
+}

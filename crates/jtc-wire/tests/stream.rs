@@ -259,6 +259,47 @@ fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
     assert!(!receiver.poll(now + 10_000));
 }
 
+/// Halves of frames, each behind a gap: none may be joined to another, not even those that had to be offered twice because
+/// there were too many gaps to remember.
+#[test]
+fn j05_gaps_are_never_forgotten() {
+    for first in 0..2 {
+        let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+        let (mut now, mut piece, mut bad, mut refused) = (0, first, 0, 0);
+        while piece < 300 {
+            let half = if piece % 2 == 0 { &ON[..3] } else { &ON[3..] };
+            if receiver.push(now, half) == 3 {
+                piece += 1;
+                now += 10_000;
+                continue;
+            }
+            refused += 1;
+            assert!(receiver.poll(now));
+            assert!(matches!(receiver.event(), Some(LinkEvent::Bad(_))), "piece {piece}");
+            receiver.release();
+            bad += 1;
+        }
+        while receiver.poll(now) {
+            assert!(matches!(receiver.event(), Some(LinkEvent::Bad(_))));
+            receiver.release();
+            bad += 1;
+        }
+        assert_eq!(bad, 300 - first, "one record each");
+        assert!(refused > 100);
+    }
+}
+
+#[test]
+fn j04_silence_behind_a_held_event_is_one_gap() {
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    receiver.push(0, &ON);
+    receiver.push(0, &ON[..4]);
+    for now in 0..1000 {
+        assert!(receiver.poll(now * 1000));
+    }
+    assert_eq!(receiver.push(1_000_000, &ON), 6);
+}
+
 /// A reader slower than a gap: the rest of a piece is offered late, the frame is whole all the same.
 #[test]
 fn j03_a_slow_reader_is_no_gap() {
@@ -300,7 +341,7 @@ fn j07_hostile_bytes_cost_little() {
             break;
         }
     }
-    assert!(polls <= 15_000 / 14, "{polls} polls");
+    assert!((15_000 / 32..=15_000 / 14).contains(&polls), "{polls} polls");
     assert_eq!(receiver.push(6000, &ON), 6);
     assert!(receiver.poll(6000));
 }

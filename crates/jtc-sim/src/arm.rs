@@ -88,7 +88,7 @@ struct Curves {
     /// Polynomial coefficients, a row per power, a column per joint; zero for joints with a table.
     k: [JointVec; 4],
     /// Velocities and torques of joints with a table.
-    tables: [Option<Box<([f64; 20], [f64; 20])>>; JOINTS],
+    tables: [Option<Box<Points>>; JOINTS],
     any_table: bool,
 }
 
@@ -105,7 +105,7 @@ impl Curves {
         if self.any_table {
             for (j, table) in self.tables.iter().enumerate() {
                 if let Some(table) = table {
-                    out[j] += straight(&table.0, &table.1, v[j]);
+                    out[j] += table.at(v[j]);
                 }
             }
         }
@@ -113,10 +113,22 @@ impl Curves {
     }
 }
 
-/// Straight lines between the points, and on beyond the ends.
-fn straight(x: &[f64; 20], y: &[f64; 20], v: f64) -> f64 {
-    let i = x[1..19].iter().filter(|&&start| v >= start).count();
-    y[i] + (v - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i])
+/// A friction table at one temperature.
+#[derive(Clone, Debug)]
+struct Points {
+    /// rad/s.
+    velocity: [f64; 20],
+    /// N·m.
+    torque: [f64; 20],
+}
+
+impl Points {
+    /// Straight lines between the points, and on beyond the ends.
+    fn at(&self, v: f64) -> f64 {
+        let (x, y) = (&self.velocity, &self.torque);
+        let i = x[1..19].iter().filter(|&&start| v >= start).count();
+        y[i] + (v - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i])
+    }
 }
 
 /// The arm in motion.
@@ -290,7 +302,7 @@ fn along(x: &JointVec, rate: &JointVec, dt: f64) -> JointVec {
 }
 
 /// Velocities and torques of the table at one temperature (°C), which is kept within its axis.
-fn cut(table: &TableOf<f32>, temperature: f64, scale: f64) -> ([f64; 20], [f64; 20]) {
+fn cut(table: &TableOf<f32>, temperature: f64, scale: f64) -> Points {
     let axis = table.temperature.map(f64::from);
     let t = temperature.clamp(axis[0], axis[19]);
     let i = axis[1..19].iter().filter(|&&start| t >= start).count();
@@ -299,5 +311,5 @@ fn cut(table: &TableOf<f32>, temperature: f64, scale: f64) -> ([f64; 20], [f64; 
         let (a, b) = (f64::from(row[i]), f64::from(row[i + 1]));
         scale * (a + u * (b - a))
     });
-    (table.velocity.map(f64::from), torque)
+    Points { velocity: table.velocity.map(f64::from), torque }
 }

@@ -9,6 +9,9 @@ const RECEIVE_BUFFER: usize = FRAME_MAX;
 /// Bytes given to the parser at once.
 const CHUNK: usize = 4096;
 
+/// Looks at the parser between two ticks: what a processor with time to spare does.
+const POLLS: usize = 32;
+
 /// A host frame that the controller worked off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worked {
@@ -78,13 +81,16 @@ impl Board {
     /// Between ticks: bytes that arrived by `now_us` go through the parser; those taken are removed from
     /// `bytes`.
     pub fn receive(&mut self, now_us: u64, bytes: &mut Vec<u8>) {
+        // Bytes are taken also while a frame is worked off, as an interrupt does: held back, they would make a gap.
         let mut taken = 0;
-        while !self.has_event {
+        for _ in 0..POLLS {
             let rest = &bytes[taken..];
-            let count = self.receiver.push(now_us, &rest[..rest.len().min(CHUNK)]);
-            taken += count;
-            self.has_event = self.receiver.poll(now_us);
-            if count == 0 {
+            taken += self.receiver.push(now_us, &rest[..rest.len().min(CHUNK)]);
+            if !self.has_event {
+                self.has_event = self.receiver.poll(now_us);
+            }
+            let more = taken < bytes.len() || (!self.has_event && self.receiver.busy());
+            if !more {
                 break;
             }
         }

@@ -149,3 +149,32 @@ fn others_on_the_bus_see_every_frame_and_take_part() {
     }
     assert_eq!((tap.taken, operator.state()), (1, State::Error));
 }
+
+#[test]
+fn j07_a_friction_table_and_what_follows_it_at_once_are_taken_without_losing_a_tick() {
+    for baud in [None, Some(3_000_000), Some(115_200)] {
+        let config = SimConfig { start: FROM, baud, ..SimConfig::default() };
+        let mut operator = Operator::new(config);
+        operator.bring_up().unwrap();
+        operator.listener.responses.clear();
+        // A table like a measured one: torques grow with speed.
+        let one = |_| {
+            let axis = (0..20).map(|i| -1.9 + 0.2 * i as f32).chain((0..20).map(|i| 5.0 + 4.0 * i as f32));
+            let torque = (0..400).map(|i| 3.0 * (-1.9 + 0.2 * (i / 20) as f32));
+            axis.chain(torque).collect::<Vec<f32>>()
+        };
+        let body: Vec<u8> = (0..6).flat_map(one).flat_map(f32::to_be_bytes).collect();
+        let mut bytes = host::frame(FrameType::FrictionTable, &body);
+        bytes.extend(host::frame(FrameType::ClearOccurredErrors, &[]));
+        bytes.extend(host::frame(FrameType::PidParamUseDefault, &[]));
+        operator.world.host_write(&bytes);
+        let tick = operator.world.telemetry().tick;
+        operator.run(1500);
+        assert_eq!(operator.world.telemetry().tick, tick + 1500);
+        let responses: Vec<_> = operator.listener.responses.iter().map(|r| (r.frame_type, r.data)).collect();
+        let expected =
+            [(0x05, DataStatus::NoError), (0x02, DataStatus::NoError), (0x08, DataStatus::NoError)];
+        assert_eq!(responses, expected, "at {baud:?} Bd");
+        assert_eq!(operator.state(), State::HoldPos);
+    }
+}

@@ -1,47 +1,4 @@
-//! Fault files: what goes wrong, as TOML.
-//!
-//! ```toml
-//! [[fault]]
-//! kind = "node-silent"   # what
-//! node = 2               # whom it concerns
-//! at_s = 3.5             # when: s after the start …
-//! for_s = 0.05           # how long; left out: for good
-//!
-//! [[fault]]
-//! kind = "encoder-jump"
-//! joint = 1
-//! rad = 0.3
-//! # … or when this state is first entered: start, init, hold, operate, teaching, error …
-//! in_state = "operate"
-//! after_s = 1.0          # … and this much later …
-//!
-//! [[fault]]
-//! kind = "frames-lost"
-//! probability = 0.01
-//! at_point = 4000        # … or at this 1 ms point of the trajectory
-//! for_s = 2
-//! ```
-//!
-//! | kind | keys | what |
-//! |---|---|---|
-//! | `node-silent` | `node` (0..5 joints, 6 gripper) | off the bus; a joint's motor goes on with its last torque |
-//! | `node-reboot` | `node` | its processor restarts |
-//! | `motor-fault` | `joint`, `bits` | motor-control fault bits |
-//! | `hardware-fault` | `joint` | the gate driver reports a fault |
-//! | `fault-state` | `joint` | goes to its fault state with no error bit set |
-//! | `encoder-jump` | `joint`, `rad` | the position is off by that much |
-//! | `not-accurate` | `joint` | says that its position is not accurate |
-//! | `friction` | `joint`, `factor` | friction times the factor |
-//! | `temperature` | `joint`, `celsius` | the bearing is set to that temperature |
-//! | `frames-lost` | `probability` | receptions on the joint bus fail |
-//! | `frames-corrupted` | `probability` | frames are destroyed on the wire and repeated |
-//! | `frames-garbled` | `probability` | answers reach the controller with other contents |
-//! | `bus-off`, `no-acknowledge` | – | the controller is off the bus; its bus line is cut |
-//! | `safety-input` | – | the controller's safety input is low |
-//! | `safety-line` | `node` | a drive's safety line says danger |
-//! | `serial-lost`, `serial-flipped` | `probability` | bytes from the host vanish, have a bit flipped |
-//! | `serial-delayed` | – | bytes from the host are held back until the fault is over |
-//! | `tick-overrun` | – | the controller's tick does not come |
+#![doc = include_str!("fault_file.md")]
 use core::fmt;
 
 use jtc_core::State;
@@ -200,11 +157,14 @@ struct Entry {
     for_s: Option<f64>,
 }
 
+/// What fault files look like, for people (Markdown).
+pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
+
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
 
 impl FaultPlan {
-    /// Read a fault file.
+    /// Read a fault file; [`FAULT_FILE_HELP`] describes them.
     pub fn from_toml(text: &str) -> Result<Self, FaultFileError> {
         let file: File = toml::from_str(text).map_err(|e| FaultFileError::Syntax(e.to_string()))?;
         let faults = (1..).zip(file.fault).map(|(number, entry)| Reader { number, entry }.read());

@@ -5,9 +5,8 @@ use super::*;
 
 #[test]
 fn the_documented_example_is_read() {
-    let docs = include_str!("fault_file.rs");
-    let lines = docs.lines().skip_while(|l| *l != "//! ```toml").skip(1).take_while(|l| *l != "//! ```");
-    let text: Vec<_> = lines.map(|l| l.trim_start_matches("//!")).collect();
+    let lines = FAULT_FILE_HELP.lines().skip_while(|l| *l != "```toml").skip(1);
+    let text: Vec<_> = lines.take_while(|l| *l != "```").collect();
     let plan = FaultPlan::from_toml(&text.join("\n")).unwrap();
     let expected = [
         Fault { kind: FaultKind::NodeSilent { node: 2 }, trigger: Trigger::At(3500), duration_ms: Some(50) },

@@ -43,7 +43,7 @@ pub use bus::{BusFault, BusStatistics, TimedFrame, frame_us};
 pub use config::{ModelError, SimConfig, Support};
 pub use drive::{Drive, DriveConfig, DriveFault};
 pub use event::{Event, Log, LogEntry};
-pub use fault_file::FaultFileError;
+pub use fault_file::{FAULT_FILE_HELP, FaultFileError};
 pub use faults::{Fault, FaultKind, FaultPlan, Trigger};
 pub use gripper::Gripper;
 pub use operator::{Operator, OperatorError};

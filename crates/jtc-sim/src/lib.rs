@@ -6,6 +6,10 @@
 //! parser, the controller ticks, its frame goes over the bus and is answered, drives do their millisecond,
 //! the arm moves. The same seed gives the same bytes.
 //!
+//! What is kinder than reality: by default each joint has a holding brake that is open only while its drive is
+//! enabled ([`Support`]), so that the arm can be used again after an error; the drives' motor alignment moves
+//! nothing; frames take their usual time on the bus, not their exact one.
+//!
 //! ```no_run
 //! use jtc_sim::{SimConfig, World};
 //!

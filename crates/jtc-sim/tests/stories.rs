@@ -1,6 +1,6 @@
 //! Short stories of an operator and an arm.
 use jtc_core::{State, Tes};
-use jtc_sim::{BusTap, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
+use jtc_sim::{BusTap, DriveConfig, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
 
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
@@ -177,4 +177,23 @@ fn j07_a_friction_table_and_what_follows_it_at_once_are_taken_without_losing_a_t
         assert_eq!(responses, expected, "at {baud:?} Bd");
         assert_eq!(operator.state(), State::HoldPos);
     }
+}
+
+#[test]
+fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
+    let mut config = SimConfig { start: FROM, baud: None, ..SimConfig::default() };
+    let older = DriveConfig::older();
+    config.controller.velocity_full_scale = older.velocity_full_scale;
+    config.drives = [older; 6];
+    let mut operator = Operator::new(config);
+    operator.bring_up().unwrap();
+    operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
+    operator.execute(10_000).unwrap();
+    // Somebody else's broadcast right behind one of the controller's leaves them one request behind, for good.
+    let ask = jtc_bus::Request::ChangeFsm { target: [jtc_bus::Target::NoChange; 7] }.emit();
+    operator.world.put_bus_frame(ask);
+    operator.run(20);
+    let answers = operator.world.bus_frames().iter().filter(|f| f.frame.id & 0x200 != 0).count();
+    assert_eq!(answers, 7, "they answer what was asked a millisecond ago");
+    assert_eq!(operator.state(), State::HoldPos);
 }

@@ -3,9 +3,14 @@
 
 pub mod arm;
 pub mod check;
+pub mod doctor;
 pub mod error;
+pub mod explain;
 pub mod file;
 pub mod frame;
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod plan;
 pub mod port;
 pub mod recording;

@@ -3,6 +3,8 @@
 use jtc_core::{JOINTS, JointTelemetry, Telemetry};
 use jtc_wire::Status;
 
+use crate::trajectory::Trajectory;
+
 /// One joint in a [`Sample`]; NaN where the source does not know a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSample {
@@ -145,5 +147,19 @@ impl Sample {
                 }
             }),
         }
+    }
+
+    /// What a status says while `trajectory` is executed: the commanded values are those of the reported point, as the
+    /// controller computes them.
+    pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory) -> Self {
+        let mut sample = Self::from_status(time_s, status);
+        if let (3, Some(set)) = (status.fsm, trajectory.at_ms(status.point)) {
+            for (j, joint) in sample.joints.iter_mut().enumerate() {
+                joint.set_position = set.position[j];
+                joint.set_velocity = set.velocity[j];
+                joint.set_acceleration = set.acceleration[j];
+            }
+        }
+        sample
     }
 }

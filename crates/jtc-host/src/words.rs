@@ -4,32 +4,17 @@ use jtc_wire::{DataStatus, FrameStatus, Status};
 
 /// State of the controller.
 pub fn state(fsm: u8) -> &'static str {
-    ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"]
-        .get(fsm as usize)
-        .copied()
-        .unwrap_or("unknown")
+    jtc_wire::words::jtc_fsm(fsm)
 }
 
 /// Trajectory execution state.
 pub fn tes(tes: u8) -> &'static str {
-    ["Null", "Stop", "Pause", "Execute", "Finish", "TransNullToStop"]
-        .get(tes as usize)
-        .copied()
-        .unwrap_or("unknown")
+    jtc_wire::words::tes(tes)
 }
 
 /// State of a node; numbers from 10 to 16 are transitions.
 pub fn node_state(fsm: u8) -> &'static str {
-    match fsm {
-        0 => "Start",
-        1 => "Init",
-        2 => "ReadyToOperate",
-        3 => "OperationEnable",
-        10..=16 => "in transition",
-        254 => "FaultReactionActive",
-        255 => "Fault",
-        _ => "unknown",
-    }
+    jtc_wire::words::node_fsm(fsm)
 }
 
 /// Name of a node on the joint bus: joints count from 1, as people do.
@@ -70,72 +55,27 @@ fn list(bits: u32, names: &[&'static str]) -> Vec<&'static str> {
 
 /// Error word of the controller.
 pub fn errors(word: u16) -> Vec<&'static str> {
-    list(
-        u32::from(word),
-        &[
-            "emergency input",
-            "emergency output",
-            "internal error",
-            "external error",
-            "internal joint error",
-            "CAN error",
-            "host link error",
-            "external joint error",
-        ],
-    )
+    list(u32::from(word), &jtc_wire::words::JTC_ERRORS)
 }
 
 /// Internal error word of a joint.
 pub fn joint_errors(word: u16) -> Vec<&'static str> {
-    list(
-        u32::from(word),
-        &[
-            "set position over limit",
-            "set velocity over limit",
-            "set acceleration over limit",
-            "torque over limit",
-            "position error over limit",
-            "friction table value missing",
-        ],
-    )
+    list(u32::from(word), &jtc_wire::words::JOINT_INTERNAL)
 }
 
 /// Fault byte of a drive's motor control.
 pub fn motor_faults(byte: u8) -> Vec<&'static str> {
-    list(
-        u32::from(byte),
-        &[
-            "FOC duration",
-            "over-voltage",
-            "under-voltage",
-            "over-temperature",
-            "start-up failed",
-            "speed feedback",
-            "over-current",
-            "software error",
-        ],
-    )
+    list(u32::from(byte), &jtc_wire::words::MC_FAULTS)
 }
 
 /// Error byte of a drive.
 pub fn node_errors(byte: u8) -> Vec<&'static str> {
-    list(
-        u32::from(byte),
-        &["encoder failed", "motor control fault", "over-speed", "hardware fault", "", "", "", ""],
-    )
+    list(u32::from(byte), &jtc_wire::words::NODE_ERRORS)
 }
 
 /// Warning byte of a node.
 pub fn node_warnings(byte: u8) -> Vec<&'static str> {
-    list(
-        u32::from(byte),
-        &[
-            "position not accurate",
-            "outside working area",
-            "magnetic field out of range",
-            "safety line active",
-        ],
-    )
+    list(u32::from(byte), &jtc_wire::words::NODE_WARNINGS)
 }
 
 /// CAN flags.
@@ -150,7 +90,7 @@ pub fn can_flags(word: u32) -> Vec<String> {
 
 /// What the controller still waits for in Init: friction, PID, arm model.
 pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
-    list(u32::from(jtc_init), &["friction", "PID", "arm model"])
+    list(u32::from(jtc_init), &jtc_wire::words::JTC_INIT)
 }
 
 /// Nodes that are not ready.

@@ -56,6 +56,17 @@ impl ParameterFile {
         Ok(all)
     }
 
+    /// From the text of a table alone.
+    pub fn parse_table(text: &str) -> Result<Self, FileError> {
+        let mut all = Self::default();
+        match csv::read(text)? {
+            Table::Friction(t) => all.table = Some(Box::new([*t; JOINTS])),
+            Table::Pid(g) => all.pid = Some([g; JOINTS]),
+            whole => all.take(Path::new(""), whole),
+        }
+        Ok(all)
+    }
+
     /// What can be sent.
     pub fn parameter_set(&self, choice: FrictionChoice) -> ParameterSet {
         let polynomial = self.polynomial.map(Friction::Polynomial);

@@ -13,7 +13,7 @@ use std::time::Duration;
 pub use capture::{Capture, Captured, Direction, read_capture};
 pub use error::PortError;
 pub use list::{PortInfo, PortKind, list, only_one};
-pub use serial::SerialPort;
+pub use serial::{STANDARD_RATES, SerialPort};
 
 /// A byte stream to a controller, polled by one thread.
 ///

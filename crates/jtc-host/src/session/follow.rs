@@ -41,19 +41,24 @@ impl<P: Port> Session<P> {
     pub fn follow(&mut self, mut each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         let start = self.port.now();
         let mut begun = false;
+        // On an error the controller forgets the trajectory, and its point with it.
+        let mut point = 0;
         loop {
             let status = self.next_status()?;
             begun |= status.tes == 3 || self.port.now() - start > SETTLE;
+            if status.fsm == 3 {
+                point = status.point;
+            }
             let flow = each(&status);
             if status.fsm == 5 || status.errors != 0 {
-                return Err(Error::RunFault { point: status.point, status: Box::new(status) });
+                return Err(Error::RunFault { point, status: Box::new(status) });
             }
             match (status.tes, status.fsm) {
                 (4, _) if begun => return Ok(Outcome::Finished(status)),
                 (1, _) if begun => return Ok(Outcome::Stopped(status)),
                 // The trajectory is gone, or nodes fell out of operation.
                 (0, _) | (_, 0 | 1) if begun => {
-                    return Err(Error::RunFault { point: status.point, status: Box::new(status) });
+                    return Err(Error::RunFault { point, status: Box::new(status) });
                 }
                 _ => {}
             }

@@ -7,20 +7,18 @@ mod commands;
 mod follow;
 mod params;
 mod recover;
-mod scanner;
 mod statistics;
 mod upload;
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status};
+use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status, StatusReceiver};
 
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
 pub use params::Pushed;
 pub use recover::RecoverStep;
-pub use scanner::Scanner;
 pub use statistics::LinkStatistics;
 pub use upload::{Progress, UploadOptions, UploadReport};
 
@@ -51,7 +49,7 @@ impl Default for Patience {
 /// A conversation over a port.
 pub struct Session<P> {
     port: P,
-    scanner: Scanner,
+    receiver: StatusReceiver,
     arrived: VecDeque<Status>,
     records: VecDeque<Response>,
     last: Option<Status>,
@@ -69,7 +67,7 @@ impl<P: Port> Session<P> {
         let start = port.now();
         Self {
             port,
-            scanner: Scanner::default(),
+            receiver: StatusReceiver::new(),
             arrived: VecDeque::new(),
             records: VecDeque::new(),
             last: None,
@@ -114,7 +112,7 @@ impl<P: Port> Session<P> {
     /// What passed so far.
     pub fn statistics(&self) -> LinkStatistics {
         LinkStatistics {
-            bad_bytes: self.scanner.skipped(),
+            bad_bytes: self.receiver.counters().skipped_bytes,
             time_s: (self.port.now() - self.start).as_secs_f64(),
             ..self.statistics
         }
@@ -176,8 +174,10 @@ impl<P: Port> Session<P> {
         let n = self.port.read(&mut buffer, timeout)?;
         self.statistics.bytes_received += n as u64;
         let before = self.arrived.len();
-        let arrived = &mut self.arrived;
-        self.scanner.push(&buffer[..n], |status| arrived.push_back(status));
+        let mut rest = &buffer[..n];
+        while let Some(status) = self.receiver.next(&mut rest) {
+            self.arrived.push_back(status);
+        }
         let now = self.port.now();
         for status in self.arrived.iter().skip(before) {
             self.statistics.statuses += 1;

@@ -72,12 +72,28 @@ impl<P: Port> Session<P> {
         let mut status = self.fresh_status()?;
         say(&RecoverStep::Found(words::waiting_for(&status)));
         let (mut resets, mut clears, mut waited) = (0u8, 0, false);
-        for _ in 0..24 {
-            if status.errors & 1 != 0 {
-                say(&RecoverStep::SafetyInput);
-                self.wait_for("safety input high", PERSON_TIME, |s| s.errors & 1 == 0 || input_released(s))?;
-            }
+        let mut asked: Option<Duration> = None;
+        let mut rounds = 0;
+        while rounds < 24 {
+            rounds += 1;
             match status.fsm {
+                // Errors latch: only clearing tells whether the safety input is high again.
+                5 if status.errors & 1 != 0
+                    && clears > 0
+                    && faulty(&status) == 0
+                    && status.can_current == 0 =>
+                {
+                    let since = *asked.get_or_insert_with(|| {
+                        say(&RecoverStep::SafetyInput);
+                        self.port.now()
+                    });
+                    if self.port.now() - since > PERSON_TIME {
+                        return Err(Error::Device { status: Box::new(status) });
+                    }
+                    rounds -= 1;
+                    self.clear(true, 0)?;
+                    self.pause_for(EFFECT)?;
+                }
                 5 => {
                     let silent = (status.can_current >> 8 & 0x7F) as u8 & !resets;
                     if silent != 0 && clears > 0 {
@@ -176,11 +192,6 @@ impl<P: Port> Session<P> {
             self.poll(end - now)?;
         }
     }
-}
-
-/// The error stays latched until it is cleared: no status tells the level of the input itself, so clearing is the test.
-fn input_released(_: &Status) -> bool {
-    true
 }
 
 /// Nodes that report a fault of their own.

@@ -1,0 +1,345 @@
+//! What is wrong with link, bus and set-up, in words with the next command.
+
+use std::time::Duration;
+
+use jtc_wire::Status;
+
+use crate::port::Port;
+use crate::{Error, Session, words};
+
+/// Rates that are tried when bytes come and no frame is in them.
+pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
+
+/// What was heard on the link.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Observation {
+    /// Rate of the port, Bd.
+    pub baud: Option<u32>,
+    /// How long was listened, s.
+    pub time_s: f64,
+    /// Bytes that came.
+    pub bytes: u64,
+    /// Bytes that belong to no status.
+    pub bad_bytes: u64,
+    /// Statuses.
+    pub statuses: u64,
+    /// The last one.
+    pub status: Option<Status>,
+    /// A request was confirmed; `None`: none was tried.
+    pub confirmed: Option<bool>,
+    /// Another rate at which statuses were found.
+    pub other_baud: Option<u32>,
+}
+
+/// How bad a finding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Nothing works until it is gone.
+    Problem,
+    /// It works, but not as it should.
+    Warning,
+    /// As it should be.
+    Good,
+}
+
+/// One finding.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Finding {
+    /// How bad it is.
+    pub severity: Severity,
+    /// What was found.
+    pub what: String,
+    /// What probably is the cause; may be empty.
+    pub why: String,
+    /// The next command or act; empty when there is nothing to do.
+    pub next: String,
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.what)?;
+        if !self.why.is_empty() {
+            write!(f, ": {}", self.why)?;
+        }
+        if !self.next.is_empty() {
+            write!(f, "\n    next: {}", self.next)?;
+        }
+        Ok(())
+    }
+}
+
+fn finding(severity: Severity, what: impl Into<String>, why: &str, next: &str) -> Finding {
+    Finding { severity, what: what.into(), why: why.into(), next: next.into() }
+}
+
+impl<P: Port> Session<P> {
+    /// Listens for `time`; silence is an observation, no error.
+    pub fn examine(&mut self, time: Duration) -> Result<Observation, Error> {
+        let (start, before) = (self.now(), self.statistics());
+        let end = start + time;
+        let mut status = None;
+        loop {
+            let now = self.now();
+            if now >= end {
+                break;
+            }
+            status = self.poll(end - now)?.or(status);
+        }
+        let after = self.statistics();
+        Ok(Observation {
+            baud: self.port().baud(),
+            time_s: (self.now() - start).as_secs_f64(),
+            bytes: after.bytes_received - before.bytes_received,
+            bad_bytes: after.bad_bytes - before.bad_bytes,
+            statuses: after.statuses - before.statuses,
+            status,
+            confirmed: None,
+            other_baud: None,
+        })
+    }
+}
+
+/// Findings, worst first.
+pub fn findings(seen: &Observation) -> Vec<Finding> {
+    let mut all = Vec::new();
+    link(seen, &mut all);
+    if let Some(status) = &seen.status {
+        errors(status, &mut all);
+        set_up(status, &mut all);
+        temperatures(status, &mut all);
+    }
+    all.sort_by_key(|f| f.severity);
+    all
+}
+
+fn link(seen: &Observation, all: &mut Vec<Finding>) {
+    use Severity::{Good, Problem, Warning};
+    let baud = seen.baud.map_or_else(|| "this rate".to_owned(), |b| format!("{b} Bd"));
+    if seen.bytes == 0 {
+        all.push(finding(
+            Problem,
+            format!("no byte came in {:.1} s", seen.time_s),
+            "controller off, wrong port, or receive wire open",
+            "check power and cable, then `jtc ports`",
+        ));
+        return;
+    }
+    if seen.statuses == 0 {
+        match seen.other_baud {
+            Some(rate) => all.push(finding(
+                Problem,
+                format!("{} bytes came at {baud}, but no frame in them", seen.bytes),
+                &format!("the controller speaks at {rate} Bd"),
+                &format!("`--baud {rate}`"),
+            )),
+            None => all.push(finding(
+                Problem,
+                format!("{} bytes came at {baud}, but no frame in them", seen.bytes),
+                "wrong rate, or another device at this port",
+                "`jtc doctor --baud RATE` with the rate of the controller (it starts with 115200)",
+            )),
+        }
+        return;
+    }
+    let bad = seen.bad_bytes as f64 / seen.bytes as f64;
+    // The first status may have been cut by our coming in the middle of it.
+    if seen.bad_bytes > 175 && bad > 0.001 {
+        all.push(finding(
+            Warning,
+            format!("{:.1} % of the bytes belong to no frame", bad * 100.0),
+            "a bad cable, no common earth, or a rate that is a little off",
+            "another cable, or a lower rate",
+        ));
+    }
+    let rate = seen.statuses as f64 / seen.time_s.max(1e-3);
+    if rate < 15.0 && seen.time_s >= 0.5 {
+        all.push(finding(
+            Warning,
+            format!("only {rate:.0} statuses per second, 25 are usual"),
+            "bytes are lost on the way, or this computer is busy",
+            "`jtc monitor` shows the link",
+        ));
+    } else {
+        all.push(finding(Good, format!("link: {rate:.0} statuses per second at {baud}"), "", ""));
+    }
+    if seen.confirmed == Some(false) {
+        all.push(finding(
+            Problem,
+            "the controller speaks, but does not answer",
+            "the wire towards the controller is open, or another program sends at the same time",
+            "check the transmit wire; `fuser -v PORT` names other programs",
+        ));
+    }
+}
+
+fn errors(s: &Status, all: &mut Vec<Finding>) {
+    use Severity::{Problem, Warning};
+    if s.errors & 1 != 0 {
+        all.push(finding(
+            Problem,
+            "the safety input is low",
+            "emergency stop pressed, or its wire broken (it is pulled down)",
+            "make the cell safe, release it, then `jtc recover`",
+        ));
+    }
+    for flag in words::can_flags(s.can_current) {
+        all.push(finding(
+            Problem,
+            format!("joint bus: {flag}"),
+            "supply or cable of this node",
+            "`jtc recover` when it is back",
+        ));
+    }
+    for (j, joint) in s.joints.iter().enumerate() {
+        let who = words::node(j);
+        for word in words::joint_errors(joint.internal) {
+            all.push(finding(
+                Problem,
+                format!("{who}: {word}"),
+                "",
+                "`jtc recover`, after the trajectory or the model was corrected",
+            ));
+        }
+        for word in words::node_errors(joint.errors).into_iter().chain(words::motor_faults(joint.mc_current))
+        {
+            all.push(finding(
+                Problem,
+                format!("{who}: {word}"),
+                "reported by the drive",
+                "`jtc explain`, then `jtc recover`",
+            ));
+        }
+        for word in words::node_warnings(joint.warnings) {
+            let severity = if joint.warnings & 8 != 0 { Problem } else { Warning };
+            all.push(finding(severity, format!("{who}: {word}"), "reported by the drive", "`jtc explain`"));
+        }
+        if joint.fsm >= 254 {
+            all.push(finding(Problem, format!("{who}: drive in its fault state"), "", "`jtc recover`"));
+        }
+    }
+    if s.fsm == 5 && all.iter().all(|f| f.severity != Problem) {
+        all.push(finding(
+            Problem,
+            "an error is latched whose cause is gone",
+            &words::errors_line(s),
+            "`jtc recover`",
+        ));
+    }
+}
+
+fn set_up(s: &Status, all: &mut Vec<Finding>) {
+    use Severity::{Good, Problem, Warning};
+    let missing = words::missing_parameters(s.jtc_init);
+    if !missing.is_empty() {
+        all.push(finding(
+            Problem,
+            format!("not given yet: {}", missing.join(", ")),
+            "the controller waits for it in Init",
+            "`jtc params push FILE` or `jtc params use-defaults`",
+        ));
+    }
+    for n in (0..7).filter(|n| s.node_init >> n & 1 == 1) {
+        let (fsm, warnings) = match (s.joints.get(n), s.gripper) {
+            (Some(j), _) => (j.fsm, j.warnings),
+            (None, Some(g)) => (g.fsm, g.warnings),
+            (None, None) => (0, 0),
+        };
+        let why = match (fsm, warnings & 1) {
+            _ if s.can_current >> (8 + n) & 1 == 1 => "it does not answer",
+            (0, _) => "it has not answered yet, or it starts",
+            (_, 1) => "its position is not accurate yet",
+            (1, _) => "its configuration was not accepted yet",
+            (254 | 255, _) => "it is in its fault state",
+            (10..=16, _) => "it is changing its state (the first enable takes 4 s)",
+            _ => "it is being brought up",
+        };
+        let what = format!("{} is not ready ({})", words::node(n), words::node_state(fsm));
+        all.push(finding(
+            if s.fsm <= 1 { Problem } else { Warning },
+            what,
+            why,
+            "wait 10 s; then `jtc recover`",
+        ));
+    }
+    if s.errors == 0 && s.jtc_init == 0 && s.node_init == 0 {
+        let line = format!("controller: {}, trajectory {}", words::state(s.fsm), words::tes(s.tes));
+        all.push(finding(Good, line, "", ""));
+    }
+}
+
+/// Bearing temperature above which friction and life suffer, °C.
+const HOT: u8 = 70;
+
+fn temperatures(s: &Status, all: &mut Vec<Finding>) {
+    for (j, joint) in s.joints.iter().enumerate() {
+        // Above 200 the byte is a negative temperature.
+        if (HOT..200).contains(&joint.temperature) {
+            let what = format!("{}: bearing at {} °C", words::node(j), joint.temperature);
+            all.push(finding(
+                Severity::Warning,
+                what,
+                "long motion at high torque",
+                "let it cool; `jtc monitor`",
+            ));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(status: Status) -> Observation {
+        let confirmed = Some(true);
+        Observation {
+            baud: Some(115_200),
+            time_s: 1.0,
+            bytes: 4375,
+            statuses: 25,
+            status: Some(status),
+            confirmed,
+            ..Default::default()
+        }
+    }
+
+    fn text(o: &Observation) -> String {
+        findings(o).iter().map(|f| format!("{:?} {f}\n", f.severity)).collect()
+    }
+
+    #[test]
+    fn silence_and_a_wrong_rate_are_told_apart() {
+        let silent = Observation { time_s: 2.0, ..Default::default() };
+        assert!(text(&silent).contains("no byte came"));
+        let noise = Observation { bytes: 500, bad_bytes: 500, baud: Some(9_600), ..silent };
+        assert!(text(&noise).contains("wrong rate"));
+        let found = Observation { other_baud: Some(921_600), ..noise };
+        assert!(text(&found).contains("--baud 921600"));
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let mut status = Status { fsm: 1, jtc_init: 0b101, node_init: 0b10, ..Default::default() };
+        status.joints[1].fsm = 12;
+        let t = text(&seen(status));
+        assert!(
+            t.contains("friction, arm model") && t.contains("joint 2 is not ready") && t.contains("4 s"),
+            "{t}"
+        );
+    }
+
+    #[test]
+    fn problems_come_first_and_a_good_controller_has_none() {
+        let good = seen(Status { fsm: 2, tes: 1, ..Default::default() });
+        assert!(findings(&good).iter().all(|f| f.severity == Severity::Good), "{}", text(&good));
+        let mut status = Status { fsm: 5, errors: 0x29, can_current: 1 << 12, ..Default::default() };
+        status.joints[3].temperature = 80;
+        let all = findings(&seen(status));
+        assert!(all.is_sorted_by_key(|f| f.severity));
+        let t = text(&seen(status));
+        assert!(
+            t.contains("safety input") && t.contains("joint 5 does not answer") && t.contains("80 °C"),
+            "{t}"
+        );
+    }
+}

@@ -1,0 +1,226 @@
+//! One page for each code that a controller, a drive or this library reports: what it means, why, what to do, the next command.
+
+mod pages;
+
+pub use pages::PAGES;
+
+/// Which number a page is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Family {
+    /// Bits of the controller's error words.
+    Jtc,
+    /// Bits of a joint's internal error word.
+    Joint,
+    /// CAN flags.
+    Can,
+    /// Bits of a node's error byte.
+    Node,
+    /// Bits of a node's warning byte.
+    Warning,
+    /// Bits of the motor-control fault bytes.
+    Motor,
+    /// Data status codes of a response.
+    Data,
+    /// Frame status codes of a response.
+    Frame,
+    /// States of the controller.
+    State,
+    /// Trajectory execution states.
+    Tes,
+    /// States of a node.
+    NodeState,
+}
+
+impl Family {
+    /// All, in the order in which a bare number is looked up.
+    pub const ALL: [Family; 11] = [
+        Family::Jtc,
+        Family::Joint,
+        Family::Can,
+        Family::Node,
+        Family::Warning,
+        Family::Motor,
+        Family::Data,
+        Family::Frame,
+        Family::State,
+        Family::Tes,
+        Family::NodeState,
+    ];
+
+    /// What stands before the colon in `can:0x100`.
+    pub fn key(self) -> &'static str {
+        match self {
+            Family::Jtc => "jtc",
+            Family::Joint => "joint",
+            Family::Can => "can",
+            Family::Node => "node",
+            Family::Warning => "warning",
+            Family::Motor => "motor",
+            Family::Data => "data",
+            Family::Frame => "frame",
+            Family::State => "state",
+            Family::Tes => "tes",
+            Family::NodeState => "node-state",
+        }
+    }
+
+    /// In words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Family::Jtc => "controller error word",
+            Family::Joint => "internal error word of a joint",
+            Family::Can => "CAN flags",
+            Family::Node => "error byte of a node",
+            Family::Warning => "warning byte of a node",
+            Family::Motor => "motor-control fault byte of a drive",
+            Family::Data => "data status of a response",
+            Family::Frame => "frame status of a response",
+            Family::State => "state of the controller",
+            Family::Tes => "trajectory execution state",
+            Family::NodeState => "state of a node",
+        }
+    }
+
+    /// Its number is a set of bits, not one code.
+    pub fn is_bits(self) -> bool {
+        matches!(
+            self,
+            Family::Jtc | Family::Joint | Family::Can | Family::Node | Family::Warning | Family::Motor
+        )
+    }
+}
+
+/// One page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Page {
+    /// Which number.
+    pub family: Family,
+    /// Bit number, or the code itself.
+    pub code: u32,
+    /// Name, unique.
+    pub name: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+    /// What usually causes it.
+    pub cause: &'static str,
+    /// What to do.
+    pub remedy: &'static str,
+    /// The next command.
+    pub command: &'static str,
+}
+
+impl Page {
+    /// The number as it stands in its word: a mask for bits.
+    pub fn number(&self) -> u32 {
+        if self.family.is_bits() { 1 << self.code } else { self.code }
+    }
+}
+
+impl std::fmt::Display for Page {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let number = if self.family.is_bits() {
+            format!("bit {} (0x{:02X}) of the {}", self.code, self.number(), self.family.title())
+        } else {
+            format!("{} of the {}", self.code, self.family.title())
+        };
+        writeln!(f, "{} - {number}", self.name)?;
+        writeln!(f, "  meaning: {}", self.meaning)?;
+        writeln!(f, "  cause:   {}", self.cause)?;
+        writeln!(f, "  do:      {}", self.remedy)?;
+        write!(f, "  next:    {}", self.command)
+    }
+}
+
+/// Pages for a name (`joint-position-error`), a number of one family (`can:0x100`, `data:7`), a bare number (looked up in every
+/// family), or words of a name. Empty: nothing fits.
+pub fn find(query: &str) -> Vec<&'static Page> {
+    let query = query.trim().to_ascii_lowercase().replace([' ', '_'], "-");
+    if let Some(page) = PAGES.iter().find(|p| p.name == query) {
+        return vec![page];
+    }
+    let (family, text) = match query.split_once(':') {
+        Some((key, rest)) => match Family::ALL.into_iter().find(|f| f.key() == key) {
+            Some(family) => (Some(family), rest.trim_matches('-').to_owned()),
+            None => return Vec::new(),
+        },
+        None => (None, query),
+    };
+    let in_family = |p: &&Page| family.is_none_or(|f| p.family == f);
+    if let Some(number) = number(&text) {
+        let hit = |p: &&'static Page| {
+            if p.family.is_bits() {
+                number & p.number() != 0 && known_bits(p.family, number)
+            } else {
+                p.code == number
+            }
+        };
+        return PAGES.iter().filter(in_family).filter(hit).collect();
+    }
+    if text.is_empty() {
+        return if family.is_some() { PAGES.iter().filter(in_family).collect() } else { Vec::new() };
+    }
+    PAGES.iter().filter(in_family).filter(|p| text.split('-').all(|word| p.name.contains(word))).collect()
+}
+
+/// All set bits have a page: else the number belongs to another family.
+fn known_bits(family: Family, number: u32) -> bool {
+    let known = PAGES.iter().filter(|p| p.family == family).fold(0, |m, p| m | p.number());
+    number & !known == 0
+}
+
+fn number(text: &str) -> Option<u32> {
+    match text.strip_prefix("0x") {
+        Some(hex) => u32::from_str_radix(hex, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_are_found_by_name_number_and_words() {
+        assert_eq!(find("joint-position-error")[0].number(), 0x10);
+        assert_eq!(find("Joint Position Error").len(), 1);
+        let names: Vec<&str> = find("jtc:0x12").iter().map(|p| p.name).collect();
+        assert_eq!(names, ["emergency-output", "internal-joint-error"]);
+        assert!(find("0x12").iter().any(|p| p.family == Family::Joint));
+        assert_eq!(find("data:8")[0].name, "start-position-mismatch");
+        assert_eq!(find("can:0x0400").len(), 1);
+        assert_eq!(find("node-state:255")[0].name, "node-fault");
+        assert!(find("friction table").iter().any(|p| p.family == Family::Joint));
+        assert!(find("tes:").len() >= 5);
+        assert!(find("no-such-thing").is_empty() && find("").is_empty() && find("bogus:1").is_empty());
+    }
+
+    /// No bit and no code without a page, no page twice.
+    #[test]
+    fn every_code_has_one_page() {
+        use jtc_wire::words as w;
+        let count = |family| PAGES.iter().filter(|p| p.family == family).count();
+        assert_eq!(count(Family::Jtc), w::JTC_ERRORS.len());
+        assert_eq!(count(Family::Joint), w::JOINT_INTERNAL.len());
+        assert_eq!(count(Family::Motor), w::MC_FAULTS.len());
+        assert_eq!(count(Family::Node), w::NODE_ERRORS.len());
+        assert_eq!(count(Family::Warning), w::NODE_WARNINGS.len());
+        assert_eq!(count(Family::Can), w::CAN_FLAGS.iter().filter(|n| !n.is_empty()).count());
+        assert_eq!(count(Family::State), w::JTC_FSM.len());
+        assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));
+        for (i, p) in PAGES.iter().enumerate() {
+            assert!(
+                PAGES[..i].iter().all(|q| q.name != p.name && (q.family, q.code) != (p.family, p.code)),
+                "{}",
+                p.name
+            );
+            assert_eq!(find(p.name), [p]);
+            assert!(
+                !p.command.is_empty()
+                    && p.meaning.ends_with('.')
+                    && p.cause.ends_with('.')
+                    && p.remedy.ends_with('.')
+            );
+        }
+    }
+}

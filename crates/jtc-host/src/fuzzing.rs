@@ -1,0 +1,112 @@
+//! What the fuzz targets run: every file reader on any bytes. A panic, or a promise broken, is a finding.
+
+use crate::arm::{Arm, ParameterFile};
+use crate::file::FileError;
+use crate::port::read_capture;
+use crate::trajectory::{Loaded, Trajectory};
+
+fn text(data: &[u8]) -> Option<&str> {
+    std::str::from_utf8(data).ok()
+}
+
+/// What was read is finite, has a step, and comes back from our own forms as it was.
+fn sound(read: Result<Loaded, FileError>) {
+    let Ok(loaded) = read else { return };
+    let t = &loaded.trajectory;
+    assert!(t.step_ms > 0 && !t.points.is_empty());
+    let finite = |v: &[f64; 6]| v.iter().all(|v| v.is_finite());
+    // A spline through huge numbers may overflow; such a file fails the check by its scale.
+    if !t.points.iter().all(|p| finite(&p.position) && finite(&p.velocity) && finite(&p.acceleration)) {
+        assert!(t.raw().is_err());
+        return;
+    }
+    if t.points.len() < 200 && t.step_ms <= 1000 && t.points.len() > 1 {
+        let again = |text: &str| Loaded::parse(text, None).expect("our own form").trajectory;
+        assert_eq!(&again(&t.to_csv()), t);
+        assert_eq!(&again(&t.to_json()), t);
+    }
+    let _: Result<_, _> = Trajectory::raw(t);
+}
+
+/// CSV with a header.
+pub fn trajectory_csv(data: &[u8]) {
+    let Some(text) = text(data) else { return };
+    sound(Loaded::parse(&format!("t,q1,q2,q3,q4,q5,q6\n{text}"), None));
+    sound(Loaded::parse(text, None));
+}
+
+/// The header-less 19 columns; `data` also as numbers of such a file.
+pub fn trajectory_table(data: &[u8]) {
+    if let Some(text) = text(data) {
+        sound(Loaded::parse(text, None));
+    }
+    let (mut whole, mut float) = (String::new(), String::new());
+    for (i, row) in data.chunks(36).take(50).enumerate() {
+        let time = i * (1 + usize::from(row[0]));
+        whole += &time.to_string();
+        float += &format!("{:.3}", time as f64 * 1e-3);
+        for c in 0..18 {
+            let byte = |k: usize| row.get(k).copied().unwrap_or(0);
+            let v = i16::from_be_bytes([byte(2 * c), byte(2 * c + 1)]);
+            whole += &format!(",{v}");
+            float += &format!(",{:.6}", f64::from(v) / 1e4);
+        }
+        whole.push('\n');
+        float.push('\n');
+    }
+    sound(Loaded::parse(&whole, None));
+    sound(Loaded::parse(&float, None));
+}
+
+/// JSON of both forms.
+pub fn trajectory_json(data: &[u8]) {
+    let Some(text) = text(data) else { return };
+    sound(Loaded::parse(&format!("{{{text}"), None));
+}
+
+/// YAML.
+pub fn trajectory_yaml(data: &[u8]) {
+    let Some(text) = text(data) else { return };
+    sound(Loaded::parse(&format!("joint_names: [a1, a2, a3, a4, a5, a6]\n{text}"), None));
+    sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
+}
+
+/// What is an arm has a physical model, and its numbers can be sent or are refused by name.
+fn sound_arm(read: Result<Arm, FileError>) {
+    let Ok(arm) = read else { return };
+    assert!(arm.model.check().is_ok());
+    let set = arm.parameter_set();
+    if set.check().is_ok() {
+        for frame in
+            set.friction.iter().map(crate::frame::friction).chain(set.pid.iter().map(crate::frame::pid))
+        {
+            assert!(jtc_wire::FrameRef::new_checked(&frame).is_some());
+        }
+    }
+}
+
+/// Arm files.
+pub fn arm_toml(data: &[u8]) {
+    let Some(text) = text(data) else { return };
+    sound_arm(Arm::from_toml(text).and_then(|_| Arm::parse(text)));
+}
+
+/// Robot descriptions.
+pub fn arm_urdf(data: &[u8]) {
+    let Some(text) = text(data) else { return };
+    sound_arm(Arm::parse(text));
+    let _ = Arm::from_urdf(text);
+}
+
+/// Friction tables, polynomials, gains, models.
+pub fn parameter_table(data: &[u8]) {
+    let Some(text) = text(data) else { return };
+    if let Ok(file) = ParameterFile::parse_table(text) {
+        let _ = file.parameter_set(Default::default()).check();
+    }
+}
+
+/// Raw captures.
+pub fn capture(data: &[u8]) {
+    let _ = read_capture(data);
+}

@@ -1,0 +1,199 @@
+//! The client against the whole simulated controller: parameters, uploads on good and bad lines, execution, recovery.
+
+use std::time::Duration;
+
+use jtc_core::Config;
+use jtc_host::arm::{Arm, FrictionChoice, ParameterFile};
+use jtc_host::port::sim::SimPort;
+use jtc_host::session::{Flow, Outcome, RecoverStep, UploadOptions, UploadReport};
+use jtc_host::{Error, Session, Trajectory, plan};
+use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
+
+type Sim = Session<SimPort>;
+
+fn session(baud: Option<u32>) -> Sim {
+    Session::new(SimPort::new(World::new(SimConfig { baud, ..SimConfig::default() })))
+}
+
+/// In HoldPos with the default parameters.
+fn ready(baud: Option<u32>) -> Sim {
+    let mut s = session(baud);
+    s.use_defaults().unwrap();
+    s.wait_hold(Duration::from_secs(15)).unwrap();
+    s
+}
+
+/// There and back between two poses, `points` in all.
+fn trajectory(points: usize) -> Trajectory {
+    let config = Config::avena();
+    let there = plan::joint_move(&[0.0; 6], &[0.6, -0.5, 0.4, 0.8, -0.3, 0.9], &config, 60.0).unwrap();
+    let mut all = Trajectory { step_ms: there.step_ms, points: Vec::new() };
+    while all.points.len() < points {
+        all.points.extend(&there.points);
+        all.points.extend(
+            there.points.iter().rev().map(|p| jtc_host::Point { velocity: p.velocity.map(|v| -v), ..*p }),
+        );
+    }
+    all.points.truncate(points);
+    all
+}
+
+fn upload(s: &mut Sim, t: &Trajectory) -> Result<UploadReport, Error> {
+    s.upload(&t.raw().unwrap(), t.step_ms, &UploadOptions::default(), |_| Flow::Continue)
+}
+
+#[test]
+fn parameters_go_over_and_the_controller_becomes_ready() {
+    let mut s = session(Some(921_600));
+    let status = s.next_status().unwrap();
+    assert_eq!((status.fsm, status.jtc_init), (1, 7));
+    let arm = Arm::avena();
+    let file = ParameterFile { polynomial: arm.polynomial, table: arm.table, ..ParameterFile::default() };
+    let table = s.push(&file.parameter_set(FrictionChoice::Table), |_| {}).unwrap();
+    // The long frame is sent twice, and both are confirmed.
+    assert_eq!((table[0].times, table[0].bytes), (2, 10_566));
+    assert_eq!(s.fresh_status().unwrap().friction_type, 1);
+    let pushed = s.push(&Arm::avena().parameter_set(), |_| {}).unwrap();
+    assert_eq!(pushed.len(), 3);
+    let status = s.wait_hold(Duration::from_secs(15)).unwrap();
+    assert_eq!((status.jtc_init, status.node_init, status.friction_type), (0, 0, 0));
+}
+
+/// At least 98 % of what the line can carry.
+#[test]
+fn uploads_fill_the_line() {
+    for (baud, points) in [(115_200, 2_000), (921_600, 12_000), (3_000_000, 12_000)] {
+        let mut s = ready(Some(baud));
+        let report = upload(&mut s, &trajectory(points)).unwrap();
+        let share = report.line_share.unwrap();
+        println!("{baud} Bd: {points} points in {:.3} s, {:.2} % of the line", report.time_s, share * 100.0);
+        assert!(share >= 0.98, "{baud} Bd: {share}");
+        assert_eq!((report.retries, report.restarts, s.last().unwrap().tes), (0, 0, 1));
+        assert_eq!(s.statistics().bad_frames, 0);
+    }
+}
+
+/// J-04, J-30: whatever the line loses, in the end the controller has every point.
+#[test]
+fn uploads_survive_a_bad_line() {
+    for (seed, kind) in [
+        (1, FaultKind::SerialFlipped { probability: 2e-5 }),
+        (2, FaultKind::SerialLost { probability: 2e-5 }),
+        (3, FaultKind::SerialFlipped { probability: 1e-4 }),
+    ] {
+        let mut s = ready(Some(921_600));
+        s.port_mut().world_mut().inject(Fault { kind, trigger: Trigger::At(0), duration_ms: None });
+        let report =
+            upload(&mut s, &trajectory(3_000)).unwrap_or_else(|e| panic!("seed {seed}, {kind:?}: {e}"));
+        println!(
+            "{kind:?}: {:.2} s, {} retries, {} restarts",
+            report.time_s, report.retries, report.restarts
+        );
+        assert_eq!(s.last().unwrap().tes, 1);
+    }
+}
+
+#[test]
+fn a_trajectory_runs_to_its_end_and_is_followed() {
+    let mut s = ready(Some(921_600));
+    let config = Config::avena();
+    let t = plan::joint_move(&[0.0; 6], &[0.4, -0.3, 0.2, 0.1, 0.2, -0.5], &config, 100.0).unwrap();
+    upload(&mut s, &t).unwrap();
+    s.execute().unwrap();
+    let mut seen = 0;
+    let outcome = s
+        .follow(|_| {
+            seen += 1;
+            Flow::Continue
+        })
+        .unwrap();
+    let Outcome::Finished(status) = outcome else { panic!("{outcome:?}") };
+    assert_eq!(status.point, (t.duration_s() * 1e3).round() as u32);
+    assert!(seen > 10 && (f64::from(status.joints[0].position) - 0.4).abs() < 0.01);
+    // Again from Finish: refused, the arm is at the end (J-34).
+    let error = s.execute().unwrap_err();
+    assert_eq!(error.exit_code(), 1);
+    assert!(error.hint().contains("--approach"), "{error}");
+}
+
+#[test]
+fn pause_resume_and_stop() {
+    let mut s = ready(Some(921_600));
+    let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
+    upload(&mut s, &t).unwrap();
+    s.execute().unwrap();
+    let (mut paused, mut resumed, mut stopped) = (false, false, false);
+    let outcome = s
+        .follow(|status| match (status.tes, status.point) {
+            (3, 300..) if !paused => {
+                paused = true;
+                Flow::Pause
+            }
+            (2, _) if !resumed => {
+                resumed = true;
+                Flow::Resume
+            }
+            (3, 900..) if resumed && !stopped => {
+                stopped = true;
+                Flow::Stop
+            }
+            _ => Flow::Continue,
+        })
+        .unwrap();
+    assert!(matches!(outcome, Outcome::Stopped(_)) && resumed && stopped, "{outcome:?}");
+}
+
+#[test]
+fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
+    let mut s = ready(Some(921_600));
+    let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
+    upload(&mut s, &t).unwrap();
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::MotorFault { joint: 2, bits: 2 },
+        trigger: Trigger::AtPoint(500),
+        duration_ms: Some(300),
+    });
+    s.execute().unwrap();
+    let error = s.follow(|_| Flow::Continue).unwrap_err();
+    let Error::RunFault { point, .. } = &error else { panic!("{error}") };
+    assert!((490..600).contains(point), "{error}");
+    assert_eq!(error.exit_code(), 5);
+    assert!(error.to_string().contains("joint 3"), "{error}");
+    let mut steps = Vec::new();
+    let status =
+        s.recover(None, |step| steps.push(step.clone())).unwrap_or_else(|e| panic!("{e}: {steps:?}"));
+    assert_eq!((status.fsm, status.errors), (2, 0), "{steps:?}");
+    assert!(steps.iter().any(|s| matches!(s, RecoverStep::Clear(_))));
+    // J-24: nothing moves on its own.
+    assert_ne!(status.tes, 3);
+}
+
+#[test]
+fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
+    let mut s = session(Some(921_600));
+    let status = s.recover(None, |_| {}).unwrap();
+    assert_eq!(status.fsm, 2);
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::SafetyInput,
+        trigger: Trigger::At(0),
+        duration_ms: Some(5_000),
+    });
+    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    let mut steps = Vec::new();
+    let status = s.recover(None, |step| steps.push(step.clone())).unwrap();
+    assert_eq!((status.fsm, status.errors), (2, 0));
+    assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
+}
+
+#[test]
+fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
+    use jtc_host::port::test::ScriptedPort;
+    let mut silent = Session::new(ScriptedPort::new(Some(115_200), |_, _| Vec::new()));
+    let error = silent.next_status().unwrap_err();
+    assert_eq!((error.exit_code(), error.code()), (3, "no-link"));
+    assert_eq!(silent.clear(true, 0).unwrap_err().exit_code(), 3);
+    let mut s = session(Some(921_600));
+    let error = upload(&mut s, &trajectory(50)).unwrap_err();
+    assert!(matches!(error, Error::SegmentRefused { segment: 0, .. }), "{error}");
+    assert_eq!(s.teach(true).unwrap_err().exit_code(), 1);
+}

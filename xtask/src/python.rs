@@ -50,21 +50,22 @@ pub fn environment(requirements: &str) -> Result<PathBuf> {
 struct Check {
     /// Below references/.
     script: &'static str,
-    /// Example of a crate that it runs, as its first argument.
-    example: Option<&'static str>,
+    /// Program below the release directory that it runs, as its first argument.
+    program: Option<&'static str>,
     /// Files of the demo that it reads, as the arguments after.
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 4] = [
-    Check { script: "dynamics/check_pinocchio.py", example: Some("reference"), demo_files: &[] },
-    Check { script: "mujoco/check_free_fall.py", example: Some("free_fall"), demo_files: &[] },
-    Check { script: "can/check_multicast.py", example: None, demo_files: &[] },
+const CHECKS: [Check; 5] = [
+    Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
+    Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
+    Check { script: "can/check_multicast.py", program: None, demo_files: &[] },
     Check {
         script: "recording/check_mcap.py",
-        example: None,
+        program: None,
         demo_files: &["recording.mcap", "recording.csv"],
     },
+    Check { script: "host/check_serial_host.py", program: Some("jtc"), demo_files: &[] },
 ];
 
 /// A step for each reference; `demo` is where the demo left its files.
@@ -76,8 +77,12 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     });
     let mut built = false;
     tally.step("programs for the references", || {
-        let packages = ["--package", "jtc-dynamics", "--package", "jtc-sim", "--package", "can-link"];
-        run(cargo(&["build", "--release", "--examples"]).args(packages))?;
+        for (package, example) in
+            [("jtc-dynamics", "reference"), ("jtc-sim", "free_fall"), ("can-link", "echo")]
+        {
+            run(&mut cargo(&["build", "--release", "--package", package, "--example", example]))?;
+        }
+        run(&mut cargo(&["build", "--release", "--package", "jtc-cli"]))?;
         built = true;
         Ok(Outcome::Passed)
     });
@@ -92,16 +97,16 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         }
         Ok(Outcome::Passed)
     });
-    let examples = shell::target().join("release/examples");
+    let release = shell::target().join("release");
     for check in &CHECKS {
         tally.step(&format!("references/{}", check.script), || {
             let python = python.as_ref().context("there is no Python environment")?;
             ensure!(built, "the programs it needs were not built");
             let mut script = command(python);
             script.arg(Path::new("references").join(check.script));
-            script.args(check.example.map(|name| examples.join(name)));
+            script.args(check.program.map(|name| release.join(name)));
             script.args(check.demo_files.iter().map(|name| demo.join(name)));
-            script.env("JTC_EXAMPLES", &examples).env("PYTHONDONTWRITEBYTECODE", "1");
+            script.env("JTC_EXAMPLES", release.join("examples")).env("PYTHONDONTWRITEBYTECODE", "1");
             run(&mut script).map(|()| Outcome::Passed)
         });
     }

@@ -56,7 +56,8 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 5] = [
+const CHECKS: [Check; 6] = [
+    Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
     Check { script: "can/check_multicast.py", program: None, demo_files: &[] },

@@ -39,7 +39,7 @@ enum Path {
     /// Waits until every joint is enabled.
     Waiting,
     /// On the way from where the arm is held to the first point.
-    Gliding { from: [f64; JOINTS], elapsed_ms: f64 },
+    Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<Tes> },
     /// At point 0, which the next tick commands.
     AtStart,
     /// On the path; `leave` says where to when it stands.
@@ -109,7 +109,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// One millisecond, with a bounded amount of work whatever the inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         // What has come in.
-        let had_errors = self.state == State::Error;
+        let was_powered = self.powered();
         self.nodes.take(inputs, &self.config, self.goal());
         // In Start nothing is executed yet; the event is offered again.
         let host_done = self.state != State::Start && self.serve_host(inputs.host);
@@ -134,8 +134,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
 
         // What goes out.
-        let new_error = self.state == State::Error && !had_errors;
-        let bus = self.nodes.frame(&self.config, self.goal(), torque, self.pump, new_error);
+        // Drives keep their last torque: taking it away comes before everything else.
+        let must_move = was_powered && !self.powered();
+        let bus = self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move);
         self.observe(&torque);
         Outputs {
             bus: Some(bus),
@@ -159,6 +160,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Frames of the joint bus that were ignored because they were not understood (J-15).
     pub fn ignored_frames(&self) -> u32 {
         self.nodes.ignored
+    }
+
+    /// In a state that commands torque.
+    pub(crate) fn powered(&self) -> bool {
+        matches!(self.state, State::HoldPos | State::Operate | State::Teaching)
     }
 
     /// Where the nodes are wanted in the present state.
@@ -188,10 +194,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn select_state(&mut self) {
         // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
         let initialised = self.given.missing() == 0
-            && match self.state {
-                State::HoldPos | State::Operate | State::Teaching => self.nodes.init_word() == 0,
-                State::Start | State::Init | State::Error => self.nodes.all_ready(),
-            };
+            && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready() };
         let next = if self.errors.any() || (self.state == State::Error && self.nodes.clearing()) {
             State::Error
         } else if !initialised {
@@ -256,8 +259,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Execute from Pause.
     pub(crate) fn resume_path(&mut self) {
         if self.clock.time > 0.0 {
-            let ramp = self.ramp_ms();
-            self.clock.ramp_to(1.0, ramp);
+            self.clock.go();
+            self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
             self.path = Path::Running { leave: None };
         } else {
             self.path = Path::Waiting;
@@ -270,21 +273,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let to = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
         match &mut self.path {
             Path::Running { leave } => {
-                let ramping = leave.replace(to).is_some();
-                if !ramping {
-                    let ramp = self.ramp_ms();
-                    self.clock.ramp_to(0.0, ramp);
+                if leave.replace(to).is_none() {
+                    self.clock.halt();
+                    self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
                 }
             }
-            // Not on the path yet: nothing to slow down.
-            Path::Waiting | Path::Gliding { .. } | Path::AtStart => self.set_tes(to),
-        }
-    }
-
-    fn ramp_ms(&self) -> f64 {
-        match self.store.at(self.clock.time) {
-            Some(at) => self.motion.ramp_ms(&at, &self.nodes, &self.config, &self.dynamics),
-            None => f64::from(self.config.ramp_ms),
+            // It comes to rest at point 0 by itself.
+            Path::Gliding { leave, .. } => *leave = Some(to),
+            Path::Waiting | Path::AtStart => self.set_tes(to),
         }
     }
 
@@ -313,18 +309,24 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.hold(&self.config);
                 if self.motion.all_holding() {
                     if self.near(&self.first_point()) {
-                        self.path = Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0 };
+                        self.path =
+                            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
                     } else {
                         self.set_tes(Tes::Stop);
                     }
                 }
             }
-            Path::Gliding { from, elapsed_ms } => {
+            Path::Gliding { from, elapsed_ms, leave } => {
                 let length = f64::from(self.config.ramp_ms.max(1));
                 let elapsed_ms = elapsed_ms + 1.0;
                 self.motion.glide(&from, &self.first_point(), (elapsed_ms / length).min(1.0), length);
-                self.path =
-                    if elapsed_ms < length { Path::Gliding { from, elapsed_ms } } else { Path::AtStart };
+                if elapsed_ms < length {
+                    self.path = Path::Gliding { from, elapsed_ms, leave };
+                } else if let Some(tes) = leave {
+                    self.set_tes(tes);
+                } else {
+                    self.path = Path::AtStart;
+                }
             }
             Path::AtStart => {
                 self.clock = PathClock::start();
@@ -333,8 +335,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.finish_at_end();
             }
             Path::Running { leave } => {
-                self.clock.advance();
-                self.clock.time = self.clock.time.min(f64::from(self.store.duration_ms()));
+                self.clock.advance(f64::from(self.store.duration_ms()));
                 self.follow();
                 match leave {
                     Some(tes) if self.clock.standing() => self.set_tes(tes),
@@ -346,9 +347,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Set values at the present path time.
     fn follow(&mut self) {
-        if let Some(at) = self.store.at(self.clock.time) {
-            self.motion.follow(&at, self.clock.rate, self.clock.slope);
+        let Some(at) = self.store.at(self.clock.time) else { return };
+        if self.clock.ramping() {
+            let bounds = self.motion.slope_bounds(&at, self.clock.rate, self.clock.slope, &self.config);
+            self.clock.change_rate(f64::from(self.config.ramp_ms), bounds);
+        } else {
+            self.clock.slope = 0.0;
         }
+        self.motion.follow(&at, self.clock.rate, self.clock.slope);
     }
 
     /// Positions of the first point; without a trajectory (which Execute refuses) where the arm is held.
@@ -381,16 +387,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// J-43; returns the torque to command.
     fn check_limits(&mut self) -> [f64; JOINTS] {
         let mut torque = [0.0; JOINTS];
-        if !matches!(self.state, State::HoldPos | State::Operate | State::Teaching) {
-            return torque;
-        }
+        let law = match self.state {
+            State::HoldPos => Law::Hold,
+            State::Operate => Law::Follow,
+            State::Teaching => Law::Teach,
+            State::Start | State::Init | State::Error => return torque,
+        };
         for (j, torque) in torque.iter_mut().enumerate() {
             let measured = self.nodes.positions()[j];
-            let mut errors = if self.state == State::Teaching {
-                0
-            } else {
-                self.motion.check_set(j, measured, &self.config)
-            };
+            let mut errors =
+                if law == Law::Teach { 0 } else { self.motion.check_set(law, j, measured, &self.config) };
             match self.motion.limit_torque(j, &self.config) {
                 Ok(limited) => *torque = limited,
                 Err(bit) => errors |= bit,

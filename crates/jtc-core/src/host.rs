@@ -103,7 +103,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 if jtc {
                     self.errors.clear_current();
                 }
-                self.nodes.clear(nodes);
+                self.nodes.clear(nodes, !self.powered());
                 Progress::Done
             }
             Command::ClearOccurredErrors => {

@@ -8,10 +8,10 @@ use crate::nodes::Nodes;
 use crate::pid::{Pid, PidTorque};
 use crate::{JOINTS, joint_error};
 
-/// Share of a limit that a pause or a stop may use; the rest is for the controller.
-const RAMP_SHARE: f64 = 0.9;
-/// Longest ramp, ms.
-const RAMP_MAX_MS: f64 = 2_000.0;
+/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the rest is for what changes within
+/// a tick and for the controller.
+const RAMP_ACCELERATION: f64 = 0.98;
+const RAMP_TORQUE: f64 = 0.95;
 /// Speed below which a joint counts as standing, rad/s.
 const STANDING: f64 = 0.02;
 /// Length of a tick, s.
@@ -62,6 +62,8 @@ impl JointTorque {
 /// A motion that comes to rest: leaving teaching while somebody still moves the arm.
 #[derive(Clone, Copy, Debug)]
 struct Coast {
+    /// Joints that were held when it began; those enabled later stay where they are.
+    joints: [bool; JOINTS],
     from: [f64; JOINTS],
     velocity: [f64; JOINTS],
     elapsed_ms: f64,
@@ -82,10 +84,14 @@ pub(crate) struct Motion {
     over_limit: [u16; JOINTS],
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
-    step_ms: u16,
+    step_ms: [u16; JOINTS],
+    /// Joints that were latched in this tick: their torque starts from that of the model.
+    fresh: [bool; JOINTS],
     /// The next torque has to continue the last one: all of it, or all but the model.
     rebase: Option<Rebase>,
     coast: Option<Coast>,
+    /// Mass matrix with rotors at the start of a ramp of path time.
+    inertia: [[f64; JOINTS]; JOINTS],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,12 +133,12 @@ impl Motion {
             pid.reset(0.0);
         }
         let moves = velocity.iter().any(|v| v.abs() > STANDING);
-        self.coast = moves.then_some(Coast { from, velocity, elapsed_ms: 0.0 });
+        self.coast = moves.then_some(Coast { joints: self.holding, from, velocity, elapsed_ms: 0.0 });
     }
 
-    /// Every joint is enabled and held.
+    /// Every joint is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
-        self.holding.iter().all(|&h| h)
+        self.coast.is_none() && self.holding.iter().all(|&h| h)
     }
 
     /// Latches the set position of joints that have just been enabled; joints that are not are followed, without torque.
@@ -144,6 +150,7 @@ impl Motion {
                 self.set.position[j] = measured[j];
                 self.pid[j].reset(0.0);
             }
+            self.fresh[j] = enabled && !self.holding[j];
             self.holding[j] = enabled;
         }
     }
@@ -158,6 +165,9 @@ impl Motion {
             // Integral of the falling velocity v·(1 − smooth(u)).
             let way = (u - u * u * u + 0.5 * u * u * u * u) * length * DT;
             for j in 0..JOINTS {
+                if !coast.joints[j] {
+                    continue;
+                }
                 let limit = &config.joints[j];
                 let position = coast.from[j] + coast.velocity[j] * way;
                 // Coasting never leads out of the limits; where the arm already is outside, it stays.
@@ -192,27 +202,36 @@ impl Motion {
         }
     }
 
-    /// Length of a ramp of path time at `at`, ms: that of the configuration, longer where it would take more acceleration or
-    /// torque than the limits leave.
-    pub fn ramp_ms(&self, at: &SetPoint, nodes: &Nodes, config: &Config, dynamics: &Dynamics) -> f64 {
-        // Steepest slope of a ramp of length 1 s.
-        const STEEPEST: f64 = 1.5;
-        let q = nodes.positions();
-        let gravity = dynamics.gravity_torque(q);
-        let push = dynamics.inverse(q, &[0.0; JOINTS], &at.velocity);
-        let mut seconds = f64::from(config.ramp_ms) / 1000.0;
+    /// A ramp of path time begins: its bounds need the inertia of the arm.
+    pub fn begin_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
+        self.inertia = dynamics.mass_matrix(nodes.positions());
+        for j in 0..JOINTS {
+            self.inertia[j][j] += config.joints[j].rotor_inertia;
+        }
+    }
+
+    /// Slopes of path time (1/s) that keep every joint within its acceleration and torque limits, at `at` and at the present
+    /// `rate` and `slope`. Empty (lower bound above upper) where no slope does.
+    pub fn slope_bounds(&self, at: &SetPoint, rate: f64, slope: f64, config: &Config) -> (f64, f64) {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut narrow = |offset: f64, factor: f64, limit: f64| {
+            // |offset + factor·slope| ≤ limit
+            if factor.abs() > 1e-9 {
+                let (a, b) = ((-limit - offset) / factor, (limit - offset) / factor);
+                (low, high) = (low.max(a.min(b)), high.min(a.max(b)));
+            }
+        };
         for j in 0..JOINTS {
             let limit = &config.joints[j];
-            let acceleration = (RAMP_SHARE * limit.acceleration_max - at.acceleration[j].abs())
-                .max(0.1 * limit.acceleration_max);
-            let torque =
-                (RAMP_SHARE * limit.torque_max - self.torque[j].sum().abs()).max(0.1 * limit.torque_max);
-            let inertial = push[j] - gravity[j] + limit.rotor_inertia * at.velocity[j];
-            seconds = seconds
-                .max(STEEPEST * at.velocity[j].abs() / acceleration)
-                .max(STEEPEST * inertial.abs() / torque);
+            narrow(
+                at.acceleration[j] * rate * rate,
+                at.velocity[j],
+                RAMP_ACCELERATION * limit.acceleration_max,
+            );
+            let push: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * at.velocity[k]).sum();
+            narrow(self.torque[j].sum() - push * slope, push, RAMP_TORQUE * limit.torque_max);
         }
-        (seconds * 1000.0).min(RAMP_MAX_MS)
+        (low, high)
     }
 
     /// Computes the torque of this tick into `self.torque`; returns joint errors found on the way (friction table).
@@ -233,11 +252,9 @@ impl Motion {
             if law != Law::Teach {
                 let error = self.set.position[j] - q[j];
                 torque.pid = self.pid[j].step(&gains.pid[j], error, self.saturated[j]);
-            } else {
-                torque.brake = brake(v[j], torque.model, config, limit.torque_max);
             }
             if law == Law::Follow {
-                let t = f64::from(nodes.node(j).report.temperature);
+                let t = celsius(nodes.node(j).report.temperature);
                 torque.friction = match gains.table {
                     None => friction::polynomial(&gains.polynomial[j], qd[j], t, config.friction_sign_width),
                     Some(tables) => friction::table(&tables[j], qd[j], t).unwrap_or_else(|| {
@@ -249,6 +266,14 @@ impl Motion {
             self.torque[j] = torque;
         }
         self.blend(&before, nodes, config);
+        if law == Law::Teach {
+            for j in 0..JOINTS {
+                if nodes.node(j).enabled() {
+                    self.torque[j].brake =
+                        brake(v[j], self.torque[j].sum(), config, config.joints[j].torque_max);
+                }
+            }
+        }
         errors
     }
 
@@ -260,12 +285,15 @@ impl Motion {
                     Rebase::Correction => before[j].correction() - self.torque[j].correction(),
                     Rebase::Everything => before[j].sum() - self.torque[j].sum(),
                 };
+                self.step_ms[j] = 0;
             }
-            self.step_ms = 0;
         }
-        let left = 1.0 - smooth(f64::from(self.step_ms) / f64::from(config.blend_ms.max(1)));
-        self.step_ms = self.step_ms.saturating_add(1);
         for j in 0..JOINTS {
+            if core::mem::take(&mut self.fresh[j]) {
+                (self.step[j], self.step_ms[j]) = (-self.torque[j].correction(), 0);
+            }
+            let left = 1.0 - smooth(f64::from(self.step_ms[j]) / f64::from(config.blend_ms.max(1)));
+            self.step_ms[j] = self.step_ms[j].saturating_add(1);
             if nodes.node(j).enabled() {
                 self.torque[j].blend = self.step[j] * left;
             } else {
@@ -275,8 +303,9 @@ impl Motion {
         }
     }
 
-    /// Set values outside the limits, as joint errors (J-43).
-    pub fn check_set(&self, j: usize, measured: f64, config: &Config) -> u16 {
+    /// Set values outside the limits, as joint errors (J-43). The position limit holds for positions that somebody commanded: an
+    /// arm that is found beyond it is held where it is, or it could never be brought back.
+    pub fn check_set(&self, law: Law, j: usize, measured: f64, config: &Config) -> u16 {
         let limit = &config.joints[j];
         if !self.holding[j] {
             return 0;
@@ -285,7 +314,9 @@ impl Motion {
         let within = |x: f64, low: f64, high: f64| x >= low && x <= high;
         let bit = |ok: bool, bit: u16| if ok { 0 } else { bit };
         let (v, a, e) = (limit.velocity_max, limit.acceleration_max, limit.position_error_max);
-        bit(within(self.set.position[j], limit.position_min, limit.position_max), joint_error::POSITION)
+        let position =
+            law != Law::Follow || within(self.set.position[j], limit.position_min, limit.position_max);
+        bit(position, joint_error::POSITION)
             | bit(within(self.set.velocity[j], -v, v), joint_error::VELOCITY)
             | bit(within(self.set.acceleration[j], -a, a), joint_error::ACCELERATION)
             | bit(within(self.set.position[j] - measured, -e, e), joint_error::POSITION_ERROR)
@@ -309,11 +340,17 @@ impl Motion {
     }
 }
 
-/// Teaching brakes a joint above the speed limit, with what torque the model leaves (J-25).
-fn brake(velocity: f64, model: f64, config: &Config, torque_max: f64) -> f64 {
+/// Teaching brakes a joint above the speed limit, with what its `torque` so far leaves of the limit (J-25).
+fn brake(velocity: f64, torque: f64, config: &Config, torque_max: f64) -> f64 {
     let limit = config.teach_velocity_max;
     let excess = velocity - velocity.max(-limit).min(limit);
     let wanted = -config.teach_damping * excess;
-    let (low, high) = ((-torque_max - model).min(0.0), (torque_max - model).max(0.0));
+    let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)
+}
+
+/// Temperature in °C: drives send negative ones modulo 256, and no bearing reaches 200 °C.
+fn celsius(byte: u8) -> f64 {
+    let t = f64::from(byte);
+    if byte >= 200 { t - 256.0 } else { t }
 }

@@ -14,8 +14,6 @@ const FRAMES_MAX: usize = 32;
 const MOVES_BETWEEN: u8 = 3;
 /// Ticks after a reset in which a late answer does not count as sign of life.
 const DEAF_AFTER_RESET: u8 = 20;
-/// Ticks after which a node that does not follow ClearCurrentErrors is given up.
-const CLEAR_TIMEOUT: u16 = 3_000;
 
 /// Where the nodes are wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,8 +43,8 @@ pub(crate) struct Node {
     /// Ticks of silence that are no error yet.
     boot_left: u32,
     deaf_left: u8,
-    /// Ticks left in which the node is commanded to Init to clear its errors.
-    clear_left: u16,
+    /// The node is commanded to Init to clear its errors, until it has followed (J-21).
+    clear: bool,
     /// A reset frame is to be sent.
     reset: bool,
     /// Reported OperationEnable while that was wanted.
@@ -86,13 +84,15 @@ impl Node {
         if !self.seen {
             return Target::NoChange;
         }
-        if self.clear_left > 0 {
+        if self.clear {
             // A drive ignores Init while it is enabled.
             return if state == fsm::ENABLED { Target::Ready } else { Target::Init };
         }
         let moving = fsm::is_transition(state);
         match goal {
-            Goal::Down if state == fsm::ENABLED || moving => Target::Ready,
+            Goal::Down if state == fsm::ENABLED || moving || (state == fsm::INIT && self.configured) => {
+                Target::Ready
+            }
             Goal::Ready if state == fsm::START => Target::Init,
             Goal::Ready if state == fsm::READY && !self.configured && self.refused => Target::Init,
             Goal::Ready if state == fsm::ENABLED || ((state == fsm::INIT || moving) && self.configured) => {
@@ -104,10 +104,7 @@ impl Node {
     }
 
     fn wants_configuration(&self) -> bool {
-        self.seen
-            && !self.configured
-            && self.clear_left == 0
-            && matches!(self.report.fsm, fsm::INIT | fsm::READY)
+        self.seen && !self.configured && !self.clear && matches!(self.report.fsm, fsm::INIT | fsm::READY)
     }
 }
 
@@ -243,7 +240,7 @@ impl Nodes {
                 (node.configured, node.valid, node.refused) = (false, false, false);
             }
             if report.fsm != 10 {
-                node.clear_left = 0;
+                node.clear = false;
             }
         }
         if node.configured && configured_before & (1 << n) != 0 {
@@ -268,17 +265,23 @@ impl Nodes {
                 node.boot_left = 0;
             } else if self.sent_move && on_the_bus && node.boot_left == 0 {
                 node.missed = node.missed.saturating_add(1).min(config.missed_moves_max);
+                if node.missed == config.missed_moves_max {
+                    // It may have lost its supply, and its configuration with it, in any state.
+                    (node.configured, node.valid, node.refused) = (false, false, false);
+                }
             }
         }
     }
 
-    /// Sees nodes that leave OperationEnable unasked or do not reach it in time (J-16).
+    /// Sees nodes that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
     fn watch(&mut self, config: &Config, goal: Goal) {
-        for node in &mut self.nodes {
-            node.clear_left = node.clear_left.saturating_sub(1);
+        for (n, node) in self.nodes.iter_mut().enumerate() {
             if goal != Goal::Enabled {
                 (node.enabled, node.enable_wait) = (false, 0);
                 continue;
+            }
+            if n < JOINTS && node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
+                node.misbehaved = true;
             }
             if node.report.fsm == fsm::ENABLED {
                 (node.enabled, node.enable_wait) = (true, 0);
@@ -310,13 +313,13 @@ impl Nodes {
     pub fn external_error(&self) -> bool {
         (0..self.present()).any(|n| {
             let node = self.node(n);
-            node.misbehaved || (node.clear_left == 0 && node.faulty(n < JOINTS))
+            node.misbehaved || (!node.clear && node.faulty(n < JOINTS))
         })
     }
 
     /// A node is still being cleared: the cause of its error is not gone.
     pub fn clearing(&self) -> bool {
-        (0..self.present()).any(|n| self.node(n).clear_left > 0)
+        (0..self.present()).any(|n| self.node(n).clear)
     }
 
     /// Node init word: bit n set while node n is not initialised.
@@ -332,20 +335,26 @@ impl Nodes {
         word
     }
 
+    /// A node has lost its configuration or fallen back to Start or Init (J-20).
+    pub fn fallen_back(&self) -> bool {
+        self.nodes[..self.present()].iter().any(|node| !node.valid || node.starting())
+    }
+
     /// Init is done: every node is initialised and reports ReadyToOperate.
     pub fn all_ready(&self) -> bool {
         self.init_word() == 0 && (0..self.present()).all(|n| self.node(n).report.fsm == fsm::READY)
     }
 
     /// ClearCurrentErrors for the nodes in `mask`: those that have something to clear are commanded to Init until they follow.
-    pub fn clear(&mut self, mask: u8) {
+    /// What has merely occurred is cleared only while the arm is `limp`: it is no reason to drop it.
+    pub fn clear(&mut self, mask: u8, limp: bool) {
         for n in 0..self.present() {
             let joint = n < JOINTS;
             if let Some(node) = self.nodes.get_mut(n)
                 && mask & (1 << n) != 0
-                && (node.faulty(joint) || (joint && node.report.mc_occurred != 0))
+                && (node.faulty(joint) || (limp && joint && node.report.mc_occurred != 0))
             {
-                node.clear_left = CLEAR_TIMEOUT;
+                node.clear = true;
             }
         }
     }
@@ -359,7 +368,7 @@ impl Nodes {
         }
     }
 
-    /// The frame of this tick (J-12). `must_move`: the first frame after an error is Move.
+    /// The frame of this tick (J-12). `must_move`: the first frame after an error, or after power is taken away, is Move.
     pub fn frame(
         &mut self,
         config: &Config,
@@ -396,7 +405,9 @@ impl Nodes {
             change |= target[n] != Target::NoChange;
         }
         let configure = goal == Goal::Ready && self.nodes[..present].iter().any(Node::wants_configuration);
-        if configure && !(change && self.configured_last) {
+        // Nodes that are enabled refuse their configuration and should not be: they come first.
+        let enabled = self.nodes[..present].iter().any(|node| node.report.fsm == fsm::ENABLED);
+        if configure && !(change && (self.configured_last || enabled)) {
             self.configured_last = true;
             return Some(Request::ChangeMode {
                 mode: [1; JOINTS],

@@ -9,63 +9,88 @@ pub struct PathClock {
     pub rate: f64,
     /// Change of `rate`, 1/s.
     pub slope: f64,
-    ramp: Option<Ramp>,
+    /// The rate that is wanted, 0 or 1.
+    target: f64,
 }
 
-/// A cubic from the rate and slope at its start to a steady rate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Ramp {
-    from: f64,
-    slope: f64,
-    to: f64,
-    elapsed_ms: f64,
-    length_ms: f64,
-}
+/// Length of a tick, s.
+const DT: f64 = 0.001;
+/// A slope in the wrong direction (a pause during a resume) is taken out this much faster than a ramp is rounded.
+const REVERSAL: f64 = 8.0;
 
 impl PathClock {
     /// At point 0 and at full speed.
     pub fn start() -> Self {
-        Self { rate: 1.0, ..Self::default() }
+        Self { rate: 1.0, target: 1.0, ..Self::default() }
     }
 
-    /// Go to `rate` (0 or 1) within `length_ms`.
-    pub fn ramp_to(&mut self, rate: f64, length_ms: f64) {
-        self.ramp = Some(Ramp {
-            from: self.rate,
-            slope: self.slope,
-            to: rate,
-            elapsed_ms: 0.0,
-            length_ms: length_ms.max(1.0),
-        });
+    /// Standing at the present time, about to go.
+    pub fn go(&mut self) {
+        self.target = 1.0;
+    }
+
+    /// Slow down to standstill.
+    pub fn halt(&mut self) {
+        self.target = 0.0;
     }
 
     /// Not moving, and not about to.
     pub fn standing(&self) -> bool {
-        self.rate == 0.0 && self.ramp.is_none()
+        self.rate == 0.0 && self.target == 0.0
     }
 
-    /// One tick.
-    pub fn advance(&mut self) {
-        let before = self.rate;
-        if let Some(ramp) = &mut self.ramp {
-            ramp.elapsed_ms += 1.0;
-            if ramp.elapsed_ms >= ramp.length_ms {
-                (self.rate, self.slope) = (ramp.to, 0.0);
-                self.ramp = None;
-            } else {
-                let length = ramp.length_ms / 1000.0;
-                let u = ramp.elapsed_ms / ramp.length_ms;
-                let rise = u * u * (3.0 - 2.0 * u);
-                let bump = u * (1.0 - u) * (1.0 - u);
-                // A slope at the start may carry the cubic a little beyond its ends.
-                self.rate =
-                    (ramp.from + (ramp.to - ramp.from) * rise + ramp.slope * length * bump).clamp(0.0, 1.0);
-                self.slope = (ramp.to - ramp.from) * 6.0 * u * (1.0 - u) / length
-                    + ramp.slope * (1.0 - u) * (1.0 - 3.0 * u);
-            }
-        }
-        self.time += 0.5 * (before + self.rate);
+    /// Neither at full speed nor standing.
+    pub fn ramping(&self) -> bool {
+        self.rate != self.target
     }
+
+    /// Moves on by one tick, at most to `end` (ms).
+    pub fn advance(&mut self, end: f64) {
+        self.time = (self.time + self.rate).min(end);
+    }
+
+    /// Changes the rate towards the wanted one: along an S of `ramp_ms` (parabola, line, parabola, a third each), or slower
+    /// where the slope would leave `bounds`. The rate never goes the other way.
+    pub fn change_rate(&mut self, ramp_ms: f64, bounds: (f64, f64)) {
+        let distance = (self.target - self.rate).abs();
+        if distance == 0.0 {
+            self.slope = 0.0;
+            return;
+        }
+        let length = ramp_ms.max(1.0) / 1000.0;
+        // An S of this slope and curvature takes exactly `length` from 0 to 1.
+        let (steepest, curvature) = (1.5 / length, 4.5 / (length * length));
+        let direction = if self.target > self.rate { 1.0 } else { -1.0 };
+        // In the direction of travel: slope now, and the slope from which the rest of the way just suffices to flatten out.
+        let now = self.slope * direction;
+        let round = curvature * DT;
+        let flatten = round * (root(0.25 + 2.0 * distance / (round * DT)) - 0.5);
+        let step = if now < 0.0 { REVERSAL * round } else { round };
+        let wanted = flatten.min(steepest).min(now + step);
+        let (low, high) = if direction > 0.0 { bounds } else { (-bounds.1, -bounds.0) };
+        // Bounds that leave nothing, or only the other direction: keep the rate for now.
+        let slope = if low <= high { wanted.min(high).max(low.min(wanted)) } else { 0.0 };
+        let slope = if now < 0.0 { slope } else { slope.max(0.0) };
+        self.slope = slope * direction;
+        let rate = self.rate + self.slope * DT;
+        if slope * DT >= distance || distance < 1e-9 {
+            (self.rate, self.slope) = (self.target, 0.0);
+        } else if !(0.0..=1.0).contains(&rate) {
+            self.rate = rate.clamp(0.0, 1.0);
+            self.slope = 0.0;
+        } else {
+            self.rate = rate;
+        }
+    }
+}
+
+/// Square root by Newton's method from above, which needs no library: enough for a slope, not for more.
+fn root(x: f64) -> f64 {
+    let mut y = 0.5 * (x + 1.0);
+    for _ in 0..24 {
+        y = 0.5 * (y + x / y);
+    }
+    y
 }
 
 #[cfg(test)]
@@ -73,35 +98,71 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
+    fn tick(clock: &mut PathClock, bounds: (f64, f64)) {
+        clock.advance(1e9);
+        clock.change_rate(200.0, bounds);
+    }
+
     #[test]
     fn j33_full_speed_counts_whole_milliseconds() {
         let mut clock = PathClock::start();
         for k in 1..100_000 {
-            clock.advance();
+            tick(&mut clock, FREE);
             assert_eq!(clock.time, f64::from(k));
         }
     }
 
+    #[test]
+    fn j33_a_ramp_takes_its_length() {
+        let mut clock = PathClock::start();
+        clock.halt();
+        let mut ticks = 0;
+        while !clock.standing() {
+            tick(&mut clock, FREE);
+            ticks += 1;
+        }
+        assert!((195..=206).contains(&ticks), "{ticks}");
+    }
+
+    #[test]
+    fn roots() {
+        for x in [0.25, 1.0, 2.0, 1e3, 1e5, 1e6, 2e9] {
+            assert!((root(x) / x.sqrt() - 1.0).abs() < 1e-12, "{x}");
+        }
+    }
+
     proptest! {
-        /// Whatever is asked when: the rate stays within 0..1, has no step, and its slope is the derivative of it.
+        /// Whatever is asked when: the rate stays within 0..1, never goes the wrong way for long, has no step, and the slope
+        /// is the derivative of it.
         #[test]
-        fn j33_the_ramp_is_smooth(switches in prop::collection::vec((1..400u32, any::<bool>()), 1..12)) {
+        fn j33_the_ramp_is_smooth(switches in prop::collection::vec((1..400u32, any::<bool>()), 1..12), bound in 0.5..20.0f64) {
             let mut clock = PathClock::start();
             for (ticks, go) in switches {
-                clock.ramp_to(if go { 1.0 } else { 0.0 }, 200.0);
+                if go { clock.go() } else { clock.halt() }
+                let mut wrong = 0.0;
                 for _ in 0..ticks {
                     let before = clock;
-                    clock.advance();
+                    tick(&mut clock, (-bound, bound));
+                    let change = clock.rate - before.rate;
                     prop_assert!((0.0..=1.0).contains(&clock.rate));
-                    prop_assert!((clock.rate - before.rate).abs() < 0.012, "{:?} {:?}", before, clock);
+                    prop_assert!(change.abs() <= 0.0076);
+                    prop_assert!(clock.slope.abs() <= bound + 1e-9 || clock.slope.abs() <= before.slope.abs());
+                    if clock.rate != 0.0 && clock.rate != 1.0 {
+                        prop_assert!((change - clock.slope * DT).abs() < 1e-12);
+                    }
+                    prop_assert!((clock.slope - before.slope).abs() < 1.0, "{:?} {:?}", before, clock);
+                    wrong += if go { (-change).max(0.0) } else { change.max(0.0) };
                     prop_assert!(clock.time >= before.time);
                 }
-                if ticks >= 200 {
-                    prop_assert_eq!(clock.rate, if go { 1.0 } else { 0.0 });
-                    prop_assert_eq!(clock.slope, 0.0);
-                    prop_assert_eq!(clock.standing(), !go);
-                }
+                prop_assert!(wrong < 0.04, "{wrong} in the wrong direction");
             }
+            clock.halt();
+            for _ in 0..5_000 {
+                tick(&mut clock, (-bound, bound));
+            }
+            prop_assert!(clock.standing());
         }
     }
 }

@@ -60,7 +60,7 @@ fn j20_no_node_is_enabled_before_the_reset_of_the_boot() {
 fn j20_waits_for_accurate_positions() {
     let mut rig = Rig::new(Config::avena());
     rig.defaults();
-    rig.run(60);
+    rig.run(30);
     rig.nodes[3].report.warnings = warning::POSITION_NOT_ACCURATE;
     rig.run(300);
     assert_eq!(rig.state(), State::Init);

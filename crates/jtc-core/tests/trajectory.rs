@@ -170,12 +170,7 @@ fn j33_pause_and_resume_follow_the_path() {
             path.push((t.joints[2].set_position, t.joints[5].set_position));
         }
     }
-    // Back to the start, then with a pause.
-    rig.exec(ExecCommand::Stop);
-    rig.follow = false;
-    for j in 0..6 {
-        rig.nodes[j].report.position = 0.0;
-    }
+    // The same with a pause.
     let mut rig = Rig::holding();
     rig.upload(&points, 10);
     rig.exec(ExecCommand::Execute);
@@ -240,7 +235,7 @@ fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
     rig.until(1000, |r| r.controller.telemetry().point == 300);
     rig.exec(ExecCommand::Stop);
     let ticks = rig.until(1000, |r| r.tes() != Tes::Execute);
-    assert!((400..500).contains(&ticks), "{ticks}");
+    assert!((256..330).contains(&ticks), "{ticks}");
     assert_eq!((rig.tes(), rig.errors()), (Tes::Stop, 0));
 }
 

@@ -1,0 +1,353 @@
+//! Situations in which a controller that follows each rule by itself would still drop, jerk or misplace an arm.
+mod rig;
+
+use jtc_bus::{Request, fsm, warning};
+use jtc_core::{Config, State, Tes, error};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use rig::{Rig, floats, rad, rest, segment_body};
+
+/// No limits but those under test.
+fn roomy(mut config: Config, acceleration_max: f64) -> Config {
+    for j in &mut config.joints {
+        j.torque_max = 1e6;
+        j.position_error_max = 10.0;
+        j.acceleration_max = acceleration_max;
+    }
+    config
+}
+
+/// A motion of joint 0 as pieces of constant acceleration (rad/s², number of points 10 ms apart).
+fn pieces(list: &[(f64, u32)]) -> Vec<RawPoint> {
+    let (mut p, mut v) = (0.0f64, 0.0f64);
+    let mut points = vec![RawPoint::default()];
+    for &(a, n) in list {
+        for i in 1..=n {
+            let next = v + a * 0.01;
+            p += 0.5 * (v + next) * 0.01;
+            v = next;
+            let mut point = RawPoint::default();
+            point.position[0] = (p / 3.141592 * 32767.0).round() as i16;
+            point.velocity[0] = (v / 6.283185 * 32767.0).round() as i16;
+            point.acceleration[0] = (if i < n { a } else { 0.0 } / 12.566370 * 32767.0).round() as i16;
+            points.push(point);
+        }
+    }
+    points
+}
+
+#[test]
+fn j16_drives_that_lost_their_supply_are_configured_again() {
+    let mut rig = Rig::new(Config::avena());
+    rig.follow = false;
+    for node in &mut rig.nodes {
+        node.report.position = 0.7;
+    }
+    rig.defaults();
+    rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.fsm == fsm::INIT);
+    rig.run(1);
+    // An emergency stop that also cuts the drives' supply, while they are configured but still in Init.
+    rig.safety_input = false;
+    rig.run(3);
+    for node in &mut rig.nodes {
+        node.restart();
+        node.booting = 300;
+    }
+    rig.run(1000);
+    rig.safety_input = true;
+    rig.clear(true, 0x7F);
+    rig.run(300);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert!(rig.nodes.iter().all(|n| n.configured));
+    for joint in &rig.controller.telemetry().joints {
+        assert!((joint.set_position - 0.7).abs() < 1e-6, "held where it is: {}", joint.set_position);
+    }
+}
+
+#[test]
+fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
+    let mut rig = Rig::holding();
+    rig.ask(FrameType::TeachingModeEnable, &[]);
+    rig.run(150);
+    rig.nodes[0].report.velocity = 0.05;
+    rig.run(2);
+    rig.send(FrameType::TeachingModeDisable, &[]);
+    let points = pieces(&[(0.05, 20), (0.0, 60), (-0.05, 20)]);
+    rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
+    rig.send(FrameType::TrajSetExecStatus, &[3]);
+    rig.run(5);
+    rig.nodes[0].report.velocity = 0.0;
+    let mut last = *rig.controller.telemetry();
+    for _ in 0..2500 {
+        rig.tick();
+        let t = *rig.controller.telemetry();
+        assert!((t.joints[0].set_position - last.joints[0].set_position).abs() < 2e-4, "{last:?} {t:?}");
+        last = t;
+    }
+    assert_eq!((last.tes, last.state, last.errors), (Tes::Finish, State::HoldPos, 0));
+    assert_eq!(last.joints[0].set_position, rad(points.last().unwrap().position[0]));
+}
+
+/// Wherever in a legal motion a pause or a resume falls, it keeps to the acceleration limit, and it stops in the end.
+#[test]
+fn j33_pause_and_resume_keep_to_the_acceleration_limit() {
+    let braking = pieces(&[(10.77, 13), (0.0, 60), (-10.77, 13)]);
+    let stages = pieces(&[(2.0, 20), (0.0, 60), (3.8, 25), (0.0, 60), (-3.8, 35), (0.0, 5)]);
+    for (points, limit, at) in [
+        (&braking, 12.56637, [50, 100, 400, 650, 690, 710, 725, 735, 780]),
+        (&stages, 4.0, [100, 400, 640, 680, 750, 800, 900, 1300, 1700]),
+    ] {
+        for pause_at in at {
+            let mut rig = Rig::holding_with(roomy(Config::avena(), limit));
+            rig.upload(points, 10);
+            rig.exec(ExecCommand::Execute);
+            rig.until(3000, |r| r.controller.telemetry().point >= pause_at);
+            rig.exec(ExecCommand::Pause);
+            rig.until(4000, |r| r.tes() != Tes::Execute);
+            assert_eq!(rig.errors(), 0, "pause at {pause_at}");
+            if rig.tes() == Tes::Pause {
+                rig.exec(ExecCommand::Execute);
+                rig.until(6000, |r| r.tes() != Tes::Execute);
+            }
+            assert_eq!((rig.errors(), rig.tes()), (0, Tes::Finish), "pause at {pause_at}");
+        }
+    }
+}
+
+#[test]
+fn j33_a_pause_during_a_resume_slows_down() {
+    let points = pieces(&[(3.8, 35), (0.0, 100), (-3.8, 35)]);
+    for wait in [20, 60, 100, 130, 160] {
+        let mut rig = Rig::holding_with(roomy(Config::avena(), 4.0));
+        rig.upload(&points, 10);
+        rig.exec(ExecCommand::Execute);
+        rig.until(2000, |r| r.controller.telemetry().point >= 500);
+        rig.exec(ExecCommand::Pause);
+        rig.until(3000, |r| r.tes() == Tes::Pause);
+        rig.exec(ExecCommand::Execute);
+        rig.run(wait);
+        let before = rig.controller.telemetry().joints[0].set_velocity;
+        rig.exec(ExecCommand::Pause);
+        let mut top = before;
+        let ticks = rig.until(3000, |r| {
+            top = top.max(r.controller.telemetry().joints[0].set_velocity);
+            r.tes() == Tes::Pause
+        });
+        assert!(top < before + 0.06, "from {before} up to {top} rad/s");
+        assert!(ticks < 600, "{ticks}");
+        assert_eq!(rig.errors(), 0);
+    }
+}
+
+#[test]
+fn j33_a_pause_on_the_way_to_point_0_has_no_step_of_velocity() {
+    let mut rig = Rig::holding();
+    let points: Vec<_> = (0..10).map(|_| rest(200)).collect();
+    rig.upload(&points, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.run(98);
+    rig.send(FrameType::TrajSetExecStatus, &[2]);
+    let mut last = rig.controller.telemetry().joints[0].set_velocity;
+    for _ in 0..300 {
+        rig.tick();
+        let v = rig.controller.telemetry().joints[0].set_velocity;
+        assert!((v - last).abs() < 0.01, "{last} to {v} rad/s");
+        last = v;
+    }
+    assert_eq!((rig.tes(), rig.errors()), (Tes::Pause, 0));
+    assert_eq!(rig.controller.telemetry().joints[0].set_position, rad(200));
+    rig.exec(ExecCommand::Execute);
+    rig.until(1000, |r| r.tes() == Tes::Finish);
+}
+
+#[test]
+fn j21_a_clear_does_not_drop_a_joint_whose_fault_is_history() {
+    for teaching in [false, true] {
+        let mut rig = Rig::holding();
+        rig.nodes[1].report.mc_occurred = 4;
+        rig.run(5);
+        if teaching {
+            rig.ask(FrameType::TeachingModeEnable, &[]);
+        }
+        rig.ask(FrameType::ClearCurrentErrors, &[]);
+        rig.run(50);
+        assert_eq!(rig.errors(), 0);
+        assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+    }
+}
+
+#[test]
+fn j21_a_clear_waits_as_long_as_the_node_takes() {
+    let mut rig = Rig::holding();
+    rig.nodes[1].fault();
+    rig.run(3);
+    rig.nodes[1].report.fsm = 254;
+    rig.clear(true, 1 << 1);
+    rig.run(6000);
+    rig.nodes[1].report.fsm = fsm::FAULT;
+    rig.run(300);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+}
+
+#[test]
+fn j21_healthy_joints_are_brought_to_ready_in_error() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.fsm == fsm::INIT);
+    rig.run(1);
+    rig.safety_input = false;
+    rig.run(50);
+    assert_eq!(rig.state(), State::Error);
+    assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY));
+}
+
+#[test]
+fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
+    let mut rig = Rig::new(Config::avena());
+    rig.nodes[1].report.position = 1.6;
+    rig.follow = false;
+    rig.defaults();
+    rig.run(400);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
+    rig.run(200);
+    assert_eq!(rig.state(), State::Teaching);
+    // A trajectory out there is another matter.
+    rig.ask(FrameType::TeachingModeDisable, &[]);
+    rig.run(300);
+    rig.follow = true;
+    let out: Vec<_> =
+        (0..10).map(|_| RawPoint { position: [0, (1.6 / rad(1)) as i16, 0, 0, 0, 0], ..rest(0) }).collect();
+    rig.upload(&out, 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(500, |r| r.state() == State::Error);
+}
+
+#[test]
+fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
+    // While the others come to rest after teaching, one joint that has sagged is enabled.
+    let mut rig = Rig::new(roomy(Config::avena(), 100.0));
+    rig.nodes[2].slow_enable = true;
+    rig.defaults();
+    rig.until(300, |r| r.state() == State::HoldPos);
+    rig.run(50);
+    rig.ask(FrameType::TeachingModeEnable, &[]);
+    rig.run(150);
+    rig.nodes[0].report.velocity = 0.3;
+    rig.follow = false;
+    rig.run(3);
+    rig.send(FrameType::TeachingModeDisable, &[]);
+    for _ in 0..60 {
+        rig.nodes[2].report.position += 0.00005;
+        rig.tick();
+    }
+    rig.nodes[2].report.fsm = fsm::ENABLED;
+    for _ in 0..20 {
+        rig.tick();
+        let t = rig.controller.telemetry().joints[2];
+        assert!((t.torque - t.torque_model).abs() < 1.0 || t.fsm != fsm::ENABLED, "{t:?}");
+    }
+    // Bounds of the integral that do not contain zero.
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.send(FrameType::PidParam, &floats((0..6).flat_map(|_| [100.0, 10.0, 1.0, 1.0, 2.0])));
+    let mut last = 0.0;
+    for _ in 0..300 {
+        rig.tick();
+        let t = rig.controller.telemetry().joints[0];
+        let correction = t.torque - t.torque_model;
+        assert!((correction - last as f64).abs() < 0.5, "{last} to {correction}");
+        last = correction;
+    }
+}
+
+#[test]
+fn j25_the_brake_leaves_room_for_what_is_being_blended_out() {
+    let mut rig = Rig::holding();
+    rig.follow = false;
+    rig.nodes[5].report.position = 0.002;
+    rig.run(30);
+    rig.ask(FrameType::TeachingModeEnable, &[]);
+    rig.nodes[5].report.velocity = 1.9;
+    rig.run(40);
+    assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
+}
+
+#[test]
+fn j12_torque_is_taken_away_before_anything_else_is_sent() {
+    let mut rig = Rig::holding();
+    rig.follow = false;
+    rig.nodes[1].report.position = 0.002;
+    rig.run(50);
+    let from = rig.sent.len();
+    rig.nodes[2].configured = false;
+    rig.nodes[2].report.fsm = fsm::INIT;
+    rig.run(9);
+    assert_eq!(rig.state(), State::Init);
+    let mut rest = rig.sent[from..]
+        .iter()
+        .skip_while(|r| matches!(r, Request::Move { torque, .. } if *torque != [0.0; 6]));
+    assert_eq!(*rest.next().unwrap(), Request::Move { torque: [0.0; 6], pump: false });
+    // Joints that are still enabled come before the configuration of the one that fell back.
+    let next = rest.find(|r| !matches!(r, Request::Move { .. })).unwrap();
+    assert!(matches!(next, Request::ChangeFsm { .. }), "{next:?}");
+}
+
+#[test]
+fn j16_a_joint_that_loses_its_position_in_motion_is_an_error() {
+    let mut rig = Rig::holding();
+    rig.nodes[3].report.warnings = warning::POSITION_NOT_ACCURATE;
+    rig.run(2);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+    rig.nodes[3].report.warnings = 0;
+    rig.run(300);
+    assert_eq!(rig.state(), State::Error, "it does not hold again by itself");
+}
+
+#[test]
+fn j42_drives_send_temperatures_below_zero_modulo_256() {
+    let run = |byte: u8| {
+        let mut rig = Rig::holding();
+        rig.nodes[1].report.temperature = byte;
+        let mut point = RawPoint::default();
+        point.velocity[1] = 1000;
+        rig.upload(&[point; 50], 10);
+        rig.exec(ExecCommand::Execute);
+        rig.until(500, |r| r.controller.telemetry().point == 20);
+        rig.controller.telemetry().joints[1].torque_friction
+    };
+    assert!(run(251) > run(0), "cold grease is stiffer");
+    assert!(run(0) > run(40));
+}
+
+#[test]
+fn j14_a_silent_node_is_seen_within_seven_frames() {
+    let mut rig = Rig::holding();
+    rig.nodes[4].silent = true;
+    let ticks = rig.until(30, |r| r.state() == State::Error);
+    assert!(ticks <= 7, "{ticks}");
+}
+
+#[test]
+fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
+    // The same arm with heavier links, on a wall so that gravity matters.
+    let mut rig = Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() });
+    let model = jtc_core::Parameters::avena().model;
+    let mut body = Vec::new();
+    for j in &model.joints {
+        body.extend(j.xyz.iter().chain(&j.rpy).map(|x| *x as f32));
+    }
+    for l in &model.links {
+        body.extend(l.origin.xyz.iter().chain(&l.origin.rpy).chain(&l.inertia).map(|x| *x as f32));
+        body.push(1.2 * l.mass as f32);
+    }
+    let before = rig.controller.telemetry().joints[1].torque;
+    rig.send(FrameType::ArmModel, &floats(body));
+    let mut last = before;
+    for _ in 0..200 {
+        rig.tick();
+        let torque = rig.controller.telemetry().joints[1].torque;
+        assert!((torque - last).abs() < 1.0, "{last} to {torque}");
+        last = torque;
+    }
+    assert!((last - 1.2 * before).abs() < 0.02 * before.abs(), "{before} to {last}");
+}

@@ -255,7 +255,7 @@ fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
         rig.tick();
         let t = rig.controller.telemetry().joints[0];
         let correction = t.torque - t.torque_model;
-        assert!((correction - last as f64).abs() < 0.5, "{last} to {correction}");
+        assert!(f64::abs(correction - last) < 0.5, "{last} to {correction}");
         last = correction;
     }
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use jtc_core::Config;
 use jtc_host::arm::{Arm, FrictionChoice, ParameterFile};
 use jtc_host::port::sim::SimPort;
+use jtc_host::port::{Port, PortError};
 use jtc_host::session::{Flow, Outcome, RecoverStep, UploadOptions, UploadReport};
 use jtc_host::{Error, Session, Trajectory, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
@@ -70,6 +71,57 @@ fn uploads_fill_the_line() {
         assert!(share >= 0.98, "{baud} Bd: {share}");
         assert_eq!((report.retries, report.restarts, s.last().unwrap().tes), (0, 0, 1));
         assert_eq!(s.statistics().bad_frames, 0);
+    }
+}
+
+/// A line that garbles bytes towards the host.
+struct Noisy {
+    port: SimPort,
+    random: u64,
+    every: u64,
+}
+
+impl Port for Noisy {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+        let n = self.port.read(buffer, timeout)?;
+        for byte in &mut buffer[..n] {
+            self.random = self.random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            if (self.random >> 33) % self.every == 0 {
+                *byte ^= 0x10;
+            }
+        }
+        Ok(n)
+    }
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.port.write_all(bytes)
+    }
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
+    fn baud(&self) -> Option<u32> {
+        self.port.baud()
+    }
+}
+
+/// J-04: records are one-shot; one that is lost on the way to the host must not cost the upload, nor a command.
+#[test]
+fn j04_lost_confirmations_are_survived() {
+    for seed in 1..6 {
+        // Every tenth status arrives damaged.
+        let mut s =
+            Session::new(Noisy { port: ready(Some(921_600)).into_port(), random: seed, every: 1_700 });
+        let t = trajectory(3_000);
+        let options = UploadOptions { points_per_segment: Some(60), ..UploadOptions::default() };
+        let report = s
+            .upload(&t.raw().unwrap(), t.step_ms, &options, |_| Flow::Continue)
+            .unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+        println!(
+            "seed {seed}: {:.2} s, {} retries, {} restarts",
+            report.time_s, report.retries, report.restarts
+        );
+        assert!(s.statistics().bad_bytes > 0);
+        s.execute().unwrap();
+        s.stop().unwrap();
     }
 }
 

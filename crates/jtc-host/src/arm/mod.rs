@@ -2,6 +2,7 @@
 
 mod collect;
 mod csv;
+mod export;
 mod frames;
 mod parameters;
 #[cfg(test)]

@@ -139,6 +139,19 @@ fn parts_of_an_arm_file_may_be_missing() {
 }
 
 #[test]
+fn arms_come_back_from_their_own_files() {
+    let mut arm = Arm::avena();
+    assert_eq!(Arm::parse(&arm.to_toml()).unwrap(), arm);
+    arm.table.as_mut().unwrap()[3].torque[2][1] = 7.5;
+    arm.name = "a \"b\" <c>".into();
+    assert_eq!(Arm::parse(&arm.to_toml()).unwrap(), arm);
+    let back = Arm::parse(&arm.to_urdf()).unwrap();
+    assert_eq!((&back.model, &back.joint_names, &back.name), (&arm.model, &arm.joint_names, &arm.name));
+    assert_eq!((back.joints[1].torque_max, back.joints[4].position_min), (180.0, -3.05));
+    assert!(back.warnings.is_empty(), "{:?}", back.warnings);
+}
+
+#[test]
 fn a_reversed_polynomial_file_is_noticed() {
     let Some(c) = Arm::avena().polynomial else { panic!() };
     let text = |rows: &[[f64; 6]], n: usize, reverse: bool| -> String {

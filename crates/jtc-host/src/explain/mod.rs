@@ -1,8 +1,8 @@
 //! One page for each code that a controller, a drive or this library reports: what it means, why, what to do, the next command.
 
-mod pages;
-
-pub use pages::PAGES;
+mod controller;
+mod link;
+mod nodes;
 
 /// Which number a page is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
@@ -132,11 +132,21 @@ impl std::fmt::Display for Page {
     }
 }
 
+const fn page(family: Family, code: u32, name: &'static str, texts: [&'static str; 4]) -> Page {
+    let [meaning, cause, remedy, command] = texts;
+    Page { family, code, name, meaning, cause, remedy, command }
+}
+
+/// All pages.
+pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
+    controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES)
+}
+
 /// Pages for a name (`joint-position-error`), a number of one family (`can:0x100`, `data:7`), a bare number (looked up in every
 /// family), or words of a name. Empty: nothing fits.
 pub fn find(query: &str) -> Vec<&'static Page> {
     let query = query.trim().to_ascii_lowercase().replace([' ', '_'], "-");
-    if let Some(page) = PAGES.iter().find(|p| p.name == query) {
+    if let Some(page) = pages().find(|p| p.name == query) {
         return vec![page];
     }
     let (family, text) = match query.split_once(':') {
@@ -155,17 +165,17 @@ pub fn find(query: &str) -> Vec<&'static Page> {
                 p.code == number
             }
         };
-        return PAGES.iter().filter(in_family).filter(hit).collect();
+        return pages().filter(in_family).filter(hit).collect();
     }
     if text.is_empty() {
-        return if family.is_some() { PAGES.iter().filter(in_family).collect() } else { Vec::new() };
+        return if family.is_some() { pages().filter(in_family).collect() } else { Vec::new() };
     }
-    PAGES.iter().filter(in_family).filter(|p| text.split('-').all(|word| p.name.contains(word))).collect()
+    pages().filter(in_family).filter(|p| text.split('-').all(|word| p.name.contains(word))).collect()
 }
 
 /// All set bits have a page: else the number belongs to another family.
 fn known_bits(family: Family, number: u32) -> bool {
-    let known = PAGES.iter().filter(|p| p.family == family).fold(0, |m, p| m | p.number());
+    let known = pages().filter(|p| p.family == family).fold(0, |m, p| m | p.number());
     number & !known == 0
 }
 
@@ -199,7 +209,7 @@ mod tests {
     #[test]
     fn every_code_has_one_page() {
         use jtc_wire::words as w;
-        let count = |family| PAGES.iter().filter(|p| p.family == family).count();
+        let count = |family| pages().filter(|p| p.family == family).count();
         assert_eq!(count(Family::Jtc), w::JTC_ERRORS.len());
         assert_eq!(count(Family::Joint), w::JOINT_INTERNAL.len());
         assert_eq!(count(Family::Motor), w::MC_FAULTS.len());
@@ -208,9 +218,9 @@ mod tests {
         assert_eq!(count(Family::Can), w::CAN_FLAGS.iter().filter(|n| !n.is_empty()).count());
         assert_eq!(count(Family::State), w::JTC_FSM.len());
         assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));
-        for (i, p) in PAGES.iter().enumerate() {
+        for (i, p) in pages().enumerate() {
             assert!(
-                PAGES[..i].iter().all(|q| q.name != p.name && (q.family, q.code) != (p.family, p.code)),
+                pages().take(i).all(|q| q.name != p.name && (q.family, q.code) != (p.family, p.code)),
                 "{}",
                 p.name
             );

@@ -1,0 +1,128 @@
+//! Arms as TOML and URDF files.
+
+use std::fmt::Write as _;
+
+use jtc_core::JOINTS;
+use jtc_dynamics::Origin;
+
+use super::Arm;
+
+fn list(values: &[f64]) -> String {
+    // `{:?}` keeps a fraction, which TOML needs to tell floats from integers.
+    let cells: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();
+    format!("[{}]", cells.join(", "))
+}
+
+fn narrow(values: &[f32]) -> String {
+    list(&values.iter().map(|v| f64::from(*v)).collect::<Vec<_>>())
+}
+
+/// A TOML string.
+fn quoted(text: &str) -> String {
+    serde_json::to_string(text).expect("a string is JSON, and TOML has the same escapes")
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+impl Arm {
+    /// As an arm file.
+    pub fn to_toml(&self) -> String {
+        let mut out = format!("name = {}\n", quoted(&self.name));
+        if let Some(g) = &self.gravity {
+            let _ = writeln!(out, "gravity_m_s2 = {}", list(g));
+        }
+        for (i, origin) in self.model.joints.iter().enumerate() {
+            let name = self.joint_names.get(i).map_or("flange", String::as_str);
+            let _ = writeln!(out, "\n[[joint]]\nname = {}", quoted(name));
+            let _ =
+                writeln!(out, "origin_xyz_m = {}\norigin_rpy_rad = {}", list(&origin.xyz), list(&origin.rpy));
+            let Some(limit) = self.joints.get(i) else { continue };
+            for (key, value) in [
+                ("position_min_rad", limit.position_min),
+                ("position_max_rad", limit.position_max),
+                ("velocity_max_rad_s", limit.velocity_max),
+                ("acceleration_max_rad_s2", limit.acceleration_max),
+                ("torque_max_nm", limit.torque_max),
+                ("position_error_max_rad", limit.position_error_max),
+                ("rotor_inertia_kg_m2", limit.rotor_inertia),
+            ] {
+                let _ = writeln!(out, "{key} = {value:?}");
+            }
+            if let Some(g) = self.pid.map(|p| p[i]) {
+                let _ = writeln!(
+                    out,
+                    "pid = {{ kp = {:?}, ki = {:?}, kd = {:?}, int_min_rad_s = {:?}, int_max_rad_s = {:?} }}",
+                    g.kp, g.ki, g.kd, g.int_min, g.int_max
+                );
+            }
+            if let Some(c) = self.polynomial.map(|p| p[i]) {
+                let _ = writeln!(out, "friction_polynomial = {} # c0..c5, ascending", list(&c));
+            }
+        }
+        for (i, link) in self.model.links.iter().enumerate() {
+            let _ = writeln!(out, "\n[[link]]\nname = \"link_{i}\"\nmass_kg = {:?}", link.mass);
+            let _ = writeln!(
+                out,
+                "com_xyz_m = {}\ncom_rpy_rad = {}",
+                list(&link.origin.xyz),
+                list(&link.origin.rpy)
+            );
+            let _ = writeln!(out, "inertia_kg_m2 = {} # ixx, ixy, ixz, iyy, iyz, izz", list(&link.inertia));
+        }
+        let Some(tables) = &self.table else { return out };
+        let one = tables.iter().all(|t| *t == tables[0]);
+        for t in tables.iter().take(if one { 1 } else { JOINTS }) {
+            let _ = writeln!(out, "\n[[friction_table]]\nvelocity_rad_s = {}", narrow(&t.velocity));
+            let _ = writeln!(out, "temperature_c = {}\ntorque_nm = [", narrow(&t.temperature));
+            for row in &t.torque {
+                let _ = writeln!(out, "  {},", narrow(row));
+            }
+            out.push_str("]\n");
+        }
+        out
+    }
+
+    /// As a robot description: what it can carry of the arm, which is kinematics, masses and limits.
+    pub fn to_urdf(&self) -> String {
+        let three = |v: &[f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
+        let placed = |o: &Origin| format!("<origin xyz=\"{}\" rpy=\"{}\"/>", three(&o.xyz), three(&o.rpy));
+        let mut out = format!("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", escaped(&self.name));
+        for (i, link) in self.model.links.iter().enumerate() {
+            let [xx, xy, xz, yy, yz, zz] = link.inertia;
+            let _ = writeln!(
+                out,
+                "  <link name=\"link_{i}\">\n    <inertial>\n      {}\n      <mass value=\"{}\"/>\n      <inertia ixx=\"{xx}\" \
+                 ixy=\"{xy}\" ixz=\"{xz}\" iyy=\"{yy}\" iyz=\"{yz}\" izz=\"{zz}\"/>\n    </inertial>\n  </link>",
+                placed(&link.origin),
+                link.mass
+            );
+        }
+        out.push_str("  <link name=\"flange\"/>\n");
+        for (i, origin) in self.model.joints.iter().enumerate() {
+            let place = placed(origin);
+            let (Some(name), Some(limit)) = (self.joint_names.get(i), self.joints.get(i)) else {
+                let _ = writeln!(
+                    out,
+                    "  <joint name=\"flange_joint\" type=\"fixed\">\n    {place}\n    <parent link=\"link_{i}\"/>\n    <child \
+                     link=\"flange\"/>\n  </joint>"
+                );
+                continue;
+            };
+            let _ = writeln!(
+                out,
+                "  <joint name=\"{}\" type=\"revolute\">\n    {place}\n    <parent link=\"link_{i}\"/>\n    <child \
+                 link=\"link_{}\"/>\n    <axis xyz=\"0 0 1\"/>\n    <limit lower=\"{}\" upper=\"{}\" effort=\"{}\" \
+                 velocity=\"{}\"/>\n  </joint>",
+                escaped(name),
+                i + 1,
+                limit.position_min,
+                limit.position_max,
+                limit.torque_max,
+                limit.velocity_max
+            );
+        }
+        out + "</robot>\n"
+    }
+}

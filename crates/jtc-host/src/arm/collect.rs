@@ -70,7 +70,7 @@ impl ParameterFile {
     /// What can be sent.
     pub fn parameter_set(&self, choice: FrictionChoice) -> ParameterSet {
         let polynomial = self.polynomial.map(Friction::Polynomial);
-        let table = self.table.as_ref().map(|t| Friction::Table((**t).clone()));
+        let table = self.table.as_ref().map(|t| Friction::Table(**t));
         let friction = match choice {
             FrictionChoice::Polynomial => polynomial.or(table),
             FrictionChoice::Table => table.or(polynomial),

@@ -79,7 +79,7 @@ fn joint_table(all: &[(usize, Vec<f64>)]) -> Result<TableOf<f32>, FileError> {
 }
 
 fn increasing(axis: &[f32; 20], line: usize, name: &str) -> Result<(), FileError> {
-    match axis.windows(2).position(|w| !(w[1] > w[0])) {
+    match axis.windows(2).position(|w| w[1] <= w[0] || w[1].is_nan() || w[0].is_nan()) {
         None => Ok(()),
         Some(i) => {
             let problem = format!("{} does not lie above {}: the axis must increase", axis[i + 1], axis[i]);

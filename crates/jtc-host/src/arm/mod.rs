@@ -90,7 +90,7 @@ impl Arm {
     /// Friction compensation: the polynomial, else the table.
     pub fn friction(&self) -> Option<Friction> {
         let polynomial = self.polynomial.map(Friction::Polynomial);
-        polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table((**t).clone())))
+        polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table(**t)))
     }
 
     /// What can be sent to a controller; friction as polynomial, else as table.

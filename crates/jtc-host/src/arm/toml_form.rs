@@ -87,6 +87,9 @@ impl Arm {
                 form.link.len()
             )));
         }
+        if let Some(v) = form.gravity_m_s2.iter().flatten().find(|v| !v.is_finite()) {
+            return Err(FileError::at(Place::name("gravity_m_s2"), format!("{v} is not finite")));
+        }
         let mut warnings = Vec::new();
         let mut limits = [JointConfig {
             position_min: 0.0,
@@ -174,7 +177,11 @@ impl JointForm {
                 return Err(FileError::at(place(key), format!("{v} is not a positive number")));
             }
         }
-        if !(config.position_min < config.position_max) {
+        if !config.position_min.is_finite() || !config.position_max.is_finite() {
+            let (min, max) = (config.position_min, config.position_max);
+            return Err(FileError::at(place("position_min_rad"), format!("{min}..{max} is not finite")));
+        }
+        if config.position_min >= config.position_max {
             let (min, max) = (config.position_min, config.position_max);
             return Err(FileError::at(
                 place("position_min_rad"),

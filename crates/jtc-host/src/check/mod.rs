@@ -98,8 +98,7 @@ impl<'a> Checker<'a> {
     fn start_pose(&self, first: &SetPoint, verdict: &mut Verdict) {
         for (j, measured) in self.start.into_iter().flatten().enumerate() {
             let away = measured - first.position[j];
-            // Not `>`: a measured NaN is a problem too.
-            if !(away.abs() <= self.config.start_tolerance_rad) {
+            if away.abs() > self.config.start_tolerance_rad || away.is_nan() {
                 verdict.add(ProblemKind::StartPose, Some(j), 0, 0.0, away, self.config.start_tolerance_rad);
             }
         }

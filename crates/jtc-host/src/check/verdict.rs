@@ -153,11 +153,7 @@ impl fmt::Display for Problem {
                 );
             }
             StartPose => {
-                return write!(
-                    f,
-                    "{} away from the first point by {value:+.4} rad (tolerance {limit})",
-                    "is"
-                );
+                return write!(f, "{value:+.4} rad away from the first point (tolerance {limit} rad)");
             }
             NotAtRest => write!(f, "{}: {value:+.4} {unit} at point {point}", kind.words())?,
             VelocityMismatch | AccelerationMismatch => write!(

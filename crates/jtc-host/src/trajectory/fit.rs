@@ -4,6 +4,8 @@
 //! those of a spline through the velocities, which the rounding of positions does not disturb. Between samples a quintic is
 //! followed, so that resampled points agree with the samples in position, velocity and acceleration.
 
+use std::cmp::Ordering;
+
 use jtc_core::{JOINTS, POINTS_MAX};
 
 use super::{Point, Trajectory};
@@ -42,11 +44,13 @@ pub(crate) enum FitError {
 impl Samples {
     pub fn fit(self) -> Result<Fitted, FitError> {
         let mut notes = Vec::new();
-        if let Some(i) = self.times.windows(2).position(|w| !(w[1] > w[0])) {
+        if let Some(i) =
+            self.times.windows(2).position(|w| w[1].partial_cmp(&w[0]) != Some(Ordering::Greater))
+        {
             return Err(FitError::Time(i + 1));
         }
         let duration = self.times.last().unwrap_or(&0.0) - self.times.first().unwrap_or(&0.0);
-        if !(duration <= DURATION_MAX) {
+        if !(0.0..=DURATION_MAX).contains(&duration) {
             return Err(FitError::Duration(duration));
         }
         if self.velocity.is_none() {

@@ -5,6 +5,7 @@ mod bench;
 mod dependencies;
 mod docs;
 mod fuzz;
+mod links;
 mod python;
 mod rules;
 mod shell;

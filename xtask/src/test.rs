@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Counts, Outcome, Tally};
-use crate::{dependencies, python, rules, size, worked_bytes};
+use crate::{dependencies, links, python, rules, size, worked_bytes};
 
 /// Crates that run on the board.
 const BOARD_CRATES: [&str; 4] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core"];
@@ -26,6 +26,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     tally.step("formatting", || passed(run(&mut cargo(&["fmt", "--all", "--", "--check"]))));
     tally.step("every rule has a test that names it", || passed(rules::check()));
     tally.step("worked bytes of the protocol page", || passed(worked_bytes::check()));
+    tally.step("links between documents", || passed(links::check()));
     tally.step("every dependency is documented", || passed(dependencies::check()));
     tally.step("lints", || {
         passed(run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"])))

@@ -188,6 +188,9 @@ pub enum ParamsCommand {
         /// Files or directories
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
+        /// Which friction to send where files hold both
+        #[arg(long, env = "JTC_FRICTION", value_enum, default_value_t = FrictionKind::Polynomial)]
+        friction: FrictionKind,
         #[command(flatten)]
         link: LinkArgs,
     },
@@ -207,6 +210,15 @@ pub enum ParamsCommand {
         #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200)]
         baud: u32,
     },
+}
+
+/// Kinds of friction compensation.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub enum FrictionKind {
+    /// Coefficients c0..c5.
+    Polynomial,
+    /// Torque over speed and temperature.
+    Table,
 }
 
 /// What a trajectory is checked against.

@@ -1,10 +1,69 @@
-//! `jtc doctor`: what is wrong, and the next command.
+//! `jtc doctor`: what is wrong with link, bus and set-up, in words with the next command.
 
+use std::time::Duration;
+
+use jtc_host::Session;
+use jtc_host::doctor::{Observation, RATES, Severity, findings};
+use jtc_host::port::SerialPort;
+use serde_json::json;
+
+use super::status;
 use crate::args::LinkArgs;
-use crate::failure::Failure;
+use crate::failure::{Failure, NO_LINK};
 use crate::output::Output;
 
-/// Looks at link, bus and set-up.
-pub fn doctor(_link: &LinkArgs, _out: &Output) -> Result<(), Failure> {
-    Err(Failure::usage("not yet"))
+/// Listening at the rate asked for: 50 statuses.
+const LISTEN: Duration = Duration::from_secs(2);
+/// Listening at each other rate.
+const TRY: Duration = Duration::from_millis(300);
+
+/// Looks at everything; ends with 0 when nothing is a problem, 3 without a link, else 1.
+pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let name = link.name()?;
+    out.note(format!("listening on {name} at {} Bd", link.baud));
+    let mut seen = Session::new(SerialPort::open(&name, link.baud)?).examine(LISTEN)?;
+    if seen.bytes > 0 && seen.statuses == 0 {
+        seen.other_baud = other_rate(&name, link.baud, out);
+    }
+    let all = findings(&seen);
+    let bad = all.iter().any(|f| f.severity == Severity::Problem);
+    let value = json!({
+        "port": name,
+        "baud": link.baud,
+        "listened_s": seen.time_s,
+        "bytes": seen.bytes,
+        "statuses": seen.statuses,
+        "other_baud": seen.other_baud,
+        "healthy": !bad,
+        "findings": all,
+        "status": seen.status.as_ref().map(status::as_json),
+    });
+    out.result(&value, || {
+        let line = |f: &jtc_host::doctor::Finding| {
+            let mark = match f.severity {
+                Severity::Problem => "✗",
+                Severity::Warning => "!",
+                Severity::Good => "✓",
+            };
+            format!("{mark} {}\n", f.to_string().replace('`', ""))
+        };
+        all.iter().map(line).collect()
+    });
+    match (bad, no_link(&seen)) {
+        (false, _) => Ok(()),
+        (true, true) => Err(Failure::printed(NO_LINK)),
+        (true, false) => Err(Failure::printed(1)),
+    }
+}
+
+fn no_link(seen: &Observation) -> bool {
+    seen.statuses == 0
+}
+
+fn other_rate(name: &str, own: u32, out: &Output) -> Option<u32> {
+    RATES.into_iter().filter(|r| *r != own).find(|rate| {
+        out.note(format!("no frame in what comes; trying {rate} Bd"));
+        let port = SerialPort::open(name, *rate).ok();
+        port.and_then(|p| Session::new(p).examine(TRY).ok()).is_some_and(|seen| seen.statuses > 0)
+    })
 }

@@ -1,10 +1,42 @@
-//! `jtc explain`: a page about a code.
+//! `jtc explain`: one page about a code.
+
+use jtc_host::explain::{Page, find, pages};
+use serde_json::{Value, json};
 
 use crate::args::ExplainArgs;
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::{Output, table};
 
-/// Prints the page, or the list.
-pub fn explain(_args: &ExplainArgs, _out: &Output) -> Result<(), Failure> {
-    Err(Failure::usage("not yet"))
+/// Prints the pages that fit, or the list of all.
+pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
+    let Some(code) = &args.code else {
+        list(out);
+        return Ok(());
+    };
+    let found = find(code);
+    if found.is_empty() {
+        return Err(Failure::usage(format!("nothing is known about \"{code}\""))
+            .hint("`jtc explain` lists every code; a number may carry its family, as data:7 or can:0x100"));
+    }
+    let value = json!({ "pages": found.iter().map(|p| as_json(p)).collect::<Vec<_>>() });
+    out.result(&value, || found.iter().map(|p| format!("{p}\n")).collect::<Vec<_>>().join("\n"));
+    Ok(())
+}
+
+fn as_json(page: &Page) -> Value {
+    let mut value = serde_json::to_value(page).unwrap_or_default();
+    value["number"] = page.number().into();
+    value
+}
+
+fn list(out: &Output) {
+    let value = json!({ "pages": pages().map(as_json).collect::<Vec<_>>() });
+    out.result(&value, || {
+        let row = |p: &Page| {
+            let number = if p.family.is_bits() { format!("0x{:02X}", p.number()) } else { p.code.to_string() };
+            vec![p.name.to_owned(), format!("{}:{number}", p.family.key())]
+        };
+        let rows: Vec<Vec<String>> = pages().map(row).collect();
+        format!("{}\njtc explain CODE tells what a code means, what causes it and what to do", table(&["name", "code"], &rows))
+    });
 }

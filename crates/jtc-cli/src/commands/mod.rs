@@ -11,6 +11,7 @@ mod pages;
 mod params;
 mod ports;
 mod report;
+mod run;
 mod run_report;
 mod sim;
 mod status;

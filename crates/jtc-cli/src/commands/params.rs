@@ -2,18 +2,18 @@
 
 use std::path::PathBuf;
 
-use jtc_host::arm::{Arm, ParameterSet};
+use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
 use jtc_host::words;
 use serde_json::json;
 
-use crate::args::{LinkArgs, ParamsCommand};
+use crate::args::{FrictionKind, LinkArgs, ParamsCommand};
 use crate::failure::Failure;
 use crate::output::{Output, table};
 
 /// Does one of the family.
 pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
     match command {
-        ParamsCommand::Push { files, link } => push(files, link, out),
+        ParamsCommand::Push { files, friction, link } => push(files, (*friction).into(), link, out),
         ParamsCommand::UseDefaults(link) => use_defaults(link, out),
         ParamsCommand::Show { files, port, baud } => {
             let link = port.as_ref().map(|p| LinkArgs { port: Some(p.clone()), baud: *baud });
@@ -22,8 +22,8 @@ pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
     }
 }
 
-fn push(files: &[PathBuf], link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let set = load(files, out)?;
+fn push(files: &[PathBuf], choice: FrictionChoice, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let set = load(files, choice, out)?;
     let mut session = link.session()?;
     let mut pushed = Vec::new();
     let done = session.push(&set, |p| {
@@ -60,7 +60,7 @@ fn show(files: &[PathBuf], link: Option<&LinkArgs>, out: &Output) -> Result<(), 
         let set = arm.parameter_set();
         (Some(arm), set)
     } else {
-        (None, load(files, out)?)
+        (None, load(files, FrictionChoice::default(), out)?)
     };
     let status = link.map(|l| l.session()?.fresh_status().map_err(Failure::from)).transpose()?;
     let friction = set.friction.as_ref().map(|f| match f {
@@ -131,16 +131,30 @@ fn as_text(set: &ParameterSet) -> String {
     text
 }
 
-/// What the files hold together; what could not be carried over goes to stderr.
-fn load(files: &[PathBuf], out: &Output) -> Result<ParameterSet, Failure> {
-    let (set, warnings) = todo_load(files)?;
-    for warning in warnings {
-        out.note(format!("note: {warning}"));
+/// What the files hold together, later ones over earlier ones; what could not be carried over goes to stderr.
+fn load(files: &[PathBuf], choice: FrictionChoice, out: &Output) -> Result<ParameterSet, Failure> {
+    let mut all = ParameterSet::default();
+    for file in files {
+        let read = ParameterFile::load(file)?;
+        for warning in &read.warnings {
+            out.note(format!("note: {warning}"));
+        }
+        for (path, what) in &read.sources {
+            out.note(format!("{what} from {}", path.display()));
+        }
+        let set = read.parameter_set(choice);
+        all.friction = set.friction.or(all.friction);
+        all.pid = set.pid.or(all.pid);
+        all.model = set.model.or(all.model);
     }
-    Ok(set)
+    Ok(all)
 }
 
-fn todo_load(files: &[PathBuf]) -> Result<(ParameterSet, Vec<jtc_host::arm::Warning>), Failure> {
-    let arm = Arm::load(&files[0])?;
-    Ok((arm.parameter_set(), arm.warnings.clone()))
+impl From<FrictionKind> for FrictionChoice {
+    fn from(kind: FrictionKind) -> Self {
+        match kind {
+            FrictionKind::Polynomial => FrictionChoice::Polynomial,
+            FrictionKind::Table => FrictionChoice::Table,
+        }
+    }
 }

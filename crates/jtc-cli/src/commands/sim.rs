@@ -30,7 +30,8 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     let pty = Pty::open(args.serial.as_deref()).map_err(Failure::usage)?;
     let name = pty.name().display().to_string();
     let ready = || out.result(&json!({ "ready": name }), || format!("ready: {name}"));
-    let time_s = Server::new(world, pty).run(args.speed, &stop, ready).map_err(Failure::usage)?;
+    let tap = args.bus.as_deref().map(bus).transpose()?;
+    let time_s = Server::new(world, pty, tap).run(args.speed, &stop, ready).map_err(Failure::usage)?;
     out.note(format!("ended after {time_s:.1} s of virtual time"));
     Ok(())
 }
@@ -39,6 +40,13 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
 fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
     let text = std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
     jtc_sim::FaultPlan::from_toml(&text).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
+}
+
+/// The joint bus on a bus that others can join.
+#[cfg(unix)]
+fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
+    let bus = can_link::open(url).map_err(|e| Failure::usage(format!("{url}: {e}")))?;
+    Ok(jtc_sim::BusTap::new(bus))
 }
 
 /// Pseudo-terminals are a thing of Unix.

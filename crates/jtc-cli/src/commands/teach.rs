@@ -1,17 +1,30 @@
 //! `jtc teach`: moving the arm by hand, and recording it.
 
+use std::fmt::Write;
+use std::path::Path;
+use std::time::Duration;
+
+use jtc_host::trajectory::Loaded;
+use jtc_host::words;
+use jtc_wire::Status;
 use serde_json::json;
 
 use crate::args::{LinkArgs, TeachCommand};
 use crate::failure::Failure;
 use crate::output::Output;
+use crate::signal::Stop;
+
+/// Statuses come every 40 ms; slower ones are as good as none.
+const STATUS: Duration = Duration::from_millis(500);
+/// Movement below this is standing still, rad.
+const STILL: f64 = 0.002;
 
 /// Does one of the family.
 pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TeachCommand::On(link) => switch(link, true, out),
         TeachCommand::Off(link) => switch(link, false, out),
-        TeachCommand::Record { .. } => Err(Failure::usage("not yet")),
+        TeachCommand::Record { file, link, duration } => record(file, link, *duration, out),
     }
 }
 
@@ -21,4 +34,82 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
         if on { "teaching on: the arm can be moved by hand".into() } else { "teaching off: the arm holds its pose".into() }
     });
     Ok(())
+}
+
+fn record(file: &Path, link: &LinkArgs, duration: Option<f64>, out: &Output) -> Result<(), Failure> {
+    let stop = Stop::listen()?;
+    let mut session = link.session()?;
+    let status = session.fresh_status()?;
+    let was_on = status.fsm == 4;
+    if !was_on {
+        session.teach(true)?;
+    }
+    out.note("teaching: move the arm by hand; Ctrl-C ends the recording");
+    let start = session.now();
+    let mut poses: Vec<(f64, [f64; 6])> = Vec::new();
+    let mut failed = None;
+    while !stop.asked() && duration.is_none_or(|s| (session.now() - start).as_secs_f64() < s) {
+        match session.poll(STATUS)? {
+            Some(s) if s.fsm == 4 => poses.push(((session.now() - start).as_secs_f64(), pose(&s))),
+            Some(s) if s.fsm == 5 || s.errors != 0 => {
+                failed = Some(s);
+                break;
+            }
+            _ => {}
+        }
+    }
+    if failed.is_none() && !was_on {
+        session.teach(false)?;
+    }
+    let poses = moving(&poses);
+    if poses.len() < 3 {
+        return Err(Failure::usage("the arm was not moved: nothing was written"));
+    }
+    let loaded = Loaded::parse(&csv(poses), None)?;
+    for note in &loaded.notes {
+        out.note(format!("note: {note}"));
+    }
+    let t = &loaded.trajectory;
+    std::fs::write(file, t.to_csv()).map_err(|e| Failure::usage(format!("{}: {e}", file.display())))?;
+    let value = json!({ "file": file.display().to_string(), "points": t.points.len(), "duration_s": t.duration_s() });
+    out.result(&value, || {
+        format!("{}: {} points, {:.2} s\nnext: jtc traj check {0}", file.display(), t.points.len(), t.duration_s())
+    });
+    match failed {
+        None => Ok(()),
+        Some(s) => Err(Failure { exit: 5, code: "run-fault".into(), ..Failure::usage(words::errors_line(&s)) }
+            .hint(words::next_step(&s))),
+    }
+}
+
+fn pose(s: &Status) -> [f64; 6] {
+    s.joints.map(|j| f64::from(j.position))
+}
+
+/// Without the standing still before and after, but with the last resting pose of each.
+fn moving(poses: &[(f64, [f64; 6])]) -> &[(f64, [f64; 6])] {
+    let moved = |a: &[f64; 6], b: &[f64; 6]| a.iter().zip(b).any(|(x, y)| (x - y).abs() > STILL);
+    let (Some(first), Some(last)) = (poses.first(), poses.last()) else { return poses };
+    let begin = poses.iter().position(|p| moved(&p.1, &first.1)).unwrap_or(poses.len()).saturating_sub(1);
+    let end = poses.iter().rposition(|p| moved(&p.1, &last.1)).map_or(0, |i| (i + 2).min(poses.len()));
+    if begin < end { &poses[begin..end] } else { &[] }
+}
+
+/// On the controller's 40 ms grid: the host's clock only says which status was lost.
+fn csv(poses: &[(f64, [f64; 6])]) -> String {
+    let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
+    let (start, mut last) = (poses[0].0, -1);
+    for (time, q) in poses {
+        let slot = ((time - start) / 0.04).round() as i64;
+        if slot <= last {
+            continue;
+        }
+        last = slot;
+        let _ = write!(text, "{:.3}", slot as f64 * 0.04);
+        for v in q {
+            let _ = write!(text, ",{v:.6}");
+        }
+        text.push('\n');
+    }
+    text
 }

@@ -1,35 +1,149 @@
-//! `jtc traj`: trajectories from files.
+//! `jtc traj check`, `info`, `pause`, `resume`, `stop`: trajectories from files, and the one being executed.
 
+use std::path::Path;
+
+use jtc_host::arm::Arm;
+use jtc_host::check::{Checker, Verdict};
+use jtc_host::session::UploadOptions;
+use jtc_host::trajectory::{Loaded, Trajectory};
+use jtc_host::{Error, plan};
 use serde_json::json;
 
-use crate::args::{LinkArgs, TrajCommand};
-use crate::failure::Failure;
-use crate::output::Output;
+use super::run;
+use crate::args::{CheckArgs, TrajCommand};
+use crate::failure::{Failure, REFUSED};
+use crate::output::{Output, table};
 
 /// Does one of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     match command {
-        TrajCommand::Check { .. } | TrajCommand::Info { .. } | TrajCommand::Run(_) => Err(Failure::usage("not yet")),
-        TrajCommand::Pause(link) => pause(link, out),
-        TrajCommand::Resume(link) => resume(link, out),
-        TrajCommand::Stop(link) => stop(link, out),
+        TrajCommand::Check { file, check: args } => check(file, args, out),
+        TrajCommand::Info { file } => info(file, out),
+        TrajCommand::Run(args) => run::run(args, out),
+        TrajCommand::Pause(link) => tell(link.session()?.pause(), "pause", "pausing on the path", out),
+        TrajCommand::Resume(link) => tell(link.session()?.execute(), "resume", "going on", out),
+        TrajCommand::Stop(link) => tell(link.session()?.stop(), "stop", "stopping on the path", out),
     }
 }
 
-fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    link.session()?.pause()?;
-    out.result(&json!({ "command": "pause", "accepted": true }), || "pausing on the path".into());
+fn tell(done: Result<(), Error>, command: &str, words: &str, out: &Output) -> Result<(), Failure> {
+    done?;
+    out.result(&json!({ "command": command, "accepted": true }), || words.to_owned());
     Ok(())
 }
 
-fn resume(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    link.session()?.execute()?;
-    out.result(&json!({ "command": "resume", "accepted": true }), || "going on".into());
-    Ok(())
+/// A trajectory at the speed asked for, and the arm that it is checked against.
+pub struct Job {
+    /// What the file was, and what was derived from it.
+    pub loaded: Loaded,
+    /// At the speed asked for.
+    pub trajectory: Trajectory,
+    /// Limits and masses.
+    pub arm: Arm,
 }
 
-fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    link.session()?.stop()?;
-    out.result(&json!({ "command": "stop", "accepted": true }), || "stopping on the path".into());
+impl Job {
+    /// Reads the files; notes and warnings go to stderr.
+    pub fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
+        let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
+        for warning in &arm.warnings {
+            out.note(format!("note: {warning}"));
+        }
+        let loaded = Loaded::load(file, Some(&arm.joint_names))?;
+        for note in &loaded.notes {
+            out.note(format!("note: {note}"));
+        }
+        let trajectory = if args.speed == 100.0 {
+            loaded.trajectory.clone()
+        } else {
+            plan::at_speed(&loaded.trajectory, args.speed).map_err(Failure::usage)?
+        };
+        Ok(Self { loaded, trajectory, arm })
+    }
+
+    /// Limits of every point and between points, torque by the arm model; the start pose, where it is given.
+    pub fn verdict(&self, trajectory: &Trajectory, start: Option<[f64; 6]>, upload: UploadOptions) -> Verdict {
+        let (config, friction) = (self.arm.config(), self.arm.friction());
+        let checker = Checker {
+            model: Some(&self.arm.model),
+            friction: friction.as_ref(),
+            start,
+            upload,
+            ..Checker::new(&config)
+        };
+        checker.check(trajectory)
+    }
+}
+
+/// Prints a verdict that refuses, and ends with exit code 4.
+pub fn refuse(verdict: &Verdict, out: &Output) -> Failure {
+    let value = json!({
+        "outcome": "refused",
+        "verdict": verdict,
+        "error": { "code": "check", "message": verdict.to_string(), "hint": verdict.hint(), "exit": REFUSED },
+    });
+    if out.is_json() {
+        out.result(&value, String::new);
+    }
+    out.note(format!("jtc: {verdict}\n     {}", verdict.hint()));
+    Failure::printed(REFUSED)
+}
+
+fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
+    let job = Job::load(file, args, out)?;
+    let verdict = job.verdict(&job.trajectory, None, UploadOptions::default());
+    let value = json!({ "ok": verdict.is_ok(), "form": job.loaded.form, "notes": job.loaded.notes, "verdict": verdict });
+    out.result(&value, || format!("{verdict}\n{}next: {}", figures(&verdict), verdict.hint().replace('`', "")));
+    if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(REFUSED)) }
+}
+
+fn figures(verdict: &Verdict) -> String {
+    let rows: Vec<Vec<String>> = verdict
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, f)| {
+            vec![
+                format!("joint {}", j + 1),
+                format!("{:.3} .. {:.3}", f.position_min_rad, f.position_max_rad),
+                format!("{:.3}", f.velocity_peak_rad_s),
+                format!("{:.3}", f.acceleration_peak_rad_s2),
+                f.torque_peak_nm.map_or("-".into(), |t| format!("{t:.1}")),
+            ]
+        })
+        .collect();
+    table(&["", "position rad", "peak rad/s", "peak rad/s²", "peak N·m"], &rows)
+}
+
+fn info(file: &Path, out: &Output) -> Result<(), Failure> {
+    let args = CheckArgs { arm: None, speed: 100.0 };
+    let job = Job::load(file, &args, out)?;
+    let (t, upload) = (&job.trajectory, UploadOptions::default());
+    let verdict = job.verdict(t, None, upload);
+    let per_segment = upload.segment_points(t.points.len());
+    let segments = t.points.len().div_ceil(per_segment);
+    let ends = |p: Option<&jtc_host::Point>| p.map(|p| p.position);
+    let value = json!({
+        "form": job.loaded.form,
+        "notes": job.loaded.notes,
+        "points": t.points.len(),
+        "step_ms": t.step_ms,
+        "duration_s": t.duration_s(),
+        "segments": segments,
+        "first_position_rad": ends(t.points.first()),
+        "last_position_rad": ends(t.points.last()),
+        "joints": verdict.joints,
+    });
+    out.result(&value, || {
+        format!(
+            "{:?}: {} points, step {} ms, {:.2} s, {segments} segments of {per_segment}\n{}next: jtc traj check {}",
+            job.loaded.form,
+            t.points.len(),
+            t.step_ms,
+            t.duration_s(),
+            figures(&verdict),
+            file.display(),
+        )
+    });
     Ok(())
 }

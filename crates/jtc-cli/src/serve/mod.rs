@@ -5,7 +5,8 @@ mod pty;
 
 use std::time::{Duration, Instant};
 
-use jtc_sim::World;
+use can_link::CanBus;
+use jtc_sim::{BusTap, World};
 
 use crate::args::SimSpeed;
 use crate::signal::Stop;
@@ -23,10 +24,14 @@ const CATCH_UP_US: u64 = 2_000_000;
 /// A tick, µs.
 const TICK_US: u64 = 1000;
 
+/// The joint bus on a bus that others can join.
+pub type Tap = BusTap<Box<dyn CanBus + Send>>;
+
 /// The loop's state.
 pub struct Server {
     world: World,
     pty: Pty,
+    tap: Option<Tap>,
     frames: Frames,
     incoming: Incoming,
     /// Bytes of a frame that the terminal did not take at once.
@@ -41,11 +46,12 @@ pub struct Server {
 }
 
 impl Server {
-    /// A world behind a terminal.
-    pub fn new(world: World, pty: Pty) -> Self {
+    /// A world behind a terminal, and its joint bus on `tap`.
+    pub fn new(world: World, pty: Pty, tap: Option<Tap>) -> Self {
         Self {
             world,
             pty,
+            tap,
             frames: Frames::default(),
             incoming: Incoming::default(),
             rest: Vec::new(),
@@ -83,6 +89,13 @@ impl Server {
                 continue;
             }
             self.world.step();
+            if let Some(tap) = &mut self.tap
+                && let Err(e) = tap.exchange(&mut self.world)
+            {
+                // Others on the bus are guests: without them the arm goes on.
+                eprintln!("jtc: CAN: {e}; the joint bus is no longer shared");
+                self.tap = None;
+            }
             self.give_output(speed)?;
             if self.answers && let Some(ready) = ready.take() {
                 ready();

@@ -1,0 +1,125 @@
+//! Runs the `jtc` command as a user does, and a simulated controller for it to talk to.
+#![allow(dead_code)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use serde_json::Value;
+
+/// What a command said and how it ended.
+pub struct Said {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+impl Said {
+    /// Its stdout as one JSON object.
+    pub fn json(&self) -> Value {
+        let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
+        serde_json::from_str(self.out.trim()).unwrap_or_else(error)
+    }
+
+    /// The same, once it ended with this code.
+    pub fn ends(self, code: i32) -> Self {
+        assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
+        self
+    }
+}
+
+fn command() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jtc"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("JTC_")) {
+        command.env_remove(name);
+    }
+    command
+}
+
+/// Runs `jtc` with these words.
+pub fn jtc(words: &[&str]) -> Said {
+    jtc_with(words, "")
+}
+
+/// Runs `jtc` with this text on its stdin.
+pub fn jtc_with(words: &[&str], stdin: &str) -> Said {
+    let mut child = command()
+        .args(words)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("jtc starts");
+    child.stdin.take().expect("stdin").write_all(stdin.as_bytes()).ok();
+    let output = child.wait_with_output().expect("jtc ends");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+}
+
+/// A simulated controller behind a pseudo-terminal; it ends with the test.
+pub struct Sim {
+    child: Child,
+    pub port: PathBuf,
+    pub dir: tempfile::TempDir,
+}
+
+impl Sim {
+    /// Starts one and waits until it is ready.
+    pub fn start(options: &[&str]) -> Self {
+        let dir = tempfile::tempdir().expect("a directory");
+        let port = dir.path().join("jtc");
+        let mut child = command()
+            .args(["sim", "--serial", port.to_str().unwrap()])
+            .args(options)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("jtc sim starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
+        if line != format!("ready: {}\n", port.display()) {
+            let mut err = String::new();
+            child.stderr.take().expect("stderr").read_to_string(&mut err).ok();
+            panic!("jtc sim says {line:?}, {err}");
+        }
+        Self { child, port, dir }
+    }
+
+    /// Runs `jtc` at its port.
+    pub fn jtc(&self, words: &[&str]) -> Said {
+        let mut all = words.to_vec();
+        all.extend(["--port", self.port.to_str().unwrap()]);
+        jtc(&all)
+    }
+
+    /// A path in its directory.
+    pub fn path(&self, name: &str) -> String {
+        self.dir.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    /// Sends a signal and waits for the end: its exit code.
+    pub fn end(mut self, signal: &str) -> (i32, bool) {
+        let pid = self.child.id().to_string();
+        Command::new("kill").args([signal, &pid]).status().expect("kill");
+        let code = self.child.wait().expect("it ends").code().unwrap_or(-1);
+        (code, Path::new(&self.port).symlink_metadata().is_ok())
+    }
+}
+
+impl Drop for Sim {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+/// A smooth trajectory file from the zero pose and back: `amplitude` rad in 1.2 s.
+pub fn motion(amplitude: f64) -> String {
+    let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
+    for i in 0..=120 {
+        let s = f64::from(i) / 120.0;
+        let q = amplitude * (std::f64::consts::PI * s).sin().powi(4);
+        text += &format!("{:.3},{q},{},{q},{q},{},{q}\n", f64::from(i) * 0.01, -0.5 * q, -q);
+    }
+    text
+}

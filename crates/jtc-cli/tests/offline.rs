@@ -1,0 +1,135 @@
+//! Commands that need no controller: exit codes, JSON, filters.
+
+mod common;
+
+use common::{jtc, jtc_with, motion};
+
+#[test]
+fn wrong_usage_and_unreadable_input_end_with_2() {
+    jtc(&["traj", "rum", "x"]).ends(2);
+    jtc(&["reset", "0x80", "--port", "/dev/null"]).ends(2);
+    let said = jtc(&["traj", "check", "/nowhere/motion.csv"]).ends(2);
+    assert!(said.err.contains("/nowhere/motion.csv"), "{}", said.err);
+    let said = jtc(&["--json", "traj", "check", "/nowhere/motion.csv"]).ends(2);
+    assert_eq!(said.json()["error"]["exit"], 2);
+    jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
+}
+
+#[test]
+fn a_port_that_is_not_there_ends_with_3() {
+    let said = jtc(&["--json", "status", "--port", "/nowhere/tty"]).ends(3);
+    let error = &said.json()["error"];
+    assert_eq!(error["code"], "port");
+    assert!(error["hint"].as_str().unwrap().contains("jtc ports"));
+}
+
+#[test]
+fn the_check_refuses_with_4_and_names_joint_and_point() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("motion.csv");
+    let file = path.to_str().unwrap();
+    std::fs::write(&path, motion(0.3)).unwrap();
+    let said = jtc(&["--json", "traj", "check", file]).ends(0);
+    assert_eq!(said.json()["ok"], true);
+    assert_eq!(said.json()["verdict"]["points"], 121);
+    std::fs::write(&path, motion(1.4)).unwrap();
+    let said = jtc(&["--json", "traj", "check", file]).ends(4);
+    let problems = said.json()["verdict"]["problems"].clone();
+    assert!(problems[0]["joint"].is_u64() && problems[0]["limit"].is_f64(), "{problems}");
+    // Refused before anything is opened: the port is not even there.
+    let said = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
+    assert_eq!(said.json()["outcome"], "refused");
+    let said = jtc(&["--json", "traj", "info", file]).ends(0);
+    assert_eq!(said.json()["duration_s"], 1.2);
+}
+
+#[test]
+fn dynamics_gives_back_what_it_was_given() {
+    let q = "0.3 -0.4 0.5 0.1 -0.2 0.7";
+    let qd = "0.5 0.2 -0.3 0.4 0.1 -0.6";
+    let qdd = "1 -2 0.5 0.25 -0.125 3";
+    let said = jtc_with(&["dynamics", "inverse"], &format!("{q} {qd} {qdd}\n")).ends(0);
+    let torque = said.out.trim().to_owned();
+    assert_eq!(torque.split(' ').count(), 6);
+    for word in torque.split(' ') {
+        let mantissa = word.trim_start_matches('-').split('e').next().unwrap();
+        assert_eq!(mantissa.len(), 18, "17 significant digits and a point: {word}");
+    }
+    let said = jtc_with(&["dynamics", "forward"], &format!("{q} {qd} {torque}\n")).ends(0);
+    for (got, want) in said.out.split_whitespace().zip(qdd.split(' ')) {
+        let (got, want): (f64, f64) = (got.parse().unwrap(), want.parse().unwrap());
+        assert!((got - want).abs() < 1e-9, "{got} is not {want}");
+    }
+    let said = jtc_with(&["dynamics", "mass"], &format!("{q}\n")).ends(0);
+    let mass: Vec<f64> = said.out.split_whitespace().map(|w| w.parse().unwrap()).collect();
+    assert_eq!(mass.len(), 36);
+    for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
+        assert!((mass[6 * i + j] - mass[6 * j + i]).abs() < 1e-12, "not symmetric at {i}, {j}");
+    }
+    let weightless = jtc_with(&["dynamics", "inverse", "--gravity", "0,0,0"], &format!("{q} 0 0 0 0 0 0 0 0 0 0 0 0\n"));
+    assert!(weightless.ends(0).out.split_whitespace().all(|w| w.parse::<f64>().unwrap() == 0.0));
+    let said = jtc_with(&["dynamics", "inverse"], "1 2 3\n").ends(2);
+    assert!(said.err.contains("line 1") && said.err.contains("3 numbers"), "{}", said.err);
+}
+
+#[test]
+fn decode_knows_frames_of_both_directions() {
+    let said = jtc_with(&["decode"], "9B 0E 00 06 A3 47\n").ends(0);
+    assert!(said.out.contains("FrictionPolynomial"), "{}", said.out);
+    let said = jtc_with(&["--json", "decode"], "9B0B0007 03 7D9E").ends(0);
+    assert_eq!(said.json()["frame"], "TrajSetExecStatus");
+    assert_eq!(said.json()["type"], 0x0B);
+    // Rubbish before and after costs no frame.
+    let said = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
+    assert!(said.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", said.out);
+    jtc_with(&["decode"], "hello").ends(2);
+    jtc_with(&["decode"], "").ends(2);
+    let capture = "0.001250 > 9B 0B 00 07\n0.001300 > 03 7D 9E\n0.016400 < 9B 03\n";
+    let said = jtc_with(&["decode"], capture).ends(0);
+    assert!(said.out.contains("to device") && said.out.contains("execute"), "{}", said.out);
+}
+
+#[test]
+fn explain_has_a_page_for_codes_and_refuses_others() {
+    let said = jtc(&["--json", "explain"]).ends(0);
+    let pages = said.json()["pages"].clone();
+    assert!(pages.as_array().unwrap().len() > 40);
+    for page in pages.as_array().unwrap() {
+        let said = jtc(&["explain", page["name"].as_str().unwrap()]).ends(0);
+        assert!(said.out.contains("meaning:") && said.out.contains("next:"));
+    }
+    assert!(jtc(&["explain", "data:8"]).ends(0).out.contains("start"));
+    jtc(&["explain", "no-such-code"]).ends(2);
+}
+
+#[test]
+fn completions_and_manual_pages_are_made() {
+    for shell in ["bash", "zsh", "fish", "powershell"] {
+        assert!(jtc(&["completions", shell]).ends(0).out.contains("jtc"));
+    }
+    let dir = tempfile::tempdir().unwrap();
+    jtc(&["man", "--out", dir.path().to_str().unwrap()]).ends(0);
+    assert!(std::fs::read_dir(dir.path()).unwrap().count() > 20);
+}
+
+#[test]
+fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("demo");
+    let said = jtc(&["--json", "demo", "--out", out.to_str().unwrap()]).ends(0);
+    let value = said.json();
+    for joint in value["joints"].as_array().unwrap() {
+        assert!(joint["rms_error_mrad"].as_f64().unwrap() < 2.0, "{joint}");
+        assert!(joint["torque_share"].as_f64().unwrap() < 1.0, "{joint}");
+    }
+    for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
+        assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
+    }
+    // What was recorded gives the same figures again.
+    let file = out.join("recording.mcap");
+    let again = jtc(&["--json", "report", file.to_str().unwrap()]).ends(0).json();
+    for (a, b) in again["joints"].as_array().unwrap().iter().zip(value["joints"].as_array().unwrap()) {
+        let rms = |v: &serde_json::Value| v["rms_error_mrad"].as_f64().unwrap();
+        assert!((rms(a) - rms(b)).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,118 @@
+//! Commands against `jtc sim` over its pseudo-terminal, in free-running virtual time.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Sim, jtc, motion};
+
+#[test]
+fn the_simulator_ends_with_0_on_a_signal_and_takes_its_link_away() {
+    for signal in ["-INT", "-TERM"] {
+        let sim = Sim::start(&["--speed", "max"]);
+        assert_eq!(sim.end(signal), (0, false), "{signal}");
+    }
+}
+
+#[test]
+fn a_stale_link_is_replaced_and_a_file_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("jtc");
+    std::fs::write(&path, "precious").unwrap();
+    let said = jtc(&["sim", "--serial", path.to_str().unwrap()]).ends(2);
+    assert!(said.err.contains("a file is there"), "{}", said.err);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
+    let sim = Sim::start(&["--speed", "max"]);
+    let stale = sim.dir.path().join("stale");
+    std::os::unix::fs::symlink("/dev/pts/99999", &stale).unwrap();
+    drop(sim);
+}
+
+#[test]
+fn from_power_up_to_a_recorded_motion() {
+    let sim = Sim::start(&["--speed", "max", "--seed", "3"]);
+    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    assert_eq!(status["joints"].as_array().unwrap().len(), 6);
+    assert!(status["missing_parameters"].as_array().unwrap().len() == 3, "{status}");
+
+    // Nothing can run yet, and it says what to do.
+    let file = sim.path("motion.csv");
+    std::fs::write(&file, motion(0.25)).unwrap();
+    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(1);
+    assert!(said.json()["error"]["hint"].as_str().unwrap().contains("params"), "{}", said.out);
+
+    let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
+    let pushed = sim.jtc(&["--json", "params", "push", arm]).ends(0).json();
+    assert_eq!(pushed["missing_parameters"].as_array().unwrap().len(), 0, "{pushed}");
+
+    let (record, page) = (sim.path("run.mcap"), sim.path("run.html"));
+    let words = ["--json", "traj", "run", &file, "--record", &record, "--report", &page, "--points-per-segment", "50"];
+    let run = sim.jtc(&words).ends(0).json();
+    assert_eq!(run["outcome"], "finished");
+    assert_eq!(run["upload"]["segments"], 3);
+    for joint in run["joints"].as_array().unwrap() {
+        assert!(joint["rms_error_mrad"].as_f64().unwrap() < 2.0, "{joint}");
+        assert!(joint["peak_torque_nm"].as_f64().unwrap() > 0.0, "{joint}");
+    }
+    assert!(std::fs::metadata(&record).unwrap().len() > 1000);
+    assert!(std::fs::read_to_string(&page).unwrap().contains("</html>"));
+
+    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    assert_eq!((status["state"].as_str(), status["trajectory"].as_str()), (Some("HoldPos"), Some("Finish")));
+    sim.jtc(&["traj", "stop"]).ends(0);
+    sim.jtc(&["traj", "pause"]).ends(1);
+    sim.jtc(&["gripper", "on"]).ends(0);
+    sim.jtc(&["teach", "on"]).ends(0);
+    sim.jtc(&["teach", "off"]).ends(0);
+    let doctor = sim.jtc(&["--json", "doctor"]).ends(0).json();
+    assert_eq!(doctor["healthy"], true, "{doctor}");
+    let lines = sim.jtc(&["--json", "monitor", "--count", "5"]).ends(0);
+    assert_eq!(lines.out.lines().count(), 5);
+}
+
+#[test]
+fn a_start_elsewhere_is_refused_until_it_is_approached() {
+    let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let file = sim.path("away.csv");
+    let shifted: String = motion(0.2)
+        .lines()
+        .enumerate()
+        .map(|(i, l)| {
+            let mut cells: Vec<String> = l.split(',').map(String::from).collect();
+            if i > 0 {
+                cells[1] = (cells[1].parse::<f64>().unwrap() + 0.3).to_string();
+            }
+            cells.join(",") + "\n"
+        })
+        .collect();
+    std::fs::write(&file, shifted).unwrap();
+    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(4);
+    assert!(said.out.contains("start_pose"), "{}", said.out);
+    let said = sim.jtc(&["--json", "traj", "run", &file, "--approach", "--speed", "50"]).ends(0);
+    assert_eq!(said.json()["outcome"], "finished");
+}
+
+#[test]
+fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let faults = dir.path().join("faults.toml");
+    std::fs::write(&faults, FAULT).unwrap();
+    let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let file = sim.path("motion.csv");
+    std::fs::write(&file, motion(0.25)).unwrap();
+    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(5);
+    assert_eq!(said.json()["outcome"], "fault");
+    let said = sim.jtc(&["--json", "recover"]).ends(0);
+    assert_eq!(said.json()["status"]["state"], "HoldPos", "{}", said.out);
+}
+
+/// A drive faults half a second into the motion.
+const FAULT: &str = r#"
+[[fault]]
+kind = "motor-fault"
+joint = 2
+bits = 4
+at_point = 500
+for_s = 0.1
+"#;

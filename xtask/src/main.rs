@@ -20,8 +20,9 @@ use std::process::ExitCode;
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
-  test [--quick]               every check of the project; ends with `N passed, N failed, N skipped`
+  test [--quick] [--only TEXT] every check of the project; ends with `N passed, N failed, N skipped`
                                --quick: only formatting, lints, tests and the document checks
+                               --only: the steps with TEXT in their heading
   bench [--json FILE] [--quick]
                                performance and tracking figures beside their anchors, all measured in this run
   soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)

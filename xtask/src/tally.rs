@@ -28,14 +28,23 @@ pub struct Counts {
 /// The steps so far.
 #[derive(Default)]
 pub struct Tally {
+    only: Option<String>,
     counts: Counts,
     failures: Vec<String>,
     skips: Vec<String>,
 }
 
 impl Tally {
+    /// Of all steps, run those with `only` in their title.
+    pub fn new(only: Option<String>) -> Self {
+        Self { only, ..Self::default() }
+    }
+
     /// Run a step under its heading; an error is reported and counted, and the next step runs all the same.
     pub fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
+        if self.only.as_ref().is_some_and(|only| !title.contains(only)) {
+            return;
+        }
         println!("\n== {title}");
         let start = Instant::now();
         let result = body();

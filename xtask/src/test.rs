@@ -15,14 +15,15 @@ const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
 /// Largest tracking error of the demo, mrad RMS of any joint.
 const RMS_LIMIT_MRAD: f64 = 2.0;
 
-/// `arguments`: `--quick`.
+/// `arguments`: `--quick`, `--only TEXT`.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let quick = shell::flag(&mut arguments, "--quick");
+    let only = shell::option(&mut arguments, "--only")?;
     shell::nothing_left(&arguments)?;
 
     let before = tree();
-    let mut tally = Tally::default();
+    let mut tally = Tally::new(only);
     tally.step("formatting", || passed(run(&mut cargo(&["fmt", "--all", "--", "--check"]))));
     tally.step("every rule has a test that names it", || passed(rules::check()));
     tally.step("worked bytes of the protocol page", || passed(worked_bytes::check()));

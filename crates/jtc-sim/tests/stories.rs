@@ -1,5 +1,6 @@
 //! Short stories of an operator and an arm.
 use jtc_core::{State, Tes};
+use jtc_sim::invariants::Invariants;
 use jtc_sim::{BusTap, DriveConfig, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
 
@@ -196,4 +197,19 @@ fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
     let answers = operator.world.bus_frames().iter().filter(|f| f.frame.id & 0x200 != 0).count();
     assert_eq!(answers, 7, "they answer what was asked a millisecond ago");
     assert_eq!(operator.state(), State::HoldPos);
+}
+
+#[test]
+fn j12_the_first_frame_after_an_error_is_zero_torque_also_during_bring_up() {
+    for at in 245..285 {
+        let mut world = jtc_sim::World::new(SimConfig::default());
+        world.host_write(&host::use_defaults());
+        let kind = FaultKind::MotorFault { joint: 4, bits: 4 };
+        world.inject(Fault { kind, trigger: Trigger::At(at), duration_ms: Some(50) });
+        let mut invariants = Invariants::default();
+        for _ in 0..400 {
+            world.step();
+            invariants.check(&world).unwrap_or_else(|violation| panic!("fault at {at} ms: {violation}"));
+        }
+    }
 }

@@ -109,7 +109,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// One millisecond, with a bounded amount of work whatever the inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         // What has come in.
-        let was_powered = self.powered();
+        let before = self.state;
         self.nodes.take(inputs, &self.config, self.goal());
         // In Start nothing is executed yet; the event is offered again.
         let host_done = self.state != State::Start && self.serve_host(inputs.host);
@@ -135,7 +135,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
         // What goes out.
         // Drives keep their last torque: taking it away comes before everything else.
-        let must_move = was_powered && !self.powered();
+        let new_error = self.state == State::Error && before != State::Error;
+        let must_move = new_error || (powered(before) && !self.powered());
         let bus = self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move);
         self.observe(&torque);
         Outputs {
@@ -164,7 +165,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// In a state that commands torque.
     pub(crate) fn powered(&self) -> bool {
-        matches!(self.state, State::HoldPos | State::Operate | State::Teaching)
+        powered(self.state)
     }
 
     /// Where the nodes are wanted in the present state.
@@ -493,6 +494,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
         Some(status.emit())
     }
+}
+
+/// The state commands torque.
+fn powered(state: State) -> bool {
+    matches!(state, State::HoldPos | State::Operate | State::Teaching)
 }
 
 #[cfg(test)]

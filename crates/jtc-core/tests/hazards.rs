@@ -293,6 +293,21 @@ fn j12_torque_is_taken_away_before_anything_else_is_sent() {
 }
 
 #[test]
+fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
+    for wait in 60..90 {
+        let mut rig = Rig::new(Config::avena());
+        rig.run(wait);
+        rig.safety_input = false;
+        rig.tick();
+        assert_eq!(
+            *rig.sent.last().unwrap(),
+            Request::Move { torque: [0.0; 6], pump: false },
+            "after {wait} ticks"
+        );
+    }
+}
+
+#[test]
 fn j16_a_joint_that_loses_its_position_in_motion_is_an_error() {
     let mut rig = Rig::holding();
     rig.nodes[3].report.warnings = warning::POSITION_NOT_ACCURATE;

@@ -59,9 +59,11 @@ pub enum Command {
     #[command(after_help = "Examples:\n  jtc demo\n  jtc demo --out /tmp/demo --speed realtime")]
     Demo(DemoArgs),
     /// A simulated controller with drives and arm behind a pseudo-terminal
-    #[command(after_help = "Examples:\n  jtc sim --serial /tmp/jtc\n  jtc sim --serial /tmp/jtc --arm my-arm.toml --seed 7\n  \
+    #[command(
+        after_help = "Examples:\n  jtc sim --serial /tmp/jtc\n  jtc sim --serial /tmp/jtc --arm my-arm.toml --seed 7\n  \
                             jtc sim --serial /tmp/jtc --speed max --no-throttle\n  \
-                            jtc sim --serial /tmp/jtc --faults faults.toml")]
+                            jtc sim --serial /tmp/jtc --faults faults.toml"
+    )]
     Sim(SimArgs),
     /// Serial ports found, and why one cannot be used
     #[command(after_help = "Examples:\n  jtc ports\n  jtc --json ports")]
@@ -88,7 +90,9 @@ pub enum Command {
     #[command(after_help = "Examples:\n  jtc clear\n  jtc clear --occurred")]
     Clear(ClearArgs),
     /// Reset nodes of the joint bus
-    #[command(after_help = "Examples:\n  jtc reset           all joints and the gripper\n  jtc reset 0x04      joint 3 only")]
+    #[command(
+        after_help = "Examples:\n  jtc reset           all joints and the gripper\n  jtc reset 0x04      joint 3 only"
+    )]
     Reset(ResetArgs),
     /// Vacuum pump of the gripper
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
@@ -97,22 +101,30 @@ pub enum Command {
     #[command(after_help = "Examples:\n  jtc recover\n  jtc recover --arm my-arm.toml")]
     Recover(RecoverArgs),
     /// Dynamics of an arm: a line of numbers in, a line of numbers out
-    #[command(after_help = "Each line on stdin holds q1..q6 qd1..qd6 qdd1..qdd6 (rad, rad/s, rad/s²); forward: torques (N·m)\n\
+    #[command(
+        after_help = "Each line on stdin holds q1..q6 qd1..qd6 qdd1..qdd6 (rad, rad/s, rad/s²); forward: torques (N·m)\n\
                             in the last six; mass: q1..q6 only. Numbers come out with 17 significant digits.\n\nExamples:\n  \
                             echo 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 | jtc dynamics inverse\n  \
-                            echo 0 0.5 0 0 0 0 | jtc dynamics mass --arm my-arm.urdf")]
+                            echo 0 0.5 0 0 0 0 | jtc dynamics mass --arm my-arm.urdf"
+    )]
     Dynamics(DynamicsArgs),
     /// A page about an error or status code
-    #[command(after_help = "Examples:\n  jtc explain\n  jtc explain start-position-mismatch\n  jtc explain 8")]
+    #[command(
+        after_help = "Examples:\n  jtc explain\n  jtc explain start-position-mismatch\n  jtc explain 8"
+    )]
     Explain(ExplainArgs),
     /// Decode frames: hex or a raw serial capture on stdin
     #[command(after_help = "Examples:\n  echo 9B 0E 00 06 A3 47 | jtc decode\n  jtc decode < capture.bin")]
     Decode,
     /// Make the report page and picture of a recording
-    #[command(after_help = "Examples:\n  jtc report run.mcap\n  jtc report run.csv --arm my-arm.toml --out run.html")]
+    #[command(
+        after_help = "Examples:\n  jtc report run.mcap\n  jtc report run.csv --arm my-arm.toml --out run.html"
+    )]
     Report(ReportArgs),
     /// Completions for a shell, on stdout
-    #[command(after_help = "Examples:\n  jtc completions bash > ~/.local/share/bash-completion/completions/jtc")]
+    #[command(
+        after_help = "Examples:\n  jtc completions bash > ~/.local/share/bash-completion/completions/jtc"
+    )]
     Completions {
         /// The shell
         shell: clap_complete::Shell,
@@ -181,9 +193,11 @@ pub struct MonitorArgs {
 #[derive(Debug, Subcommand)]
 pub enum ParamsCommand {
     /// Send what the files hold: an arm file (TOML, URDF) or CSV files of friction and gains
-    #[command(after_help = "Files: an arm as TOML or URDF; FricPolynomialCoeffs.csv (a row a joint); six FricTableJointN.csv;\n\
+    #[command(
+        after_help = "Files: an arm as TOML or URDF; FricPolynomialCoeffs.csv (a row a joint); six FricTableJointN.csv;\n\
                             six PidParamJointN.csv. Several may be named; a directory is searched for them.\n\nExamples:\n  \
-                            jtc params push my-arm.toml\n  jtc params push arm.urdf FricPolynomialCoeffs.csv PidParamJoint*.csv")]
+                            jtc params push my-arm.toml\n  jtc params push arm.urdf FricPolynomialCoeffs.csv PidParamJoint*.csv"
+    )]
     Push {
         /// Files or directories
         #[arg(required = true, value_name = "FILE")]
@@ -236,7 +250,9 @@ pub struct CheckArgs {
 #[derive(Debug, Subcommand)]
 pub enum TrajCommand {
     /// Limits at and between points, torques by the arm model; nothing is sent
-    #[command(after_help = "Examples:\n  jtc traj check motion.csv\n  jtc --json traj check motion.yaml --arm my-arm.toml")]
+    #[command(
+        after_help = "Examples:\n  jtc traj check motion.csv\n  jtc --json traj check motion.yaml --arm my-arm.toml"
+    )]
     Check {
         /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
         file: PathBuf,
@@ -250,7 +266,9 @@ pub enum TrajCommand {
         file: PathBuf,
     },
     /// Check, upload, execute, follow, report
-    #[command(after_help = "Examples:\n  jtc traj run motion.csv --approach\n  jtc traj run motion.csv --speed 10 --record run.mcap")]
+    #[command(
+        after_help = "Examples:\n  jtc traj run motion.csv --approach\n  jtc traj run motion.csv --speed 10 --record run.mcap"
+    )]
     Run(RunArgs),
     /// Pause on the path
     #[command(after_help = "Examples:\n  jtc traj pause")]
@@ -296,7 +314,9 @@ pub enum TeachCommand {
     #[command(after_help = "Examples:\n  jtc teach off")]
     Off(LinkArgs),
     /// Record a motion by hand as a trajectory file, until Ctrl-C
-    #[command(after_help = "Examples:\n  jtc teach record motion.csv\n  jtc teach record motion.csv --duration 20")]
+    #[command(
+        after_help = "Examples:\n  jtc teach record motion.csv\n  jtc teach record motion.csv --duration 20"
+    )]
     Record {
         /// Trajectory file to write, CSV
         file: PathBuf,
@@ -415,7 +435,8 @@ fn mask(text: &str) -> Result<u8, String> {
 }
 
 fn gravity(text: &str) -> Result<[f64; 3], String> {
-    let values: Vec<f64> = text.split(',').filter_map(|v| v.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
+    let values: Vec<f64> =
+        text.split(',').filter_map(|v| v.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
     let count = text.split(',').count();
     match <[f64; 3]>::try_from(values) {
         Ok(values) if count == 3 => Ok(values),

@@ -32,7 +32,13 @@ pub struct Failure {
 impl Failure {
     /// Wrong usage or unreadable input.
     pub fn usage(message: impl Display) -> Self {
-        Self { exit: USAGE, code: "usage".into(), message: message.to_string(), hint: String::new(), printed: false }
+        Self {
+            exit: USAGE,
+            code: "usage".into(),
+            message: message.to_string(),
+            hint: String::new(),
+            printed: false,
+        }
     }
 
     /// With the next command or act.
@@ -48,7 +54,13 @@ impl Failure {
 
 impl From<jtc_host::Error> for Failure {
     fn from(e: jtc_host::Error) -> Self {
-        Self { exit: e.exit_code(), code: e.code().into(), message: e.to_string(), hint: e.hint(), printed: false }
+        Self {
+            exit: e.exit_code(),
+            code: e.code().into(),
+            message: e.to_string(),
+            hint: e.hint(),
+            printed: false,
+        }
     }
 }
 

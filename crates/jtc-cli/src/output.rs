@@ -28,7 +28,8 @@ impl Output {
     /// Prints a result: `value` as one line of JSON, or the text.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
         let line = if self.json {
-            serde_json::to_string(value).unwrap_or_else(|e| json!({ "error": { "message": e.to_string() } }).to_string())
+            serde_json::to_string(value)
+                .unwrap_or_else(|e| json!({ "error": { "message": e.to_string() } }).to_string())
         } else {
             text()
         };

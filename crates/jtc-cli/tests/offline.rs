@@ -66,7 +66,8 @@ fn dynamics_gives_back_what_it_was_given() {
     for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
         assert!((mass[6 * i + j] - mass[6 * j + i]).abs() < 1e-12, "not symmetric at {i}, {j}");
     }
-    let weightless = jtc_with(&["dynamics", "inverse", "--gravity", "0,0,0"], &format!("{q} 0 0 0 0 0 0 0 0 0 0 0 0\n"));
+    let weightless =
+        jtc_with(&["dynamics", "inverse", "--gravity", "0,0,0"], &format!("{q} 0 0 0 0 0 0 0 0 0 0 0 0\n"));
     assert!(weightless.ends(0).out.split_whitespace().all(|w| w.parse::<f64>().unwrap() == 0.0));
     let said = jtc_with(&["dynamics", "inverse"], "1 2 3\n").ends(2);
     assert!(said.err.contains("line 1") && said.err.contains("3 numbers"), "{}", said.err);

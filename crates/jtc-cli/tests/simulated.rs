@@ -45,7 +45,18 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(pushed["missing_parameters"].as_array().unwrap().len(), 0, "{pushed}");
 
     let (record, page) = (sim.path("run.mcap"), sim.path("run.html"));
-    let words = ["--json", "traj", "run", &file, "--record", &record, "--report", &page, "--points-per-segment", "50"];
+    let words = [
+        "--json",
+        "traj",
+        "run",
+        &file,
+        "--record",
+        &record,
+        "--report",
+        &page,
+        "--points-per-segment",
+        "50",
+    ];
     let run = sim.jtc(&words).ends(0).json();
     assert_eq!(run["outcome"], "finished");
     assert_eq!(run["upload"]["segments"], 3);

@@ -75,7 +75,9 @@ fn hex(bytes: &[u8]) -> String {
 
 /// The byte streams of an input with their names; one without a name, unless the input tells directions apart.
 fn streams(input: &[u8]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
-    let Some(text) = std::str::from_utf8(input).ok().filter(|t| t.chars().all(|c| !c.is_control() || c.is_whitespace())) else {
+    let Some(text) =
+        std::str::from_utf8(input).ok().filter(|t| t.chars().all(|c| !c.is_control() || c.is_whitespace()))
+    else {
         return Ok(vec![(String::new(), input.to_vec())]);
     };
     if text.lines().any(|l| l.contains('>') || l.contains('<')) {

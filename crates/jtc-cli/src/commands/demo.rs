@@ -100,9 +100,12 @@ fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
     let points = trajectory.raw().map_err(|e| Failure::usage(e.to_string()))?;
     let world = World::new(SimConfig { seed: SEED, ..SimConfig::new(arm.config(), &arm.parameters()) });
     let percent = |true_value: f64, believed: f64| {
-        if believed > 0.0 { format!("{:+.0} %", (true_value / believed - 1.0) * 100.0) } else { "0 %".into() }
+        let off = if believed > 0.0 { ((true_value / believed - 1.0) * 100.0).round() + 0.0 } else { 0.0 };
+        format!("{off:+} %")
     };
-    let masses = (0..7).map(|i| percent(world.true_model().links[i].mass, arm.model.links[i].mass)).collect::<Vec<_>>();
+    let masses = (0..7)
+        .map(|i| percent(world.true_model().links[i].mass, arm.model.links[i].mass))
+        .collect::<Vec<_>>();
 
     let samples: Rc<RefCell<Vec<Sample>>> = Rc::default();
     let recording = Rc::new(Cell::new(false));
@@ -119,7 +122,9 @@ fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
     let mut session = Session::new(port);
 
     out.note("parameters: friction, gains and arm model over the serial protocol");
-    session.push(&arm.parameter_set(), |p| out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes)))?;
+    session.push(&arm.parameter_set(), |p| {
+        out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes))
+    })?;
     out.note("drives: waiting until all six hold the arm");
     session.wait_hold(BRING_UP)?;
     session.wait_for("all drives enabled", BRING_UP, |s| s.joints.iter().all(|j| j.fsm == 3))?;
@@ -147,7 +152,11 @@ fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
     })?;
     bar.finish();
     if !matches!(outcome, Outcome::Finished(_)) {
-        return Err(Failure { exit: FAULT, code: "stopped".into(), ..Failure::usage("the motion was stopped") });
+        return Err(Failure {
+            exit: FAULT,
+            code: "stopped".into(),
+            ..Failure::usage("the motion was stopped")
+        });
     }
     wait(&mut session, MARGIN)?;
     recording.set(false);
@@ -226,13 +235,27 @@ mod tests {
         assert_eq!(t.duration_s(), TIME);
         for p in [t.points.first().unwrap(), t.points.last().unwrap()] {
             for j in 0..6 {
-                assert!(p.position[j].abs() < 1e-9 && p.velocity[j].abs() < 1e-9 && p.acceleration[j].abs() < 1e-9);
+                assert!(
+                    p.position[j].abs() < 1e-9
+                        && p.velocity[j].abs() < 1e-9
+                        && p.acceleration[j].abs() < 1e-9
+                );
             }
         }
         for p in &t.points {
             for (j, limit) in arm.joints.iter().enumerate() {
-                assert!(p.position[j].abs() < 0.95 * limit.position_max, "joint {}: {} rad", j + 1, p.position[j]);
-                assert!(p.velocity[j].abs() < 0.8 * limit.velocity_max, "joint {}: {} rad/s", j + 1, p.velocity[j]);
+                assert!(
+                    p.position[j].abs() < 0.95 * limit.position_max,
+                    "joint {}: {} rad",
+                    j + 1,
+                    p.position[j]
+                );
+                assert!(
+                    p.velocity[j].abs() < 0.8 * limit.velocity_max,
+                    "joint {}: {} rad/s",
+                    j + 1,
+                    p.velocity[j]
+                );
                 assert!(p.acceleration[j].abs() < 0.5 * limit.acceleration_max);
             }
         }

@@ -18,14 +18,16 @@ pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
     }
     let gravity = args.gravity.unwrap_or_else(|| arm.config().gravity);
     let dynamics = Dynamics::new(&arm.model, gravity);
-    let rotor: JointVec = std::array::from_fn(|j| if args.rotors { arm.joints[j].rotor_inertia } else { 0.0 });
+    let rotor: JointVec =
+        std::array::from_fn(|j| if args.rotors { arm.joints[j].rotor_inertia } else { 0.0 });
     let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
     for (number, line) in std::io::stdin().lock().lines().enumerate() {
         let line = line?;
         if line.trim().is_empty() || line.starts_with('#') {
             continue;
         }
-        let values = numbers(&line, args.what).map_err(|e| Failure::usage(format!("line {}: {e}", number + 1)))?;
+        let values =
+            numbers(&line, args.what).map_err(|e| Failure::usage(format!("line {}: {e}", number + 1)))?;
         let result = compute(args.what, &dynamics, &rotor, &values);
         let written = if out.is_json() {
             writeln!(stdout, "{}", json!({ key(args.what): result }))
@@ -54,7 +56,12 @@ fn numbers(line: &str, what: DynamicsKind) -> Result<Vec<f64>, String> {
     let need = if what == DynamicsKind::Mass { JOINTS } else { 3 * JOINTS };
     let words = line.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty());
     let values = words
-        .map(|w| w.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| format!("\"{w}\" is not a finite number")))
+        .map(|w| {
+            w.parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite())
+                .ok_or_else(|| format!("\"{w}\" is not a finite number"))
+        })
         .collect::<Result<Vec<f64>, String>>()?;
     // A mass matrix needs positions only, but takes lines of the other kinds, too.
     if values.len() == need || (what == DynamicsKind::Mass && values.len() == 3 * JOINTS) {
@@ -65,7 +72,9 @@ fn numbers(line: &str, what: DynamicsKind) -> Result<Vec<f64>, String> {
 }
 
 fn compute(what: DynamicsKind, dynamics: &Dynamics, rotor: &JointVec, values: &[f64]) -> Vec<f64> {
-    let part = |k: usize| -> JointVec { std::array::from_fn(|j| values.get(k * JOINTS + j).copied().unwrap_or(0.0)) };
+    let part = |k: usize| -> JointVec {
+        std::array::from_fn(|j| values.get(k * JOINTS + j).copied().unwrap_or(0.0))
+    };
     let (q, qd, last) = (part(0), part(1), part(2));
     match what {
         DynamicsKind::Inverse => {

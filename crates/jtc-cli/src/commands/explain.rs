@@ -33,10 +33,14 @@ fn list(out: &Output) {
     let value = json!({ "pages": pages().map(as_json).collect::<Vec<_>>() });
     out.result(&value, || {
         let row = |p: &Page| {
-            let number = if p.family.is_bits() { format!("0x{:02X}", p.number()) } else { p.code.to_string() };
+            let number =
+                if p.family.is_bits() { format!("0x{:02X}", p.number()) } else { p.code.to_string() };
             vec![p.name.to_owned(), format!("{}:{number}", p.family.key())]
         };
         let rows: Vec<Vec<String>> = pages().map(row).collect();
-        format!("{}\njtc explain CODE tells what a code means, what causes it and what to do", table(&["name", "code"], &rows))
+        format!(
+            "{}\njtc explain CODE tells what a code means, what causes it and what to do",
+            table(&["name", "code"], &rows)
+        )
     });
 }

@@ -50,7 +50,13 @@ fn lines(session: &mut Session<SerialPort>, count: Option<u64>, out: &Output) ->
         out.result(&value, || {
             let q: Vec<String> = s.joints.iter().map(|j| format!("{:8.4}", j.position)).collect();
             let errors = if s.errors == 0 { String::new() } else { format!("   {}", words::errors_line(&s)) };
-            format!("{time_s:8.3} s   {:8} {:7} {:6}{errors}   {}", words::state(s.fsm), words::tes(s.tes), s.point, q.join(" "))
+            format!(
+                "{time_s:8.3} s   {:8} {:7} {:6}{errors}   {}",
+                words::state(s.fsm),
+                words::tes(s.tes),
+                s.point,
+                q.join(" ")
+            )
         });
         left -= 1;
     }
@@ -88,7 +94,8 @@ fn live(session: &mut Session<SerialPort>, count: Option<u64>) -> Result<(), Fai
         while left > 0 {
             while event::poll(Duration::ZERO)? {
                 if let Event::Key(key) = event::read()? {
-                    let ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+                    let ctrl_c =
+                        key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
                     if ctrl_c || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) {
                         return Ok(());
                     }
@@ -118,7 +125,9 @@ fn live(session: &mut Session<SerialPort>, count: Option<u64>) -> Result<(), Fai
 impl View {
     fn push(&mut self, s: Status) {
         for (j, joint) in s.joints.iter().enumerate() {
-            for (history, value) in [(&mut self.position[j], joint.position), (&mut self.torque[j], joint.torque)] {
+            for (history, value) in
+                [(&mut self.position[j], joint.position), (&mut self.torque[j], joint.torque)]
+            {
                 history.push_back(f64::from(value));
                 if history.len() > HISTORY {
                     history.pop_front();
@@ -137,7 +146,11 @@ impl View {
         ])
         .areas(frame.area());
         let Some(s) = &self.last else {
-            let text = if self.silent { "no status comes; `jtc doctor` looks for the reason" } else { "waiting for a status" };
+            let text = if self.silent {
+                "no status comes; `jtc doctor` looks for the reason"
+            } else {
+                "waiting for a status"
+            };
             frame.render_widget(Paragraph::new(text).block(panel(&format!(" {} ", self.port))), head);
             return;
         };
@@ -169,7 +182,11 @@ impl View {
 
     fn foot(&self, s: &Status) -> Paragraph<'static> {
         let line = if s.errors != 0 {
-            Line::from(vec!["errors ".red().bold(), words::errors_line(s).red(), format!("   {}", words::next_step(s)).into()])
+            Line::from(vec![
+                "errors ".red().bold(),
+                words::errors_line(s).red(),
+                format!("   {}", words::next_step(s)).into(),
+            ])
         } else {
             Line::from(vec![words::next_step(s).replace('`', "").into(), "     q ends".dark_gray()])
         };

@@ -27,19 +27,27 @@ fn push(files: &[PathBuf], choice: FrictionChoice, link: &LinkArgs, out: &Output
     let mut session = link.session()?;
     let mut pushed = Vec::new();
     let done = session.push(&set, |p| {
-        out.note(format!("{}: {} bytes, {}confirmed", p.parameter.name(), p.bytes, if p.times > 1 { "twice " } else { "" }));
+        out.note(format!(
+            "{}: {} bytes, {}confirmed",
+            p.parameter.name(),
+            p.bytes,
+            if p.times > 1 { "twice " } else { "" }
+        ));
         pushed.push(*p);
     });
     done?;
     let status = session.fresh_status()?;
     let missing = words::missing_parameters(status.jtc_init);
-    out.result(&json!({ "pushed": pushed, "state": words::state(status.fsm), "missing_parameters": missing }), || {
-        if missing.is_empty() {
-            format!("all parameters given; {}", words::waiting_for(&status))
-        } else {
-            format!("still missing: {}", missing.join(", "))
-        }
-    });
+    out.result(
+        &json!({ "pushed": pushed, "state": words::state(status.fsm), "missing_parameters": missing }),
+        || {
+            if missing.is_empty() {
+                format!("all parameters given; {}", words::waiting_for(&status))
+            } else {
+                format!("still missing: {}", missing.join(", "))
+            }
+        },
+    );
     Ok(())
 }
 
@@ -103,7 +111,10 @@ fn as_text(set: &ParameterSet) -> String {
             [vec![format!("joint {}", j + 1)], numbers.to_vec()].concat()
         };
         let rows: Vec<_> = pid.iter().enumerate().map(row).collect();
-        text += &table(&["gains", "Kp N·m/rad", "Ki N·m/(rad·s)", "Kd N·m·s/rad", "∫min rad·s", "∫max rad·s"], &rows);
+        text += &table(
+            &["gains", "Kp N·m/rad", "Ki N·m/(rad·s)", "Kd N·m·s/rad", "∫min rad·s", "∫max rad·s"],
+            &rows,
+        );
     }
     match &set.friction {
         Some(jtc_core::Friction::Polynomial(c)) => {

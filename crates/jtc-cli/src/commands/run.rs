@@ -65,7 +65,8 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     let info = run_report::info(&job.arm, &session.port().name(), &name, start_unix_ns);
     let samples = samples.take();
     // A run that ended in a fault is what one wants to look at most: it is recorded and reported as well.
-    let files = write(args, &info, &samples, &[run_report::link_facts(&upload, &link, session.port().baud())])?;
+    let files =
+        write(args, &info, &samples, &[run_report::link_facts(&upload, &link, session.port().baud())])?;
     let summary = Summary::of(&info, &samples);
     let word = match &outcome {
         Ok(Outcome::Finished(_)) => "finished",
@@ -108,7 +109,8 @@ fn ready(session: &mut Session<SerialPort>, out: &Output) -> Result<Status, Fail
         status = session.wait_hold(BRING_UP)?;
     }
     if status.fsm != 2 {
-        let failure = Failure { exit: 1, code: "not-ready".into(), ..Failure::usage(words::waiting_for(&status)) };
+        let failure =
+            Failure { exit: 1, code: "not-ready".into(), ..Failure::usage(words::waiting_for(&status)) };
         return Err(failure.hint(words::next_step(&status)));
     }
     if status.joints.iter().any(|j| j.fsm != 3) {
@@ -126,7 +128,8 @@ fn approach(
     stop: &Stop,
     out: &Output,
 ) -> Result<(), Failure> {
-    let refused = |e: plan::PlanError| Failure { exit: REFUSED, code: "approach".into(), ..Failure::usage(e) };
+    let refused =
+        |e: plan::PlanError| Failure { exit: REFUSED, code: "approach".into(), ..Failure::usage(e) };
     let first = job.trajectory.points.first().map_or(here, |p| p.position);
     let config = job.arm.config();
     // Half of the limits: nobody has looked at this path for obstacles.
@@ -140,7 +143,9 @@ fn approach(
     upload(session, &path, &UploadOptions::default(), "approach", stop, out)?;
     match execute(session, &path, "approach", stop, out)? {
         Outcome::Finished(_) => Ok(()),
-        Outcome::Stopped(_) => Err(Failure { exit: FAULT, code: "stopped".into(), ..Failure::usage("stopped on the approach") }),
+        Outcome::Stopped(_) => {
+            Err(Failure { exit: FAULT, code: "stopped".into(), ..Failure::usage("stopped on the approach") })
+        }
     }
 }
 
@@ -183,11 +188,13 @@ fn execute(
 /// Collects what each status carries; the commanded values come from the trajectory at the status' point index.
 fn observe(session: &mut Session<SerialPort>, trajectory: &Trajectory) -> Samples {
     let samples = Samples::default();
-    let (taken, start, trajectory) = (Rc::clone(&samples), session.now(), trajectory.clone());
+    let (taken, trajectory) = (Rc::clone(&samples), trajectory.clone());
+    let mut clock = Clock { arrived: session.now(), point: 0, time_s: 0.0 };
     session.observe(move |now, status| {
-        let mut sample = Sample::from_status((now - start).as_secs_f64(), status);
-        // Not while the path is slowed down: the velocities are scaled then, and only the controller knows how much.
-        if status.fsm == 3 && let Some(set) = trajectory.at_ms(status.point) {
+        let mut sample = Sample::from_status(clock.at(now, status), status);
+        if status.fsm == 3
+            && let Some(set) = trajectory.at_ms(status.point)
+        {
             for (j, joint) in sample.joints.iter_mut().enumerate() {
                 joint.set_position = set.position[j];
                 joint.set_velocity = set.velocity[j];
@@ -197,6 +204,24 @@ fn observe(session: &mut Session<SerialPort>, trajectory: &Trajectory) -> Sample
         taken.borrow_mut().push(sample);
     });
     samples
+}
+
+/// Time of statuses: the controller's own milliseconds while it follows the path, which no delay on the way to us can blur; the time of
+/// arrival otherwise.
+struct Clock {
+    arrived: Duration,
+    point: u32,
+    time_s: f64,
+}
+
+impl Clock {
+    fn at(&mut self, now: Duration, status: &Status) -> f64 {
+        let moved = f64::from(status.point.saturating_sub(self.point)) * 1e-3;
+        let waited = now.saturating_sub(self.arrived).as_secs_f64();
+        self.time_s += if moved > 0.0 { moved } else { waited };
+        (self.arrived, self.point) = (now, status.point);
+        self.time_s
+    }
 }
 
 fn write(

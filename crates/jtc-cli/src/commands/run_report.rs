@@ -55,13 +55,17 @@ pub fn figures(summary: &Summary) -> String {
 
 /// Upload and link as facts for the report.
 pub fn link_facts(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32>) -> Facts {
-    let share = upload.line_share.map_or(String::new(), |s| format!(", {:.1} % of what the line can carry", s * 100.0));
+    let share =
+        line_share(upload).map_or(String::new(), |s| format!(", {s:.1} % of what the line can carry"));
     let row = |name: &str, value: String| (name.to_owned(), value);
     Facts {
         title: "Link".into(),
         rows: vec![
             row("Rate", baud.map_or("not limited".into(), |b| format!("{b} Bd"))),
-            row("Upload", format!("{} points in {} segments, {} bytes", upload.points, upload.segments, upload.bytes)),
+            row(
+                "Upload",
+                format!("{} points in {} segments, {} bytes", upload.points, upload.segments, upload.bytes),
+            ),
             row("Upload time", format!("{:.2} s{share}", upload.time_s)),
             row("Segments sent again", upload.retries.to_string()),
             row("Statuses", format!("{}, {:.1} a second", link.statuses, link.status_rate())),
@@ -74,9 +78,14 @@ pub fn link_facts(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32
 
 /// The link in one line.
 pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
-    let share = upload.line_share.map_or(String::new(), |s| format!(" ({:.1} % of the line)", s * 100.0));
+    let share = line_share(upload).map_or(String::new(), |s| format!(" ({s:.1} % of the line)"));
     format!(
         "upload {} points in {:.2} s{share}; {} statuses, {} frames sent again, {} damaged",
         upload.points, upload.time_s, link.statuses, link.retries, link.bad_frames
     )
+}
+
+/// In percent; none behind a pseudo-terminal that is faster than the rate says.
+fn line_share(upload: &UploadReport) -> Option<f64> {
+    upload.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
 }

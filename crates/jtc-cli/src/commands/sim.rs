@@ -38,7 +38,8 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
 
 #[cfg(unix)]
 fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+    let text =
+        std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
     jtc_sim::FaultPlan::from_toml(&text).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
 }
 
@@ -52,5 +53,6 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
 /// Pseudo-terminals are a thing of Unix.
 #[cfg(not(unix))]
 pub fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
-    Err(Failure::usage("jtc sim needs pseudo-terminals, which this system does not have").hint("jtc demo runs everywhere"))
+    Err(Failure::usage("jtc sim needs pseudo-terminals, which this system does not have")
+        .hint("jtc demo runs everywhere"))
 }

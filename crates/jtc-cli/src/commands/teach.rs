@@ -31,7 +31,11 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
 fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
     link.session()?.teach(on)?;
     out.result(&json!({ "teaching": on }), || {
-        if on { "teaching on: the arm can be moved by hand".into() } else { "teaching off: the arm holds its pose".into() }
+        if on {
+            "teaching on: the arm can be moved by hand".into()
+        } else {
+            "teaching off: the arm holds its pose".into()
+        }
     });
     Ok(())
 }
@@ -71,14 +75,22 @@ fn record(file: &Path, link: &LinkArgs, duration: Option<f64>, out: &Output) -> 
     }
     let t = &loaded.trajectory;
     std::fs::write(file, t.to_csv()).map_err(|e| Failure::usage(format!("{}: {e}", file.display())))?;
-    let value = json!({ "file": file.display().to_string(), "points": t.points.len(), "duration_s": t.duration_s() });
+    let value =
+        json!({ "file": file.display().to_string(), "points": t.points.len(), "duration_s": t.duration_s() });
     out.result(&value, || {
-        format!("{}: {} points, {:.2} s\nnext: jtc traj check {0}", file.display(), t.points.len(), t.duration_s())
+        format!(
+            "{}: {} points, {:.2} s\nnext: jtc traj check {0}",
+            file.display(),
+            t.points.len(),
+            t.duration_s()
+        )
     });
     match failed {
         None => Ok(()),
-        Some(s) => Err(Failure { exit: 5, code: "run-fault".into(), ..Failure::usage(words::errors_line(&s)) }
-            .hint(words::next_step(&s))),
+        Some(s) => {
+            Err(Failure { exit: 5, code: "run-fault".into(), ..Failure::usage(words::errors_line(&s)) }
+                .hint(words::next_step(&s)))
+        }
     }
 }
 

@@ -62,7 +62,12 @@ impl Job {
     }
 
     /// Limits of every point and between points, torque by the arm model; the start pose, where it is given.
-    pub fn verdict(&self, trajectory: &Trajectory, start: Option<[f64; 6]>, upload: UploadOptions) -> Verdict {
+    pub fn verdict(
+        &self,
+        trajectory: &Trajectory,
+        start: Option<[f64; 6]>,
+        upload: UploadOptions,
+    ) -> Verdict {
         let (config, friction) = (self.arm.config(), self.arm.friction());
         let checker = Checker {
             model: Some(&self.arm.model),
@@ -93,7 +98,9 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
     let job = Job::load(file, args, out)?;
     let verdict = job.verdict(&job.trajectory, None, UploadOptions::default());
     let value = json!({ "ok": verdict.is_ok(), "form": job.loaded.form, "notes": job.loaded.notes, "verdict": verdict });
-    out.result(&value, || format!("{verdict}\n{}next: {}", figures(&verdict), verdict.hint().replace('`', "")));
+    out.result(&value, || {
+        format!("{verdict}\n{}next: {}", figures(&verdict), verdict.hint().replace('`', ""))
+    });
     if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(REFUSED)) }
 }
 

@@ -10,8 +10,8 @@ use jtc_sim::{BusTap, World};
 
 use crate::args::SimSpeed;
 use crate::signal::Stop;
-pub use pty::{Pty, PtyError};
 use frames::{Frames, Incoming};
+pub use pty::{Pty, PtyError};
 
 /// Bytes of the host that wait for the line: as much as an adapter's buffer; beyond that its writes block.
 const WAITING_MAX: usize = 4096;
@@ -97,7 +97,9 @@ impl Server {
                 self.tap = None;
             }
             self.give_output(speed)?;
-            if self.answers && let Some(ready) = ready.take() {
+            if self.answers
+                && let Some(ready) = ready.take()
+            {
                 ready();
             }
         }

@@ -36,6 +36,7 @@ impl From<&RawPoint> for SetPoint {
 }
 
 /// Set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
+#[inline]
 pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     let mut out = SetPoint::default();
     let u2 = u * u;

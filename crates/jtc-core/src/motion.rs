@@ -237,7 +237,12 @@ impl Motion {
     /// Computes the torque of this tick into `self.torque`; returns joint errors found on the way (friction table).
     pub fn compute(&mut self, law: Law, nodes: &Nodes, config: &Config, gains: &Gains<'_>) -> [u16; JOINTS] {
         let mut errors = [0; JOINTS];
-        let before = self.torque;
+        // What the last torque has to be continued from, where it has to be.
+        let rebase = self.rebase.take();
+        let mut before = [0.0; JOINTS];
+        if let Some(rebase) = rebase {
+            before = self.torque.map(|t| if rebase == Rebase::Everything { t.sum() } else { t.correction() });
+        }
         let q = nodes.positions();
         let v = nodes.velocities();
         // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere.
@@ -265,7 +270,7 @@ impl Motion {
             }
             self.torque[j] = torque;
         }
-        self.blend(&before, nodes, config);
+        self.blend(rebase, &before, nodes, config);
         if law == Law::Teach {
             for j in 0..JOINTS {
                 if nodes.node(j).enabled() {
@@ -278,21 +283,21 @@ impl Motion {
     }
 
     /// Adds what is left of torque steps, and forgets the torque of joints that are not enabled.
-    fn blend(&mut self, before: &[JointTorque; JOINTS], nodes: &Nodes, config: &Config) {
-        if let Some(rebase) = self.rebase.take() {
+    fn blend(&mut self, rebase: Option<Rebase>, before: &[f64; JOINTS], nodes: &Nodes, config: &Config) {
+        if let Some(rebase) = rebase {
             for j in 0..JOINTS {
-                self.step[j] = match rebase {
-                    Rebase::Correction => before[j].correction() - self.torque[j].correction(),
-                    Rebase::Everything => before[j].sum() - self.torque[j].sum(),
-                };
+                let now = &self.torque[j];
+                self.step[j] =
+                    before[j] - if rebase == Rebase::Everything { now.sum() } else { now.correction() };
                 self.step_ms[j] = 0;
             }
         }
+        let per_tick = 1.0 / f64::from(config.blend_ms.max(1));
         for j in 0..JOINTS {
             if core::mem::take(&mut self.fresh[j]) {
                 (self.step[j], self.step_ms[j]) = (-self.torque[j].correction(), 0);
             }
-            let left = 1.0 - smooth(f64::from(self.step_ms[j]) / f64::from(config.blend_ms.max(1)));
+            let left = 1.0 - smooth(f64::from(self.step_ms[j]) * per_tick);
             self.step_ms[j] = self.step_ms[j].saturating_add(1);
             if nodes.node(j).enabled() {
                 self.torque[j].blend = self.step[j] * left;

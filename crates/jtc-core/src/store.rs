@@ -100,6 +100,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
+    #[inline]
     pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
         let points = self.points.as_ref().get(..self.received)?;
         let step = f64::from(self.step_ms);

@@ -103,6 +103,9 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         tally.step(&format!("references/{}", check.script), || {
             let python = python.as_ref().context("there is no Python environment")?;
             ensure!(built, "the programs it needs were not built");
+            if let Some(name) = check.demo_files.iter().find(|name| !demo.join(name).exists()) {
+                return Ok(Outcome::Skipped(format!("the demo left no {name}")));
+            }
             let mut script = command(python);
             script.arg(Path::new("references").join(check.script));
             script.args(check.program.map(|name| release.join(name)));

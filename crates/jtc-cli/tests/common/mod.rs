@@ -66,7 +66,11 @@ pub struct Sim {
 impl Sim {
     /// Starts one and waits until it is ready.
     pub fn start(options: &[&str]) -> Self {
-        let dir = tempfile::tempdir().expect("a directory");
+        Self::start_in(tempfile::tempdir().expect("a directory"), options)
+    }
+
+    /// The same at `jtc` in a directory that may hold something already.
+    pub fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let port = dir.path().join("jtc");
         let mut child = command()
             .args(["sim", "--serial", port.to_str().unwrap()])

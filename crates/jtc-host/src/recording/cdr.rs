@@ -21,7 +21,7 @@ impl Encoder {
     }
 
     fn align(&mut self, to: usize) {
-        while (self.bytes.len() - HEADER.len()) % to != 0 {
+        while !(self.bytes.len() - HEADER.len()).is_multiple_of(to) {
             self.bytes.push(0);
         }
     }

@@ -41,15 +41,17 @@ impl<'a> Thinner<'a> {
             return self.samples.iter().map(value).collect();
         }
         let extremes = |bucket: &[Sample]| {
-            let (mut low, mut high) = ((f64::NAN, 0), (f64::NAN, 0));
-            for (i, v) in bucket.iter().map(&value).enumerate() {
-                if !(v >= low.0) && v.is_finite() {
-                    low = (v, i);
+            let mut ends: Option<((f64, usize), (f64, usize))> = None;
+            for (i, v) in bucket.iter().map(&value).enumerate().filter(|(_, v)| v.is_finite()) {
+                let (low, high) = ends.get_or_insert(((v, i), (v, i)));
+                if v < low.0 {
+                    *low = (v, i);
                 }
-                if !(v <= high.0) && v.is_finite() {
-                    high = (v, i);
+                if v > high.0 {
+                    *high = (v, i);
                 }
             }
+            let (low, high) = ends.unwrap_or(((f64::NAN, 0), (f64::NAN, 0)));
             if low.1 <= high.1 { [low.0, high.0] } else { [high.0, low.0] }
         };
         self.samples.chunks(self.bucket).flat_map(extremes).collect()

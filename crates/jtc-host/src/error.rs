@@ -10,6 +10,9 @@ use crate::words;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// A number or a count that no frame carries.
+    #[error(transparent)]
+    Frame(#[from] jtc_wire::EncodeError),
     /// The port cannot be used.
     #[error(transparent)]
     Port(#[from] PortError),
@@ -125,7 +128,7 @@ impl Error {
             | Error::UploadFailed { .. }
             | Error::Device { .. }
             | Error::StateTimeout { .. } => 1,
-            Error::File(_) | Error::Parameter(_) => 2,
+            Error::File(_) | Error::Parameter(_) | Error::Frame(_) => 2,
             Error::Check(_) => 4,
             Error::RunFault { .. } | Error::Cancelled => 5,
         }
@@ -135,6 +138,7 @@ impl Error {
     pub fn code(&self) -> &'static str {
         match self {
             Error::Port(_) => "port",
+            Error::Frame(_) => "frame",
             Error::NoLink { .. } => "no-link",
             Error::NotConfirmed { .. } => "not-confirmed",
             Error::Refused { .. } => "refused",
@@ -154,6 +158,7 @@ impl Error {
     pub fn hint(&self) -> String {
         match self {
             Error::Port(e) => e.hint(),
+            Error::Frame(_) => "`jtc traj check` and `jtc params show` tell what the file holds".into(),
             Error::NoLink { bytes: 0, .. } => {
                 "check cable and power of the controller, then `jtc doctor`; is it the right one of `jtc ports`?".into()
             }

@@ -77,9 +77,8 @@ fn sound_arm(read: Result<Arm, FileError>) {
     assert!(arm.model.check().is_ok());
     let set = arm.parameter_set();
     if set.check().is_ok() {
-        for frame in
-            set.friction.iter().map(crate::frame::friction).chain(set.pid.iter().map(crate::frame::pid))
-        {
+        let friction = set.friction.iter().map(crate::frame::friction);
+        for frame in friction.chain(set.pid.iter().map(crate::frame::pid)).flatten() {
             assert!(jtc_wire::FrameRef::new_checked(&frame).is_some());
         }
     }

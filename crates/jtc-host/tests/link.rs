@@ -86,7 +86,7 @@ impl Port for Noisy {
         let n = self.port.read(buffer, timeout)?;
         for byte in &mut buffer[..n] {
             self.random = self.random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            if (self.random >> 33) % self.every == 0 {
+            if (self.random >> 33).is_multiple_of(self.every) {
                 *byte ^= 0x10;
             }
         }

@@ -1,11 +1,11 @@
 //! The simple commands.
 
-use jtc_wire::{ExecCommand, FrameType, Status};
+use jtc_wire::{ExecCommand, FrameType, Status, fixed};
 
 use super::{Session, not_allowed};
 use crate::error::accepted;
 use crate::port::Port;
-use crate::{Error, frame, words};
+use crate::{Error, words};
 
 /// What the controller wants to be given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -45,33 +45,33 @@ impl Parameter {
 impl<P: Port> Session<P> {
     /// Clears current errors: the controller's own, and those of the nodes in `nodes` (bits 0..6).
     pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), Error> {
-        self.command(&frame::clear_current(jtc, nodes))
+        self.command(&fixed::clear_current_errors(jtc, nodes))
     }
 
     /// Clears current and occurred errors.
     pub fn clear_occurred(&mut self) -> Result<(), Error> {
-        self.command(&frame::frame(FrameType::ClearOccurredErrors, &[]))
+        self.command(&fixed::CLEAR_OCCURRED_ERRORS)
     }
 
     /// Resets the nodes in `nodes` (bits 0..6).
     pub fn reset(&mut self, nodes: u8) -> Result<(), Error> {
-        self.command(&frame::reset(nodes))
+        self.command(&fixed::reset_can_devices(nodes))
     }
 
     /// Teaching on (only in HoldPos) or off.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
         let kind = if on { FrameType::TeachingModeEnable } else { FrameType::TeachingModeDisable };
-        self.command(&frame::frame(kind, &[]))
+        self.command(&fixed::empty(kind))
     }
 
     /// Pump on or off.
     pub fn gripper(&mut self, pump: bool) -> Result<(), Error> {
-        self.command(&frame::gripper(pump))
+        self.command(&fixed::gripper_control(pump))
     }
 
     /// Tells the controller to use its default of one parameter.
     pub fn use_default(&mut self, parameter: Parameter) -> Result<(), Error> {
-        self.command(&frame::frame(parameter.use_default(), &[]))
+        self.command(&fixed::empty(parameter.use_default()))
     }
 
     /// Tells the controller to use its defaults: friction polynomial, gains and arm model.
@@ -98,7 +98,7 @@ impl<P: Port> Session<P> {
 
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let retries = self.statistics.retries;
-        let record = self.request(&frame::exec(command))?;
+        let record = self.request(&fixed::exec(command))?;
         if accepted(&record) {
             return Ok(());
         }

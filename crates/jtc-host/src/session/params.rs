@@ -22,15 +22,23 @@ impl<P: Port> Session<P> {
     /// Sends what `set` has, after all of it was checked; `done` is called after each.
     pub fn push(&mut self, set: &ParameterSet, mut done: impl FnMut(&Pushed)) -> Result<Vec<Pushed>, Error> {
         set.check()?;
+        let mut frames = Vec::new();
+        if let Some(friction) = &set.friction {
+            // The table is longer than CRC-16 protects against every double bit error: sent twice, both must be confirmed.
+            let (parameter, times) = match friction {
+                jtc_core::Friction::Table(_) => (Parameter::FrictionTable, 2),
+                jtc_core::Friction::Polynomial(_) => (Parameter::FrictionPolynomial, 1),
+            };
+            frames.push((parameter, frame::friction(friction)?, times));
+        }
+        if let Some(pid) = &set.pid {
+            frames.push((Parameter::Pid, frame::pid(pid)?, 1));
+        }
+        if let Some(model) = &set.model {
+            frames.push((Parameter::ArmModel, frame::arm_model(model)?, 1));
+        }
         let mut all = Vec::new();
-        let friction = set.friction.as_ref().map(|f| match f {
-            // Longer than CRC-16 protects against every double bit error: sent twice, both must be confirmed.
-            jtc_core::Friction::Table(_) => (Parameter::FrictionTable, frame::friction(f), 2),
-            jtc_core::Friction::Polynomial(_) => (Parameter::FrictionPolynomial, frame::friction(f), 1),
-        });
-        let pid = set.pid.as_ref().map(|p| (Parameter::Pid, frame::pid(p), 1));
-        let model = set.model.as_ref().map(|m| (Parameter::ArmModel, frame::arm_model(m), 1));
-        for (parameter, frame, times) in [friction, pid, model].into_iter().flatten() {
+        for (parameter, frame, times) in frames {
             let start = self.port.now();
             for _ in 0..times {
                 self.command(&frame)?;

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
-use jtc_wire::{DataStatus, FrameStatus, RawPoint, Response, STATUS_LEN};
+use jtc_wire::{DataStatus, EncodeError, FrameStatus, RawPoint, Response, STATUS_LEN};
 
 use super::{Flow, Session};
 use crate::error::accepted;
@@ -115,19 +115,19 @@ impl Upload {
         options: &UploadOptions,
         baud: Option<u32>,
         now: Duration,
-    ) -> Self {
+    ) -> Result<Self, EncodeError> {
         let per_segment = options.segment_points(points.len());
         let count = points.len().div_ceil(per_segment);
-        let frames: Vec<Vec<u8>> = points
+        let frames = points
             .chunks(per_segment)
             .enumerate()
             .map(|(i, chunk)| frame::segment(options.number, i as u16, count as u16, step_ms, chunk))
-            .collect();
+            .collect::<Result<Vec<Vec<u8>>, _>>()?;
         let longest = frames.first().map_or(0, Vec::len);
         // Enough in flight for 60 ms, which covers the latency of USB adapters.
         let time = line_time(longest, baud).as_secs_f64();
         let window = if time > 0.0 { (0.060 / time).ceil() as usize + 2 } else { WINDOW_MAX };
-        Self {
+        Ok(Self {
             bytes: frames.iter().map(Vec::len).sum(),
             frames,
             confirmed: 0,
@@ -144,7 +144,7 @@ impl Upload {
             chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
             start: now,
             bytes_done: 0,
-        }
+        })
     }
 
     fn progress(&self, now: Duration) -> Progress {
@@ -217,7 +217,7 @@ impl<P: Port> Session<P> {
         self.catch_up()?;
         self.records.clear();
         let (baud, start) = (self.port.baud(), self.port.now());
-        let mut up = Upload::new(points, step_ms, options, baud, start);
+        let mut up = Upload::new(points, step_ms, options, baud, start)?;
         loop {
             while up.confirmed < segments {
                 if self.advance(&mut up)? && progress(&up.progress(self.port.now())) == Flow::Cancel {

@@ -140,11 +140,13 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut skipped = Vec::new();
     for round in 1..=rounds {
         println!("\nround {round} of {rounds}");
-        let mut figures = own_figures()?;
-        figures.append(&mut anchors(&work, &kernels, &mut skipped)?);
-        for (name, value) in figures {
+        for (name, value) in own_figures()? {
             samples.entry(name).or_default().push(value);
         }
+    }
+    println!("\nanchors, in turn with our own dynamics");
+    for (name, value) in anchors(&work, &kernels, rounds, &mut skipped)? {
+        samples.entry(name).or_default().push(value);
     }
     let figures: Figures = samples.into_iter().map(|(name, values)| (name, median(values))).collect();
     let missed = print_table(&figures);
@@ -219,7 +221,12 @@ fn lines(text: &str) -> Figures {
 }
 
 /// Our dynamics and those of others in turn, on the same arm and states.
-fn anchors(work: &std::path::Path, kernels: &std::path::Path, skipped: &mut Vec<String>) -> Result<Figures> {
+fn anchors(
+    work: &std::path::Path,
+    kernels: &std::path::Path,
+    rounds: usize,
+    skipped: &mut Vec<String>,
+) -> Result<Figures> {
     for (header, package) in [
         ("/usr/include/eigen3/Eigen/Core", "libeigen3-dev"),
         ("/usr/include/kdl/chain.hpp", "liborocos-kdl-dev"),
@@ -232,7 +239,10 @@ fn anchors(work: &std::path::Path, kernels: &std::path::Path, skipped: &mut Vec<
         }
     }
     let mut script = command(python::environment("requirements-bench.txt")?);
-    script.arg(root().join("references/dynamics/anchors.py")).args(["--rounds", "3", "--ours"]).arg(kernels);
+    script
+        .arg(root().join("references/dynamics/anchors.py"))
+        .args(["--rounds", &(2 * rounds + 1).to_string(), "--ours"])
+        .arg(kernels);
     script.arg("--keep").arg(work.join("anchors")).env("PYTHONDONTWRITEBYTECODE", "1");
     let report: Value =
         serde_json::from_str(&shell::read(&mut script)?).context("anchors.py printed no JSON")?;

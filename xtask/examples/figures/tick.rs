@@ -7,7 +7,7 @@ use jtc_bus::Frame;
 use jtc_core::{BusState, Config, Controller, Inputs, POINTS_MAX, State};
 use jtc_host::frame;
 use jtc_sim::{SimConfig, World};
-use jtc_wire::{ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint};
+use jtc_wire::{Command, ExecCommand, FRAME_MAX, FrameRef, LinkEvent, RawPoint};
 
 use crate::world::Result;
 use crate::{path, print};
@@ -24,18 +24,27 @@ struct Seen {
     host: Option<usize>,
 }
 
+/// A command as bytes.
+fn bytes(command: &Command<'_>) -> Result<Vec<u8>> {
+    let mut bytes = vec![0; FRAME_MAX];
+    let length = command.emit(&mut bytes)?;
+    bytes.truncate(length);
+    Ok(bytes)
+}
+
 /// Frames that a host sends, and the state in which each is offered.
 fn script() -> Result<Vec<(State, Vec<u8>)>> {
-    use FrameType::*;
-    let parameters = [FrictionTableUseDefault, PidParamUseDefault, ArmModelUseDefault];
-    let mut frames: Vec<_> = parameters.map(|kind| (State::Init, frame::frame(kind, &[]))).into();
-    let avena = jtc_host::Arm::avena();
-    let points = path::raw(&path::smooth(MOVING / usize::from(path::STEP_MS) + 200))?;
-    frames.push((State::HoldPos, frame::segment(1, 0, 1, path::STEP_MS, &points)));
-    frames.push((State::HoldPos, frame::exec(ExecCommand::Execute)));
-    if let Some(friction) = avena.friction() {
-        frames.insert(3, (State::HoldPos, frame::friction(&friction)));
+    use Command::{ArmModelUseDefault, FrictionTableUseDefault, PidParamUseDefault, TrajSetExecStatus};
+    let mut frames = Vec::new();
+    for command in [FrictionTableUseDefault, PidParamUseDefault, ArmModelUseDefault] {
+        frames.push((State::Init, bytes(&command)?));
     }
+    if let Some(friction) = jtc_host::Arm::avena().friction() {
+        frames.push((State::HoldPos, frame::friction(&friction)?));
+    }
+    let points = path::raw(&path::smooth(MOVING / usize::from(path::STEP_MS) + 200))?;
+    frames.push((State::HoldPos, frame::segment(1, 0, 1, path::STEP_MS, &points)?));
+    frames.push((State::HoldPos, bytes(&TrajSetExecStatus(ExecCommand::Execute))?));
     Ok(frames)
 }
 

@@ -185,7 +185,7 @@ fn own_figures() -> Result<Figures> {
         shell::read(&mut cargo(&["run", "--release", "--quiet", "--package", package, "--example", name]))
     };
     let mut figures = lines(&example("xtask", "figures")?);
-    figures.append(&mut lines(&example("jtc-core", "time")?));
+    figures.append(&mut lines(&example("jtc-core", "tick")?));
     if let Some(bytes) = figures.get("controller_bytes").copied() {
         figures.insert("controller_kib".into(), bytes / 1024.0);
     }

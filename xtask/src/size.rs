@@ -17,10 +17,10 @@ pub fn controller_bytes() -> Result<u64> {
         "--package",
         "jtc-core",
         "--example",
-        "time",
+        "tick",
     ]))?;
     let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));
-    line.context("the example `time` of jtc-core printed no controller_bytes")?
+    line.context("the example `tick` of jtc-core printed no controller_bytes")?
         .trim()
         .parse()
         .context("controller_bytes")

@@ -15,7 +15,8 @@ fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
             set_position: (t * 0.5).sin() * (j + 1) as f64 * 0.3,
             set_velocity: (t * 0.5).cos() * (j + 1) as f64 * 0.15,
             set_acceleration: 0.0,
-            position: (t * 0.5).sin() * (j + 1) as f64 * 0.3 - 1e-3 * if i.is_multiple_of(2) { 1.0 } else { -1.0 },
+            position: (t * 0.5).sin() * (j + 1) as f64 * 0.3
+                - 1e-3 * if i.is_multiple_of(2) { 1.0 } else { -1.0 },
             velocity: (t * 0.5).cos() * (j + 1) as f64 * 0.15,
             torque_model: 20.0,
             torque_p: 1.0,

@@ -27,9 +27,8 @@ fn same(a: f64, b: f64) -> bool {
 }
 
 fn check(name: &str) -> Recording {
-    let dir = std::env::temp_dir().join(format!("openjtc-recording-{}", std::process::id()));
-    std::fs::create_dir_all(&dir).unwrap();
-    let path = dir.join(name);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
     let mut info = RecordingInfo { arm: "avena".into(), source: "simulator".into(), ..Default::default() };
     for (j, joint) in info.joints.iter_mut().enumerate() {
         *joint = JointInfo {
@@ -69,7 +68,6 @@ fn check(name: &str) -> Recording {
     if let Some(read) = &read.info {
         assert_eq!(*read, info);
     }
-    std::fs::remove_dir_all(&dir).ok();
     read
 }
 

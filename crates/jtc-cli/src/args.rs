@@ -171,7 +171,7 @@ pub struct SimArgs {
     /// Seed of all that is drawn by chance: the same seed gives the same bytes
     #[arg(long, env = "JTC_SEED", value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Faults to inject, TOML
+    /// Faults to inject, TOML; `jtc explain faults` shows the form
     #[arg(long, env = "JTC_FAULTS", value_name = "FILE")]
     pub faults: Option<PathBuf>,
     /// Put the joint bus on a CAN URL too, as multicast:239.74.163.2:43113
@@ -406,7 +406,7 @@ pub enum DynamicsKind {
 /// Options of `jtc explain`.
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
-    /// Name or number of the code; without it: the list
+    /// Name or number of the code, or `faults` for the form of fault files; without it: the list
     pub code: Option<String>,
 }
 

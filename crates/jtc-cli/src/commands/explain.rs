@@ -1,4 +1,4 @@
-//! `jtc explain`: one page about a code.
+//! `jtc explain`: one page about a code, or about fault files.
 
 use jtc_host::explain::{Page, find, pages};
 use serde_json::{Value, json};
@@ -13,6 +13,11 @@ pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
         list(out);
         return Ok(());
     };
+    if code == "faults" {
+        let text = jtc_sim::FAULT_FILE_HELP;
+        out.result(&json!({ "text": text }), || text.trim_end().to_owned());
+        return Ok(());
+    }
     let found = find(code);
     if found.is_empty() {
         return Err(Failure::usage(format!("nothing is known about \"{code}\""))

@@ -409,16 +409,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// Index of the current 1 ms point.
-    fn point(&self) -> u32 {
-        self.clock.time as u32
-    }
-
     fn observe(&mut self, torque: &[f64; JOINTS]) {
         let (q, v) = (self.nodes.positions(), self.nodes.velocities());
         let t = &mut self.telemetry;
         t.tick += 1;
         (t.state, t.tes, t.errors) = (self.state, self.tes, self.errors.word());
+        // Index of the current 1 ms point.
         t.point = self.clock.time as u32;
         for (j, out) in t.joints.iter_mut().enumerate() {
             let (set, parts, report) = (&self.motion.set, &self.motion.torque[j], &self.nodes.node(j).report);
@@ -477,7 +473,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             jtc_init: self.given.missing(),
             node_init: self.nodes.init_word(),
             tes: self.tes as u8,
-            point: self.point(),
+            point: self.telemetry.point,
             friction_type: u8::from(self.friction_is_table),
             can_error: u8::from(can_current != 0),
             can_current,

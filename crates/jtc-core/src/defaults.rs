@@ -4,7 +4,7 @@ use jtc_dynamics::{ArmModel, Link, Origin};
 use crate::config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf};
 
 /// The constants as the build script wrote them.
-#[allow(clippy::excessive_precision, clippy::approx_constant)]
+#[allow(clippy::excessive_precision)]
 mod arm {
     use super::*;
     include!(concat!(env!("OUT_DIR"), "/default_arm.rs"));

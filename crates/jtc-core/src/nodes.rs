@@ -64,6 +64,11 @@ impl Node {
         matches!(self.report.fsm, fsm::START | fsm::INIT | 10)
     }
 
+    /// Lost its configuration, or back in Start or Init (J-20).
+    fn fallen_back(&self) -> bool {
+        !self.valid || self.starting()
+    }
+
     fn faulty(&self, joint: bool) -> bool {
         let r = &self.report;
         self.seen
@@ -328,7 +333,7 @@ impl Nodes {
         for n in 0..self.present() {
             let node = self.node(n);
             let accurate = n == GRIPPER || node.report.warnings & warning::POSITION_NOT_ACCURATE == 0;
-            if !(node.valid && accurate) || node.starting() {
+            if node.fallen_back() || !accurate {
                 word |= 1 << n;
             }
         }
@@ -337,7 +342,7 @@ impl Nodes {
 
     /// A node has lost its configuration or fallen back to Start or Init (J-20).
     pub fn fallen_back(&self) -> bool {
-        self.nodes[..self.present()].iter().any(|node| !node.valid || node.starting())
+        self.nodes[..self.present()].iter().any(Node::fallen_back)
     }
 
     /// Init is done: every node is initialised and reports ReadyToOperate.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::{CanError, CanFrame, CanUrl, MulticastBus, VirtualBus};
+use crate::{CanError, CanFrame, CanUrl, ControllerState, MulticastBus, SocketcandBus, VirtualBus};
 
 /// A member of a CAN bus.
 ///
@@ -13,6 +13,11 @@ pub trait CanBus {
 
     /// The next frame of another member; `None` when none came within `timeout`. Zero does not wait.
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
+
+    /// How this member's controller gets on with the bus, as far as is known from what was received so far.
+    fn state(&mut self) -> ControllerState {
+        ControllerState::default()
+    }
 }
 
 impl<B: CanBus + ?Sized> CanBus for &mut B {
@@ -22,6 +27,9 @@ impl<B: CanBus + ?Sized> CanBus for &mut B {
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         (**self).receive(timeout)
     }
+    fn state(&mut self) -> ControllerState {
+        (**self).state()
+    }
 }
 
 impl<B: CanBus + ?Sized> CanBus for Box<B> {
@@ -30,6 +38,9 @@ impl<B: CanBus + ?Sized> CanBus for Box<B> {
     }
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         (**self).receive(timeout)
+    }
+    fn state(&mut self) -> ControllerState {
+        (**self).state()
     }
 }
 
@@ -43,7 +54,10 @@ pub fn open_url(url: &CanUrl) -> Result<Box<dyn CanBus + Send>, CanError> {
     match url {
         CanUrl::Virtual { name } => Ok(Box::new(VirtualBus::join(name))),
         CanUrl::Multicast { group, port, ttl } => Ok(Box::new(MulticastBus::join(*group, *port, *ttl)?)),
-        CanUrl::SocketCan { .. } | CanUrl::Slcan { .. } | CanUrl::Socketcand { .. } => {
+        CanUrl::Socketcand { host, port, channel } => {
+            Ok(Box::new(SocketcandBus::connect(host, *port, channel)?))
+        }
+        CanUrl::SocketCan { .. } | CanUrl::Slcan { .. } => {
             Err(CanError::Unsupported { url: url.to_string(), kind: url.scheme() })
         }
     }
@@ -55,7 +69,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_opened_says_what_can() {
-        for url in ["socketcan:can0", "slcan:/dev/ttyACM0@1000000", "socketcand:localhost:29536/can0"] {
+        for url in ["socketcan:can0", "slcan:/dev/ttyACM0@1000000"] {
             let message = open(url).err().expect("not in this version").to_string();
             for part in [url, "this version", "multicast:ADDR:PORT", "virtual:NAME"] {
                 assert!(message.contains(part), "{message}");

@@ -3,6 +3,7 @@
 use std::io;
 use std::net::IpAddr;
 
+use crate::CanFrame;
 use crate::url::UrlError;
 
 /// Why a bus could not be opened or used.
@@ -41,6 +42,60 @@ pub enum CanError {
         url: String,
         /// What was tried.
         step: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// No connection to a server.
+    #[error("{url}: cannot connect: {source}; is the server running there, and is that its port?")]
+    Connect {
+        /// The bus.
+        url: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The other side refused to open the bus.
+    #[error("{url}: {step} was refused: {answer}")]
+    Refused {
+        /// The bus.
+        url: String,
+        /// What was asked for.
+        step: &'static str,
+        /// What the other side said.
+        answer: String,
+    },
+    /// The other side speaks something else, or nothing.
+    #[error("{url}: no answer to {step} within {seconds} s; {hint}")]
+    NoAnswer {
+        /// The bus.
+        url: String,
+        /// What was asked for.
+        step: &'static str,
+        /// How long was waited.
+        seconds: u64,
+        /// What to look at.
+        hint: &'static str,
+    },
+    /// The connection has ended; the bus must be opened again.
+    #[error("{url}: the other side has ended the connection; open the bus again when it is back")]
+    Closed {
+        /// The bus.
+        url: String,
+    },
+    /// A frame that this bus cannot carry.
+    #[error("{url}: cannot carry {frame}: {why}")]
+    NotCarried {
+        /// The bus.
+        url: String,
+        /// The frame.
+        frame: CanFrame,
+        /// What is missing.
+        why: &'static str,
+    },
+    /// A server could not listen.
+    #[error("cannot listen at {address}: {source}; is another server running there? Port 0 takes a free one")]
+    Listen {
+        /// The address asked for.
+        address: String,
         /// What the system said.
         source: io::Error,
     },

@@ -4,8 +4,9 @@
 //! |---|---|---|
 //! | `virtual:NAME` | a bus inside this process | yes |
 //! | `multicast:ADDR:PORT` | python-can's `udp_multicast`; stays on this host | yes |
+//! | `socketcand:HOST:PORT/can0` | a server of the socketcand protocol, such as [`SocketcandServer`] | no |
 //!
-//! `socketcan:`, `slcan:` and `socketcand:` are understood as [URLs](CanUrl) and refused by [`open`] with an
+//! `socketcan:` and `slcan:` are understood as [URLs](CanUrl) and refused by [`open`] with an
 //! error that says what can be opened.
 //!
 //! ```
@@ -30,6 +31,8 @@ mod error;
 mod faulty;
 mod frame;
 mod multicast;
+mod socketcand;
+mod state;
 mod url;
 mod virtual_bus;
 
@@ -38,5 +41,10 @@ pub use error::CanError;
 pub use faulty::{Counts, Faults, Faulty, Plan};
 pub use frame::{CanFrame, Id, InvalidFrame};
 pub use multicast::MulticastBus;
+pub use socketcand::{
+    ClientEvent, ClientId, FromClient, SOCKETCAND_PORT, ServerStats, SocketcandBus, SocketcandGateway,
+    SocketcandServer,
+};
+pub use state::{ControllerState, ErrorState};
 pub use url::{CanUrl, UrlError};
 pub use virtual_bus::{VirtualBus, VirtualHub};

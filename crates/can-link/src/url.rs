@@ -4,11 +4,11 @@ use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 use std::str::FromStr;
 
-/// What this version opens, for error messages.
-pub(crate) const OPENABLE: &str = "multicast:ADDR:PORT and virtual:NAME";
+use crate::SOCKETCAND_PORT;
 
-/// Default port of the socketcand protocol.
-const SOCKETCAND_PORT: u16 = 29536;
+/// What this version opens, for error messages.
+pub(crate) const OPENABLE: &str = "socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME";
+
 /// Default port of python-can's `udp_multicast`.
 const MULTICAST_PORT: u16 = 43113;
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use crate::{CanBus, CanError, CanFrame};
+use crate::{CanBus, CanError, CanFrame, ControllerState};
 
 /// Frames that wait for a member at most.
 const QUEUE: usize = 4096;
@@ -47,12 +47,38 @@ struct State {
     members: BTreeMap<u64, Member>,
 }
 
-#[derive(Default)]
 struct Member {
     waiting: VecDeque<CanFrame>,
-    /// It let a sender wait in vain and has taken nothing since.
+    /// Frames that wait at most.
+    limit: usize,
+    /// Nobody waits for it: it let a sender wait in vain and has taken nothing since, or is a guest.
     stalled: bool,
+    /// No sender ever waits for it.
+    guest: bool,
+    /// It hears nothing at present.
+    deaf: bool,
     missed: u64,
+}
+
+impl Member {
+    const ORDINARY: Self =
+        Self { waiting: VecDeque::new(), limit: QUEUE, stalled: false, guest: false, deaf: false, missed: 0 };
+
+    fn full(&self) -> bool {
+        self.waiting.len() >= self.limit
+    }
+
+    fn hear(&mut self, frame: &CanFrame) {
+        if self.deaf {
+            return;
+        }
+        if self.full() {
+            self.stalled = true;
+            self.missed += 1;
+        } else {
+            self.waiting.push_back(*frame);
+        }
+    }
 }
 
 impl Shared {
@@ -81,11 +107,33 @@ impl VirtualHub {
 
     /// A new member; it hears what is sent from now on.
     pub fn join(&self) -> VirtualBus {
+        self.add(Member::ORDINARY)
+    }
+
+    /// A new member that nobody ever waits for: beyond `limit` frames it misses what is sent. It is deaf at first.
+    pub(crate) fn join_as_guest(&self, limit: usize) -> VirtualBus {
+        self.add(Member { limit, stalled: true, guest: true, deaf: true, ..Member::ORDINARY })
+    }
+
+    fn add(&self, member: Member) -> VirtualBus {
         let mut state = self.shared.state();
         let number = state.next_member;
         state.next_member += 1;
-        state.members.insert(number, Member::default());
-        VirtualBus { shared: Arc::clone(&self.shared), number }
+        state.members.insert(number, member);
+        let membership = Membership { shared: Arc::clone(&self.shared), number };
+        VirtualBus { membership: Arc::new(membership) }
+    }
+
+    /// Puts a frame on the bus for all members but one, without waiting for any.
+    pub(crate) fn deliver(&self, frame: &CanFrame, except: Option<u64>) {
+        let mut state = self.shared.state();
+        for (number, member) in &mut state.members {
+            if Some(*number) != except {
+                member.hear(frame);
+            }
+        }
+        drop(state);
+        self.shared.changed.notify_all();
     }
 }
 
@@ -94,6 +142,11 @@ static NAMED: Mutex<BTreeMap<String, Weak<Shared>>> = Mutex::new(BTreeMap::new()
 
 /// A member of a bus inside this process.
 pub struct VirtualBus {
+    membership: Arc<Membership>,
+}
+
+/// The member leaves the bus with the last handle.
+struct Membership {
     shared: Arc<Shared>,
     number: u64,
 }
@@ -110,61 +163,115 @@ impl VirtualBus {
 
     /// Frames this member missed because it did not take them.
     pub fn missed(&self) -> u64 {
-        self.shared.state().members.get(&self.number).map_or(0, |member| member.missed)
+        self.shared().state().members.get(&self.number()).map_or(0, |member| member.missed)
+    }
+
+    fn shared(&self) -> &Shared {
+        &self.membership.shared
+    }
+
+    /// Tells it from other members of its hub.
+    pub(crate) fn number(&self) -> u64 {
+        self.membership.number
+    }
+
+    /// The same member for another thread.
+    pub(crate) fn second_handle(&self) -> Self {
+        Self { membership: Arc::clone(&self.membership) }
+    }
+
+    /// Starts or stops hearing; what waits is forgotten when it stops.
+    pub(crate) fn set_deaf(&self, deaf: bool) {
+        if let Some(member) = self.shared().state().members.get_mut(&self.number()) {
+            member.deaf = deaf;
+            if deaf {
+                member.waiting.clear();
+            }
+        }
+    }
+
+    /// Leaves the bus; all handles learn it.
+    pub(crate) fn leave(&self) {
+        self.shared().state().members.remove(&self.number());
+        self.shared().changed.notify_all();
+    }
+
+    /// Waits for frames and moves at most `most` of them to `frames`; false when it has left the bus.
+    pub(crate) fn take_some(&self, most: usize, timeout: Duration, frames: &mut Vec<CanFrame>) -> bool {
+        let mut state = self.shared().state();
+        let deadline = Instant::now() + timeout;
+        loop {
+            let Some(member) = state.members.get_mut(&self.number()) else { return false };
+            if !member.waiting.is_empty() {
+                let count = member.waiting.len().min(most);
+                frames.extend(member.waiting.drain(..count));
+                member.stalled = member.guest;
+                self.shared().changed.notify_all();
+                return true;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return true;
+            }
+            state = self.shared().wait(state, left);
+        }
     }
 }
 
 impl CanBus for VirtualBus {
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
-        let give_up = Instant::now().checked_add(self.shared.patience);
-        let mut state = self.shared.state();
-        let full = |member: &Member| member.waiting.len() >= QUEUE;
+        let shared = self.shared();
+        let give_up = Instant::now().checked_add(shared.patience);
+        let mut state = shared.state();
         // Waiting for the slowest before anyone gets the frame keeps one order for all.
         loop {
-            let blocked = state.members.iter().any(|(n, m)| *n != self.number && full(m) && !m.stalled);
+            let blocks = |(number, member): (&u64, &Member)| {
+                *number != self.number() && member.full() && !member.stalled && !member.deaf
+            };
+            let blocked = state.members.iter().any(blocks);
             let left = give_up.map_or(PATIENCE, |end| end.saturating_duration_since(Instant::now()));
             if !blocked || left.is_zero() {
                 break;
             }
-            state = self.shared.wait(state, left);
+            state = shared.wait(state, left);
         }
         for (number, member) in &mut state.members {
-            if *number == self.number {
-                continue;
-            }
-            if full(member) {
-                member.stalled = true;
-                member.missed += 1;
-            } else {
-                member.waiting.push_back(*frame);
+            if *number != self.number() {
+                member.hear(frame);
             }
         }
-        self.shared.changed.notify_all();
+        shared.changed.notify_all();
         Ok(())
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         // A timeout beyond the clock's range is as good as none.
         let deadline = Instant::now().checked_add(timeout);
-        let mut state = self.shared.state();
+        let shared = self.shared();
+        let mut state = shared.state();
         loop {
-            if let Some(member) = state.members.get_mut(&self.number)
+            if let Some(member) = state.members.get_mut(&self.number())
                 && let Some(frame) = member.waiting.pop_front()
             {
-                member.stalled = false;
-                self.shared.changed.notify_all();
+                member.stalled = member.guest;
+                shared.changed.notify_all();
                 return Ok(Some(frame));
             }
             let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));
             if left.is_zero() {
                 return Ok(None);
             }
-            state = self.shared.wait(state, left);
+            state = shared.wait(state, left);
         }
+    }
+
+    /// There are no errors inside a process.
+    fn state(&mut self) -> ControllerState {
+        ControllerState::of_counters(0, 0)
     }
 }
 
-impl Drop for VirtualBus {
+impl Drop for Membership {
     fn drop(&mut self) {
         self.shared.state().members.remove(&self.number);
         self.shared.changed.notify_all();

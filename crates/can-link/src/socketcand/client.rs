@@ -1,0 +1,285 @@
+//! The client.
+
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::net::{Shutdown, TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+
+use super::text::{Reply, Splitter, has_form, push_send};
+use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
+
+/// How long connecting and each answer while opening may take.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// How long sending waits for a server that takes nothing.
+const SEND_PATIENCE: Duration = Duration::from_secs(10);
+/// After so long a wait for room to send, what the server has sent is read: it may wait for us.
+const SEND_SLICE: Duration = Duration::from_millis(20);
+/// How long the end waits for the server to take the last frames.
+const END_PATIENCE: Duration = Duration::from_millis(250);
+/// Bytes of one read.
+const READ: usize = 16 * 1024;
+/// Received frames that are kept while sending waits.
+const INBOX: usize = 100_000;
+
+/// Classes of error frames (Linux, `can/error.h`).
+const CLASS_BUS_OFF: u32 = 0x40;
+const CLASS_RESTARTED: u32 = 0x100;
+
+/// A bus behind a server of the socketcand protocol: classic data frames only.
+///
+/// When the connection ends, [`CanBus::send`] and [`CanBus::receive`] say so with [`CanError::Closed`]; there is no
+/// connecting again.
+pub struct SocketcandBus {
+    url: String,
+    stream: TcpStream,
+    splitter: Splitter,
+    /// Bytes that came together with an answer while opening.
+    glued: Vec<u8>,
+    inbox: VecDeque<CanFrame>,
+    /// What the socket is set to: `None` does not wait.
+    timeout: Option<Duration>,
+    closed: bool,
+    errors: ErrorState,
+    ignored: u64,
+}
+
+impl SocketcandBus {
+    /// Connects to a server and opens one of its buses. An IPv6 address comes without brackets.
+    pub fn connect(host: &str, port: u16, channel: &str) -> Result<Self, CanError> {
+        let url = CanUrl::Socketcand { host: host.to_owned(), port, channel: channel.to_owned() }.to_string();
+        let stream = match connect(host, port) {
+            Ok(stream) => stream,
+            Err(source) => return Err(CanError::Connect { url, source }),
+        };
+        let mut bus = Self {
+            url,
+            stream,
+            splitter: Splitter::new(),
+            glued: Vec::new(),
+            inbox: VecDeque::new(),
+            timeout: Some(PATIENCE),
+            closed: false,
+            errors: ErrorState::Unknown,
+            ignored: 0,
+        };
+        bus.set_up().map_err(bus.failed("setting the socket"))?;
+        bus.expect("connecting", &Reply::Hi)?;
+        bus.ask("opening the bus", &format!("< open {channel} >"))?;
+        bus.ask("raw mode", "< rawmode >")?;
+        Ok(bus)
+    }
+
+    /// Messages of the server so far that were none of the protocol's raw mode.
+    pub fn ignored(&self) -> u64 {
+        self.ignored + self.splitter.rubbish()
+    }
+
+    fn set_up(&mut self) -> io::Result<()> {
+        // Frames are small and must not wait for each other.
+        self.stream.set_nodelay(true)?;
+        self.stream.set_read_timeout(self.timeout)?;
+        self.stream.set_write_timeout(Some(SEND_SLICE))
+    }
+
+    fn failed(&self, step: &'static str) -> impl FnOnce(io::Error) -> CanError + use<> {
+        let url = self.url.clone();
+        move |source| CanError::Io { url, step, source }
+    }
+
+    fn ask(&mut self, step: &'static str, request: &str) -> Result<(), CanError> {
+        self.write(request.as_bytes())?;
+        self.expect(step, &Reply::Ok)
+    }
+
+    /// Waits for an answer; what follows it is kept.
+    fn expect(&mut self, step: &'static str, answer: &Reply) -> Result<(), CanError> {
+        let end = Instant::now() + PATIENCE;
+        let mut buffer = [0; READ];
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let count = match left.is_zero() {
+                true => None,
+                false => self.read(&mut buffer, Some(left))?,
+            };
+            let Some(count) = count else {
+                let hint = "is it a socketcand server, and does it still take clients?";
+                return Err(CanError::NoAnswer {
+                    url: self.url.clone(),
+                    step,
+                    seconds: PATIENCE.as_secs(),
+                    hint,
+                });
+            };
+            let mut bytes = &buffer[..count];
+            while let Some(message) = self.splitter.next(&mut bytes) {
+                match Reply::parse(message) {
+                    reply if reply == *answer => {
+                        self.glued = bytes.to_vec();
+                        return Ok(());
+                    }
+                    Reply::Refused(text) => {
+                        let (url, answer) = (self.url.clone(), text.to_owned());
+                        return Err(CanError::Refused { url, step, answer });
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// Waits so long (`None` not at all) for bytes; `None` if none came. The end of the stream is an error.
+    fn read(&mut self, buffer: &mut [u8; READ], wait: Option<Duration>) -> Result<Option<usize>, CanError> {
+        if self.closed {
+            return Err(CanError::Closed { url: self.url.clone() });
+        }
+        if !self.glued.is_empty() {
+            // At most what one read gave.
+            let count = self.glued.len();
+            buffer[..count].copy_from_slice(&self.glued);
+            self.glued.clear();
+            return Ok(Some(count));
+        }
+        self.set_timeout(wait).map_err(self.failed("setting the timeout"))?;
+        match self.stream.read(buffer) {
+            Ok(0) => {
+                self.closed = true;
+                Err(CanError::Closed { url: self.url.clone() })
+            }
+            Ok(count) => Ok(Some(count)),
+            Err(error) if is_no_data(&error) => Ok(None),
+            Err(error) => Err(self.broken("receiving", error)),
+        }
+    }
+
+    fn set_timeout(&mut self, timeout: Option<Duration>) -> io::Result<()> {
+        if timeout == self.timeout {
+            return Ok(());
+        }
+        if timeout.is_none() || self.timeout.is_none() {
+            self.stream.set_nonblocking(timeout.is_none())?;
+        }
+        if timeout.is_some() {
+            self.stream.set_read_timeout(timeout)?;
+        }
+        self.timeout = timeout;
+        Ok(())
+    }
+
+    /// A connection that was cut has ended like any other.
+    fn broken(&mut self, step: &'static str, source: io::Error) -> CanError {
+        use io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset};
+        self.closed = true;
+        match source.kind() {
+            BrokenPipe | ConnectionAborted | ConnectionReset => CanError::Closed { url: self.url.clone() },
+            _ => CanError::Io { url: self.url.clone(), step, source },
+        }
+    }
+
+    /// Takes in what is there; true if something was.
+    fn take_in(&mut self, wait: Option<Duration>) -> Result<bool, CanError> {
+        let mut buffer = [0; READ];
+        let Some(count) = self.read(&mut buffer, wait)? else { return Ok(false) };
+        let mut bytes = &buffer[..count];
+        while let Some(message) = self.splitter.next(&mut bytes) {
+            match Reply::parse(message) {
+                Reply::Frame(frame) => self.inbox.push_back(frame),
+                Reply::ErrorFrame(class) if class & CLASS_BUS_OFF != 0 => self.errors = ErrorState::BusOff,
+                Reply::ErrorFrame(class) if class & CLASS_RESTARTED != 0 => self.errors = ErrorState::Active,
+                Reply::ErrorFrame(_) => {}
+                _ => self.ignored += 1,
+            }
+        }
+        Ok(true)
+    }
+
+    /// Writes all; while the server takes nothing, what it has sent is read.
+    fn write(&mut self, mut bytes: &[u8]) -> Result<(), CanError> {
+        if self.closed {
+            return Err(CanError::Closed { url: self.url.clone() });
+        }
+        let mut give_up = Instant::now() + SEND_PATIENCE;
+        while !bytes.is_empty() {
+            match self.stream.write(bytes) {
+                Ok(count) => {
+                    bytes = &bytes[count..];
+                    give_up = Instant::now() + SEND_PATIENCE;
+                }
+                Err(error) if is_no_data(&error) && Instant::now() < give_up => {
+                    // The socket may be set not to wait at all.
+                    if self.inbox.len() >= INBOX || !self.take_in(Some(SEND_SLICE))? {
+                        std::thread::sleep(Duration::from_micros(200));
+                    }
+                }
+                Err(error) => return Err(self.broken("sending", error)),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn connect(host: &str, port: u16) -> io::Result<TcpStream> {
+    let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
+    for address in (host, port).to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, PATIENCE) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+fn is_no_data(error: &io::Error) -> bool {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    matches!(error.kind(), WouldBlock | TimedOut | Interrupted)
+}
+
+impl CanBus for SocketcandBus {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        if !has_form(frame) {
+            let why =
+                "the socketcand protocol has classic data frames only; for CAN FD use multicast:ADDR:PORT";
+            return Err(CanError::NotCarried { url: self.url.clone(), frame: *frame, why });
+        }
+        let mut text = String::with_capacity(64);
+        push_send(&mut text, frame);
+        self.write(text.as_bytes())
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        let deadline = Instant::now().checked_add(timeout);
+        let mut wait = None;
+        loop {
+            if let Some(frame) = self.inbox.pop_front() {
+                return Ok(Some(frame));
+            }
+            if self.take_in(wait)? {
+                continue;
+            }
+            let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));
+            if left.is_zero() {
+                return Ok(None);
+            }
+            wait = Some(left);
+        }
+    }
+
+    /// The protocol only tells of bus-off and of the way back.
+    fn state(&mut self) -> ControllerState {
+        ControllerState::without_counters(self.errors)
+    }
+}
+
+impl Drop for SocketcandBus {
+    fn drop(&mut self) {
+        // Closing with unread bytes would cut the connection and with it frames that the server has yet to read.
+        let _ = self.stream.shutdown(Shutdown::Write);
+        let end = Instant::now() + END_PATIENCE;
+        let mut buffer = [0; READ];
+        while !self.closed {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() || self.read(&mut buffer, Some(left)).is_err() {
+                break;
+            }
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The server for a host that runs the bus itself, such as a simulator in virtual time.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration;
+
+use super::server::{Channel, Route};
+use super::session::Happened;
+use super::{ClientId, ServerStats, SocketcandServer};
+use crate::{CanError, CanFrame, VirtualHub};
+
+/// What clients did and the host has not taken yet; beyond that their connections wait.
+const WAITING: usize = 1024;
+
+/// What a client did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClientEvent {
+    /// It opened the bus.
+    Joined,
+    /// It wants this frame on the bus.
+    Frame(CanFrame),
+    /// It is gone.
+    Left,
+}
+
+/// What happened at a [`SocketcandGateway`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FromClient {
+    /// Index of the channel among the names given.
+    pub channel: usize,
+    /// Which client.
+    pub client: ClientId,
+    /// What it did.
+    pub event: ClientEvent,
+}
+
+/// A [`SocketcandServer`] whose clients' frames go to the host alone. The host decides when each is on the bus, and then
+/// [delivers](Self::deliver) it: bus order, arbitration and faults are its own.
+pub struct SocketcandGateway {
+    // Dropped first: threads that wait for the host then end.
+    events: Receiver<FromClient>,
+    server: SocketcandServer,
+}
+
+impl SocketcandGateway {
+    /// Listens at an address (port 0 takes a free one) and offers buses under the given names.
+    pub fn bind(address: impl ToSocketAddrs, channels: &[&str]) -> Result<Self, CanError> {
+        let (sender, events) = sync_channel(WAITING);
+        let channel = |(channel, name): (usize, &&str)| {
+            let sender = sender.clone();
+            let tell = move |client, happened| {
+                let event = match happened {
+                    Happened::Joined => ClientEvent::Joined,
+                    Happened::Sent(frame) => ClientEvent::Frame(frame),
+                    Happened::Left => ClientEvent::Left,
+                };
+                sender.send(FromClient { channel, client, event }).is_ok()
+            };
+            Channel { name: (*name).to_owned(), hub: VirtualHub::new(), route: Route::Host(Box::new(tell)) }
+        };
+        let channels = channels.iter().enumerate().map(channel).collect();
+        Ok(Self { events, server: SocketcandServer::listen(address, channels)? })
+    }
+
+    /// The next thing a client did, in order; `None` when nothing happened within `timeout`.
+    pub fn next(&mut self, timeout: Duration) -> Option<FromClient> {
+        // The other end is held by the server, which lives as long as this: the only error is that time is up.
+        self.events.recv_timeout(timeout).ok()
+    }
+
+    /// A frame was on the bus: all clients of the channel hear it, except one (that sent it). Never waits.
+    pub fn deliver(&self, channel: usize, frame: &CanFrame, except: Option<ClientId>) {
+        self.server.deliver(channel, frame, except);
+    }
+
+    /// Where it listens, with the port that was taken.
+    pub fn local_addr(&self) -> SocketAddr {
+        self.server.local_addr()
+    }
+
+    /// The CAN URL of a channel for clients on this host.
+    pub fn url(&self, channel: &str) -> String {
+        self.server.url(channel)
+    }
+
+    /// What happened so far.
+    pub fn stats(&self) -> ServerStats {
+        self.server.stats()
+    }
+}

@@ -1,0 +1,272 @@
+//! The server: listens, counts, ends.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::session;
+use crate::{CanError, CanFrame, CanUrl, VirtualBus, VirtualHub};
+
+/// Clients at a time.
+const MOST_CLIENTS: usize = 64;
+/// How long the end waits for the clients' threads.
+const END_PATIENCE: Duration = Duration::from_secs(1);
+
+/// Tells clients of a server apart; never used twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ClientId(u64);
+
+impl fmt::Display for ClientId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "client {}", self.0)
+    }
+}
+
+/// What happened at a server so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ServerStats {
+    /// Clients at present.
+    pub clients: usize,
+    /// Connections taken.
+    pub accepted: u64,
+    /// Connections ended at once because there were 64 clients.
+    pub turned_away: u64,
+    /// Frames of clients.
+    pub received: u64,
+    /// Frames written to clients, counted for each.
+    pub sent: u64,
+    /// Frames that clients missed because they did not read.
+    pub missed: u64,
+    /// Frames that the protocol cannot carry (remote, CAN FD), counted for each client.
+    pub not_carried: u64,
+    /// Commands that were none.
+    pub not_understood: u64,
+}
+
+/// Where the frames of a channel's clients go.
+pub(super) enum Route {
+    /// Straight to the other members of the hub.
+    Hub,
+    /// To the host, which puts them on its bus and delivers them.
+    Host(Box<dyn Fn(ClientId, session::Happened) -> bool + Send + Sync>),
+}
+
+/// A bus of the server: clients are guests of the hub.
+pub(super) struct Channel {
+    pub(super) name: String,
+    pub(super) hub: VirtualHub,
+    pub(super) route: Route,
+}
+
+/// What the threads share.
+pub(super) struct Inner {
+    pub(super) channels: Vec<Channel>,
+    pub(super) closing: AtomicBool,
+    clients: Mutex<BTreeMap<ClientId, Client>>,
+    gone: Condvar,
+    accepted: AtomicU64,
+    turned_away: AtomicU64,
+    pub(super) received: AtomicU64,
+    pub(super) sent: AtomicU64,
+    missed: AtomicU64,
+    pub(super) not_carried: AtomicU64,
+    pub(super) not_understood: AtomicU64,
+}
+
+struct Client {
+    stream: TcpStream,
+    member: Option<VirtualBus>,
+}
+
+impl Inner {
+    fn clients(&self) -> MutexGuard<'_, BTreeMap<ClientId, Client>> {
+        // No code that can panic runs while the lock is held.
+        self.clients.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn set_member(&self, client: ClientId, member: &VirtualBus) {
+        if let Some(client) = self.clients().get_mut(&client) {
+            client.member = Some(member.second_handle());
+        }
+    }
+
+    pub(super) fn member_number(&self, client: ClientId) -> Option<u64> {
+        self.clients().get(&client)?.member.as_ref().map(VirtualBus::number)
+    }
+
+    fn forget(&self, client: ClientId) {
+        let mut clients = self.clients();
+        if let Some(Client { member: Some(member), .. }) = clients.remove(&client) {
+            self.missed.fetch_add(member.missed(), Ordering::Relaxed);
+            member.leave();
+        }
+        drop(clients);
+        self.gone.notify_all();
+    }
+}
+
+/// A server of the socketcand protocol, as python-can's `socketcand` interface and SavvyCAN know it.
+///
+/// A client's frames reach all others and do not come back to it. A client that does not read misses what is beyond some
+/// 65,000 frames, and is let go after 30 s; it never holds up the bus. Dropping the server ends all connections.
+///
+/// ```
+/// use std::time::Duration;
+/// use can_link::{CanBus, CanFrame, Id, SocketcandServer, VirtualHub, open};
+/// let hub = VirtualHub::new();
+/// let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)])?;
+/// let mut node = hub.join();
+/// let mut tool = open(&server.url("can0"))?;
+/// tool.send(&CanFrame::classic(Id::standard(0x123)?, &[1, 2])?)?;
+/// assert!(node.receive(Duration::from_secs(60))?.is_some());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct SocketcandServer {
+    address: SocketAddr,
+    inner: Arc<Inner>,
+    acceptor: Option<JoinHandle<()>>,
+}
+
+impl SocketcandServer {
+    /// Listens at an address (port 0 takes a free one) and offers buses of this process under the given names, which have
+    /// no blanks and at most 16 characters.
+    pub fn bind(address: impl ToSocketAddrs, buses: &[(&str, &VirtualHub)]) -> Result<Self, CanError> {
+        let channel = |(name, hub): &(&str, &VirtualHub)| Channel {
+            name: (*name).to_owned(),
+            hub: (*hub).clone(),
+            route: Route::Hub,
+        };
+        Self::listen(address, buses.iter().map(channel).collect())
+    }
+
+    pub(super) fn listen(address: impl ToSocketAddrs, channels: Vec<Channel>) -> Result<Self, CanError> {
+        let asked = address.to_socket_addrs().map(|found| found.map(|a| a.to_string()).collect::<Vec<_>>());
+        let asked = asked.map_or_else(|_| "this address".to_owned(), |found| found.join(", "));
+        let failed = |source| CanError::Listen { address: asked.clone(), source };
+        let listener = TcpListener::bind(address).map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        let inner = Arc::new(Inner {
+            channels,
+            closing: AtomicBool::new(false),
+            clients: Mutex::default(),
+            gone: Condvar::new(),
+            accepted: AtomicU64::new(0),
+            turned_away: AtomicU64::new(0),
+            received: AtomicU64::new(0),
+            sent: AtomicU64::new(0),
+            missed: AtomicU64::new(0),
+            not_carried: AtomicU64::new(0),
+            not_understood: AtomicU64::new(0),
+        });
+        let shared = Arc::clone(&inner);
+        let thread = std::thread::Builder::new().name("socketcand".into());
+        let acceptor = thread.spawn(move || accept(&listener, &shared)).map_err(failed)?;
+        Ok(Self { address, inner, acceptor: Some(acceptor) })
+    }
+
+    /// Where it listens, with the port that was taken.
+    pub fn local_addr(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The CAN URL of a channel for clients on this host.
+    pub fn url(&self, channel: &str) -> String {
+        let (host, port) = (reachable(self.address).ip().to_string(), self.address.port());
+        CanUrl::Socketcand { host, port, channel: channel.to_owned() }.to_string()
+    }
+
+    /// What happened so far.
+    pub fn stats(&self) -> ServerStats {
+        let inner = &self.inner;
+        let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        let clients = inner.clients();
+        let missing: u64 =
+            clients.values().filter_map(|client| client.member.as_ref()).map(VirtualBus::missed).sum();
+        ServerStats {
+            clients: clients.len(),
+            accepted: count(&inner.accepted),
+            turned_away: count(&inner.turned_away),
+            received: count(&inner.received),
+            sent: count(&inner.sent),
+            missed: count(&inner.missed) + missing,
+            not_carried: count(&inner.not_carried),
+            not_understood: count(&inner.not_understood),
+        }
+    }
+
+    pub(super) fn deliver(&self, channel: usize, frame: &CanFrame, except: Option<ClientId>) {
+        let except = except.and_then(|client| self.inner.member_number(client));
+        if let Some(channel) = self.inner.channels.get(channel) {
+            channel.hub.deliver(frame, except);
+        }
+    }
+}
+
+impl Drop for SocketcandServer {
+    fn drop(&mut self) {
+        self.inner.closing.store(true, Ordering::SeqCst);
+        // The acceptor waits in the system: a connection wakes it.
+        let woken = TcpStream::connect_timeout(&reachable(self.address), END_PATIENCE).is_ok();
+        if let Some(acceptor) = self.acceptor.take().filter(|_| woken) {
+            let _ = acceptor.join();
+        }
+        let clients = self.inner.clients();
+        for client in clients.values() {
+            let _ = client.stream.shutdown(Shutdown::Both);
+        }
+        drop(self.inner.gone.wait_timeout_while(clients, END_PATIENCE, |clients| !clients.is_empty()));
+    }
+}
+
+/// The address under which this host reaches a listener.
+fn reachable(mut address: SocketAddr) -> SocketAddr {
+    if address.ip().is_unspecified() {
+        address.set_ip(match address.ip() {
+            IpAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
+            IpAddr::V6(_) => Ipv6Addr::LOCALHOST.into(),
+        });
+    }
+    address
+}
+
+fn accept(listener: &TcpListener, inner: &Arc<Inner>) {
+    for number in 0.. {
+        let accepted = listener.accept();
+        if inner.closing.load(Ordering::SeqCst) {
+            return;
+        }
+        match accepted {
+            Ok((stream, _)) => {
+                inner.accepted.fetch_add(1, Ordering::Relaxed);
+                if start(inner, ClientId(number), stream).is_err() {
+                    inner.turned_away.fetch_add(1, Ordering::Relaxed);
+                }
+            }
+            // A client that went at once, or no room for another connection: others go on.
+            Err(_) => std::thread::sleep(Duration::from_millis(5)),
+        }
+    }
+}
+
+/// A thread for a client.
+fn start(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) -> io::Result<()> {
+    let kept = stream.try_clone()?;
+    let mut clients = inner.clients();
+    if clients.len() >= MOST_CLIENTS {
+        return Err(io::ErrorKind::QuotaExceeded.into());
+    }
+    clients.insert(client, Client { stream: kept, member: None });
+    drop(clients);
+    let shared = Arc::clone(inner);
+    let session = move || {
+        session::serve(&shared, client, stream);
+        shared.forget(client);
+    };
+    let started = std::thread::Builder::new().name(format!("socketcand {client}")).spawn(session);
+    started.map(|_| ()).inspect_err(|_| inner.forget(client))
+}

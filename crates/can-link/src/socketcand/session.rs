@@ -1,0 +1,238 @@
+//! One client of the server: a thread that reads and, from raw mode on, one that writes.
+
+use std::io::{self, Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use super::server::{ClientId, Inner, Route};
+use super::text::{Request, Splitter, has_form, push_frame};
+use crate::{CanBus, CanFrame, VirtualBus};
+
+/// No frame leaves so soon after the answer to `rawmode`: python-can compares all that one read gives with that answer.
+const HELD_BACK: Duration = Duration::from_millis(20);
+/// Frames that wait for a client: some seconds of a full bus.
+const WAITING: usize = 65_536;
+/// Bytes that wait in the system for a client; more would only delay what it hears.
+const SEND_BUFFER: usize = 128 * 1024;
+/// Frames in one write.
+const BATCH: usize = 64;
+/// A client that takes nothing for so long is gone.
+const WRITE_PATIENCE: Duration = Duration::from_secs(30);
+/// A client that asks for nothing and has not opened a bus is gone.
+const OPEN_PATIENCE: Duration = Duration::from_secs(30);
+
+/// What a client did, for a host that runs the bus itself.
+pub(super) enum Happened {
+    Joined,
+    Sent(CanFrame),
+    Left,
+}
+
+/// The socket as both threads write to it.
+struct Out {
+    stream: Mutex<Speaker>,
+}
+
+struct Speaker {
+    stream: TcpStream,
+    /// Frames wait until then.
+    frames_from: Instant,
+}
+
+impl Out {
+    fn lock(&self) -> MutexGuard<'_, Speaker> {
+        self.stream.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Serves a client until it goes.
+pub(super) fn serve(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) {
+    let mut session = Session { inner, client, opened: None, writer: None };
+    // What went wrong with one client's connection ends this client only.
+    let _ = session.run(stream);
+    session.end();
+}
+
+struct Session<'a> {
+    inner: &'a Arc<Inner>,
+    client: ClientId,
+    /// Channel and membership.
+    opened: Option<(usize, VirtualBus)>,
+    writer: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Session<'_> {
+    fn run(&mut self, mut stream: TcpStream) -> io::Result<()> {
+        // Each answer must be a segment of its own, at once.
+        stream.set_nodelay(true)?;
+        // A client whose computer was switched off is noticed.
+        socket2::SockRef::from(&stream).set_keepalive(true)?;
+        // A wish: the system may have limits of its own.
+        let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
+        stream.set_write_timeout(Some(WRITE_PATIENCE))?;
+        stream.set_read_timeout(Some(OPEN_PATIENCE))?;
+        let speaker = Speaker { stream: stream.try_clone()?, frames_from: Instant::now() };
+        let out = Arc::new(Out { stream: Mutex::new(speaker) });
+        say(&out, "< hi >")?;
+        let mut splitter = Splitter::new();
+        let mut buffer = [0; 4096];
+        loop {
+            let count = match stream.read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(count) => count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            let mut bytes = &buffer[..count];
+            let rubbish = splitter.rubbish();
+            while let Some(message) = splitter.next(&mut bytes) {
+                if !self.obey(Request::parse(message), &out)? {
+                    return Ok(());
+                }
+            }
+            self.not_understood(splitter.rubbish() - rubbish);
+            if self.opened.is_some() {
+                stream.set_read_timeout(None)?;
+            }
+        }
+    }
+
+    fn not_understood(&self, count: u64) {
+        self.inner.not_understood.fetch_add(count, Ordering::Relaxed);
+    }
+
+    /// False ends the connection.
+    fn obey(&mut self, request: Request, out: &Arc<Out>) -> io::Result<bool> {
+        match (request, &mut self.opened) {
+            (Request::Echo, _) => say(out, "< echo >")?,
+            (Request::Open(name), None) => return self.open(name, out),
+            (Request::RawMode, Some((_, member))) => {
+                // From here on it hears the bus; what it hears waits.
+                let member = member.second_handle();
+                let mut speaker = out.lock();
+                member.set_deaf(false);
+                speaker.stream.write_all(b"< ok >")?;
+                speaker.frames_from = Instant::now() + HELD_BACK;
+                drop(speaker);
+                if self.writer.is_none() {
+                    self.writer = Some(write_frames(self.inner, member, out)?);
+                }
+            }
+            (Request::BcmMode, Some((_, member))) => {
+                let mut speaker = out.lock();
+                member.set_deaf(true);
+                speaker.stream.write_all(b"< ok >")?;
+            }
+            (Request::Send(frame), Some((channel, member))) => {
+                self.inner.received.fetch_add(1, Ordering::Relaxed);
+                match &self.inner.channels[*channel].route {
+                    Route::Hub => drop(member.send(&frame)),
+                    Route::Host(tell) => return Ok(tell(self.client, Happened::Sent(frame))),
+                }
+            }
+            // In raw mode python-can would take the first word of an error text for a number, and fail.
+            _ => {
+                self.not_understood(1);
+                if self.writer.is_none() {
+                    say(out, "< error unknown command >")?;
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn open(&mut self, name: &str, out: &Arc<Out>) -> io::Result<bool> {
+        let channels = &self.inner.channels;
+        let Some(number) = channels.iter().position(|channel| channel.name == name) else {
+            let names: Vec<_> = channels.iter().map(|channel| channel.name.as_str()).collect();
+            let mut names = names.join(", ");
+            names.truncate(names.floor_char_boundary(150));
+            say(out, &format!("< error no such bus; there is {names} >"))?;
+            return Ok(false);
+        };
+        let member = channels[number].hub.join_as_guest(WAITING);
+        self.inner.set_member(self.client, &member);
+        self.opened = Some((number, member));
+        if let Route::Host(tell) = &channels[number].route
+            && !tell(self.client, Happened::Joined)
+        {
+            return Ok(false);
+        }
+        say(out, "< ok >")?;
+        Ok(true)
+    }
+
+    fn end(mut self) {
+        if let Some((channel, member)) = self.opened.take() {
+            if let Route::Host(tell) = &self.inner.channels[channel].route {
+                tell(self.client, Happened::Left);
+            }
+            member.set_deaf(true);
+            member.leave();
+        }
+        if let Some(writer) = self.writer.take() {
+            let _ = writer.join();
+        }
+    }
+}
+
+fn say(out: &Out, text: &str) -> io::Result<()> {
+    out.lock().stream.write_all(text.as_bytes())
+}
+
+/// The thread that writes frames; it ends when the member leaves the bus or the client takes no more.
+fn write_frames(
+    inner: &Arc<Inner>,
+    member: VirtualBus,
+    out: &Arc<Out>,
+) -> io::Result<std::thread::JoinHandle<()>> {
+    let (inner, out) = (Arc::clone(inner), Arc::clone(out));
+    std::thread::Builder::new().name("socketcand frames".into()).spawn(move || {
+        let mut frames = Vec::with_capacity(BATCH);
+        let mut text = String::new();
+        while member.take_some(BATCH, Duration::from_secs(1), &mut frames) {
+            let carried = write_batch(&frames, &mut text);
+            count(&inner.not_carried, frames.len() - carried);
+            if speak_frames(&out, &text).is_err() {
+                // The reading thread ends with the socket.
+                let _ = out.lock().stream.shutdown(Shutdown::Both);
+                return;
+            }
+            count(&inner.sent, carried);
+            frames.clear();
+        }
+    })
+}
+
+fn count(counter: &AtomicU64, number: usize) {
+    counter.fetch_add(number as u64, Ordering::Relaxed);
+}
+
+/// The lines of the frames that have a form; how many.
+fn write_batch(frames: &[CanFrame], text: &mut String) -> usize {
+    text.clear();
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let mut carried = 0;
+    for frame in frames.iter().filter(|frame| has_form(frame)) {
+        push_frame(text, frame, now);
+        carried += 1;
+    }
+    carried
+}
+
+fn speak_frames(out: &Out, text: &str) -> io::Result<()> {
+    if text.is_empty() {
+        return Ok(());
+    }
+    loop {
+        let mut speaker = out.lock();
+        let early = speaker.frames_from.saturating_duration_since(Instant::now());
+        if early.is_zero() {
+            return speaker.stream.write_all(text.as_bytes());
+        }
+        drop(speaker);
+        std::thread::sleep(early);
+    }
+}

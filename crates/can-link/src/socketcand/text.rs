@@ -1,0 +1,367 @@
+//! The texts of the protocol: `< WORD WORD … >`, found in a stream of bytes, understood and written.
+
+use std::fmt::Write;
+use std::time::Duration;
+
+use crate::{CanFrame, Id};
+
+/// Longest message that is kept; the longest of the protocol, a CAN FD frame with blanks between its bytes, has 240.
+const LONGEST: usize = 512;
+
+/// Finds messages in a stream that may be cut anywhere, in bounded memory.
+pub(crate) struct Splitter {
+    /// What followed the last `<`.
+    message: Vec<u8>,
+    inside: bool,
+    /// The message in `message` was handed out.
+    complete: bool,
+    rubbish: u64,
+}
+
+impl Splitter {
+    pub(crate) fn new() -> Self {
+        Self { message: Vec::with_capacity(LONGEST), inside: false, complete: false, rubbish: 0 }
+    }
+
+    /// Messages that were too long, not ASCII or never ended, so far.
+    pub(crate) fn rubbish(&self) -> u64 {
+        self.rubbish
+    }
+
+    /// The text between `<` and `>` of the next message; what it takes of `bytes` is gone from there.
+    pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<&'a str> {
+        if self.complete {
+            self.complete = false;
+            self.message.clear();
+        }
+        while let Some((&byte, rest)) = bytes.split_first() {
+            *bytes = rest;
+            match byte {
+                b'<' => {
+                    // A message within a message: the first one lost its end.
+                    self.rubbish += u64::from(self.inside);
+                    self.inside = true;
+                    self.message.clear();
+                }
+                b'>' if self.inside => {
+                    self.inside = false;
+                    if self.message.is_ascii() {
+                        self.complete = true;
+                        return str::from_utf8(&self.message).ok();
+                    }
+                    self.rubbish += 1;
+                    self.message.clear();
+                }
+                _ if !self.inside => {}
+                _ if self.message.len() == LONGEST => {
+                    self.rubbish += 1;
+                    self.inside = false;
+                    self.message.clear();
+                }
+                _ => self.message.push(byte),
+            }
+        }
+        None
+    }
+}
+
+/// What a client asks for.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Request<'a> {
+    Open(&'a str),
+    RawMode,
+    BcmMode,
+    Echo,
+    Send(CanFrame),
+    /// A `send` that is no frame.
+    BadSend,
+    Other,
+}
+
+impl<'a> Request<'a> {
+    pub(crate) fn parse(message: &'a str) -> Self {
+        let mut words = message.split_ascii_whitespace();
+        let request = match words.next() {
+            Some("open") => match words.next() {
+                Some(name) => Self::Open(name),
+                None => Self::Other,
+            },
+            Some("rawmode") => Self::RawMode,
+            Some("bcmmode") => Self::BcmMode,
+            Some("echo") => Self::Echo,
+            Some("send") => return send(words).map_or(Self::BadSend, Self::Send),
+            _ => Self::Other,
+        };
+        if words.next().is_some() { Self::Other } else { request }
+    }
+}
+
+/// `ID LENGTH BYTE …`: what stands behind `send`.
+fn send<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
+    let id = id(words.next()?)?;
+    let len = words.next().filter(|word| word.len() == 1 && is_hex(word))?;
+    let len = usize::from_str_radix(len, 16).ok()?;
+    let data = bytes::<8>(words)?;
+    CanFrame::classic(id, data.get(..len).filter(|_| data.len() == len)?).ok()
+}
+
+/// What a server says.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Reply<'a> {
+    Hi,
+    Ok,
+    Frame(CanFrame),
+    /// An error frame with its class bits (Linux, `can/error.h`).
+    ErrorFrame(u32),
+    /// The server refuses something.
+    Refused(&'a str),
+    Other,
+}
+
+impl<'a> Reply<'a> {
+    pub(crate) fn parse(message: &'a str) -> Self {
+        let message = message.trim_ascii();
+        let (kind, rest) = message.split_once(' ').unwrap_or((message, ""));
+        let words = rest.split_ascii_whitespace();
+        let reply = match kind {
+            "hi" => Some(Self::Hi),
+            "ok" => Some(Self::Ok),
+            "frame" => classic_frame(words).map(Self::Frame),
+            "fdframe" => fd_frame(words).map(Self::Frame),
+            "error" => Some(error_class(words).map_or(Self::Refused(rest.trim_ascii()), Self::ErrorFrame)),
+            _ => None,
+        };
+        reply.unwrap_or(Self::Other)
+    }
+}
+
+/// `ID TIME DATA`: what stands behind `frame`.
+fn classic_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
+    let id = id(words.next()?)?;
+    words.next().filter(|word| is_time(word))?;
+    CanFrame::classic(id, &bytes::<8>(words)?).ok()
+}
+
+/// `ID FLAGS TIME DATA`: what stands behind `fdframe` of servers that know CAN FD.
+fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
+    let id = id(words.next()?)?;
+    let flags = words.next().filter(|word| word.len() <= 2 && is_hex(word))?;
+    let flags = u8::from_str_radix(flags, 16).ok()?;
+    words.next().filter(|word| is_time(word))?;
+    // Bit 0 is the bit rate switch (Linux, `can.h`).
+    Some(CanFrame::fd(id, &bytes::<64>(words)?).ok()?.with_brs(flags & 1 != 0))
+}
+
+/// `CLASS TIME`, or `CLASS` alone; anything else is a text for people.
+fn error_class<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<u32> {
+    let class = words.next().filter(|word| word.len() <= 8 && is_hex(word))?;
+    if let Some(time) = words.next() {
+        let alone = words.next().is_none();
+        Some(time).filter(|time| alone && is_time(time))?;
+    }
+    u32::from_str_radix(class, 16).ok()
+}
+
+/// Up to three digits are 11 bits, more are 29.
+fn id(word: &str) -> Option<Id> {
+    if !is_hex(word) || word.len() > 8 {
+        return None;
+    }
+    let value = u32::from_str_radix(word, 16).ok()?;
+    if word.len() <= 3 { Id::standard(value).ok() } else { Id::extended(value).ok() }
+}
+
+/// Bytes as hex: one word for all, or a word for each, which may then lack its leading zero.
+fn bytes<'a, const MOST: usize>(words: impl Iterator<Item = &'a str>) -> Option<Vec<u8>> {
+    let mut found = Vec::new();
+    for word in words {
+        if !is_hex(word) || (word.len() > 1 && word.len() % 2 == 1) {
+            return None;
+        }
+        for at in (0..word.len()).step_by(2) {
+            let digits = &word[at..word.len().min(at + 2)];
+            found.push(u8::from_str_radix(digits, 16).ok()?);
+        }
+        if found.len() > MOST {
+            return None;
+        }
+    }
+    Some(found)
+}
+
+/// Nothing but digits: Rust's own conversion would take a sign, too.
+fn is_hex(word: &str) -> bool {
+    !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+fn is_time(word: &str) -> bool {
+    word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.') && word.parse::<f64>().is_ok()
+}
+
+/// A frame in the protocol; only classic data frames have a form there.
+pub(crate) fn has_form(frame: &CanFrame) -> bool {
+    !frame.is_fd() && !frame.is_remote()
+}
+
+/// Appends `< frame … >` with the time since 1970.
+///
+/// The bytes stand without blanks between them, because python-can reads the first word only; without bytes two blanks
+/// follow each other, because python-can does not find the empty word otherwise.
+pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
+    let (s, us) = (time.as_secs(), time.subsec_micros());
+    let written = write!(text, "< frame {} {s}.{us:06} ", frame.id()).and_then(|()| {
+        frame.data().iter().try_for_each(|byte| write!(text, "{byte:02X}"))?;
+        text.write_str(" >")
+    });
+    written.expect("a String takes everything");
+}
+
+/// Appends `< send … >`.
+pub(crate) fn push_send(text: &mut String, frame: &CanFrame) {
+    let written = write!(text, "< send {} {:X} ", frame.id(), frame.len()).and_then(|()| {
+        let mut gap = "";
+        for byte in frame.data() {
+            write!(text, "{gap}{byte:02X}")?;
+            gap = " ";
+        }
+        text.write_str(" >")
+    });
+    written.expect("a String takes everything");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(id: u32, data: &[u8]) -> CanFrame {
+        CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
+    }
+
+    fn extended(id: u32, data: &[u8]) -> CanFrame {
+        CanFrame::classic(Id::extended(id).unwrap(), data).unwrap()
+    }
+
+    fn messages(splitter: &mut Splitter, mut bytes: &[u8]) -> Vec<String> {
+        std::iter::from_fn(|| splitter.next(&mut bytes).map(str::to_owned)).collect()
+    }
+
+    #[test]
+    fn messages_are_found_wherever_the_stream_is_cut() {
+        let stream = b"xx< hi ><ok>\n< frame 1 1.0  > > < send < echo >\xFF<\xFF>";
+        let whole = [" hi ", "ok", " frame 1 1.0  ", " echo "];
+        for cut in 0..=stream.len() {
+            let mut splitter = Splitter::new();
+            let mut found = messages(&mut splitter, &stream[..cut]);
+            found.extend(messages(&mut splitter, &stream[cut..]));
+            assert_eq!(found, whole, "cut at {cut}");
+            assert_eq!(splitter.rubbish(), 2);
+        }
+    }
+
+    #[test]
+    fn an_endless_message_takes_bounded_memory_and_the_next_is_found() {
+        let mut splitter = Splitter::new();
+        assert!(messages(&mut splitter, b"<").is_empty());
+        for _ in 0..1000 {
+            assert!(messages(&mut splitter, &[b'a'; 4096]).is_empty());
+        }
+        assert_eq!(splitter.message.capacity(), LONGEST);
+        assert_eq!(messages(&mut splitter, b"> < hi >"), [" hi "]);
+        assert_eq!(splitter.rubbish(), 1);
+    }
+
+    /// As python-can 4.6.1 writes them: no leading zeros, two blanks without data.
+    #[test]
+    fn requests_of_python_can_are_understood() {
+        for (text, request) in [
+            (" open can0 ", Request::Open("can0")),
+            ("open can0", Request::Open("can0")),
+            (" rawmode ", Request::RawMode),
+            (" echo ", Request::Echo),
+            (" send 281 0  ", Request::Send(frame(0x281, &[]))),
+            (" send 1C1 2 2 f ", Request::Send(frame(0x1C1, &[2, 15]))),
+            (
+                " send 00000281 8 0 1 2 3 4 5 6 ff ",
+                Request::Send(extended(0x281, &[0, 1, 2, 3, 4, 5, 6, 255])),
+            ),
+            (" send 1C1 2 0102 ", Request::Send(frame(0x1C1, &[1, 2]))),
+        ] {
+            assert_eq!(Request::parse(text), request);
+        }
+    }
+
+    #[test]
+    fn requests_that_are_no_frames_are_none() {
+        for text in [
+            "send",
+            "send 281",
+            "send 281 1",
+            "send 281 9 1 2 3 4 5 6 7 8 9",
+            "send 281 1 1 2",
+            "send 800 0",
+            "send 20000000 0",
+            "send 000000281 0",
+            "send +81 0",
+            "send 281 +1 1",
+            "send 281 1 +1",
+            "send 281 1 100",
+            "send 281 1 g",
+            "send 281 01 1",
+            "send 281 0x1 1",
+        ] {
+            assert_eq!(Request::parse(text), Request::BadSend, "{text}");
+        }
+        for text in ["", " ", "open", "open a b", "rawmode 1", "isotpmode", "OPEN can0"] {
+            assert_eq!(Request::parse(text), Request::Other, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_servers_say_is_understood() {
+        for (text, reply) in [
+            (" hi ", Reply::Hi),
+            (" ok ", Reply::Ok),
+            (" frame 123 23.424242 11 22 33 44 ", Reply::Frame(frame(0x123, &[0x11, 0x22, 0x33, 0x44]))),
+            (" frame 123 23.424242 11223344 ", Reply::Frame(frame(0x123, &[0x11, 0x22, 0x33, 0x44]))),
+            (" frame 123 23.424242  ", Reply::Frame(frame(0x123, &[]))),
+            (" frame 123 23.424242 ", Reply::Frame(frame(0x123, &[]))),
+            (" frame 00000123 1.0 1 2 ", Reply::Frame(extended(0x123, &[1, 2]))),
+            (" error 008 1.000000 ", Reply::ErrorFrame(8)),
+            (" error 20000040 ", Reply::ErrorFrame(0x2000_0040)),
+            (" error could not open bus ", Reply::Refused("could not open bus")),
+            (" error bad command ", Reply::Refused("bad command")),
+            (" frame 123 x 11 ", Reply::Other),
+            (" frame 123 1.0 112 ", Reply::Other),
+            (" frame 123 1.0 112233445566778899 ", Reply::Other),
+            (" frame 123 inf 11 ", Reply::Other),
+            (" stat 1 2 3 4 ", Reply::Other),
+        ] {
+            assert_eq!(Reply::parse(text), reply, "{text}");
+        }
+        let fd = CanFrame::fd(Id::standard(0x12).unwrap(), &[7; 12]).unwrap();
+        let text = "fdframe 012 01 1.0 070707070707070707070707";
+        assert_eq!(Reply::parse(text), Reply::Frame(fd));
+        assert_eq!(Reply::parse(&text.replace(" 01 ", " 00 ")), Reply::Frame(fd.with_brs(false)));
+    }
+
+    /// python-can 4.6.1 needs exactly these forms: an IndexError with one blank, one byte only with blanks between bytes.
+    #[test]
+    fn frames_are_written_as_python_can_reads_them() {
+        for (frame, line, send) in [
+            (frame(0x680, &[]), "< frame 680 12.000345  >", "< send 680 0  >"),
+            (frame(5, &[1, 0xAB]), "< frame 005 12.000345 01AB >", "< send 005 2 01 AB >"),
+            (
+                extended(5, &[9; 8]),
+                "< frame 00000005 12.000345 0909090909090909 >",
+                "< send 00000005 8 09 09 09 09 09 09 09 09 >",
+            ),
+        ] {
+            let mut text = String::new();
+            push_frame(&mut text, &frame, Duration::from_micros(12_000_345));
+            assert_eq!(text, line);
+            let mut text = String::new();
+            push_send(&mut text, &frame);
+            assert_eq!(text, send);
+        }
+    }
+}

@@ -1,0 +1,443 @@
+//! The socketcand protocol on the wire: what a client that knows nothing but the protocol sees.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use can_link::{
+    CanBus, CanError, CanFrame, ClientEvent, ErrorState, Id, SocketcandBus, SocketcandGateway,
+    SocketcandServer, VirtualHub, open,
+};
+
+/// Only something broken waits so long.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn frame(id: u32, data: &[u8]) -> CanFrame {
+    CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
+}
+
+fn numbered(number: u32) -> CanFrame {
+    frame(0x100, &number.to_be_bytes())
+}
+
+fn bench() -> (SocketcandServer, VirtualHub) {
+    let hub = VirtualHub::new();
+    let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
+    (server, hub)
+}
+
+/// A client as simple as python-can's.
+struct Raw(TcpStream);
+
+impl Raw {
+    fn connect(server: &SocketcandServer) -> Self {
+        let stream = TcpStream::connect(server.local_addr()).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        Self(stream)
+    }
+
+    /// One read, as python-can does it.
+    fn read(&mut self) -> String {
+        let mut buffer = [0; 256];
+        let count = self.0.read(&mut buffer).unwrap();
+        String::from_utf8(buffer[..count].to_vec()).unwrap()
+    }
+
+    fn say(&mut self, text: &str) {
+        self.0.write_all(text.as_bytes()).unwrap();
+    }
+
+    fn ask(&mut self, text: &str) -> String {
+        self.say(text);
+        self.read()
+    }
+
+    fn raw_mode(server: &SocketcandServer) -> Self {
+        let mut raw = Self::connect(server);
+        assert_eq!(raw.read(), "< hi >");
+        assert_eq!(raw.ask("< open can0 >"), "< ok >");
+        assert_eq!(raw.ask("< rawmode >"), "< ok >");
+        raw
+    }
+
+    /// Reads until `end` has come.
+    fn read_until(&mut self, end: &str) -> String {
+        let mut text = String::new();
+        while !text.contains(end) {
+            let more = self.read();
+            assert!(!more.is_empty(), "the connection ended after {text:?}");
+            text += &more;
+        }
+        text
+    }
+}
+
+/// Waits for something that other threads do.
+fn until(mut done: impl FnMut() -> bool) {
+    let end = Instant::now() + PATIENCE;
+    while !done() {
+        assert!(Instant::now() < end, "it does not happen");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn take(bus: &mut impl CanBus) -> CanFrame {
+    bus.receive(PATIENCE).unwrap().expect("a frame is on its way")
+}
+
+#[test]
+fn answers_come_alone_and_no_frame_is_glued_to_them() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        // The bus is never quiet.
+        scope.spawn(|| {
+            for number in 0.. {
+                node.send(&numbered(number)).unwrap();
+                std::thread::sleep(Duration::from_micros(100));
+                if stop.load(Ordering::Relaxed) {
+                    break;
+                }
+            }
+        });
+        let alone = (0..50).any(|_| {
+            let mut client = Raw::connect(&server);
+            assert_eq!(client.read(), "< hi >");
+            // None before raw mode.
+            assert_eq!(client.ask("< open can0 >"), "< ok >");
+            client.say("< rawmode >");
+            client.0.peek(&mut [0]).unwrap();
+            // Long enough for frames that are not held back; on a busy computer sometimes too long for those that are.
+            std::thread::sleep(Duration::from_millis(3));
+            let first = client.read();
+            assert!(first.starts_with("< ok >"), "{first}");
+            // What was held back comes, without a gap.
+            let text = client.read_until(" >< frame 100 ");
+            let text = text + &client.read_until(" >< frame 100 ");
+            let numbers: Vec<_> = text.split(" >").filter_map(|line| line.get(line.len() - 8..)).collect();
+            let numbers: Vec<_> =
+                numbers.iter().filter_map(|hex| u32::from_str_radix(hex, 16).ok()).collect();
+            assert!(numbers.len() > 1 && numbers.windows(2).all(|pair| pair[0] + 1 == pair[1]), "{text}");
+            first == "< ok >"
+        });
+        stop.store(true, Ordering::Relaxed);
+        assert!(alone, "a frame always shares the segment of the answer");
+    });
+}
+
+#[test]
+fn frames_are_lines_with_a_time_and_two_blanks_without_data() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    let mut client = Raw::raw_mode(&server);
+    node.send(&frame(0x680, &[])).unwrap();
+    let line = client.read_until(">");
+    let words: Vec<_> = line.split(' ').collect();
+    let [_, "frame", "680", time, "", ">"] = words[..] else { panic!("{line}") };
+    let (seconds, micros) = time.split_once('.').unwrap();
+    assert!(seconds.parse::<u64>().unwrap() > 1_600_000_000 && micros.len() == 6, "{line}");
+    node.send(&CanFrame::classic(Id::extended(0x680).unwrap(), &[1, 0xAB]).unwrap()).unwrap();
+    let line = client.read_until(">");
+    assert!(line.starts_with("< frame 00000680 ") && line.ends_with(" 01AB >"), "{line}");
+}
+
+#[test]
+fn commands_may_be_cut_anywhere_and_glued_together() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    let commands = b"< send 281 0  >< send 1C1 2 2 f >< send 00000281 8 1 2 3 4 5 6 7 8 >";
+    let expected = [
+        frame(0x281, &[]),
+        frame(0x1C1, &[2, 15]),
+        CanFrame::classic(Id::extended(0x281).unwrap(), &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap(),
+    ];
+    let mut client = Raw::raw_mode(&server);
+    client.0.set_nodelay(true).unwrap();
+    for cut in (0..commands.len()).step_by(7) {
+        client.0.write_all(&commands[..cut]).unwrap();
+        client.0.write_all(&commands[cut..]).unwrap();
+        for frame in expected {
+            assert_eq!(take(&mut node), frame);
+        }
+    }
+}
+
+#[test]
+fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    let mut clients: Vec<_> = (0..3).map(|_| open(&server.url("can0")).unwrap()).collect();
+    let count = 300;
+    std::thread::scope(|scope| {
+        for (number, client) in clients.iter_mut().enumerate() {
+            scope.spawn(move || {
+                for k in 0..count {
+                    client.send(&frame(number as u32, &[0, k as u8, (k >> 8) as u8])).unwrap();
+                }
+            });
+        }
+    });
+    let order: Vec<_> = (0..3 * count).map(|_| take(&mut node)).collect();
+    for (number, client) in clients.iter_mut().enumerate() {
+        for frame in order.iter().filter(|frame| frame.id().value() != number as u32) {
+            assert_eq!(take(client), *frame);
+        }
+    }
+    node.send(&frame(9, &[])).unwrap();
+    for client in &mut clients {
+        assert_eq!(take(client), frame(9, &[]), "none of its own frames came back");
+    }
+}
+
+#[test]
+fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    let mut sleeper = Raw::raw_mode(&server);
+    let mut listener = open(&server.url("can0")).unwrap();
+    // More than waits for it and fits into the buffers of any system.
+    let count = 100_000;
+    let mut heard = 0;
+    for number in 0..count {
+        node.send(&numbered(number)).unwrap();
+        // Whoever reads hears all.
+        if number % 1000 == 999 {
+            while heard <= number {
+                assert_eq!(take(&mut listener), numbered(heard));
+                heard += 1;
+            }
+        }
+    }
+    let missed = server.stats().missed;
+    assert!(missed > 0, "{:?}", server.stats());
+    // It is still a client: it finds the oldest that waited, and with room again hears what is new.
+    assert!(sleeper.read_until(">").contains(" 00000000 >"));
+    until(|| {
+        sleeper.read();
+        node.send(&numbered(count)).unwrap();
+        let before = server.stats().missed;
+        node.send(&numbered(count)).unwrap();
+        before == server.stats().missed
+    });
+    sleeper.read_until(&format!(" {count:08X} >"));
+}
+
+#[test]
+fn what_cannot_be_said_is_counted_and_what_is_not_understood_does_no_harm() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    let mut client = Raw::connect(&server);
+    assert_eq!(client.read(), "< hi >");
+    assert_eq!(client.ask("< rawmode >"), "< error unknown command >");
+    assert_eq!(client.ask("< send 281 0  >"), "< error unknown command >");
+    assert_eq!(client.ask("<echo>"), "< echo >");
+    assert_eq!(client.ask("< open can0 >"), "< ok >");
+    assert_eq!(client.ask("< subscribe 0 0 123 >"), "< error unknown command >");
+    assert_eq!(client.ask("< rawmode >"), "< ok >");
+    // In raw mode no error texts: python-can would stumble over them.
+    client.say("< rubbish >< send 281 9 >< send xyz 0  ><<<>>> \u{e4} < \u{e4} >");
+    client.say(&"x".repeat(100_000));
+    client.say(&format!("< {}", "y".repeat(100_000)));
+    node.send(&CanFrame::fd(Id::standard(1).unwrap(), &[1; 12]).unwrap()).unwrap();
+    node.send(&CanFrame::remote(Id::standard(1).unwrap(), 0).unwrap()).unwrap();
+    assert_eq!(client.ask("< echo >"), "< echo >");
+    node.send(&numbered(7)).unwrap();
+    assert!(client.read_until(">").contains(" 00000007 >"));
+    until(|| server.stats().not_carried == 2);
+    let stats = server.stats();
+    assert!(stats.not_understood >= 9 && stats.received == 0, "{stats:?}");
+    // Back in the mode without frames.
+    assert_eq!(client.ask("< bcmmode >"), "< ok >");
+    node.send(&numbered(8)).unwrap();
+    assert_eq!(client.ask("< echo >"), "< echo >");
+    client.say("< send 5 0  >");
+    assert_eq!(take(&mut node), frame(5, &[]));
+}
+
+#[test]
+fn an_unknown_bus_is_refused_with_what_there_is() {
+    let (server, _hub) = bench();
+    let mut client = Raw::connect(&server);
+    assert_eq!(client.read(), "< hi >");
+    assert_eq!(client.ask("< open can7 >"), "< error no such bus; there is can0 >");
+    assert_eq!(client.read(), "", "and the connection ends");
+    let error = open(&server.url("can7")).err().expect("no such bus").to_string();
+    assert!(error.contains("opening the bus") && error.contains("there is can0"), "{error}");
+}
+
+#[test]
+fn the_client_says_when_the_server_goes_and_when_it_was_never_there() {
+    let (server, hub) = bench();
+    let url = server.url("can0");
+    let mut client = open(&url).unwrap();
+    let mut node = hub.join();
+    node.send(&numbered(1)).unwrap();
+    assert_eq!(take(&mut client), numbered(1));
+    drop(server);
+    let error = client.receive(PATIENCE).expect_err("the server is gone");
+    assert!(matches!(error, CanError::Closed { .. }) && error.to_string().contains(&url), "{error}");
+    assert!(matches!(client.receive(Duration::ZERO), Err(CanError::Closed { .. })), "for good");
+    assert!(matches!(client.send(&numbered(1)), Err(CanError::Closed { .. })));
+    let error = open(&url).err().expect("no server").to_string();
+    assert!(error.contains("cannot connect") && error.contains(&url), "{error}");
+}
+
+#[test]
+fn the_client_refuses_what_the_protocol_cannot_carry() {
+    let (server, _hub) = bench();
+    let mut client = open(&server.url("can0")).unwrap();
+    for frame in [
+        CanFrame::fd(Id::standard(1).unwrap(), &[1]).unwrap(),
+        CanFrame::remote(Id::standard(1).unwrap(), 1).unwrap(),
+    ] {
+        let error = client.send(&frame).expect_err("no form").to_string();
+        assert!(error.contains("multicast:ADDR:PORT"), "{error}");
+    }
+}
+
+/// Frames that a client sent before it ended are heard, even when it did not read what was sent to it.
+#[test]
+fn the_last_frames_of_a_client_are_heard() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    for number in 0..20 {
+        let mut client = open(&server.url("can0")).unwrap();
+        for k in 0..100 {
+            node.send(&numbered(k)).unwrap();
+        }
+        client.send(&numbered(number)).unwrap();
+        drop(client);
+        assert_eq!(take(&mut node), numbered(number));
+    }
+    until(|| server.stats().clients == 0);
+}
+
+/// A server that is no good: each must end in an error, none in a panic or a hang.
+#[test]
+fn servers_that_are_none_end_in_words() {
+    let end_with = |says: &'static [&'static str]| {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let server = std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            for text in says {
+                stream.write_all(text.as_bytes()).unwrap();
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            let _ = stream.shutdown(Shutdown::Write);
+            let _ = stream.read_to_end(&mut Vec::new());
+        });
+        let bus = SocketcandBus::connect("127.0.0.1", port, "can0");
+        let result = bus.map(|mut bus| {
+            let mut frames = Vec::new();
+            let end = loop {
+                match bus.receive(PATIENCE) {
+                    Ok(Some(frame)) => frames.push(frame),
+                    Ok(None) => panic!("it must end"),
+                    Err(error) => break error,
+                }
+            };
+            assert!(matches!(end, CanError::Closed { .. }), "{end}");
+            (frames, bus.ignored(), bus.state().errors)
+        });
+        server.join().unwrap();
+        result
+    };
+    assert!(matches!(end_with(&["HTTP/1.1 400 Bad Request\r\n"]), Err(CanError::Closed { .. })));
+    let refused = end_with(&["< hi >", "< error could not open bus >"]);
+    assert!(matches!(&refused, Err(CanError::Refused { answer, .. }) if answer == "could not open bus"));
+    // All in one piece, blanks or not between bytes, an old and a new kind of line, a cut line at the end.
+    let (frames, ignored, errors) = end_with(&[
+        "< hi >< ok >< ok >< frame 123 1.0 11 22 >< frame 123 1.0 1122 >\n< frame 00000001 2.5  >",
+        "< error 040 1.0 >< rtr 123 1.0 >< frame 5 zz 11 >< frame 12",
+    ])
+    .unwrap();
+    let one = CanFrame::classic(Id::extended(1).unwrap(), &[]).unwrap();
+    assert_eq!(frames, [frame(0x123, &[0x11, 0x22]), frame(0x123, &[0x11, 0x22]), one]);
+    assert_eq!((ignored, errors), (2, ErrorState::BusOff));
+    assert_eq!(
+        end_with(&["< hi >< ok >< ok >< error 040 1 >< error 100 2 >"]).unwrap().2,
+        ErrorState::Active
+    );
+}
+
+#[test]
+fn ten_thousand_visitors_leave_nothing_behind() {
+    let (server, _hub) = bench();
+    let texts: [&[u8]; 5] = [b"", b"< open can0 >", b"< open can0 >< rawmode >", b"<", &[0xFF; 3000]];
+    for number in 0..10_000 {
+        let mut stream = TcpStream::connect(server.local_addr()).unwrap();
+        // The server may have ended the connection already.
+        let _ = stream.write_all(texts[number % texts.len()]);
+        if number % 16 == 15 {
+            // No more at a time than there is room for.
+            until(|| server.stats().accepted > number as u64 && server.stats().clients < 32);
+        }
+    }
+    until(|| server.stats().clients == 0);
+    let stats = server.stats();
+    assert_eq!((stats.accepted, stats.turned_away), (10_000, 0));
+    drop(Raw::raw_mode(&server));
+}
+
+#[test]
+fn more_clients_than_there_is_room_for_are_turned_away() {
+    let (server, _hub) = bench();
+    let clients: Vec<_> = (0..64).map(|_| Raw::raw_mode(&server)).collect();
+    let mut one_more = Raw::connect(&server);
+    match one_more.0.read(&mut [0; 10]) {
+        Ok(count) => assert_eq!(count, 0),
+        Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+    }
+    assert_eq!(server.stats().turned_away, 1);
+    drop(clients);
+    until(|| server.stats().clients == 0);
+    Raw::raw_mode(&server);
+}
+
+#[test]
+fn a_host_can_run_the_bus_itself() {
+    let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0", "can1"]).unwrap();
+    let joined = |gateway: &mut SocketcandGateway, name| {
+        let bus = open(&gateway.url(name)).unwrap();
+        let event = gateway.next(PATIENCE).unwrap();
+        assert_eq!(event.event, ClientEvent::Joined);
+        (bus, event.client, event.channel)
+    };
+    let (mut a, id_a, channel) = joined(&mut gateway, "can0");
+    assert_eq!(channel, 0);
+    let (mut b, id_b, _) = joined(&mut gateway, "can0");
+    let (mut other, _, channel) = joined(&mut gateway, "can1");
+    assert_eq!(channel, 1);
+    assert_ne!(id_a, id_b);
+    a.send(&numbered(1)).unwrap();
+    let event = gateway.next(PATIENCE).unwrap();
+    assert_eq!((event.channel, event.client, event.event), (0, id_a, ClientEvent::Frame(numbered(1))));
+    // Nobody has heard it yet: the host decides.
+    gateway.deliver(0, &numbered(2), None);
+    gateway.deliver(0, &numbered(1), Some(id_a));
+    gateway.deliver(0, &numbered(3), None);
+    assert_eq!([take(&mut a), take(&mut a)], [numbered(2), numbered(3)]);
+    assert_eq!([take(&mut b), take(&mut b), take(&mut b)], [numbered(2), numbered(1), numbered(3)]);
+    assert_eq!(other.receive(Duration::ZERO).unwrap(), None);
+    drop(a);
+    let event = gateway.next(PATIENCE).unwrap();
+    assert_eq!((event.client, event.event), (id_a, ClientEvent::Left));
+    assert_eq!(gateway.next(Duration::ZERO), None);
+    // Full queues towards a host that takes nothing do not keep the gateway from ending.
+    std::thread::scope(|scope| {
+        scope.spawn(move || while b.send(&numbered(4)).is_ok() {});
+        until(|| gateway.stats().received > 1000);
+        drop(gateway);
+    });
+}
+
+#[test]
+fn a_taken_address_is_an_error_with_the_way_out() {
+    let (server, hub) = bench();
+    let again = SocketcandServer::bind(server.local_addr(), &[("can0", &hub)]).err().expect("taken");
+    let message = again.to_string();
+    assert!(message.contains(&server.local_addr().to_string()) && message.contains("Port 0"), "{message}");
+}

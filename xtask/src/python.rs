@@ -56,11 +56,12 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 6] = [
+const CHECKS: [Check; 7] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
     Check { script: "can/check_multicast.py", program: None, demo_files: &[] },
+    Check { script: "can/check_socketcand.py", program: None, demo_files: &[] },
     Check {
         script: "recording/check_mcap.py",
         program: None,
@@ -78,9 +79,12 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     });
     let mut built = false;
     tally.step("programs for the references", || {
-        for (package, example) in
-            [("jtc-dynamics", "reference"), ("jtc-sim", "free_fall"), ("can-link", "echo")]
-        {
+        for (package, example) in [
+            ("jtc-dynamics", "reference"),
+            ("jtc-sim", "free_fall"),
+            ("can-link", "echo"),
+            ("can-link", "socketcand_server"),
+        ] {
             run(&mut cargo(&["build", "--release", "--package", package, "--example", example]))?;
         }
         run(&mut cargo(&["build", "--release", "--package", "jtc-cli"]))?;

@@ -1,0 +1,141 @@
+"""python-can's socketcand interface against can-link's server.
+
+Needs python-can. The example `socketcand_server` is taken from $JTC_EXAMPLES, else built with cargo. Exit code 0: all agreed.
+"""
+
+import logging
+import os
+import pathlib
+import random
+import subprocess
+import sys
+import threading
+import time
+
+import can
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PATIENCE_S = 120.0
+BURST = 5000
+
+
+def server_program() -> list[str]:
+    built = os.environ.get("JTC_EXAMPLES")
+    if built and (pathlib.Path(built) / "socketcand_server").exists():
+        return [str(pathlib.Path(built) / "socketcand_server")]
+    cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", "socketcand_server"]
+    return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml"), "--"]
+
+
+def connect(port: int, channel: str) -> can.BusABC:
+    return can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel=channel)
+
+
+def heard(bus: can.BusABC) -> can.Message:
+    """The next message; python-can returns without one when only part of a line has come."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        message = bus.recv(1.0)
+        if message is not None:
+            return message
+    raise AssertionError("nothing came")
+
+
+def same(sent: can.Message, got: can.Message, step: int = 0) -> None:
+    for field in ("is_extended_id", "is_remote_frame", "is_error_frame", "is_fd", "dlc"):
+        assert getattr(sent, field) == getattr(got, field), f"{field}: {sent} became {got}"
+    assert sent.arbitration_id + step == got.arbitration_id, f"{sent} became {got}"
+    assert bytes(sent.data) == bytes(got.data), f"{sent} became {got}"
+
+
+def check_kinds(port: int, rng: random.Random) -> None:
+    """Both directions, every length, both widths of identifiers; bytes from 0 to 255."""
+    count = 0
+    with connect(port, "can0") as bus:
+        for extended, top in ((False, 0x7FF), (True, 0x1FFFFFFF)):
+            for length in range(9):
+                for data in (rng.randbytes(length), bytes(range(length)), bytes([255] * length)):
+                    number = rng.choice([0, top - 1, rng.randrange(0, top) & ~1])
+                    message = can.Message(arbitration_id=number, is_extended_id=extended, data=data, check=True)
+                    bus.send(message)
+                    same(message, heard(bus), step=1)
+                    count += 1
+    print(f"{count} frames answered alike")
+
+
+def check_two(port: int) -> None:
+    """Two clients: each hears the other once and itself never, in order, a burst without gaps."""
+    with connect(port, "can1") as one, connect(port, "can1") as two:
+        def send() -> None:
+            for number in range(BURST):
+                one.send(can.Message(arbitration_id=0x100, is_extended_id=False, data=number.to_bytes(2, "big")))
+
+        sender = threading.Thread(target=send)
+        sender.start()
+        for number in range(BURST):
+            message = heard(two)
+            assert message.arbitration_id == 0x100 and bytes(message.data) == number.to_bytes(2, "big"), message
+        sender.join()
+        # A frame back: what `one` hears first is this, so none of its own came back.
+        two.send(can.Message(arbitration_id=0x200, is_extended_id=False))
+        message = heard(one)
+        assert message.arbitration_id == 0x200 and message.dlc == 0, message
+    print(f"a burst of {BURST} frames from one client to the other")
+
+
+def check_busy(port: int) -> None:
+    """A bus that is never quiet: connecting works and the frames come without gaps.
+
+    Between two reads of python-can's constructor a computer that is busy may pause longer than frames are held back; then the
+    client itself refuses. That is tried again.
+    """
+    attempts, connected = 60, 0
+    for _ in range(attempts):
+        try:
+            bus = connect(port, "busy")
+        except can.CanError as error:
+            print(f"tried again: {error}")
+            continue
+        with bus:
+            first = int.from_bytes(heard(bus).data, "big")
+            for number in range(first + 1, first + 20):
+                message = heard(bus)
+                assert int.from_bytes(message.data, "big") == number, message
+        connected += 1
+        if connected == 20:
+            print("20 connections to a busy bus")
+            return
+    raise AssertionError(f"only {connected} of {attempts} connections to a busy bus")
+
+
+def check_unknown_bus(port: int) -> None:
+    try:
+        connect(port, "can9")
+    except can.CanError as error:
+        assert "there is can0, can1, busy" in str(error), error
+        return
+    raise AssertionError("a bus that is not there was opened")
+
+
+def main() -> int:
+    # A line that is cut between two reads is no news.
+    logging.getLogger("can").setLevel(logging.CRITICAL)
+    seed = int(os.environ.get("SEED", random.randrange(2**32)))
+    print(f"seed {seed}")
+    server = subprocess.Popen([*server_program(), "127.0.0.1:0"], stdout=subprocess.PIPE, text=True)
+    try:
+        line = server.stdout.readline()
+        assert line.startswith("ready: socketcand:127.0.0.1:"), line
+        port = int(line.rsplit(":", 1)[1].split("/")[0])
+        check_kinds(port, random.Random(seed))
+        check_two(port)
+        check_busy(port)
+        check_unknown_bus(port)
+    finally:
+        server.terminate()
+        server.wait()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

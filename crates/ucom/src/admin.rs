@@ -1,0 +1,76 @@
+//! The four flags of MCA_ADMIN_DATA (D-37).
+
+use core::fmt;
+
+use crate::frame::Payload;
+
+/// Flags of the addressed board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Admin {
+    /// The control loop runs.
+    pub run: bool,
+    /// Outputs are enabled; never without `run`.
+    pub active: bool,
+    /// The module sends its texts.
+    pub debug: bool,
+    /// All texts of the board are sent.
+    pub global_debug: bool,
+}
+
+impl Admin {
+    /// The 4 bytes.
+    pub const fn payload(self) -> Payload {
+        let data = [self.run as u8, self.active as u8, self.debug as u8, self.global_debug as u8, 0, 0, 0, 0];
+        Payload::of(data, 4)
+    }
+
+    /// `None` when a byte is neither 0 nor 1: such a frame is ignored.
+    pub const fn from_bytes(bytes: [u8; 4]) -> Option<Self> {
+        if bytes[0] > 1 || bytes[1] > 1 || bytes[2] > 1 || bytes[3] > 1 {
+            return None;
+        }
+        Some(Self {
+            run: bytes[0] == 1,
+            active: bytes[1] == 1,
+            debug: bytes[2] == 1,
+            global_debug: bytes[3] == 1,
+        })
+    }
+}
+
+/// `run active`, or `-`.
+impl fmt::Display for Admin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let flags = [
+            (self.run, "run"),
+            (self.active, "active"),
+            (self.debug, "debug"),
+            (self.global_debug, "global-debug"),
+        ];
+        let mut gap = "";
+        for (_, name) in flags.iter().filter(|(on, _)| *on) {
+            write!(f, "{gap}{name}")?;
+            gap = " ";
+        }
+        if gap.is_empty() { f.write_str("-") } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn d37_flags_are_0_or_1() {
+        for number in 0..16u8 {
+            let bytes = [number & 1, number >> 1 & 1, number >> 2 & 1, number >> 3 & 1];
+            let admin = Admin::from_bytes(bytes).unwrap();
+            assert_eq!(admin.payload().bytes(), bytes);
+        }
+        for place in 0..4 {
+            let mut bytes = [0; 4];
+            bytes[place] = 2;
+            assert_eq!(Admin::from_bytes(bytes), None);
+        }
+    }
+}

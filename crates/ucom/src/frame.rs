@@ -1,0 +1,263 @@
+//! A frame of the bus, and why one is not of this protocol.
+
+use core::fmt;
+use core::str::FromStr;
+
+use crate::function::{Function, Sequence};
+
+/// Up to 8 data bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Payload {
+    len: u8,
+    data: [u8; 8],
+}
+
+impl Payload {
+    /// No data, DLC 0.
+    pub const EMPTY: Self = Self { len: 0, data: [0; 8] };
+
+    /// `None` when `data` is longer than 8 bytes.
+    pub const fn new(data: &[u8]) -> Option<Self> {
+        if data.len() > 8 {
+            return None;
+        }
+        let mut payload = Self { len: data.len() as u8, data: [0; 8] };
+        let mut i = 0;
+        while i < data.len() {
+            payload.data[i] = data[i];
+            i += 1;
+        }
+        Some(payload)
+    }
+
+    /// The first `len` bytes of `data`, `len` at most 8; for encoders.
+    pub(crate) const fn of(data: [u8; 8], len: usize) -> Self {
+        let len = if len > 8 { 8 } else { len };
+        let mut payload = Self { len: len as u8, data: [0; 8] };
+        let mut i = 0;
+        while i < len {
+            payload.data[i] = data[i];
+            i += 1;
+        }
+        payload
+    }
+
+    /// The bytes.
+    pub fn bytes(&self) -> &[u8] {
+        self.data.get(..usize::from(self.len)).unwrap_or(&[])
+    }
+
+    /// All 8 bytes, 0 beyond the length (padding is 0, D-12).
+    pub const fn padded(&self) -> [u8; 8] {
+        self.data
+    }
+
+    /// Number of bytes, 0..8: the DLC.
+    pub const fn len(&self) -> u8 {
+        self.len
+    }
+
+    /// Whether the DLC is 0.
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+}
+
+/// A classic CAN data frame with an 11-bit identifier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame {
+    id: u16,
+    payload: Payload,
+}
+
+/// How a frame arrived, for drivers that hear everything on a bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Format {
+    /// 29-bit identifier.
+    pub extended: bool,
+    /// Remote frame.
+    pub remote: bool,
+    /// CAN FD, else classic.
+    pub fd: bool,
+}
+
+impl Format {
+    /// The only format of this protocol: a classic data frame with an 11-bit identifier (D-02).
+    pub const BUS: Self = Self { extended: false, remote: false, fd: false };
+}
+
+/// Why a frame is not of this protocol: it is counted and shown, never acted on (D-02).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Foreign {
+    /// 29-bit identifier.
+    Extended,
+    /// Remote frame.
+    Remote,
+    /// CAN FD frame.
+    Fd,
+    /// Bit 5 of the identifier is set; no identifier of the formula has it (D-01).
+    Bit5,
+    /// Function 28..31: they fit into the identifier, and nobody has given them a meaning.
+    NoFunction(u8),
+    /// More than 11 bits of identifier or more than 8 bytes of data.
+    Malformed,
+}
+
+impl fmt::Display for Foreign {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Extended => f.write_str("29-bit identifier"),
+            Self::Remote => f.write_str("remote frame"),
+            Self::Fd => f.write_str("CAN FD frame"),
+            Self::Bit5 => f.write_str("bit 5 of the identifier is set"),
+            Self::NoFunction(number) => write!(f, "there is no function {number}"),
+            Self::Malformed => f.write_str("identifier or data longer than classic CAN has"),
+        }
+    }
+}
+
+impl core::error::Error for Foreign {}
+
+impl Frame {
+    /// `None` when `id` has more than 11 bits or `data` more than 8 bytes. The id may be one of no function:
+    /// [`Frame::address`] tells.
+    pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
+        if id > 0x7FF {
+            return None;
+        }
+        match Payload::new(data) {
+            Some(payload) => Some(Self { id, payload }),
+            None => None,
+        }
+    }
+
+    /// A frame of this protocol; infallible, as a [`Sequence`] always fits.
+    pub const fn of(function: Function, sequence: Sequence, payload: Payload) -> Self {
+        Self { id: function.id(sequence), payload }
+    }
+
+    /// A frame as heard on a bus where others may talk, too (D-02).
+    pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, Foreign> {
+        match format {
+            Format { extended: true, .. } => return Err(Foreign::Extended),
+            Format { remote: true, .. } => return Err(Foreign::Remote),
+            Format { fd: true, .. } => return Err(Foreign::Fd),
+            _ => {}
+        }
+        let id = u16::try_from(id).map_err(|_| Foreign::Malformed)?;
+        let frame = Self::new(id, data).ok_or(Foreign::Malformed)?;
+        frame.address().map(|_| frame)
+    }
+
+    /// Identifier, 11 bits.
+    pub const fn id(&self) -> u16 {
+        self.id
+    }
+
+    /// Function and sequence number in the identifier (D-01).
+    pub const fn address(&self) -> Result<(Function, Sequence), Foreign> {
+        Function::split(self.id)
+    }
+
+    /// The data bytes.
+    pub fn data(&self) -> &[u8] {
+        self.payload.bytes()
+    }
+
+    /// The data bytes as a value.
+    pub const fn payload(&self) -> Payload {
+        self.payload
+    }
+
+    /// Length code, 0..8.
+    pub const fn dlc(&self) -> u8 {
+        self.payload.len
+    }
+}
+
+/// As candump prints frames: `1C1#0202`.
+impl fmt::Display for Frame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:03X}#", self.id)?;
+        self.data().iter().try_for_each(|byte| write!(f, "{byte:02X}"))
+    }
+}
+
+/// A text that is no frame of the form `1C1#0202`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotAFrame;
+
+impl fmt::Display for NotAFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a frame is written as three hex digits, #, and up to 8 bytes in hex: 1C1#0202")
+    }
+}
+
+impl core::error::Error for NotAFrame {}
+
+/// The form that candump prints; blanks and dots between bytes are allowed.
+impl FromStr for Frame {
+    type Err = NotAFrame;
+
+    fn from_str(text: &str) -> Result<Self, NotAFrame> {
+        let (id, data) = text.trim().split_once('#').ok_or(NotAFrame)?;
+        if id.len() != 3 || !id.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Err(NotAFrame);
+        }
+        let id = u16::from_str_radix(id, 16).map_err(|_| NotAFrame)?;
+        let mut bytes = [0; 8];
+        let mut digits = 0;
+        for character in data.chars().filter(|c| !matches!(c, ' ' | '.' | '_')) {
+            let digit = character.to_digit(16).ok_or(NotAFrame)? as u8;
+            let byte = bytes.get_mut(digits / 2).ok_or(NotAFrame)?;
+            *byte = *byte << 4 | digit;
+            digits += 1;
+        }
+        if digits % 2 != 0 {
+            return Err(NotAFrame);
+        }
+        let data = bytes.get(..digits / 2).ok_or(NotAFrame)?;
+        Self::new(id, data).ok_or(NotAFrame)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn d02_c2_foreign_frames_are_told_apart() {
+        let bus = Format::BUS;
+        assert_eq!(Frame::received(0x281, Format { extended: true, ..bus }, &[]), Err(Foreign::Extended));
+        assert_eq!(Frame::received(0x281, Format { remote: true, ..bus }, &[]), Err(Foreign::Remote));
+        assert_eq!(Frame::received(0x281, Format { fd: true, ..bus }, &[]), Err(Foreign::Fd));
+        assert_eq!(Frame::received(0x2A1, bus, &[]), Err(Foreign::Bit5));
+        for function in 28..32u8 {
+            let id = u32::from(function) << 6 | 3;
+            assert_eq!(Frame::received(id, bus, &[]), Err(Foreign::NoFunction(function)));
+        }
+        assert_eq!(Frame::received(0x800, bus, &[]), Err(Foreign::Malformed));
+        assert_eq!(Frame::received(0x1_0281, bus, &[]), Err(Foreign::Malformed));
+        assert_eq!(Frame::received(0x281, bus, &[0; 9]), Err(Foreign::Malformed));
+        assert!(Frame::received(0x281, bus, &[0; 8]).is_ok());
+    }
+
+    #[test]
+    fn d04_c3_the_frame_000_is_a_frame() {
+        let frame = Frame::received(0, Format::BUS, &[]).unwrap();
+        assert_eq!(frame.address(), Ok((Function::Reset, Sequence::ZERO)));
+        assert_eq!(frame.to_string(), "000#");
+        assert_eq!("000#".parse(), Ok(frame));
+    }
+
+    #[test]
+    fn text_form_is_exact() {
+        for bad in ["", "281", "28#", "0281#", "800#", "281#1", "281#gg", "281#112233445566778899", "+81#"] {
+            assert_eq!(bad.parse::<Frame>(), Err(NotAFrame), "{bad}");
+        }
+        let frame: Frame = "141#55 43 6F4D.32206865".parse().unwrap();
+        assert_eq!(frame.data(), b"UCoM2 he");
+        assert_eq!(frame.to_string(), "141#55436F4D32206865");
+    }
+}

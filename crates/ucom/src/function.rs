@@ -1,0 +1,248 @@
+//! The 28 functions and the identifier they make with a sequence number (D-01).
+
+use core::fmt;
+
+use crate::frame::Foreign;
+
+/// Position of a board in the chain, 0..31. What 0 means depends on the sender (D-04): from the PC it is
+/// everybody, from a board "I have no number yet".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Sequence(u8);
+
+impl Sequence {
+    /// Number 0.
+    pub const ZERO: Self = Self(0);
+    /// The highest number, 31.
+    pub const MAX: Self = Self(31);
+
+    /// `None` above 31: nothing is masked silently (D-01).
+    pub const fn new(number: u8) -> Option<Self> {
+        if number > 31 { None } else { Some(Self(number)) }
+    }
+
+    /// The low 5 bits of a number; for fields that have no more.
+    pub(crate) const fn low5(number: u8) -> Self {
+        Self(number & 0x1F)
+    }
+
+    /// The number, 0..31.
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    /// All numbers, 0 to 31.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..32).map(Self)
+    }
+}
+
+impl fmt::Display for Sequence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
+}
+
+/// Who sends a function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sender {
+    /// The PC only.
+    Pc,
+    /// The boards only.
+    Board,
+    /// Both, with the same identifier; D-05 keeps them apart.
+    Both,
+}
+
+macro_rules! functions {
+    ($($(#[doc = $doc:literal])+ $variant:ident = $number:literal, $name:literal, $sender:ident;)+) => {
+        /// A function of the protocol, the upper five bits of the identifier.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[repr(u8)]
+        pub enum Function { $($(#[doc = $doc])+ $variant = $number),+ }
+
+        impl Function {
+            /// All functions in the order of their numbers.
+            pub const ALL: [Self; 28] = [$(Self::$variant),+];
+
+            /// The name in the published list, `PC_RESET`.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name),+ }
+            }
+
+            /// Who sends it.
+            pub const fn sender(self) -> Sender {
+                match self { $(Self::$variant => Sender::$sender),+ }
+            }
+
+            /// What it is for, one sentence.
+            pub const fn doc(self) -> &'static str {
+                match self { $(Self::$variant => concat!($($doc),+).trim_ascii()),+ }
+            }
+        }
+    };
+}
+
+functions! {
+    /// Reset: outputs safe, number forgotten, boards answer with DSP_REPORT0..3.
+    Reset = 0, "PC_RESET", Pc;
+    /// Special reset before an update: exloader with programming enabled, the number stays.
+    XReset = 1, "PC_XRESET", Pc;
+    /// Error code of a board.
+    Error = 2, "DSP_ERROR", Board;
+    /// A board has taken a number.
+    InitAck = 3, "DSP_INITACK", Board;
+    /// The image is written and verified.
+    ProgFinished = 4, "DSP_PROGFINISHED", Board;
+    /// Numbers, status, program and description of a board.
+    DspInfo = 5, "DSP_INFO", Board;
+    /// A block of program data is taken, the next may come.
+    DspReady = 6, "DSP_READY", Board;
+    /// Sets bits of the status byte.
+    SetStatus = 7, "PC_SETSTATUS", Pc;
+    /// Asks for DSP_INFO.
+    Info = 8, "PC_INFO", Pc;
+    /// Asks every board for its DSP_REPORT, without a reset.
+    AskReport = 9, "PC_REPORT", Pc;
+    /// Gives the number in the identifier to the next board of the chain.
+    Init = 10, "PC_INIT", Pc;
+    /// Eight bytes of program data.
+    Prog = 11, "PC_PROG", Pc;
+    /// The exloader starts the application.
+    Start = 12, "PC_START", Pc;
+    /// Sets controller inputs.
+    Ci = 13, "MCA_PC_CI", Pc;
+    /// Sensor outputs of a running board.
+    So = 14, "MCA_DSP_SO", Board;
+    /// Sets parameters.
+    Par = 15, "MCA_PC_PAR", Pc;
+    /// A board is there; flash ids 0..31.
+    Report0 = 16, "DSP_REPORT0", Board;
+    /// A board is there; flash ids 32..63.
+    Report1 = 17, "DSP_REPORT1", Board;
+    /// A board is there; flash ids 64..95.
+    Report2 = 18, "DSP_REPORT2", Board;
+    /// A board is there; flash ids 96..127.
+    Report3 = 19, "DSP_REPORT3", Board;
+    /// The application is up and serves the MCA_ functions.
+    McaReady = 20, "MCA_DSP_READY", Board;
+    /// The control loop starts.
+    McaStart = 21, "MCA_PC_START", Pc;
+    /// Asks for, and carries, the descriptions of inputs, outputs and parameters.
+    DumpIo = 22, "MCA_DUMP_IO_DESCRIPTION", Both;
+    /// Asks for the initial controller inputs.
+    DumpCi = 23, "MCA_DUMP_CI", Pc;
+    /// The flags run, active, debug and global debug, set by the PC and told by the board.
+    Admin = 24, "MCA_ADMIN_DATA", Both;
+    /// A text for people.
+    Debug = 25, "MCA_DEBUG_MSG", Board;
+    /// Life sign.
+    Alive = 26, "MCA_ALIVE", Both;
+    /// Initial controller inputs.
+    DspCi = 27, "MCA_DSP_CI", Board;
+}
+
+impl Function {
+    /// The function of a number; `None` above 27.
+    pub const fn from_number(number: u8) -> Option<Self> {
+        if number < 28 { Some(Self::ALL[number as usize]) } else { None }
+    }
+
+    /// The number, 0..27.
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// The identifier `(sequence & 0x1F) | ((function & 0x3F) << 6)` (D-01).
+    pub const fn id(self, sequence: Sequence) -> u16 {
+        (sequence.0 as u16 & 0x1F) | ((self as u16 & 0x3F) << 6)
+    }
+
+    /// DSP_REPORT0..3.
+    pub const fn report(k: u8) -> Option<Self> {
+        if k < 4 { Self::from_number(16 + k) } else { None }
+    }
+
+    /// Function and sequence number of an identifier.
+    pub const fn split(id: u16) -> Result<(Self, Sequence), Foreign> {
+        if id > 0x7FF {
+            return Err(Foreign::Malformed);
+        }
+        if id & 0x20 != 0 {
+            return Err(Foreign::Bit5);
+        }
+        let number = (id >> 6) as u8;
+        match Self::from_number(number) {
+            Some(function) => Ok((function, Sequence((id & 0x1F) as u8))),
+            None => Err(Foreign::NoFunction(number)),
+        }
+    }
+
+    /// Whether the PC may send it: a board acts on these only.
+    pub const fn from_pc(self) -> bool {
+        !matches!(self.sender(), Sender::Board)
+    }
+
+    /// Whether a board may send it: the PC acts on these only.
+    pub const fn from_board(self) -> bool {
+        !matches!(self.sender(), Sender::Pc)
+    }
+
+    /// Whether a board takes it when it goes to everybody (D-04).
+    pub const fn broadcast(self) -> bool {
+        use Function::*;
+        matches!(
+            self,
+            Reset | AskReport | XReset | SetStatus | Info | Prog | Start | McaStart | Admin | Alive
+        )
+    }
+}
+
+impl fmt::Display for Function {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// C-1: all 28 functions and 32 numbers give the published formula, and back.
+    #[test]
+    fn d01_c1_identifiers_follow_the_formula() {
+        for (number, function) in Function::ALL.into_iter().enumerate() {
+            assert_eq!(usize::from(function.number()), number);
+            for sequence in 0..32u16 {
+                let id = (sequence & 0x001f) | ((number as u16 & 0x003f) << 6);
+                let place = Sequence::new(sequence as u8).unwrap();
+                assert_eq!(function.id(place), id);
+                assert_eq!(Function::split(id), Ok((function, place)));
+            }
+        }
+        assert_eq!(Function::DspCi.id(Sequence::MAX), 0x6DF);
+    }
+
+    #[test]
+    fn d01_nothing_is_masked() {
+        assert_eq!(Sequence::new(32), None);
+        assert_eq!(Sequence::new(255), None);
+        assert_eq!(Function::from_number(28), None);
+        assert_eq!(Function::from_number(32), None);
+        assert_eq!(Function::report(4), None);
+        assert_eq!(Function::split(0x800), Err(Foreign::Malformed));
+    }
+
+    /// D-00: the published list of names and numbers stands as it is.
+    #[test]
+    fn d00_names_are_those_of_the_list() {
+        assert_eq!(Function::from_number(22).unwrap().name(), "MCA_DUMP_IO_DESCRIPTION");
+        assert_eq!(Function::from_number(19).unwrap().name(), "DSP_REPORT3");
+        assert_eq!(Function::ALL.iter().filter(|f| f.sender() == Sender::Both).count(), 3);
+        for function in Function::ALL {
+            let name = function.name();
+            let board = name.starts_with("DSP_") || name.starts_with("MCA_DSP_") || name == "MCA_DEBUG_MSG";
+            assert_eq!(function.sender() == Sender::Board, board, "{name}");
+            assert!(!function.doc().starts_with(' ') && function.doc().ends_with('.'), "{name}");
+        }
+    }
+}

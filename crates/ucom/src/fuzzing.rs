@@ -1,0 +1,28 @@
+//! Bodies of the fuzz targets.
+
+use crate::{Frame, FromBoard, Profile, ToBoard};
+
+/// Two bytes of identifier, then the payload: read as either side, send again, compare.
+pub fn frame(data: &[u8]) {
+    let Some((id, payload)) = data.split_first_chunk::<2>() else { return };
+    let Some(frame) = Frame::new(u16::from_be_bytes(*id) & 0x7FF, payload) else { return };
+    let profile = Profile::default();
+    if let Ok((to, message)) = ToBoard::decode(&frame, &profile) {
+        let again = message.encode(to, &profile);
+        assert_eq!(again.id(), frame.id());
+        assert!(ToBoard::decode(&again, &profile).is_ok());
+    }
+    if let Ok((from, message)) = FromBoard::decode(&frame, &profile) {
+        let again = message.encode(from, &profile);
+        assert_eq!(again.id(), frame.id());
+        assert!(FromBoard::decode(&again, &profile).is_ok());
+    }
+}
+
+/// Text of a profile file.
+pub fn profile(data: &[u8]) {
+    let Ok(text) = core::str::from_utf8(data) else { return };
+    if let Ok(profile) = Profile::from_toml(text) {
+        assert_eq!(Profile::from_toml(&profile.to_toml()), Ok(profile));
+    }
+}

@@ -1,0 +1,190 @@
+//! The header block, the first block of each cycle (D-41).
+
+use core::fmt;
+
+use crate::profile::Endian;
+
+/// Bytes of a block: 8 frames of 8 bytes, 32 words (D-40).
+pub const BLOCK_LEN: usize = 64;
+
+const MAGIC: u16 = 0x5543;
+const VERSION: u16 = 1;
+
+/// Where an image goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Memory {
+    /// Program flash.
+    Program,
+    /// Data flash.
+    Data,
+    /// RAM, for an exloader.
+    Ram,
+}
+
+impl Memory {
+    /// The number in the header.
+    pub const fn number(self) -> u16 {
+        match self {
+            Self::Program => 0,
+            Self::Data => 1,
+            Self::Ram => 0x10,
+        }
+    }
+
+    /// `None` for a number without a meaning.
+    pub const fn from_number(number: u16) -> Option<Self> {
+        match number {
+            0 => Some(Self::Program),
+            1 => Some(Self::Data),
+            0x10 => Some(Self::Ram),
+            _ => None,
+        }
+    }
+}
+
+/// What the header block says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// 1 or 2; others are possible on the wire and refused by boards.
+    pub cycle: u16,
+    /// Number of the memory, see [`Memory::from_number`].
+    pub memory: u16,
+    /// Load address in words.
+    pub address: u32,
+    /// Length of the image in words.
+    pub length: u32,
+    /// Program ID of the image (D-44).
+    pub program_id: u16,
+    /// Flash date (D-45).
+    pub date: u16,
+    /// Flash number of the board it is for, [`Header::ANY_BOARD`] for every one.
+    pub target: u16,
+}
+
+/// Why a block is no header (DSP_ERROR 5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeaderError {
+    /// Word 0 is not 0x5543 but this.
+    Magic(u16),
+    /// Word 1 is not 1 but this.
+    Version(u16),
+    /// The 32 words do not add up to 0 but to this.
+    Sum(u16),
+}
+
+impl fmt::Display for HeaderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Magic(word) => write!(f, "header starts with {word:04X}, not 5543"),
+            Self::Version(word) => write!(f, "header version {word}, only 1 is known"),
+            Self::Sum(word) => write!(f, "the words of the header add up to {word:04X}, not 0"),
+        }
+    }
+}
+
+impl core::error::Error for HeaderError {}
+
+impl Header {
+    /// Target of an image that any board may take.
+    pub const ANY_BOARD: u16 = 0xFFFF;
+
+    /// The block, in program word order.
+    pub fn build(&self, endian: Endian) -> [u8; BLOCK_LEN] {
+        let mut words = [0xFFFFu16; 32];
+        let fields = [
+            MAGIC,
+            VERSION,
+            self.cycle,
+            self.memory,
+            self.address as u16,
+            (self.address >> 16) as u16,
+            self.length as u16,
+            (self.length >> 16) as u16,
+            self.program_id,
+            self.date,
+            self.target,
+        ];
+        for (word, field) in words.iter_mut().zip(fields) {
+            *word = field;
+        }
+        let sum = words.iter().take(31).fold(0u16, |sum, word| sum.wrapping_add(*word));
+        if let Some(last) = words.last_mut() {
+            *last = sum.wrapping_neg();
+        }
+        let mut block = [0; BLOCK_LEN];
+        for (place, word) in block.chunks_exact_mut(2).zip(words) {
+            place.copy_from_slice(&endian.bytes(word));
+        }
+        block
+    }
+
+    /// The header in a block.
+    pub fn parse(block: &[u8; BLOCK_LEN], endian: Endian) -> Result<Self, HeaderError> {
+        let mut words = [0u16; 32];
+        for (word, bytes) in words.iter_mut().zip(block.chunks_exact(2)) {
+            if let &[a, b] = bytes {
+                *word = endian.word([a, b]);
+            }
+        }
+        let [magic, version, cycle, memory, a0, a1, l0, l1, program_id, date, target, ..] = words;
+        if magic != MAGIC {
+            return Err(HeaderError::Magic(magic));
+        }
+        if version != VERSION {
+            return Err(HeaderError::Version(version));
+        }
+        let sum = words.iter().fold(0u16, |sum, word| sum.wrapping_add(*word));
+        if sum != 0 {
+            return Err(HeaderError::Sum(sum));
+        }
+        let long = |low: u16, high: u16| u32::from(high) << 16 | u32::from(low);
+        Ok(Self { cycle, memory, address: long(a0, a1), length: long(l0, l1), program_id, date, target })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Golden vector 13.4, byte for byte.
+    #[test]
+    fn d41_header_golden() {
+        let mut header = Header {
+            cycle: 1,
+            memory: 0,
+            address: 0,
+            length: 500,
+            program_id: 0x4B3F,
+            date: 0x3AC1,
+            target: Header::ANY_BOARD,
+        };
+        let mut block = [0xFF; 64];
+        block[..20].copy_from_slice(&[
+            0x43, 0x55, 0x01, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xF4, 0x01, 0x00, 0x00,
+            0x3F, 0x4B, 0xC1, 0x3A,
+        ]);
+        block[62..].copy_from_slice(&[0xDC, 0x22]);
+        assert_eq!(header.build(Endian::Little), block);
+        assert_eq!(Header::parse(&block, Endian::Little), Ok(header));
+        // Cycle 2 is the same but for the cycle and the sum.
+        header.cycle = 2;
+        (block[4], block[62]) = (0x02, 0xDB);
+        assert_eq!(header.build(Endian::Little), block);
+        assert_eq!(Header::parse(&block, Endian::Big), Err(HeaderError::Magic(0x4355)));
+    }
+
+    proptest! {
+        #[test]
+        fn d41_round_trip(words: [u16; 5], address: u32, length: u32, big: bool, at in 0..64usize, flip in 1..=255u8) {
+            let [cycle, memory, program_id, date, target] = words;
+            let header = Header { cycle, memory, address, length, program_id, date, target };
+            let endian = if big { Endian::Big } else { Endian::Little };
+            let mut block = header.build(endian);
+            prop_assert_eq!(Header::parse(&block, endian), Ok(header));
+            // One byte changed is always seen: a sum of words finds it.
+            block[at] ^= flip;
+            prop_assert!(Header::parse(&block, endian).is_err());
+        }
+    }
+}

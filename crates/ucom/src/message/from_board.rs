@@ -1,0 +1,122 @@
+//! What a board says.
+
+use super::to_board::package;
+use super::{DecodeError, need};
+use crate::admin::Admin;
+use crate::buffer::BufferPackage;
+use crate::error_code::ErrorCode;
+use crate::frame::{Frame, Payload};
+use crate::function::{Function, Sequence};
+use crate::profile::Profile;
+use crate::report::Report;
+
+/// A message from a board.
+///
+/// DSP_INFO, the IO description and debug texts are several frames with one identifier and no tag (G-15): only
+/// who counts them knows which part a frame is. They come out as bare payloads, to be read with
+/// [`BoardInfo::parse`](crate::BoardInfo::parse), [`Dimensions::parse`](crate::Dimensions::parse) and
+/// [`StringAssembler`](crate::StringAssembler).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FromBoard {
+    /// DSP_ERROR.
+    Error(ErrorCode),
+    /// DSP_INITACK with the number that the board took; it must be the one in the identifier (D-24).
+    InitAck(u8),
+    /// DSP_PROGFINISHED.
+    ProgFinished,
+    /// A part of DSP_INFO: 8 bytes of numbers, then a string.
+    Info(Payload),
+    /// DSP_READY: the block is taken.
+    Ready,
+    /// MCA_DSP_SO.
+    So(BufferPackage),
+    /// DSP_REPORT0..3. The sequence field of its identifier is part of the flash id (D-07).
+    Report(Report),
+    /// MCA_DSP_READY: the application is up.
+    McaReady,
+    /// A part of MCA_DUMP_IO_DESCRIPTION: 6 bytes of dimensions, then strings.
+    IoDescription(Payload),
+    /// MCA_ADMIN_DATA: the board's state.
+    Admin(Admin),
+    /// A part of MCA_DEBUG_MSG: a string.
+    Debug(Payload),
+    /// MCA_ALIVE of the board.
+    Alive,
+    /// MCA_DSP_CI: initial inputs.
+    Ci(BufferPackage),
+}
+
+impl FromBoard {
+    /// The function that carries it.
+    pub const fn function(&self) -> Function {
+        match self {
+            Self::Error(_) => Function::Error,
+            Self::InitAck(_) => Function::InitAck,
+            Self::ProgFinished => Function::ProgFinished,
+            Self::Info(_) => Function::DspInfo,
+            Self::Ready => Function::DspReady,
+            Self::So(_) => Function::So,
+            Self::Report(report) => report.function(),
+            Self::McaReady => Function::McaReady,
+            Self::IoDescription(_) => Function::DumpIo,
+            Self::Admin(_) => Function::Admin,
+            Self::Debug(_) => Function::Debug,
+            Self::Alive => Function::Alive,
+            Self::Ci(_) => Function::DspCi,
+        }
+    }
+
+    /// The frame of a board. A report brings its own sequence field, `from` does not count there.
+    pub fn encode(&self, from: Sequence, profile: &Profile) -> Frame {
+        let byte = |byte| Payload::of([byte, 0, 0, 0, 0, 0, 0, 0], 1);
+        let (sequence, payload) = match *self {
+            Self::Error(code) => (from, byte(code.number())),
+            Self::InitAck(number) => (from, byte(number)),
+            Self::Report(report) => (report.id_field, byte(report.ucom_id)),
+            Self::So(package) | Self::Ci(package) => {
+                (from, package.payload(profile.endian, profile.pd_short_last))
+            }
+            Self::Info(payload) | Self::IoDescription(payload) | Self::Debug(payload) => (from, payload),
+            Self::Admin(admin) => (from, admin.payload()),
+            Self::ProgFinished | Self::Ready | Self::McaReady | Self::Alive => (from, Payload::EMPTY),
+        };
+        Frame::of(self.function(), sequence, payload)
+    }
+
+    /// The message in a frame and the sequence field of its identifier.
+    pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
+        let (function, from) = frame.address().map_err(DecodeError::Foreign)?;
+        let empty = |message| need(frame, function, 0, profile).map(|_| message);
+        let byte = || need(frame, function, 1, profile).map(|payload| payload.padded()[0]);
+        let some = || {
+            let len = frame.dlc();
+            let short = DecodeError::TooShort { function, len, need: 1 };
+            if len == 0 { Err(short) } else { Ok(frame.payload()) }
+        };
+        let message = match function {
+            Function::Error => Self::Error(ErrorCode::from_number(byte()?)),
+            Function::InitAck => Self::InitAck(byte()?),
+            Function::ProgFinished => empty(Self::ProgFinished)?,
+            Function::DspInfo => Self::Info(some()?),
+            Function::DspReady => empty(Self::Ready)?,
+            Function::So => Self::So(package(frame, function, profile)?),
+            Function::Report0 | Function::Report1 | Function::Report2 | Function::Report3 => {
+                let k = function.number() - Function::Report0.number();
+                Self::Report(Report { k, id_field: from, ucom_id: byte()? })
+            }
+            Function::McaReady => empty(Self::McaReady)?,
+            // Without data it is the PC's request, always (D-12).
+            Function::DumpIo if frame.dlc() > 0 => Self::IoDescription(some()?),
+            Function::Admin => {
+                let [run, active, debug, global, ..] = need(frame, function, 4, profile)?.padded();
+                let admin = Admin::from_bytes([run, active, debug, global]);
+                Self::Admin(admin.ok_or(DecodeError::Value(function))?)
+            }
+            Function::Debug => Self::Debug(some()?),
+            Function::Alive => empty(Self::Alive)?,
+            Function::DspCi => Self::Ci(package(frame, function, profile)?),
+            other => return Err(DecodeError::Direction(other)),
+        };
+        Ok((from, message))
+    }
+}

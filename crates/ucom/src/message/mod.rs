@@ -1,0 +1,82 @@
+//! The messages of both directions, made from and into frames.
+//!
+//! Functions 22, 24 and 26 are sent by both sides with one identifier (D-05): which side a frame comes from is
+//! said by choosing [`ToBoard`] or [`FromBoard`].
+
+mod from_board;
+mod to_board;
+
+use core::fmt;
+
+pub use from_board::FromBoard;
+pub use to_board::ToBoard;
+
+use crate::frame::{Foreign, Frame, Payload};
+use crate::function::Function;
+use crate::profile::Profile;
+
+/// Why a frame is no message of the wanted direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DecodeError {
+    /// Not of this protocol at all (D-02).
+    Foreign(Foreign),
+    /// A message of the other side (D-04).
+    Direction(Function),
+    /// Fewer bytes than the message needs (D-12).
+    TooShort {
+        /// What it would have been.
+        function: Function,
+        /// Bytes that came.
+        len: u8,
+        /// Bytes that it needs.
+        need: u8,
+    },
+    /// A length that the message cannot have, where the length has a meaning (D-12), or any other than the
+    /// exact one with `dlc.strict`.
+    Length {
+        /// What it would have been.
+        function: Function,
+        /// Bytes that came.
+        len: u8,
+    },
+    /// A flag that is neither 0 nor 1 (D-37).
+    Value(Function),
+}
+
+impl DecodeError {
+    /// Whether the length is at fault: a board says DSP_ERROR 7.
+    pub const fn is_length(&self) -> bool {
+        matches!(self, Self::TooShort { .. } | Self::Length { .. })
+    }
+}
+
+impl fmt::Display for DecodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Foreign(foreign) => write!(f, "{foreign}"),
+            Self::Direction(function) => write!(f, "{function} of the other side"),
+            Self::TooShort { function, len, need } => {
+                write!(f, "{function} with {len} of at least {need} bytes")
+            }
+            Self::Length { function, len } => write!(f, "{function} cannot have {len} bytes"),
+            Self::Value(function) => write!(f, "{function} with a flag that is neither 0 nor 1"),
+        }
+    }
+}
+
+impl core::error::Error for DecodeError {}
+
+/// The payload when it is long enough; with `dlc.strict` it must have exactly `need` bytes.
+fn need(frame: &Frame, function: Function, need: u8, profile: &Profile) -> Result<Payload, DecodeError> {
+    let len = frame.dlc();
+    if len < need {
+        return Err(DecodeError::TooShort { function, len, need });
+    }
+    if profile.dlc_strict && len != need {
+        return Err(DecodeError::Length { function, len });
+    }
+    Ok(frame.payload())
+}
+
+#[cfg(test)]
+mod tests;

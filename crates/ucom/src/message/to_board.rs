@@ -1,0 +1,129 @@
+//! What the PC says.
+
+use super::{DecodeError, need};
+use crate::admin::Admin;
+use crate::buffer::BufferPackage;
+use crate::frame::{Frame, Payload};
+use crate::function::{Function, Sequence};
+use crate::profile::Profile;
+
+/// A message from the PC to one board, or to everybody.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ToBoard {
+    /// PC_RESET.
+    Reset,
+    /// PC_XRESET.
+    XReset,
+    /// PC_SETSTATUS: `(old & ~mask) | value` (D-22).
+    SetStatus {
+        /// Bits that are cleared first.
+        mask: u8,
+        /// Bits that are set then, whatever the mask.
+        value: u8,
+    },
+    /// PC_INFO.
+    Info,
+    /// PC_REPORT.
+    Report,
+    /// PC_INIT: the identifier carries the new number.
+    Init,
+    /// PC_PROG: an eighth of a block.
+    Prog([u8; 8]),
+    /// PC_START.
+    Start,
+    /// MCA_PC_CI.
+    Ci(BufferPackage),
+    /// MCA_PC_PAR.
+    Par(BufferPackage),
+    /// MCA_PC_START.
+    McaStart,
+    /// MCA_DUMP_IO_DESCRIPTION, the request.
+    DumpIo,
+    /// MCA_DUMP_CI.
+    DumpCi,
+    /// MCA_ADMIN_DATA, the request.
+    Admin(Admin),
+    /// MCA_ALIVE of the PC.
+    Alive,
+}
+
+impl ToBoard {
+    /// The function that carries it.
+    pub const fn function(&self) -> Function {
+        match self {
+            Self::Reset => Function::Reset,
+            Self::XReset => Function::XReset,
+            Self::SetStatus { .. } => Function::SetStatus,
+            Self::Info => Function::Info,
+            Self::Report => Function::AskReport,
+            Self::Init => Function::Init,
+            Self::Prog(_) => Function::Prog,
+            Self::Start => Function::Start,
+            Self::Ci(_) => Function::Ci,
+            Self::Par(_) => Function::Par,
+            Self::McaStart => Function::McaStart,
+            Self::DumpIo => Function::DumpIo,
+            Self::DumpCi => Function::DumpCi,
+            Self::Admin(_) => Function::Admin,
+            Self::Alive => Function::Alive,
+        }
+    }
+
+    /// The frame to a board.
+    pub fn encode(&self, to: Sequence, profile: &Profile) -> Frame {
+        let payload = match *self {
+            Self::SetStatus { mask, value } => Payload::of([mask, value, 0, 0, 0, 0, 0, 0], 2),
+            Self::Prog(data) => Payload::of(data, 8),
+            Self::Ci(package) | Self::Par(package) => package.payload(profile.endian, profile.pd_short_last),
+            Self::Admin(admin) => admin.payload(),
+            _ => Payload::EMPTY,
+        };
+        Frame::of(self.function(), to, payload)
+    }
+
+    /// The message in a frame and to whom it goes.
+    pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
+        let (function, to) = frame.address().map_err(DecodeError::Foreign)?;
+        let empty = |message| need(frame, function, 0, profile).map(|_| message);
+        let message = match function {
+            Function::Reset => empty(Self::Reset)?,
+            Function::XReset => empty(Self::XReset)?,
+            Function::SetStatus => {
+                let [mask, value, ..] = need(frame, function, 2, profile)?.padded();
+                Self::SetStatus { mask, value }
+            }
+            Function::Info => empty(Self::Info)?,
+            Function::AskReport => empty(Self::Report)?,
+            Function::Init => empty(Self::Init)?,
+            Function::Prog => Self::Prog(need(frame, function, 8, profile)?.padded()),
+            Function::Start => empty(Self::Start)?,
+            Function::Ci => Self::Ci(package(frame, function, profile)?),
+            Function::Par => Self::Par(package(frame, function, profile)?),
+            Function::McaStart => empty(Self::McaStart)?,
+            // With data it is a board's answer, always (D-12).
+            Function::DumpIo if frame.dlc() == 0 => Self::DumpIo,
+            Function::DumpCi => empty(Self::DumpCi)?,
+            Function::Admin => {
+                let [run, active, debug, global, ..] = need(frame, function, 4, profile)?.padded();
+                let admin = Admin::from_bytes([run, active, debug, global]);
+                Self::Admin(admin.ok_or(DecodeError::Value(function))?)
+            }
+            Function::Alive => empty(Self::Alive)?,
+            other => return Err(DecodeError::Direction(other)),
+        };
+        Ok((to, message))
+    }
+}
+
+/// A buffer package: 4, 6 or 8 bytes.
+pub(super) fn package(
+    frame: &Frame,
+    function: Function,
+    profile: &Profile,
+) -> Result<BufferPackage, DecodeError> {
+    let len = frame.dlc();
+    if len < 4 {
+        return Err(DecodeError::TooShort { function, len, need: 4 });
+    }
+    BufferPackage::parse(&frame.payload(), profile.endian).ok_or(DecodeError::Length { function, len })
+}

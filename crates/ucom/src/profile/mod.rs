@@ -1,0 +1,170 @@
+//! The compatibility profile: how a board reads what the published description leaves open.
+//!
+//! Each decision of this project has a key here, so that the same code can talk to a board that was built with
+//! another reading. [`KEYS`] lists them with default, range and meaning; [`Profile`] is the values. Reading and
+//! writing profile files needs feature `std`.
+
+#[cfg(feature = "std")]
+mod file;
+mod keys;
+mod values;
+
+#[cfg(feature = "std")]
+pub use file::{ProfileFileError, help};
+pub use keys::{KEYS, Key, Kind, Profile};
+pub use values::{AliveMode, Broadcast, CiLatch, Endian, HeaderForm, OnLost, Plan, ReportMode};
+pub(crate) use values::{Value, words};
+
+use crate::function::Sequence;
+
+/// Why a value or a whole profile is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProfileError {
+    /// There is no such key.
+    UnknownKey,
+    /// The key's range does not have the value.
+    Value(&'static Key),
+    /// Two values contradict each other: the keys and why.
+    Contradiction(&'static str),
+}
+
+impl core::fmt::Display for ProfileError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::UnknownKey => f.write_str("no such key"),
+            Self::Value(key) => write!(f, "{} must be {}", key.name, key.range),
+            Self::Contradiction(why) => f.write_str(why),
+        }
+    }
+}
+
+impl core::error::Error for ProfileError {}
+
+impl Profile {
+    /// Sets one key from text: a number, one of the key's words, or `yes`/`no`.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), ProfileError> {
+        let key = KEYS.iter().find(|known| known.name == key).ok_or(ProfileError::UnknownKey)?;
+        if (key.set)(self, value) { Ok(()) } else { Err(ProfileError::Value(key)) }
+    }
+
+    /// Values that fit their ranges and yet cannot be used together.
+    pub const fn check(&self) -> Result<(), ProfileError> {
+        let contradiction = if self.addr_first == 0 && matches!(self.addr_broadcast, Broadcast::Zero) {
+            "addr.first and addr.broadcast cannot both be 0: the first board would hear what is for everybody"
+        } else if self.alive_pc_lost <= self.alive_pc_period {
+            "alive.pc_lost must be longer than alive.pc_period, or every board stops at once"
+        } else if self.alive_dsp_lost <= self.alive_dsp_period {
+            "alive.dsp_lost must be longer than alive.dsp_period, or every board counts as lost"
+        } else {
+            return Ok(());
+        };
+        Err(ProfileError::Contradiction(contradiction))
+    }
+
+    /// The number that means everybody when the PC sends it; `None` when there is none (D-04).
+    pub const fn everybody(&self) -> Option<Sequence> {
+        match self.addr_broadcast {
+            Broadcast::Zero => Some(Sequence::ZERO),
+            Broadcast::ThirtyOne => Some(Sequence::MAX),
+            Broadcast::None => None,
+        }
+    }
+
+    /// The number that reaches boards without one, and that they use themselves: what means everybody, else 0
+    /// (D-04, D-06).
+    pub const fn unnumbered(&self) -> Sequence {
+        match self.everybody() {
+            Some(number) => number,
+            None => Sequence::ZERO,
+        }
+    }
+
+    /// Whether a board can have this number.
+    pub const fn is_board(&self, number: Sequence) -> bool {
+        let everybody = match self.everybody() {
+            Some(everybody) => everybody.number() == number.number(),
+            None => false,
+        };
+        number.number() as u32 >= self.addr_first && !everybody
+    }
+
+    /// The numbers that boards can have, in the order of the chain.
+    pub fn board_numbers(&self) -> impl Iterator<Item = Sequence> + use<> {
+        let profile = *self;
+        Sequence::all().filter(move |number| profile.is_board(*number))
+    }
+
+    /// `string.max`, never above the 512 that the table allows.
+    pub const fn string_limit(&self) -> usize {
+        if self.string_max > 512 { 512 } else { self.string_max as usize }
+    }
+
+    /// `string.gap` in microseconds.
+    pub const fn string_gap_us(&self) -> u64 {
+        self.string_gap as u64 * 1000
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::string::ToString;
+    use std::vec::Vec;
+
+    /// Every key's default is what the table says, fits its own range, and is read back as it is written.
+    #[test]
+    fn keys_and_defaults_agree() {
+        let mut profile = Profile::default();
+        let names: BTreeSet<_> = KEYS.iter().map(|key| key.name).collect();
+        assert_eq!(names.len(), KEYS.len());
+        for key in KEYS {
+            let written = key.value(&profile).to_string();
+            assert_eq!(written, key.default, "{}", key.name);
+            assert_eq!(profile.set(key.name, &written), Ok(()), "{}", key.name);
+            assert!(!key.doc.is_empty() && !key.range.is_empty());
+            assert_eq!(profile.set(key.name, "nonsense"), Err(ProfileError::Value(key)));
+        }
+        assert_eq!(profile, Profile::default());
+        assert_eq!(profile.set("prog.chksum", "crc16"), Err(ProfileError::UnknownKey));
+        assert_eq!(profile.check(), Ok(()));
+    }
+
+    /// The published set of parameters, word for word.
+    #[test]
+    fn d03_the_listed_parameters_are_all_there() {
+        let listed = "bitrate 1000000 · endian little · prog.endian little · addr.first 1 · addr.broadcast 0 · \
+            report.mode flash7 · report.window 1000 · init.ack_timeout 100 · info.timeout 100 · string.gap 100 · \
+            string.count_includes_header no · string.max 512 · chain.auto_opinit no · xreset.wait 500 · \
+            xreset.keeps_init yes · start.timeout 2000 · admin.timeout 100 · prog.plan verify-write · \
+            prog.header v1 · prog.checksum crc16 · prog.date fat · prog.frame_gap_us 200 · \
+            prog.ready_timeout 1000 · prog.erase_timeout 10000 · prog.attempts 3 · so.period 10 · ci.period 20 · \
+            ci.latch frame · pd.short_last no · alive.mode broadcast · alive.pc_period 500 · \
+            alive.dsp_period 1000 · alive.pc_lost 1500 · alive.dsp_lost 3000 · on_lost stop-all · load.limit 70";
+        for entry in listed.split('·') {
+            let (name, default) = entry.trim().split_once(' ').unwrap();
+            let key = KEYS.iter().find(|key| key.name == name).unwrap_or_else(|| panic!("{name}"));
+            assert_eq!(key.default, default, "{name}");
+        }
+    }
+
+    #[test]
+    fn d04_numbers_of_boards() {
+        let numbers = |first, broadcast| {
+            let profile = Profile { addr_first: first, addr_broadcast: broadcast, ..Profile::default() };
+            let numbers: Vec<_> = profile.board_numbers().map(Sequence::number).collect();
+            (numbers[0], numbers[numbers.len() - 1], profile.unnumbered().number())
+        };
+        assert_eq!(numbers(1, Broadcast::Zero), (1, 31, 0));
+        assert_eq!(numbers(0, Broadcast::ThirtyOne), (0, 30, 31));
+        assert_eq!(numbers(1, Broadcast::None), (1, 31, 0));
+        let both = Profile { addr_first: 0, ..Profile::default() };
+        assert!(matches!(both.check(), Err(ProfileError::Contradiction(_))));
+    }
+
+    #[test]
+    fn d50_lost_times_are_longer_than_periods() {
+        let bad = Profile { alive_pc_lost: 500, ..Profile::default() };
+        assert!(bad.check().is_err());
+    }
+}

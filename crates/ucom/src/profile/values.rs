@@ -1,0 +1,180 @@
+//! The values that keys can have beside numbers.
+
+use core::fmt;
+
+/// A value of a key as text, both ways.
+pub trait Value: Sized {
+    /// The value of a text.
+    fn read(text: &str) -> Option<Self>;
+    /// The text of a value.
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
+}
+
+/// Declares an enum whose variants are words in files.
+macro_rules! words {
+    ($(#[$about:meta])* pub enum $name:ident { $($(#[doc = $doc:literal])+ $variant:ident = $word:literal,)+ }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum $name { $($(#[doc = $doc])+ $variant),+ }
+
+        impl $name {
+            /// All values.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// The word that files use.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$variant => $word),+ }
+            }
+        }
+
+        impl core::fmt::Display for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl $crate::profile::Value for $name {
+            fn read(text: &str) -> Option<Self> {
+                Self::ALL.iter().copied().find(|value| value.name() == text)
+            }
+            fn write(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                core::fmt::Display::fmt(self, f)
+            }
+        }
+    };
+}
+pub(crate) use words;
+
+words! {
+    /// Order of the two bytes of a word (D-10).
+    pub enum Endian {
+        /// The first byte is the least significant.
+        Little = "little",
+        /// The first byte is the most significant.
+        Big = "big",
+    }
+}
+
+impl Endian {
+    /// The two bytes of a word.
+    pub const fn bytes(self, word: u16) -> [u8; 2] {
+        match self {
+            Self::Little => word.to_le_bytes(),
+            Self::Big => word.to_be_bytes(),
+        }
+    }
+
+    /// The word of two bytes.
+    pub const fn word(self, bytes: [u8; 2]) -> u16 {
+        match self {
+            Self::Little => u16::from_le_bytes(bytes),
+            Self::Big => u16::from_be_bytes(bytes),
+        }
+    }
+}
+
+words! {
+    /// The number that means everybody (D-04).
+    pub enum Broadcast {
+        /// 0.
+        Zero = "0",
+        /// 31.
+        ThirtyOne = "31",
+        /// No number reaches numbered boards together; 0 reaches those without a number.
+        None = "none",
+    }
+}
+
+words! {
+    /// How boards answer PC_REPORT and PC_RESET (D-07).
+    pub enum ReportMode {
+        /// One frame; function and sequence field are the 7-bit flash id.
+        Flash7 = "flash7",
+        /// One DSP_REPORT0 with the board's sequence number.
+        Seq = "seq",
+        /// All four functions, one frame each.
+        All4 = "all4",
+    }
+}
+
+words! {
+    /// What the two cycles of an update carry (D-40).
+    pub enum Plan {
+        /// The same image twice: checked, then written.
+        VerifyWrite = "verify-write",
+        /// An exloader into RAM, then the application.
+        ExloaderApp = "exloader-app",
+        /// Program memory, then data memory.
+        PmemXmem = "pmem-xmem",
+        /// Two files as they are.
+        Raw = "raw",
+    }
+}
+
+words! {
+    /// What precedes the data of a cycle (D-41).
+    pub enum HeaderForm {
+        /// The header block of this project.
+        V1 = "v1",
+        /// Nothing: the first block is data, and the board knows the length by itself.
+        None = "none",
+    }
+}
+
+words! {
+    /// When controller inputs take effect (D-34).
+    pub enum CiLatch {
+        /// Each package by itself.
+        Frame = "frame",
+        /// All together with the package that holds the last word.
+        Last = "last",
+    }
+}
+
+words! {
+    /// To whom the PC's life sign goes (D-04, D-50).
+    pub enum AliveMode {
+        /// One frame to everybody.
+        Broadcast = "broadcast",
+        /// One frame to each board; boards do not count the one to everybody.
+        Unicast = "unicast",
+        /// Both.
+        Both = "both",
+    }
+}
+
+words! {
+    /// What the PC does when a board's life sign stays away (D-51).
+    pub enum OnLost {
+        /// An event, nothing else.
+        Report = "report",
+        /// Stops that board.
+        StopBoard = "stop-board",
+        /// Stops every board: for coupled joints.
+        StopAll = "stop-all",
+    }
+}
+
+impl Value for bool {
+    fn read(text: &str) -> Option<Self> {
+        match text {
+            "yes" | "true" => Some(true),
+            "no" | "false" => Some(false),
+            _ => None,
+        }
+    }
+
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if *self { "yes" } else { "no" })
+    }
+}
+
+impl Value for u32 {
+    fn read(text: &str) -> Option<Self> {
+        text.parse().ok()
+    }
+
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}

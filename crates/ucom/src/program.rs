@@ -1,0 +1,278 @@
+//! Program images: Program ID, flash date, blocks (D-40, D-44, D-45).
+
+use crc::{CRC_16_IBM_3740, Crc, Table};
+
+use crate::header::BLOCK_LEN;
+use crate::profile::{Endian, words};
+
+words! {
+    /// How the Program ID of an image is computed (D-44), key `prog.checksum`.
+    pub enum Checksum {
+        /// CRC-16/CCITT-FALSE over the bytes in wire order: polynomial 0x1021, start value 0xFFFF.
+        Crc16 = "crc16",
+        /// Sum of the 16-bit words modulo 65 536; blind to swapped frames.
+        Sum16 = "sum16",
+        /// Exclusive-or of the 16-bit words.
+        Xor16 = "xor16",
+        /// Not computed: the number in the header is taken as it is.
+        None = "none",
+    }
+}
+
+words! {
+    /// How the flash date becomes 16 bits (D-45), key `prog.date`.
+    pub enum DateForm {
+        /// `(year − 1980) << 9 | month << 5 | day`, 1980 to 2107.
+        Fat = "fat",
+        /// Days since 2000-01-01, up to 2179.
+        Days2000 = "days2000",
+        /// Four decimal digits, YYMM, 2000 to 2099; the day is lost and reads as the first.
+        Bcd = "bcd",
+        /// A number without a meaning to this tool.
+        Raw = "raw",
+    }
+}
+
+const CCITT_FALSE: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+static CCITT_FALSE_TABLE: Crc<u16> = CCITT_FALSE;
+
+/// A Program ID under way: fed with the image in any pieces.
+#[derive(Clone)]
+pub struct Digest {
+    checksum: Checksum,
+    endian: Endian,
+    crc: crc::Digest<'static, u16, Table<1>>,
+    word: u16,
+    /// First byte of a word whose second has not come.
+    odd: Option<u8>,
+}
+
+impl core::fmt::Debug for Digest {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "Digest({}, {:04X})", self.checksum, self.finish())
+    }
+}
+
+impl Digest {
+    /// `endian` is the order of the bytes in program words (`prog.endian`).
+    pub fn new(checksum: Checksum, endian: Endian) -> Self {
+        Self { checksum, endian, crc: CCITT_FALSE_TABLE.digest(), word: 0, odd: None }
+    }
+
+    /// Takes the next bytes of the image, in wire order.
+    pub fn update(&mut self, bytes: &[u8]) {
+        match self.checksum {
+            Checksum::Crc16 => self.crc.update(bytes),
+            Checksum::None => {}
+            Checksum::Sum16 | Checksum::Xor16 => {
+                for byte in bytes {
+                    match self.odd.take() {
+                        None => self.odd = Some(*byte),
+                        Some(first) => self.word = self.with([first, *byte]),
+                    }
+                }
+            }
+        }
+    }
+
+    fn with(&self, bytes: [u8; 2]) -> u16 {
+        let word = self.endian.word(bytes);
+        if self.checksum == Checksum::Xor16 { self.word ^ word } else { self.word.wrapping_add(word) }
+    }
+
+    /// The Program ID of what came so far; 0 for [`Checksum::None`]. An odd last byte counts with 0xFF, the
+    /// padding of the last block.
+    pub fn finish(&self) -> u16 {
+        match self.checksum {
+            Checksum::Crc16 => self.crc.clone().finalize(),
+            Checksum::None => 0,
+            Checksum::Sum16 | Checksum::Xor16 => match self.odd {
+                Some(first) => self.with([first, 0xFF]),
+                None => self.word,
+            },
+        }
+    }
+}
+
+/// The Program ID of a whole image (D-44).
+pub fn checksum(checksum: Checksum, endian: Endian, image: &[u8]) -> u16 {
+    let mut digest = Digest::new(checksum, endian);
+    digest.update(image);
+    digest.finish()
+}
+
+/// Data blocks of an image, without the header block.
+pub const fn block_count(len: usize) -> usize {
+    len.div_ceil(BLOCK_LEN)
+}
+
+/// The `i`-th data block of an image, the last one padded with 0xFF; `None` after it (D-41).
+pub fn data_block(image: &[u8], i: usize) -> Option<[u8; BLOCK_LEN]> {
+    let rest = image.get(i.checked_mul(BLOCK_LEN)?..)?;
+    if rest.is_empty() {
+        return None;
+    }
+    let mut block = [0xFF; BLOCK_LEN];
+    for (place, byte) in block.iter_mut().zip(rest) {
+        *place = *byte;
+    }
+    Some(block)
+}
+
+const fn leap(year: u16) -> bool {
+    year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))
+}
+
+const fn month_days(year: u16, month: u8) -> u8 {
+    match month {
+        2 => 28 + leap(year) as u8,
+        4 | 6 | 9 | 11 => 30,
+        1..=12 => 31,
+        _ => 0,
+    }
+}
+
+impl DateForm {
+    /// The 16 bits of a date; `None` when there is no such day, or the form cannot say it. `raw` says none.
+    pub fn encode(self, year: u16, month: u8, day: u8) -> Option<u16> {
+        if day == 0 || day > month_days(year, month) {
+            return None;
+        }
+        let date = match self {
+            Self::Fat => {
+                let years = year.checked_sub(1980).filter(|years| *years < 128)?;
+                years << 9 | u16::from(month) << 5 | u16::from(day)
+            }
+            Self::Days2000 => {
+                let years = 2000..year.max(2000);
+                let before: u32 = years.take(200).map(|y| 365 + u32::from(leap(y))).sum();
+                let months: u32 = (1..month).map(|m| u32::from(month_days(year, m))).sum();
+                let days = before + months + u32::from(day) - 1;
+                u16::try_from(days).ok().filter(|_| (2000..2180).contains(&year))?
+            }
+            Self::Bcd => {
+                let years = year.checked_sub(2000).filter(|years| *years < 100)? as u8;
+                let digits = |n: u8| u16::from(n / 10) << 4 | u16::from(n % 10);
+                digits(years) << 8 | digits(month)
+            }
+            Self::Raw => return None,
+        };
+        // 0xFFFF is what a board without an application shows.
+        (date != 0xFFFF).then_some(date)
+    }
+
+    /// Year, month, day; `None` when the 16 bits are no date of this form.
+    pub fn decode(self, date: u16) -> Option<(u16, u8, u8)> {
+        let (year, month, day) = match self {
+            Self::Fat => (1980 + (date >> 9), (date >> 5 & 15) as u8, (date & 31) as u8),
+            Self::Days2000 => {
+                let (mut year, mut days) = (2000, date);
+                while days >= 365 + u16::from(leap(year)) {
+                    days -= 365 + u16::from(leap(year));
+                    year += 1;
+                }
+                let mut month = 1;
+                while days >= u16::from(month_days(year, month)) && month < 12 {
+                    days -= u16::from(month_days(year, month));
+                    month += 1;
+                }
+                (year, month, days as u8 + 1)
+            }
+            Self::Bcd => {
+                let number = |byte: u16| {
+                    (byte >> 4 < 10 && byte & 15 < 10)
+                        .then(|| byte >> 4 & 15)
+                        .map(|t| (t * 10 + (byte & 15)) as u8)
+                };
+                (2000 + u16::from(number(date >> 8)?), number(date & 0xFF)?, 1)
+            }
+            Self::Raw => return None,
+        };
+        (self.encode(year, month, day) == Some(date)).then_some((year, month, day))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn image() -> Vec<u8> {
+        (0..1000).map(|i| (37 * i + 11) as u8).collect()
+    }
+
+    /// Golden vectors 13.3, from other implementations of the same checksum.
+    #[test]
+    fn d44_program_id_golden() {
+        assert_eq!(checksum(Checksum::Crc16, Endian::Little, b"123456789"), 0x29B1);
+        assert_eq!(checksum(Checksum::Crc16, Endian::Little, &image()), 0x4B3F);
+        assert_eq!(block_count(1000), 16);
+    }
+
+    /// Why crc16 is the default: two frames of a block swapped.
+    #[test]
+    fn d44_sum_is_blind_to_swapped_frames() {
+        let image = image();
+        let mut swapped = image.clone();
+        swapped.copy_within(8..16, 0);
+        swapped[8..16].copy_from_slice(&image[..8]);
+        for (kind, blind) in [(Checksum::Crc16, false), (Checksum::Sum16, true), (Checksum::Xor16, true)] {
+            let [a, b] = [&image, &swapped].map(|bytes| checksum(kind, Endian::Little, bytes));
+            assert_eq!(a == b, blind, "{kind}");
+        }
+    }
+
+    #[test]
+    fn d44_words_are_summed_in_program_order() {
+        let bytes = [0x01, 0x02, 0x03, 0x04, 0x05];
+        assert_eq!(checksum(Checksum::Sum16, Endian::Little, &bytes), 0x0201 + 0x0403 - 0xFB);
+        assert_eq!(checksum(Checksum::Sum16, Endian::Big, &bytes), 0x0102 + 0x0304 + 0x05FF);
+        assert_eq!(checksum(Checksum::Xor16, Endian::Big, &bytes), 0x0102 ^ 0x0304 ^ 0x05FF);
+        assert_eq!(checksum(Checksum::None, Endian::Big, &bytes), 0);
+    }
+
+    #[test]
+    fn d45_dates_golden() {
+        assert_eq!(DateForm::Fat.encode(2009, 6, 1), Some(0x3AC1));
+        assert_eq!(DateForm::Fat.encode(2008, 3, 14), Some(0x386E));
+        assert_eq!(DateForm::Days2000.encode(2000, 3, 1), Some(60));
+        assert_eq!(DateForm::Days2000.encode(2026, 1, 1), Some(9497));
+        assert_eq!(DateForm::Bcd.encode(2026, 11, 30), Some(0x2611));
+        assert_eq!(DateForm::Bcd.decode(0x1A11), None);
+        assert_eq!(DateForm::Fat.encode(2009, 2, 29), None);
+        assert_eq!(DateForm::Fat.encode(2107, 12, 31), Some(0xFF9F));
+        assert_eq!(DateForm::Days2000.decode(0xFFFF), None);
+        assert_eq!(DateForm::Raw.encode(2009, 6, 1), None);
+    }
+
+    proptest! {
+        #[test]
+        fn d45_dates_round_trip(date: u16) {
+            for form in [DateForm::Fat, DateForm::Days2000, DateForm::Bcd] {
+                if let Some((year, month, day)) = form.decode(date) {
+                    prop_assert_eq!(form.encode(year, month, day), Some(date));
+                }
+            }
+        }
+
+        /// Pieces of any size give the same number as the whole.
+        #[test]
+        fn d44_pieces(bytes in proptest::collection::vec(any::<u8>(), 0..200), at in 0..200usize, i in 0..3usize) {
+            let kind = [Checksum::Crc16, Checksum::Sum16, Checksum::Xor16][i];
+            let (head, tail) = bytes.split_at(at.min(bytes.len()));
+            let mut digest = Digest::new(kind, Endian::Big);
+            digest.update(head);
+            digest.update(tail);
+            prop_assert_eq!(digest.finish(), checksum(kind, Endian::Big, &bytes));
+        }
+
+        #[test]
+        fn d41_blocks_hold_the_image(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
+            let all: Vec<u8> = (0..).map_while(|i| data_block(&bytes, i)).flatten().collect();
+            prop_assert_eq!(all.len(), 64 * block_count(bytes.len()));
+            prop_assert_eq!(&all[..bytes.len()], &bytes[..]);
+            prop_assert!(all[bytes.len()..].iter().all(|byte| *byte == 0xFF));
+        }
+    }
+}

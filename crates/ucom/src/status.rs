@@ -1,0 +1,147 @@
+//! The status byte (D-20).
+
+use core::fmt;
+use core::ops::{BitAnd, BitOr, Not};
+
+/// Status of a board, one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Status(pub u8);
+
+impl Status {
+    /// The application has been started by the exloader.
+    pub const MSTART: Self = Self(0x80);
+    /// Autostart is enabled; kept over power loss.
+    pub const ASTART: Self = Self(0x40);
+    /// The control loop is running. Mirrors reality: cannot be written.
+    pub const MCARUN: Self = Self(0x20);
+    /// The exloader is running, always the opposite of MSTART. Mirrors reality: cannot be written.
+    pub const EXLRUN: Self = Self(0x10);
+    /// The board has a sequence number.
+    pub const INIT: Self = Self(0x08);
+    /// Program data are accepted.
+    pub const PROG: Self = Self(0x04);
+    /// Level of the outgoing init pin.
+    pub const OPINIT: Self = Self(0x02);
+    /// Level of the incoming init pin. Mirrors reality: cannot be written.
+    pub const IPINIT: Self = Self(0x01);
+    /// The bits that nobody can write.
+    pub const MIRRORS: Self = Self(0x31);
+
+    /// Names of the bits, bit 7 first.
+    pub const NAMES: [(&'static str, Self); 8] = [
+        ("MSTART", Self::MSTART),
+        ("ASTART", Self::ASTART),
+        ("MCARUN", Self::MCARUN),
+        ("EXLRUN", Self::EXLRUN),
+        ("INIT", Self::INIT),
+        ("PROG", Self::PROG),
+        ("OPINIT", Self::OPINIT),
+        ("IPINIT", Self::IPINIT),
+    ];
+
+    /// The bit of a name, in either case.
+    pub fn bit(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, bit)| *bit)
+    }
+
+    /// Whether all of `bits` are set.
+    pub const fn has(self, bits: Self) -> bool {
+        self.0 & bits.0 == bits.0
+    }
+
+    /// `bits` set or cleared.
+    #[must_use]
+    pub const fn with(self, bits: Self, on: bool) -> Self {
+        if on { Self(self.0 | bits.0) } else { Self(self.0 & !bits.0) }
+    }
+
+    /// The published formula of PC_SETSTATUS, literally: `(old & ~mask) | value`. The second operand is not
+    /// masked (D-22).
+    #[must_use]
+    pub const fn set(self, mask: u8, value: u8) -> Self {
+        Self((self.0 & !mask) | value)
+    }
+
+    /// What contradicts itself in this status, if anything: no board can be in such a state.
+    pub const fn contradiction(self) -> Option<&'static str> {
+        if self.has(Self::EXLRUN) == self.has(Self::MSTART) {
+            Some("EXLRUN must be the opposite of MSTART")
+        } else if self.has(Self::MCARUN) && !self.has(Self::MSTART) {
+            Some("MCARUN without MSTART")
+        } else if !self.has(Self::INIT) && (self.has(Self::MSTART) || self.has(Self::OPINIT)) {
+            Some("MSTART or OPINIT without INIT")
+        } else if self.has(Self::PROG) && !self.has(Self::EXLRUN) {
+            Some("PROG without EXLRUN")
+        } else {
+            None
+        }
+    }
+}
+
+impl BitOr for Status {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl BitAnd for Status {
+    type Output = Self;
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+impl Not for Status {
+    type Output = Self;
+    fn not(self) -> Self {
+        Self(!self.0)
+    }
+}
+
+/// The names of the bits that are set, `EXLRUN INIT IPINIT`; `-` when none is.
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut gap = "";
+        for (name, bit) in Self::NAMES {
+            if self.has(bit) {
+                write!(f, "{gap}{name}")?;
+                gap = " ";
+            }
+        }
+        if gap.is_empty() { f.write_str("-") } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn d20_names_in_the_order_of_the_table() {
+        assert_eq!(Status(0x1B).to_string(), "EXLRUN INIT OPINIT IPINIT");
+        assert_eq!(Status(0).to_string(), "-");
+        assert_eq!(Status::bit("mcarun"), Some(Status(0x20)));
+        assert_eq!(Status::bit("OPINT"), None);
+        let all = Status::NAMES.iter().fold(0, |sum, (_, bit)| sum + u32::from(bit.0));
+        assert_eq!(all, 255);
+    }
+
+    #[test]
+    fn d22_formula_is_literal() {
+        assert_eq!(Status(0x19).set(0x00, 0x40), Status(0x59));
+        assert_eq!(Status(0x59).set(0x40, 0x00), Status(0x19));
+        assert_eq!(Status(0x19).set(0x02, 0x06), Status(0x1F));
+    }
+
+    #[test]
+    fn d20_contradictions() {
+        for good in [0x11, 0x10, 0x19, 0x1B, 0x1F, 0x8B, 0xAB, 0x59, 0x15] {
+            assert_eq!(Status(good).contradiction(), None, "{good:02X}");
+        }
+        for bad in [0x00, 0x98, 0x30, 0x80, 0x12, 0x8C, 0x38] {
+            assert!(Status(bad).contradiction().is_some(), "{bad:02X}");
+        }
+    }
+}

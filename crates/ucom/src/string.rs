@@ -1,0 +1,278 @@
+//! String transmission: a header package with a count, then packages of up to 8 characters (D-13, D-14).
+
+use core::fmt;
+
+use crate::frame::Payload;
+use crate::profile::Profile;
+
+/// Characters of Latin-1, one byte each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Latin1<'a>(pub &'a [u8]);
+
+impl Latin1<'_> {
+    /// The characters.
+    pub fn chars(&self) -> impl Iterator<Item = char> + '_ {
+        self.0.iter().map(|byte| char::from(*byte))
+    }
+}
+
+impl fmt::Display for Latin1<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        use fmt::Write;
+        self.chars().try_for_each(|character| f.write_char(character))
+    }
+}
+
+/// The `i`-th package of a string: 0 is the header, the data follow; `None` after the last.
+///
+/// Texts longer than `string.max` are cut there.
+pub fn string_package(text: &[u8], i: u16, profile: &Profile) -> Option<Payload> {
+    let text = text.get(..profile.string_limit()).unwrap_or(text);
+    let Some(i) = i.checked_sub(1) else {
+        let count = text.len().div_ceil(8) as u16 + u16::from(profile.string_count_includes_header);
+        let [c0, c1] = profile.endian.bytes(count);
+        return Some(Payload::of([c0, c1, 0, 0, 0, 0, 0, 0], 2));
+    };
+    let rest = text.get(8 * usize::from(i)..)?;
+    Payload::new(rest.get(..8).unwrap_or(rest)).filter(|payload| !payload.is_empty())
+}
+
+/// The packages of a string, header first.
+#[derive(Clone, Debug)]
+pub struct StringPackages<'a> {
+    text: &'a [u8],
+    next: u16,
+    profile: &'a Profile,
+}
+
+impl<'a> StringPackages<'a> {
+    /// `text` is Latin-1 without NUL.
+    pub const fn new(text: &'a [u8], profile: &'a Profile) -> Self {
+        Self { text, next: 0, profile }
+    }
+}
+
+impl Iterator for StringPackages<'_> {
+    type Item = Payload;
+
+    fn next(&mut self) -> Option<Payload> {
+        let package = string_package(self.text, self.next, self.profile)?;
+        self.next += 1;
+        Some(package)
+    }
+}
+
+/// What a package did to the string under way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Assembled<'a> {
+    /// More packages are to come.
+    Partial,
+    /// The whole string, trailing NULs stripped.
+    Complete(Latin1<'a>),
+    /// A first package that is no header (not 2 bytes), a header that counts more than `string.max` characters
+    /// can fill, or a data package without bytes. The string is dropped.
+    Refused,
+}
+
+/// Puts one string together: one assembler for each function and board (D-14).
+///
+/// Loss cannot be seen inside a string: a lost package makes it wait for more. [`StringAssembler::expired`]
+/// tells when 100 ms (`string.gap`) passed in silence; the next package then starts anew.
+#[derive(Clone, Debug)]
+pub struct StringAssembler<const N: usize = 512> {
+    text: [u8; N],
+    len: usize,
+    /// Packages still to come; `None` before the header.
+    open: Option<u16>,
+    last_us: u64,
+}
+
+impl<const N: usize> Default for StringAssembler<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> StringAssembler<N> {
+    /// Waits for a header.
+    pub const fn new() -> Self {
+        Self { text: [0; N], len: 0, open: None, last_us: 0 }
+    }
+
+    /// Forgets what came so far.
+    pub const fn reset(&mut self) {
+        self.open = None;
+        self.len = 0;
+    }
+
+    /// Whether a string is under way.
+    pub const fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// Whether a string is under way and `string.gap` passed since its last package.
+    pub const fn expired(&self, now_us: u64, profile: &Profile) -> bool {
+        self.open.is_some() && now_us.saturating_sub(self.last_us) >= profile.string_gap_us()
+    }
+
+    /// Packages that the string under way still lacks.
+    pub const fn missing(&self) -> u16 {
+        match self.open {
+            Some(missing) => missing,
+            None => 0,
+        }
+    }
+
+    /// Takes a package. A string that is [`expired`](Self::expired) is forgotten first.
+    pub fn push(&mut self, now_us: u64, payload: &Payload, profile: &Profile) -> Assembled<'_> {
+        if self.expired(now_us, profile) {
+            self.reset();
+        }
+        self.last_us = now_us;
+        let Some(open) = self.open else { return self.header(payload, profile) };
+        let bytes = payload.bytes();
+        let place = self.text.get_mut(self.len..self.len + bytes.len());
+        let Some(place) = place.filter(|place| !place.is_empty()) else {
+            self.reset();
+            return Assembled::Refused;
+        };
+        place.copy_from_slice(bytes);
+        self.len += bytes.len();
+        self.open = Some(open - 1);
+        if open > 1 { Assembled::Partial } else { self.complete(profile) }
+    }
+
+    fn header(&mut self, payload: &Payload, profile: &Profile) -> Assembled<'_> {
+        let &[c0, c1] = payload.bytes() else { return Assembled::Refused };
+        let including = u16::from(profile.string_count_includes_header);
+        let most = profile.string_limit().min(N).div_ceil(8);
+        let count = profile.endian.word([c0, c1]).checked_sub(including);
+        let Some(count) = count.filter(|count| usize::from(*count) <= most) else {
+            return Assembled::Refused;
+        };
+        self.len = 0;
+        self.open = Some(count);
+        if count > 0 { Assembled::Partial } else { self.complete(profile) }
+    }
+
+    fn complete(&mut self, profile: &Profile) -> Assembled<'_> {
+        let len = self.len.min(profile.string_limit());
+        self.reset();
+        let text = self.text.get(..len).unwrap_or(&[]);
+        let end = text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        Assembled::Complete(Latin1(text.get(..end).unwrap_or(&[])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::Endian;
+    use proptest::prelude::*;
+    use std::string::ToString;
+    use std::vec::Vec;
+
+    fn profiles() -> [Profile; 4] {
+        let mut all = [Profile::default(); 4];
+        for (i, profile) in all.iter_mut().enumerate() {
+            profile.endian = if i & 1 == 0 { Endian::Little } else { Endian::Big };
+            profile.string_count_includes_header = i & 2 != 0;
+        }
+        all
+    }
+
+    fn through(text: &[u8], profile: &Profile) -> Vec<u8> {
+        let mut assembler = StringAssembler::<512>::new();
+        let packages: Vec<_> = StringPackages::new(text, profile).collect();
+        assert_eq!(packages.len(), 1 + text.len().div_ceil(8));
+        let (last, before) = packages.split_last().unwrap();
+        for package in before {
+            assert_eq!(assembler.push(0, package, profile), Assembled::Partial);
+        }
+        match assembler.push(0, last, profile) {
+            Assembled::Complete(text) => text.0.to_vec(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// C-4: lengths 0, 1, 7, 8, 9, 16, 512, a trailing NUL, and a character beyond ASCII.
+    #[test]
+    fn d13_c4_strings_of_all_lengths() {
+        for profile in profiles() {
+            for len in [0, 1, 7, 8, 9, 16, 511, 512] {
+                let text: Vec<u8> = (0..len).map(|i| b'!' + (i % 90) as u8).collect();
+                assert_eq!(through(&text, &profile), text);
+            }
+            assert_eq!(through(b"ok\0", &profile), b"ok");
+            assert_eq!(Latin1(&through(b"M\xE4rz", &profile)).to_string(), "März");
+        }
+    }
+
+    #[test]
+    fn d13_header_counts_the_packages_that_follow() {
+        let [little, big, inclusive, _] = profiles();
+        let header = |text: &[u8], profile| string_package(text, 0, profile).unwrap().bytes().to_vec();
+        assert_eq!(header(b"UCoM2 head pan", &little), [2, 0]);
+        assert_eq!(header(b"UCoM2 head pan", &big), [0, 2]);
+        assert_eq!(header(b"UCoM2 head pan", &inclusive), [3, 0]);
+        assert_eq!(header(b"", &little), [0, 0]);
+        assert_eq!(string_package(b"", 1, &little), None);
+        let long = [b'x'; 600];
+        assert_eq!(StringPackages::new(&long, &little).count(), 65);
+    }
+
+    #[test]
+    fn d13_headers_that_count_too_much_are_refused() {
+        let [profile, ..] = profiles();
+        let mut assembler = StringAssembler::<512>::new();
+        for bad in [&[65, 0][..], &[0xFF, 0xFF], &[1], &[], &[1, 0, 0]] {
+            let payload = Payload::new(bad).unwrap();
+            assert_eq!(assembler.push(0, &payload, &profile), Assembled::Refused, "{bad:?}");
+            assert!(!assembler.is_open());
+        }
+        let inclusive = Profile { string_count_includes_header: true, ..profile };
+        assert_eq!(assembler.push(0, &Payload::new(&[0, 0]).unwrap(), &inclusive), Assembled::Refused);
+    }
+
+    #[test]
+    fn d14_silence_ends_a_string() {
+        let [profile, ..] = profiles();
+        let mut assembler = StringAssembler::<512>::new();
+        let header = Payload::new(&[2, 0]).unwrap();
+        let data = Payload::new(b"12345678").unwrap();
+        assert_eq!(assembler.push(0, &header, &profile), Assembled::Partial);
+        assert_eq!(assembler.push(99_999, &data, &profile), Assembled::Partial);
+        assert_eq!(assembler.missing(), 1);
+        assert!(!assembler.expired(199_998, &profile));
+        assert!(assembler.expired(199_999, &profile));
+        // The header of the repeated answer is not taken for the missing package.
+        assert_eq!(assembler.push(199_999, &header, &profile), Assembled::Partial);
+        assert_eq!(assembler.missing(), 2);
+    }
+
+    proptest! {
+        /// D-13: any text without trailing NUL arrives.
+        #[test]
+        fn d13_round_trip(mut text in proptest::collection::vec(any::<u8>(), 0..=512), i in 0..4usize) {
+            while text.last() == Some(&0) {
+                text.pop();
+            }
+            prop_assert_eq!(through(&text, &profiles()[i]), text);
+        }
+
+        /// D-14: whatever comes, the assembler stays within its buffer and its counts.
+        #[test]
+        fn d14_any_packages(packages in proptest::collection::vec((any::<[u8; 8]>(), 0..9usize), 0..200)) {
+            let [profile, ..] = profiles();
+            let mut assembler = StringAssembler::<64>::new();
+            for (data, len) in packages {
+                let data = [data[0] % 10, 0, data[2], data[3], data[4], data[5], data[6], data[7]];
+                let payload = Payload::new(&data[..len]).unwrap();
+                if let Assembled::Complete(text) = assembler.push(0, &payload, &profile) {
+                    prop_assert!(text.0.len() <= 64);
+                }
+                prop_assert!(assembler.missing() <= 8);
+            }
+        }
+    }
+}

@@ -6,6 +6,9 @@ mod dependencies;
 mod docs;
 mod fuzz;
 mod links;
+// For the checks of the board's program.
+#[allow(dead_code)]
+mod panics;
 mod python;
 mod rules;
 mod shell;

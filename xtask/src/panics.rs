@@ -1,0 +1,278 @@
+//! No panic can be reached from the control tick: a walk over the calls of the linked program.
+//!
+//! What the compiler left in is what counts, so the ELF is read and not the source. From each root every branch that leaves its
+//! function is followed; a function whose address is formed in code that was reached counts as called. Calls through a register
+//! are listed: where they lead is not known here.
+
+mod thumb;
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::fmt;
+use std::ops::Range;
+
+use anyhow::{Context, Result, ensure};
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+
+use thumb::Flow;
+
+/// Parts of the names of functions that end in a panic.
+const PANICS: [&str; 8] = [
+    "panicking",
+    "panic_",
+    "rust_begin_unwind",
+    "unwrap_failed",
+    "expect_failed",
+    "index_fail",
+    "error_fail",
+    "len_mismatch_fail",
+];
+
+/// What can be reached from the roots.
+#[derive(Debug)]
+pub struct Report {
+    /// Functions reached, roots included.
+    pub functions: usize,
+    /// Instructions in them.
+    pub instructions: usize,
+    /// Calls and jumps through a register: function and address.
+    pub indirect: Vec<String>,
+    /// A way to each place that panics or traps: function names with the address where each is left, and what is reached.
+    pub paths: Vec<String>,
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} functions of {} instructions can be reached; {} ways to a panic, {} indirect calls",
+            self.functions,
+            self.instructions,
+            self.paths.len(),
+            self.indirect.len()
+        )?;
+        for path in &self.paths {
+            write!(f, "\n  panic: {path}")?;
+        }
+        for site in &self.indirect {
+            write!(f, "\n  indirect call: {site}")?;
+        }
+        Ok(())
+    }
+}
+
+/// The ways from `roots` (names of functions, as linked or as in the source) to a panic in a program for ARMv7-M.
+///
+/// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` tells the line behind an address.
+pub fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
+    let program = Program::read(elf)?;
+    // Each reached function with the function it was reached from and the address of the branch.
+    let mut from: BTreeMap<u32, Option<(u32, u32)>> = BTreeMap::new();
+    let mut queue = VecDeque::new();
+    for root in roots {
+        let start = program.find(root).with_context(|| format!("the program has no function `{root}`"))?;
+        from.insert(start, None);
+        queue.push_back(start);
+    }
+    let mut report = Report { functions: 0, instructions: 0, indirect: Vec::new(), paths: Vec::new() };
+    while let Some(start) = queue.pop_front() {
+        let function = &program.functions[&start];
+        let here = |address: u32| format!("{} ({address:#x})", way(&program, &from, start));
+        report.functions += 1;
+        let mut edges = Vec::new();
+        program.scan(start, function, &mut report.instructions, |address, end| match end {
+            End::Indirect => report.indirect.push(format!("{} at {address:#x}", function.name)),
+            End::Trap => report.paths.push(format!("{} > trap", here(address))),
+            End::Function(to) if program.functions[&to].panics => {
+                report.paths.push(format!("{} > {}", here(address), program.functions[&to].name));
+            }
+            End::Function(to) => edges.push((to, address)),
+            End::Nowhere(to) => report
+                .indirect
+                .push(format!("{} at {address:#x}, to {to:#x} outside the code", function.name)),
+        });
+        for (to, address) in edges {
+            from.entry(to).or_insert_with(|| {
+                queue.push_back(to);
+                Some((start, address))
+            });
+        }
+    }
+    Ok(report)
+}
+
+/// How a function was reached.
+fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32) -> String {
+    let name = &program.functions[&at].name;
+    match from.get(&at) {
+        Some(Some((caller, address))) => format!("{} ({address:#x}) > {name}", way(program, from, *caller)),
+        _ => name.clone(),
+    }
+}
+
+/// What a place in a function leads to.
+enum End {
+    Function(u32),
+    /// An address where no function is.
+    Nowhere(u32),
+    Indirect,
+    Trap,
+}
+
+struct Function {
+    name: String,
+    panics: bool,
+    end: u32,
+    /// Index of its section.
+    section: usize,
+}
+
+struct Program<'a> {
+    /// By address.
+    functions: BTreeMap<u32, Function>,
+    /// Executable sections: first address and bytes.
+    sections: Vec<(u32, &'a [u8])>,
+    /// Where data in the code begins (true) and where code goes on (false).
+    data: BTreeMap<u32, bool>,
+}
+
+impl<'a> Program<'a> {
+    fn read(elf: &'a [u8]) -> Result<Self> {
+        let file = object::File::parse(elf)?;
+        ensure!(file.architecture() == object::Architecture::Arm, "a program for ARMv7-M is expected");
+        let mut program = Program { functions: BTreeMap::new(), sections: Vec::new(), data: BTreeMap::new() };
+        let mut places = HashMap::new();
+        for section in file.sections().filter(|section| section.kind() == SectionKind::Text) {
+            places.insert(section.index(), program.sections.len());
+            program.sections.push((section.address() as u32, section.data()?));
+        }
+        for symbol in file.symbols() {
+            let Some(&section) = symbol.section_index().and_then(|index| places.get(&index)) else {
+                continue;
+            };
+            let (name, address) = (symbol.name()?, symbol.address() as u32);
+            if let Some(kind) = name.strip_prefix('$') {
+                program.data.insert(address, kind.starts_with('d'));
+            } else if symbol.kind() == SymbolKind::Text {
+                // The lowest bit says Thumb.
+                let (start, end) = (address & !1, (address & !1) + symbol.size() as u32);
+                let name = format!("{:#}", rustc_demangle::demangle(name));
+                let panics = PANICS.iter().any(|part| name.contains(part));
+                let function = program.functions.entry(start).or_insert(Function {
+                    name: name.clone(),
+                    panics,
+                    end,
+                    section,
+                });
+                function.end = function.end.max(end);
+                // Equal functions are folded into one with several names.
+                if panics && !function.panics {
+                    (function.name, function.panics) = (name, true);
+                }
+            }
+        }
+        ensure!(!program.functions.is_empty(), "the program has no symbols of functions");
+        // Functions in assembly have no size: they go as far as the next one.
+        let starts: Vec<u32> = program.functions.keys().copied().collect();
+        for (start, next) in starts.iter().zip(starts.iter().skip(1).map(Some).chain([None])) {
+            let Some(function) = program.functions.get_mut(start) else { continue };
+            if function.end == *start {
+                let (base, bytes) = program.sections[function.section];
+                let limit = base + bytes.len() as u32;
+                function.end = next.map_or(limit, |next| (*next).min(limit));
+            }
+        }
+        Ok(program)
+    }
+
+    fn find(&self, root: &str) -> Option<u32> {
+        let suffix = format!("::{root}");
+        let named = |function: &Function| function.name == root || function.name.ends_with(&suffix);
+        self.functions.iter().find(|(_, function)| named(function)).map(|(start, _)| *start)
+    }
+
+    /// The function that `address` is in; a branch may lead into the middle of one.
+    fn function_at(&self, address: u32) -> Option<u32> {
+        let (start, function) = self.functions.range(..=address).next_back()?;
+        (address < function.end).then_some(*start)
+    }
+
+    fn halfword(&self, section: usize, address: u32) -> Option<u16> {
+        let (base, bytes) = self.sections[section];
+        let at = address.checked_sub(base)? as usize;
+        bytes.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]))
+    }
+
+    /// The pieces of a function: true for data.
+    fn pieces(&self, function: &Range<u32>) -> Vec<(Range<u32>, bool)> {
+        let mut is_data = self.data.range(..=function.start).next_back().is_some_and(|(_, data)| *data);
+        let mut at = function.start;
+        let mut pieces = Vec::new();
+        for (next, data) in self.data.range(function.start + 1..function.end) {
+            pieces.push((at..*next, is_data));
+            (at, is_data) = (*next, *data);
+        }
+        pieces.push((at..function.end, is_data));
+        pieces
+    }
+
+    /// Calls `found` for everything in the function that leads out of it.
+    fn scan(&self, start: u32, function: &Function, count: &mut usize, mut found: impl FnMut(u32, End)) {
+        let whole = start..function.end;
+        let mut halves = [None; 16];
+        for (piece, is_data) in self.pieces(&whole) {
+            let mut after_call = false;
+            let mut address = piece.start;
+            while address < piece.end {
+                let Some(first) = self.halfword(function.section, address) else { break };
+                let second = self.halfword(function.section, address + 2).unwrap_or(0);
+                if is_data {
+                    // Literals: addresses of functions have the lowest bit set.
+                    let word = u32::from(second) << 16 | u32::from(first);
+                    if address.is_multiple_of(4) && word & 1 == 1 && self.functions.contains_key(&(word & !1))
+                    {
+                        found(address, End::Function(word & !1));
+                    }
+                    address += 2;
+                    continue;
+                }
+                *count += 1;
+                let flow = thumb::flow(address, first, second);
+                let mut call = false;
+                match flow {
+                    Flow::Direct(to) if whole.contains(&to) => {}
+                    Flow::Direct(to) => {
+                        call = true;
+                        found(address, self.function_at(to).map_or(End::Nowhere(to), End::Function));
+                    }
+                    // A jump to a constant address: how the linker bridges long distances.
+                    Flow::Indirect(register) => match halves[usize::from(register)] {
+                        Some((at, to)) if at + 4 == address => {
+                            found(address, self.function_at(to & !1).map_or(End::Nowhere(to), End::Function));
+                        }
+                        _ => found(address, End::Indirect),
+                    },
+                    Flow::Low(register, low) => {
+                        halves[usize::from(register)] = Some((address, u32::from(low)))
+                    }
+                    Flow::High(register, high) => {
+                        if let Some((at, value)) = &mut halves[usize::from(register)] {
+                            *at = address;
+                            *value = *value & 0xFFFF | u32::from(high) << 16;
+                            if *value & 1 == 1 && self.functions.contains_key(&(*value & !1)) {
+                                found(address, End::Function(*value & !1));
+                            }
+                        }
+                    }
+                    // Behind a call that does not return a trap is never executed.
+                    Flow::Trap if !after_call => found(address, End::Trap),
+                    Flow::Trap | Flow::Other => {}
+                }
+                after_call = call;
+                address += thumb::len(first);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -106,6 +106,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
+    /// The device failed, and was reset because of it (J-12): an internal error that no other bit explains. It
+    /// latches like any other (J-21). For the board to call before the first tick.
+    pub fn raise_internal(&mut self) {
+        self.errors.raise_device();
+    }
+
     /// One millisecond, with a bounded amount of work whatever the inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         // What has come in.

@@ -6,6 +6,8 @@ use crate::{JOINTS, error};
 pub(crate) struct Errors {
     /// The safety input was low.
     emergency_input: bool,
+    /// The device itself failed.
+    device: bool,
     /// A node reported an error or misbehaved.
     external_joints: bool,
     /// Internal error word per joint.
@@ -20,6 +22,11 @@ pub(crate) struct Errors {
 impl Errors {
     pub fn raise_emergency_input(&mut self) {
         self.emergency_input = true;
+        self.occurred |= self.word();
+    }
+
+    pub fn raise_device(&mut self) {
+        self.device = true;
         self.occurred |= self.word();
     }
 
@@ -46,6 +53,7 @@ impl Errors {
     /// ClearCurrentErrors: what still persists is raised again in the same tick.
     pub fn clear_current(&mut self) {
         self.emergency_input = false;
+        self.device = false;
         self.external_joints = false;
         self.joints = [0; JOINTS];
         self.can = 0;
@@ -58,7 +66,7 @@ impl Errors {
 
     /// An internal error is latched: it holds the safety output at 0 (J-22).
     pub fn internal(&self) -> bool {
-        self.can != 0 || self.joints.iter().any(|&bits| bits != 0)
+        self.device || self.can != 0 || self.joints.iter().any(|&bits| bits != 0)
     }
 
     pub fn any(&self) -> bool {

@@ -437,3 +437,28 @@ fn an_impossible_jump_of_a_measured_position_is_an_error() {
     assert_eq!(rig.errors() & error::EXTERNAL_JOINTS, error::EXTERNAL_JOINTS);
     assert_eq!(rig.status().joints[1].internal & joint_error::POSITION, 0);
 }
+
+#[test]
+fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() {
+    const OWN: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
+    let mut rig = Rig::new(Config::avena());
+    rig.controller.raise_internal();
+    rig.defaults();
+    rig.tick();
+    assert_eq!(rig.state(), State::Error);
+    assert!(!rig.last.safety_output);
+    assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
+    rig.run(1000);
+    // It latches, and says what it is: an internal error that neither a joint nor the bus explains.
+    let status = rig.status();
+    assert_eq!((status.fsm, status.errors, status.occurred), (State::Error as u8, OWN, OWN));
+    assert_eq!(status.can_occurred, 0);
+    assert!(rig.sent.iter().all(|request| torque_of(request) == [0.0; 6]));
+    assert!(rig.nodes.iter().all(|node| node.report.fsm != fsm::ENABLED));
+
+    assert_eq!(rig.clear(true, 0), DataStatus::NoError);
+    rig.run(200);
+    assert_eq!((rig.state(), rig.tes(), rig.errors()), (State::HoldPos, Tes::Null, 0));
+    assert!(rig.last.safety_output);
+    assert_eq!(rig.status().occurred, OWN, "what has occurred stays until it is cleared, too");
+}

@@ -1,0 +1,92 @@
+//! The boards: one file each says which pin does what.
+use embassy_stm32::gpio::{AfType, Flex, Input, Output, OutputType, Pin, Pull, Speed};
+use embassy_stm32::peripherals::IWDG1;
+use embassy_stm32::{Peri, pac};
+use jtc_core::State;
+
+use crate::uart::Line;
+
+#[cfg(not(feature = "nucleo-h743zi2"))]
+mod nucleo_h745zi_q;
+#[cfg(not(feature = "nucleo-h743zi2"))]
+pub use nucleo_h745zi_q::wire;
+#[cfg(feature = "nucleo-h743zi2")]
+mod nucleo_h743zi2;
+#[cfg(feature = "nucleo-h743zi2")]
+pub use nucleo_h743zi2::wire;
+
+/// A board, wired.
+pub struct Board {
+    /// RS422, USB.
+    pub lines: [Line; 2],
+    /// Safety wires and LEDs.
+    pub pins: Pins,
+    /// Watchdog.
+    pub watchdog: Peri<'static, IWDG1>,
+}
+
+/// Safety wires and LEDs.
+pub struct Pins {
+    /// 0 is an error; pulled down, so that a broken wire is one (J-22).
+    pub safety_input: Input<'static>,
+    /// 0 is an error (J-22).
+    pub safety_output: Output<'static>,
+    /// LED1, LED2, LED3.
+    pub leds: [Output<'static>; 3],
+}
+
+impl Pins {
+    /// `input` and `output`: pins of the safety wires.
+    fn new(
+        input: Peri<'static, impl Pin>,
+        output: Peri<'static, impl Pin>,
+        leds: [Output<'static>; 3],
+    ) -> Self {
+        Self {
+            safety_input: Input::new(input, Pull::Down),
+            safety_output: Output::new(output, embassy_stm32::gpio::Level::Low, Speed::Low),
+            leds,
+        }
+    }
+
+    /// Shows the state on the LEDs as the manual has it.
+    pub fn show(&mut self, state: State) {
+        let lit = match state {
+            State::Start => [false, false, false],
+            State::Init => [true, false, false],
+            State::Teaching => [true, true, false],
+            State::HoldPos | State::Operate => [false, true, false],
+            State::Error => [false, false, true],
+        };
+        for (led, lit) in self.leds.iter_mut().zip(lit) {
+            led.set_level(lit.into());
+        }
+    }
+}
+
+/// An LED, dark.
+fn led(pin: Peri<'static, impl Pin>) -> Output<'static> {
+    Output::new(pin, embassy_stm32::gpio::Level::Low, Speed::Low)
+}
+
+/// Gives a pin to a peripheral for good.
+fn transmit(pin: Peri<'static, impl Pin>, function: u8) {
+    let mut pin = Flex::new(pin);
+    pin.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::High));
+    core::mem::forget(pin);
+}
+
+/// As `transmit`; pulled up, as an idle line is: nothing is received where nothing is connected.
+fn receive(pin: Peri<'static, impl Pin>, function: u8) {
+    let mut pin = Flex::new(pin);
+    pin.set_as_af_unchecked(function, AfType::input(Pull::Up));
+    core::mem::forget(pin);
+}
+
+/// Port D bit of the safety output; all boards have it there.
+const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } else { 4 };
+
+/// Takes the safety output to 0 from anywhere, whatever state the program is in.
+pub fn safety_output_low() {
+    pac::GPIOD.bsrr().write(|w| w.set_br(SAFETY_OUTPUT_BIT, true));
+}

@@ -1,0 +1,153 @@
+//! The clock tree, and what it makes of it: 85 MHz for the bus, 1 kHz for the tick, 15 MBd for the host.
+//!
+//! Everything comes from the 8 MHz of the ST-LINK (bypass), because CAN FD asks for a better clock than the internal
+//! oscillator's.
+use jtc_bus::timing;
+
+/// What comes in at OSC_IN, Hz.
+pub const HSE_HZ: u32 = 8_000_000;
+
+/// Vcore comes from the SMPS, as the board is wired when it is bought. The highest voltage scale is not allowed then,
+/// and with it not the highest frequency.
+pub const SMPS: bool = cfg!(feature = "nucleo-h745zi-q");
+
+/// One output of a phase-locked loop.
+#[derive(Clone, Copy, Debug)]
+pub struct Pll {
+    /// Divider before the loop.
+    pub m: u32,
+    /// Multiplier.
+    pub n: u32,
+    /// Divider after the loop.
+    pub divide: u32,
+}
+
+impl Pll {
+    /// Frequency of the oscillator, Hz.
+    pub const fn vco(&self) -> u32 {
+        HSE_HZ / self.m * self.n
+    }
+
+    /// Frequency of the output, Hz.
+    pub const fn hz(&self) -> u32 {
+        self.vco() / self.divide
+    }
+
+    /// The rules of the reference manual for the wide oscillator, and no rounding anywhere.
+    const fn valid(&self) -> bool {
+        let reference = HSE_HZ / self.m;
+        HSE_HZ.is_multiple_of(self.m)
+            && reference >= 2_000_000
+            && reference <= 4_000_000
+            && self.n >= 4
+            && self.n <= 512
+            && self.vco() >= 192_000_000
+            && self.vco() <= 960_000_000
+            && self.vco().is_multiple_of(self.divide)
+    }
+}
+
+/// PLL1, output P: the core.
+pub const CORE: Pll = Pll { m: 4, n: if SMPS { 400 } else { 480 }, divide: 2 };
+/// PLL2, output Q: the CAN controller.
+pub const CAN: Pll = Pll { m: 4, n: 170, divide: 4 };
+/// PLL3, output Q: both serial lines.
+pub const SERIAL: Pll = Pll { m: 4, n: 180, divide: 3 };
+
+/// Core, Hz.
+pub const CORE_HZ: u32 = CORE.hz();
+/// Buses and memories: half of the core.
+pub const AHB_HZ: u32 = CORE_HZ / 2;
+/// Peripherals: half of that.
+pub const APB_HZ: u32 = AHB_HZ / 2;
+/// Timers run at twice the frequency of their bus.
+pub const TIMER_HZ: u32 = 2 * APB_HZ;
+
+/// Ticks of the controller in a second.
+pub const TICK_HZ: u32 = 1_000;
+/// TIM7 counts microseconds.
+pub const TICK_PRESCALER: u32 = TIMER_HZ / 1_000_000;
+/// Microseconds in a tick.
+pub const TICK_US: u32 = 1_000_000 / TICK_HZ;
+
+const _: () = {
+    assert!(CORE.valid() && CAN.valid() && SERIAL.valid());
+    // Highest frequencies at the voltage scale: VOS1 from the SMPS, VOS0 from the LDO.
+    assert!(CORE_HZ <= if SMPS { 400_000_000 } else { 480_000_000 });
+    assert!(APB_HZ <= if SMPS { 100_000_000 } else { 120_000_000 });
+    assert!(CAN.hz() == timing::KERNEL_CLOCK_HZ && CAN.hz() <= APB_HZ);
+    assert!(timing::NOMINAL.bit_rate(CAN.hz()) == timing::NOMINAL_BIT_RATE);
+    assert!(timing::DATA.bit_rate(CAN.hz()) == timing::DATA_BIT_RATE);
+    assert!(TICK_PRESCALER * 1_000_000 == TIMER_HZ && TICK_PRESCALER <= 65_536);
+    assert!(TICK_US * TICK_HZ == 1_000_000 && TICK_US <= 65_536);
+    assert!(SERIAL.hz() == 8 * 15_000_000);
+};
+
+/// Settings of a USART for a rate: the divider register, and whether a bit is sampled 8 instead of 16 times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Baud {
+    /// Register BRR.
+    pub brr: u32,
+    /// Oversampling by 8.
+    pub over8: bool,
+}
+
+impl Baud {
+    /// Settings for `rate` Bd; `None` when the clock cannot make it within 1 %.
+    pub const fn new(rate: u32) -> Option<Self> {
+        let clock = SERIAL.hz();
+        if rate == 0 || rate > clock / 8 {
+            return None;
+        }
+        let over8 = rate > clock / 16;
+        let divided = if over8 { 2 * clock } else { clock };
+        let divider = (divided + rate / 2) / rate;
+        let actual = divided / divider;
+        let error = actual.abs_diff(rate);
+        if divider < 16 || divider > 0xFFFF || error > rate / 100 {
+            return None;
+        }
+        // With oversampling by 8 the lowest four bits are shifted down by one.
+        let brr = if over8 { divider & 0xFFF0 | (divider & 0xF) >> 1 } else { divider };
+        Some(Self { brr, over8 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the line does by the reference manual's formula, Bd.
+    fn rate(baud: Baud) -> f64 {
+        let clock = f64::from(SERIAL.hz());
+        if baud.over8 {
+            2.0 * clock / f64::from(baud.brr & 0xFFF0 | (baud.brr & 0x7) << 1)
+        } else {
+            clock / f64::from(baud.brr)
+        }
+    }
+
+    #[test]
+    fn j01_every_standard_rate_up_to_15_mbd() {
+        let rates = [
+            9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600, 1_000_000, 2_000_000, 3_000_000,
+        ];
+        for wanted in
+            rates.into_iter().chain([4_000_000, 6_000_000, 7_500_000, 8_000_000, 12_000_000, 15_000_000])
+        {
+            let baud = Baud::new(wanted).unwrap_or_else(|| panic!("{wanted} Bd"));
+            let error = rate(baud) / f64::from(wanted) - 1.0;
+            // Both ends together may be off by about 3 %.
+            assert!(error.abs() < 0.01, "{wanted} Bd: {error}");
+        }
+        assert_eq!(Baud::new(15_000_000), Some(Baud { brr: 0x10, over8: true }));
+        assert_eq!(Baud::new(115_200), Some(Baud { brr: 1042, over8: false }));
+        assert_eq!((Baud::new(0), Baud::new(15_000_001), Baud::new(1000)), (None, None, None));
+    }
+
+    #[test]
+    fn j10_kernel_clock_of_the_bus() {
+        assert_eq!(CAN.hz(), 85_000_000);
+        assert_eq!(CORE_HZ, if SMPS { 400_000_000 } else { 480_000_000 });
+    }
+}

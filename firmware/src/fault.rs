@@ -1,0 +1,208 @@
+//! When the program fails: the safety output goes to 0, the drives get one last frame with zero torque, the cause is kept, and
+//! the processor is reset. And after a reset: what the last program left behind.
+use core::arch::naked_asm;
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+
+use cortex_m::peripheral::SCB;
+use embassy_stm32::pac;
+use openjtc_firmware::flight::Flight;
+use openjtc_firmware::reset::{self, Cause, Failure};
+
+use crate::{board, fdcan};
+
+/// Memory whose contents survive a reset: tightly coupled, so no cache stands between a write and the cells.
+#[repr(transparent)]
+pub struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
+
+// SAFETY: `boot` hands out the only reference; a fault, after which nothing else runs, writes through a pointer.
+unsafe impl<T: Send> Sync for Kept<T> {}
+
+/// The last tick; layout in [`openjtc_firmware::flight`].
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".uninit.FLIGHT")]
+#[used]
+pub static FLIGHT: Kept<Flight> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// How the last program ended.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".uninit.LAST_WORDS")]
+#[used]
+pub static LAST_WORDS: Kept<LastWords> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// Place in the source code or in the program where it ended.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct LastWords {
+    /// [`LastWords::HARD_FAULT`] or [`LastWords::PANIC`]; anything else: none.
+    magic: u32,
+    /// Panic: line of the source.
+    line: u32,
+    /// Hard fault: program counter and return address, 0 where unknown.
+    pc: u32,
+    lr: u32,
+    /// Hard fault: registers CFSR, HFSR, and the address if there is one.
+    cfsr: u32,
+    hfsr: u32,
+    address: u32,
+    /// Panic: end of the name of the source file, filled up with zeros.
+    file: [u8; 32],
+}
+
+impl LastWords {
+    const HARD_FAULT: u32 = u32::from_le_bytes(*b"HFLT");
+    const PANIC: u32 = u32::from_le_bytes(*b"PANC");
+    const NONE: Self = Self { magic: 0, line: 0, pc: 0, lr: 0, cfsr: 0, hfsr: 0, address: 0, file: [0; 32] };
+
+    fn failure(&self) -> Option<Failure> {
+        match self.magic {
+            Self::HARD_FAULT => Some(Failure::HardFault),
+            Self::PANIC => Some(Failure::Panic),
+            _ => None,
+        }
+    }
+
+    fn file(&self) -> &str {
+        let end = self.file.iter().position(|byte| *byte == 0).unwrap_or(self.file.len());
+        core::str::from_utf8(&self.file[..end]).unwrap_or("?")
+    }
+}
+
+/// How this start came about.
+pub struct Boot {
+    /// Why.
+    pub cause: Cause,
+    /// What the last program said, and its last tick if that was kept.
+    last_words: LastWords,
+    last_flight: Option<(u64, u32, u8)>,
+    /// The flight record of this program.
+    pub flight: &'static mut Flight,
+}
+
+/// First thing in the program, once: what happened before it.
+pub fn boot() -> Boot {
+    let rsr = pac::RCC.rsr().read().0;
+    pac::RCC.rsr().modify(|w| w.set_rmvf(true));
+    // SAFETY: nothing else refers to the two yet, and this is called once. After power-on they are random, with wrong check
+    // bits: written before they are read. Otherwise they hold integers and floats, for which any bits are a value.
+    let (words, flight) = unsafe {
+        let (words, flight) = (&mut *LAST_WORDS.0.get(), &mut *FLIGHT.0.get());
+        if reset::lost_power(rsr) {
+            words.write(LastWords::NONE);
+            flight.write(Flight::new(0));
+        }
+        (words.assume_init_mut(), flight.assume_init_mut())
+    };
+    let last_words = core::mem::replace(words, LastWords::NONE);
+    let cause = reset::cause(rsr, last_words.failure());
+    let last_flight = flight.valid().then_some((flight.tick, flight.phase, flight.state));
+    *flight = Flight::new(cause as u32);
+    Boot { cause, last_words, last_flight, flight }
+}
+
+/// Writes it to the log.
+pub fn log(boot: &Boot) {
+    let words = &boot.last_words;
+    match boot.cause {
+        Cause::HardFault => defmt::error!(
+            "started after a hard fault at {=u32:#010x}, called from {=u32:#010x}: CFSR {=u32:#x}, HFSR {=u32:#x}, \
+             address {=u32:#010x}",
+            words.pc,
+            words.lr,
+            words.cfsr,
+            words.hfsr,
+            words.address
+        ),
+        Cause::Panic => {
+            defmt::error!("started after a panic in {=str} line {=u32}", words.file(), words.line)
+        }
+        Cause::Watchdog => defmt::error!("started by the watchdog: a tick did not complete in time"),
+        cause => defmt::info!("started by {=str}", cause.name()),
+    }
+    if let (true, Some((tick, phase, state))) = (boot.cause.failed(), boot.last_flight) {
+        let done = if phase == Flight::PHASE_COMPLETE { "completed" } else { "did not complete" };
+        defmt::error!("its last tick, {=u64}, in state {=u8}, {=str}", tick, state, done);
+    }
+}
+
+/// Leaves the machine safe, keeps the words, and starts again. Interrupts are off for good.
+fn end(words: LastWords) -> ! {
+    cortex_m::interrupt::disable();
+    board::safety_output_low();
+    // SAFETY: nothing else runs any more.
+    unsafe { LAST_WORDS.0.get().write(MaybeUninit::new(words)) };
+    fdcan::last_frame();
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    let mut words = LastWords { magic: LastWords::PANIC, ..LastWords::NONE };
+    if let Some(place) = info.location() {
+        words.line = place.line();
+        // The end of the name says most.
+        let name = place.file().as_bytes();
+        let name = &name[name.len().saturating_sub(words.file.len())..];
+        for (to, from) in words.file.iter_mut().zip(name) {
+            *to = *from;
+        }
+    }
+    end(words)
+}
+
+/// Entry of the hard fault, to which all faults lead. The stack may be what failed: a new one is begun, with
+/// where the old one was in the first argument.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+unsafe extern "C" fn hard_fault() -> ! {
+    naked_asm!(
+        "mrs r0, msp",
+        "ldr r1, =_stack_start",
+        "mov sp, r1",
+        "b {handler}",
+        handler = sym hard_fault_with_stack,
+    )
+}
+
+unsafe extern "C" {
+    static _stack_start: u32;
+    static _stack_end: u32;
+}
+
+extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
+    // Words of the frame that the processor pushed: r0..r3, r12, lr, pc, xpsr.
+    const LR: usize = 5;
+    const PC: usize = 6;
+    let (bottom, top) = (&raw const _stack_end as usize, &raw const _stack_start as usize);
+    let word = |n: usize| {
+        let at = frame + 4 * n;
+        // SAFETY: within the stack, aligned, and the new stack has not come down to it in these few calls unless the old one
+        // was nearly empty, in which case the value is wrong and harmless.
+        if at >= bottom && at + 4 <= top && at % 4 == 0 {
+            unsafe { (at as *const u32).read_volatile() }
+        } else {
+            0
+        }
+    };
+    let (pc, lr) = (word(PC), word(LR));
+    // SAFETY: registers that are only read.
+    let scb = unsafe { &*SCB::PTR };
+    let cfsr = scb.cfsr.read();
+    const MEMORY_ADDRESS: u32 = 1 << 7;
+    const BUS_ADDRESS: u32 = 1 << 15;
+    let address = match cfsr {
+        _ if cfsr & MEMORY_ADDRESS != 0 => scb.mmfar.read(),
+        _ if cfsr & BUS_ADDRESS != 0 => scb.bfar.read(),
+        _ => 0,
+    };
+    end(LastWords {
+        magic: LastWords::HARD_FAULT,
+        pc,
+        lr,
+        cfsr,
+        hfsr: scb.hfsr.read(),
+        address,
+        ..LastWords::NONE
+    })
+}

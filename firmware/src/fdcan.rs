@@ -1,0 +1,277 @@
+//! The joint bus: FDCAN1 with dedicated buffers (J-10). It is used by the tick alone and never interrupts it.
+//!
+//! At most one frame a tick goes out. It goes into the one of two transmit buffers that the last one did not use: when the next
+//! tick finds the last frame still unsent, it is cancelled, and what is on the wire at that moment ends there; it is never
+//! sent late. Such a frame counts as unacknowledged.
+use core::sync::atomic::{Ordering, compiler_fence};
+
+use embassy_stm32::pac::can::Fdcan as Registers;
+use embassy_stm32::pac::can::regs::{Ndat1, Txbar, Txbcr};
+use embassy_stm32::pac::{FDCAN1, FDCANRAM};
+use embassy_stm32::peripherals;
+use embassy_stm32::rcc;
+use jtc_bus::timing::{self, BitTiming};
+use jtc_bus::{Format, Frame, MAX_LEN, Request};
+use jtc_core::{BusState, JOINTS};
+use openjtc_firmware::message_ram as ram;
+
+const CAN: Registers = FDCAN1;
+
+/// Looks at a register before something that should happen in a few clock periods is given up.
+const PATIENCE: u32 = 10_000;
+
+/// Frames heard in a tick.
+pub struct Heard {
+    frames: [Frame; ram::RX],
+    count: usize,
+}
+
+impl Heard {
+    /// No frame.
+    pub const fn new() -> Self {
+        const NONE: Frame = Frame::new(0, &[]).expect("an empty frame is allowed");
+        Self { frames: [NONE; ram::RX], count: 0 }
+    }
+
+    /// The frames, by identifier.
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames[..self.count]
+    }
+
+    fn push(&mut self, frame: Frame) {
+        if let Some(slot) = self.frames.get_mut(self.count) {
+            *slot = frame;
+            self.count += 1;
+        }
+    }
+}
+
+/// Error counters of the controller, for the log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, defmt::Format)]
+pub struct Counters {
+    /// Transmit error counter.
+    pub transmit: u8,
+    /// Receive error counter.
+    pub receive: u8,
+    /// Frames that were cancelled because the next tick had come.
+    pub cancelled: u32,
+    /// Times the controller went off the bus.
+    pub bus_off: u32,
+    /// Frames that were not CAN FD with an 11-bit identifier (J-15).
+    pub wrong_format: u32,
+}
+
+/// The bus.
+pub struct Fdcan {
+    /// Transmit buffer of the last frame.
+    last: usize,
+    /// A frame was put there by the last tick.
+    sent: bool,
+    recovering: bool,
+    counters: Counters,
+}
+
+impl Fdcan {
+    /// Sets the controller up and joins the bus.
+    pub fn start() -> Self {
+        rcc::enable_and_reset::<peripherals::FDCAN1>();
+        CAN.cccr().modify(|w| w.set_init(true));
+        wait(|| CAN.cccr().read().init());
+        CAN.cccr().modify(|w| w.set_cce(true));
+        CAN.cccr().modify(|w| {
+            w.set_fdoe(true);
+            w.set_bse(true);
+            w.set_txp(true);
+            // ISO CAN FD, automatic retransmission.
+            w.set_niso(false);
+            w.set_dar(false);
+        });
+        set_timing();
+
+        // The memory is random after power-on and has check bits.
+        for word in 0..ram::BYTES / 4 {
+            FDCANRAM.ram(word).write_value(0);
+        }
+        for n in 0..ram::RX {
+            FDCANRAM.ram(ram::FILTERS + n).write_value(ram::filter(n));
+        }
+        CAN.gfc().write(|w| {
+            // Reject what no filter wants, and remote frames.
+            w.set_anfs(3);
+            w.set_anfe(3);
+            w.set_rrfs(true);
+            w.set_rrfe(true);
+        });
+        CAN.sidfc().write(|w| {
+            w.set_flssa(ram::FILTERS as u16);
+            w.set_lss(ram::RX as u8);
+        });
+        CAN.rxbc().write(|w| w.set_rbsa(ram::RX_BUFFERS as u16));
+        CAN.rxesc().write(|w| w.set_rbds(ram::SIZE_CODE));
+        CAN.txbc().write(|w| {
+            w.set_tbsa(ram::TX_BUFFERS as u16);
+            w.set_ndtb(ram::TX as u8);
+        });
+        CAN.txesc().write(|w| w.set_tbds(ram::SIZE_CODE));
+
+        leave_init();
+        Self { last: 0, sent: false, recovering: false, counters: Counters::default() }
+    }
+
+    /// What happened since the last tick: frames heard, and how the bus is. Before `send`, once a tick.
+    pub fn look(&mut self, heard: &mut Heard) -> BusState {
+        let acknowledged = self.finish_last();
+        let off = self.recover();
+        heard.count = 0;
+        let new = CAN.ndat1().read().nd();
+        for n in 0..ram::RX {
+            if new & 1 << n != 0 {
+                match received(n) {
+                    Some(frame) => heard.push(frame),
+                    None => self.counters.wrong_format = self.counters.wrong_format.wrapping_add(1),
+                }
+            }
+        }
+        // The buffers are open again.
+        CAN.ndat1().write_value(Ndat1(new));
+        BusState { acknowledged, bus_off: off }
+    }
+
+    /// Puts the frame of this tick on its way. While off the bus it is dropped.
+    pub fn send(&mut self, frame: &Frame) {
+        if self.recovering {
+            return;
+        }
+        self.last = (self.last + 1) % ram::TX;
+        self.sent = request(self.last, frame);
+        if !self.sent {
+            self.counters.cancelled = self.counters.cancelled.wrapping_add(1);
+        }
+    }
+
+    /// Error counters.
+    pub fn counters(&mut self) -> Counters {
+        let now = CAN.ecr().read();
+        (self.counters.transmit, self.counters.receive) = (now.tec(), now.rec());
+        self.counters
+    }
+
+    /// True when the last frame was acknowledged; cancels it when it is still waiting.
+    fn finish_last(&mut self) -> bool {
+        let sent = core::mem::take(&mut self.sent);
+        let bit = 1 << self.last;
+        if sent && CAN.txbrp().read().0 & bit != 0 {
+            CAN.txbcr().write_value(Txbcr(bit));
+            self.counters.cancelled = self.counters.cancelled.wrapping_add(1);
+            return false;
+        }
+        sent && CAN.txbto().read().0 & bit != 0
+    }
+
+    /// ISO 11898-1: a controller that is off the bus comes back 129 times 11 recessive bits after the program
+    /// allows it to. True while it is off.
+    fn recover(&mut self) -> bool {
+        if CAN.cccr().read().init() {
+            // The controller itself has stopped. Access to its configuration forgets all transmit requests.
+            CAN.cccr().modify(|w| w.set_cce(true));
+            leave_init();
+            if !self.recovering {
+                self.counters.bus_off = self.counters.bus_off.wrapping_add(1);
+            }
+        }
+        self.recovering = CAN.psr().read().bo();
+        self.recovering
+    }
+}
+
+fn set_timing() {
+    // Registers hold everything less one.
+    let BitTiming { prescaler, segment1, segment2, jump_width } = timing::NOMINAL;
+    CAN.nbtp().write(|w| {
+        w.set_nbrp(prescaler - 1);
+        w.set_ntseg1(segment1 - 1);
+        w.set_ntseg2(segment2 - 1);
+        w.set_nsjw(jump_width - 1);
+    });
+    let BitTiming { prescaler, segment1, segment2, jump_width } = timing::DATA;
+    CAN.dbtp().write(|w| {
+        w.set_dbrp((prescaler - 1) as u8);
+        w.set_dtseg1(segment1 - 1);
+        w.set_dtseg2(segment2 - 1);
+        w.set_dsjw(jump_width - 1);
+        w.set_tdc(true);
+    });
+    CAN.tdcr().write(|w| {
+        w.set_tdco(timing::TDC_OFFSET);
+        w.set_tdcf(timing::TDC_FILTER);
+    });
+}
+
+/// Ends the set-up. The bit is cleared in another clock domain: it must read 0 before it may be set again.
+fn leave_init() {
+    CAN.cccr().modify(|w| {
+        w.set_cce(false);
+        w.set_init(false);
+    });
+    wait(|| !CAN.cccr().read().init());
+}
+
+/// Waits until `done`, but not for ever.
+fn wait(done: impl Fn() -> bool) -> bool {
+    (0..PATIENCE).any(|_| done())
+}
+
+/// The frame in receive buffer `n`; `None` when it has a format that this bus has not.
+fn received(n: usize) -> Option<Frame> {
+    let word = |i: usize| FDCANRAM.ram(ram::rx(n) + i).read();
+    let (head, about) = (word(0), word(1));
+    let format =
+        Format { extended: head & 1 << 30 != 0, remote: head & 1 << 29 != 0, fd: about & 1 << 21 != 0 };
+    if format != Format::BUS {
+        return None;
+    }
+    let mut data = [0; MAX_LEN];
+    for (i, bytes) in data.chunks_exact_mut(4).enumerate() {
+        bytes.copy_from_slice(&word(2 + i).to_le_bytes());
+    }
+    Frame::from_dlc((head >> 18 & 0x7FF) as u16, (about >> 16 & 0xF) as u8, &data)
+}
+
+/// Writes a frame into transmit buffer `n` and asks for it to be sent; false when the buffer is still in use.
+fn request(n: usize, frame: &Frame) -> bool {
+    const FD: u32 = 1 << 21;
+    const BIT_RATE_SWITCH: u32 = 1 << 20;
+    if CAN.txbrp().read().0 & 1 << n != 0 {
+        return false;
+    }
+    let put = |i: usize, value: u32| FDCANRAM.ram(ram::tx(n) + i).write_value(value);
+    put(0, u32::from(frame.id) << 18);
+    put(1, u32::from(frame.dlc()) << 16 | FD | BIT_RATE_SWITCH);
+    for (i, bytes) in frame.data().chunks(4).enumerate() {
+        let mut word = [0; 4];
+        word[..bytes.len()].copy_from_slice(bytes);
+        put(2 + i, u32::from_le_bytes(word));
+    }
+    compiler_fence(Ordering::SeqCst);
+    CAN.txbar().write_value(Txbar(1 << n));
+    true
+}
+
+/// The program has failed: takes the torque away, if the bus can still be used, and gives up soon (about a
+/// millisecond) if not. Called from a fault, whatever the state of everything else.
+pub fn last_frame() {
+    /// A frame takes 0.1 ms, and up to seven answers may be on the bus before it.
+    const LOOKS: u32 = 20_000;
+    if !embassy_stm32::pac::RCC.apb1henr().read().fdcanen() || CAN.cccr().read().init() {
+        return;
+    }
+    CAN.txbcr().write_value(Txbcr((1 << ram::TX) - 1));
+    wait(|| CAN.txbrp().read().0 == 0);
+    let zero = Request::Move { torque: [0.0; JOINTS], pump: false }.emit();
+    for n in 0..ram::TX {
+        if request(n, &zero) {
+            let _ = (0..LOOKS).any(|_| CAN.txbto().read().0 & 1 << n != 0);
+            return;
+        }
+    }
+}

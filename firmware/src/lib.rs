@@ -1,0 +1,35 @@
+//! What of the firmware has no hardware in it: clock arithmetic, the layout of the CAN controller's memory, the
+//! sharing of statuses between two serial lines, causes of a reset, and the records that tools read.
+//!
+//! The program itself is in `main.rs` and its modules; it is built for the board only. This part is built for the PC,
+//! too, where it is tested: `cargo test --target x86_64-unknown-linux-gnu`.
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+pub mod clock;
+pub mod flight;
+pub mod lines;
+pub mod message_ram;
+pub mod reset;
+pub mod version;
+
+/// Name of the board this is built for, as in its feature.
+pub const BOARD: &str = match (
+    cfg!(feature = "nucleo-h745zi-q"),
+    cfg!(feature = "nucleo-h745zi-q-ldo"),
+    cfg!(feature = "nucleo-h743zi2"),
+) {
+    (true, false, false) => "nucleo-h745zi-q",
+    (false, true, false) => "nucleo-h745zi-q-ldo",
+    (false, false, true) => "nucleo-h743zi2",
+    _ => panic!(
+        "exactly one board is needed: --no-default-features --features nucleo-h745zi-q, nucleo-h745zi-q-ldo or \
+         nucleo-h743zi2"
+    ),
+};
+
+/// Rate of both serial lines, Bd: `OPENJTC_BAUD` of the build.
+pub const BAUD: u32 = match u32::from_str_radix(env!("OPENJTC_BAUD"), 10) {
+    Ok(baud) => baud,
+    Err(_) => panic!("the build script checks it"),
+};

@@ -1,0 +1,84 @@
+//! Firmware of the joint trajectory controller.
+//!
+//! Two parties share the processor. The *tick* ([`tick`]) is an interrupt of the highest priority, a thousand times a
+//! second: it owns the controller, the joint bus, the safety wires and the LEDs, and nothing delays it by more than a
+//! few instructions. The *links* ([`link`]) run in what time is left: they take bytes from both serial lines and cut
+//! them into frames. Frames go from the links to the tick through one slot, one at a time; statuses go straight from
+//! the tick to the lines' DMA.
+//!
+//! What is above the hardware stands in the library beside this program and in `jtc-core`, where it is tested on a PC.
+#![no_std]
+#![no_main]
+#![deny(unsafe_op_in_unsafe_fn)]
+#![deny(clippy::undocumented_unsafe_blocks)]
+
+use defmt_rtt as _;
+use embassy_executor::Spawner;
+use embassy_stm32::wdg::IndependentWatchdog;
+use openjtc_firmware::{BAUD, lines, version::Version};
+
+mod board;
+mod clocks;
+mod fault;
+mod fdcan;
+mod link;
+#[cfg(any(feature = "nucleo-h745zi-q", feature = "nucleo-h745zi-q-ldo"))]
+mod m4;
+mod memory;
+mod tick;
+mod uart;
+
+/// What this firmware is, at a fixed address.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".version")]
+#[used]
+pub static VERSION: Version = Version::this();
+
+/// A tick that does not complete within this time resets the processor, µs. The watchdog's own oscillator is a few per
+/// cent off.
+const WATCHDOG_US: u32 = 4_500;
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let boot = fault::boot();
+    let p = clocks::init();
+    memory::init();
+    let board = board::wire(p);
+    fault::log(&boot);
+    defmt::info!(
+        "openjtc {=str} for {=str}, build {=str}: core {=u32} MHz, {=u32} Bd, {=u32} points",
+        env!("CARGO_PKG_VERSION"),
+        openjtc_firmware::BOARD,
+        env!("OPENJTC_BUILD"),
+        VERSION.core_hz / 1_000_000,
+        VERSION.baud,
+        VERSION.points,
+    );
+
+    let memory::Memory { points, rings, statuses, receive, handover } = memory::take();
+    let [rs422, usb] = board.lines;
+    let [ring_rs422, ring_usb] = rings;
+    let [status_rs422, status_usb] = statuses;
+    let (rs422_in, rs422_out) = uart::open(rs422, ring_rs422, status_rs422, BAUD);
+    let (usb_in, usb_out) = uart::open(usb, ring_usb, status_usb, BAUD);
+    let (slot_in, slot_out) = link::slot(handover);
+
+    let mut watchdog = IndependentWatchdog::new(board.watchdog, WATCHDOG_US);
+    watchdog.unleash();
+    tick::start(tick::Parts {
+        points,
+        can: fdcan::Fdcan::start(),
+        pins: board.pins,
+        slot: slot_out,
+        lines: [rs422_out, usb_out],
+        watchdog,
+        boot,
+    });
+
+    let [receive_rs422, receive_usb] = receive;
+    let links = [
+        link::Link::new(lines::RS422, rs422_in, receive_rs422),
+        link::Link::new(lines::USB, usb_in, receive_usb),
+    ];
+    link::run(links, slot_in).await
+}

@@ -1,0 +1,133 @@
+//! Memory: protection, caches, and the large buffers that live outside the fast memory.
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+
+use cortex_m::Peripherals;
+use cortex_m::peripheral::MPU;
+use embassy_stm32::pac;
+use jtc_core::POINTS_MAX;
+use jtc_wire::{FRAME_MAX, RawPoint, STATUS_LEN};
+
+use crate::link::Handover;
+use crate::uart::RING;
+
+/// A value outside .data and .bss, which nobody initialises before [`take`].
+#[repr(C, align(32))]
+struct Place<T>(UnsafeCell<MaybeUninit<T>>);
+
+// SAFETY: the value is reached through `Place::take` only, which hands it out once.
+unsafe impl<T: Send> Sync for Place<T> {}
+
+impl<T> Place<T> {
+    const fn new() -> Self {
+        Self(UnsafeCell::new(MaybeUninit::uninit()))
+    }
+
+    /// The value, all bytes zero.
+    ///
+    /// # Safety
+    /// Called once, and zero bytes are a value of `T`.
+    unsafe fn take(&'static self) -> &'static mut T {
+        // SAFETY: the only reference there will ever be, by the contract.
+        let place = unsafe { &mut *self.0.get() };
+        *place = MaybeUninit::zeroed();
+        // SAFETY: zero bytes are a value, by the contract.
+        unsafe { place.assume_init_mut() }
+    }
+}
+
+/// The trajectory.
+#[unsafe(link_section = ".axisram")]
+static POINTS: Place<[RawPoint; POINTS_MAX]> = Place::new();
+/// The frame that the controller works on.
+#[unsafe(link_section = ".axisram")]
+static HANDOVER: Place<[Handover; 1]> = Place::new();
+/// What the lines' DMA writes; not cached.
+#[unsafe(link_section = ".sram1")]
+static RINGS: Place<[[u8; RING]; 2]> = Place::new();
+/// What the lines' DMA reads; not cached.
+#[unsafe(link_section = ".sram1")]
+static STATUSES: Place<[[u8; STATUS_LEN]; 2]> = Place::new();
+/// Where frames are put together, a buffer for each line.
+#[unsafe(link_section = ".sram2")]
+static RECEIVE: Place<[[u8; FRAME_MAX]; 2]> = Place::new();
+
+/// The large buffers.
+pub struct Memory {
+    /// The trajectory.
+    pub points: &'static mut [RawPoint],
+    /// DMA rings of the lines.
+    pub rings: [&'static mut [u8; RING]; 2],
+    /// DMA buffers of the statuses.
+    pub statuses: [&'static mut [u8; STATUS_LEN]; 2],
+    /// Receive buffers of the lines.
+    pub receive: [&'static mut [u8; FRAME_MAX]; 2],
+    /// The slot between links and tick.
+    pub handover: &'static mut [Handover; 1],
+}
+
+/// Hands out the buffers, zeroed. Once; after [`init`].
+pub fn take() -> Memory {
+    // SAFETY: `main` calls this once, and zero bytes are a value of arrays of integers and of `Handover`, which consists of
+    // integers, too.
+    let (points, rings, statuses, receive, handover) =
+        unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), HANDOVER.take()) };
+    Memory {
+        points,
+        rings: rings.each_mut(),
+        statuses: statuses.each_mut(),
+        receive: receive.each_mut(),
+        handover,
+    }
+}
+
+/// Regions of the protection unit: base, log2 of the size, attributes.
+const REGIONS: [(u32, u32, u32); 3] = [
+    // External memory that is not there: without this the core may read it speculatively and hang. The lowest and
+    // highest quarters of the 4 GB are left out.
+    (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
+    // The instruction memory at address 0 is not used: following a null pointer is a fault.
+    (0x0000_0000, 16, NO_ACCESS),
+    // What DMA reads and writes: normal memory, not cached.
+    (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
+];
+const NO_ACCESS: u32 = NO_EXECUTE;
+const FULL_ACCESS: u32 = 0b011 << 24;
+const NO_EXECUTE: u32 = 1 << 28;
+/// TEX 1, C 0, B 0, shareable.
+const NORMAL_UNCACHED: u32 = 1 << 19 | 1 << 18;
+
+/// Switches on the memories, their protection and the caches.
+pub fn init() {
+    // The HAL leaves the memories of domain D2 without a clock.
+    pac::RCC.ahb2enr().modify(|w| {
+        w.set_sram1en(true);
+        w.set_sram2en(true);
+    });
+    // Reading back makes sure that the clock runs.
+    pac::RCC.ahb2enr().read();
+
+    // SAFETY: only the HAL has used the core's peripherals so far, and it does not use these three.
+    let mut core = unsafe { Peripherals::steal() };
+    protect(&core.MPU);
+    core.SCB.enable_icache();
+    core.SCB.enable_dcache(&mut core.CPUID);
+}
+
+fn protect(mpu: &MPU) {
+    cortex_m::asm::dmb();
+    for (number, (base, size, attributes)) in REGIONS.iter().enumerate() {
+        // SAFETY: the regions restrict nothing that this program uses.
+        unsafe {
+            mpu.rnr.write(number as u32);
+            mpu.rbar.write(*base);
+            mpu.rasr.write(attributes | (size - 1) << 1 | 1);
+        }
+    }
+    const ENABLE: u32 = 1 << 0;
+    const DEFAULT_MAP_ELSEWHERE: u32 = 1 << 2;
+    // SAFETY: as above; everything else keeps the processor's default attributes.
+    unsafe { mpu.ctrl.write(ENABLE | DEFAULT_MAP_ELSEWHERE) };
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}

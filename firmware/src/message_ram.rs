@@ -1,0 +1,83 @@
+//! The CAN controller's message memory: which filter leads into which buffer, and where each begins (J-10).
+//!
+//! Buffers are dedicated: each of the 21 answers that nodes can give has one of its own, in the order
+//! of their identifiers. All else is rejected by the controller. A buffer that was not read is not overwritten.
+use jtc_bus::{MAX_LEN, NODES, id};
+
+/// Bytes of the message memory.
+pub const BYTES: usize = 10 * 1024;
+/// Identifiers that are heard: answers of seven nodes to Move, ChangeFsm and ChangeMode.
+pub const RX: usize = 3 * NODES;
+/// Transmit buffers: one for this tick's frame, one for the last one's while it is being cancelled.
+pub const TX: usize = 2;
+/// Words of a buffer: two of header, the rest payload.
+pub const BUFFER_WORDS: usize = 2 + MAX_LEN / 4;
+/// Code of a payload of 24 bytes in RXESC and TXESC.
+pub const SIZE_CODE: u8 = 4;
+
+/// First word of the filters.
+pub const FILTERS: usize = 0;
+/// First word of the receive buffers.
+pub const RX_BUFFERS: usize = FILTERS + RX;
+/// First word of the transmit buffers.
+pub const TX_BUFFERS: usize = RX_BUFFERS + RX * BUFFER_WORDS;
+/// Words used.
+pub const END: usize = TX_BUFFERS + TX * BUFFER_WORDS;
+
+const _: () = {
+    assert!(END * 4 <= BYTES);
+    // The codes 0..4 stand for 8, 12, 16, 20 and 24 bytes.
+    assert!(MAX_LEN == 8 + 4 * SIZE_CODE as usize);
+    // One register of new-data flags covers all.
+    assert!(RX <= 32 && TX <= 32);
+};
+
+/// First word of receive buffer `n`.
+pub const fn rx(n: usize) -> usize {
+    RX_BUFFERS + n * BUFFER_WORDS
+}
+
+/// First word of transmit buffer `n`.
+pub const fn tx(n: usize) -> usize {
+    TX_BUFFERS + n * BUFFER_WORDS
+}
+
+/// The identifier that receive buffer `n` hears.
+pub const fn heard(n: usize) -> u16 {
+    let node = (n % NODES) as u8;
+    match n / NODES {
+        0 => id::answer(id::MOVE, node),
+        1 => id::answer(id::CHANGE_FSM, node),
+        _ => id::answer(id::CHANGE_MODE, node),
+    }
+}
+
+/// Filter element `n`: frames with just that identifier go into receive buffer `n`.
+pub const fn filter(n: usize) -> u32 {
+    const STORE_INTO_BUFFER: u32 = 0b111 << 27;
+    STORE_INTO_BUFFER | (heard(n) as u32) << 16 | n as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j10_exactly_the_expected_identifiers_are_heard_each_in_its_own_buffer() {
+        let expected: Vec<u16> = (0x200..=0x206).chain(0x210..=0x216).chain(0x2F0..=0x2F6).collect();
+        let heard: Vec<u16> = (0..RX).map(heard).collect();
+        assert_eq!(heard, expected);
+        for n in 0..RX {
+            // By the reference manual: SFEC bits 29..27, SFID1 bits 26..16, buffer in bits 5..0 with bits 10..9 zero.
+            assert_eq!(filter(n) >> 27 & 0b111, 0b111);
+            assert_eq!(filter(n) >> 16 & 0x7FF, u32::from(expected[n]));
+            assert_eq!(filter(n) & 0x7FF, n as u32);
+        }
+    }
+
+    #[test]
+    fn areas_follow_each_other() {
+        assert_eq!((FILTERS, RX_BUFFERS), (0, 21));
+        assert_eq!((rx(0), rx(20) + BUFFER_WORDS, tx(1) + BUFFER_WORDS), (RX_BUFFERS, TX_BUFFERS, END));
+    }
+}

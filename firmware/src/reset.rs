@@ -1,0 +1,104 @@
+//! Why the processor started: from the flags of the RCC and what the last program left behind.
+
+/// Why the processor started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Cause {
+    /// Power came on, or was too low.
+    PowerOn = 1,
+    /// The reset button or a debugger.
+    Pin = 2,
+    /// A debugger or a program asked for it.
+    Software = 3,
+    /// The tick did not complete in time.
+    Watchdog = 4,
+    /// A hard fault of the processor.
+    HardFault = 5,
+    /// The program found itself in a state that it says cannot be.
+    Panic = 6,
+}
+
+impl Cause {
+    /// The program failed: it says so to the host, until the host has cleared it.
+    pub const fn failed(self) -> bool {
+        matches!(self, Self::Watchdog | Self::HardFault | Self::Panic)
+    }
+
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PowerOn => "power-on",
+            Self::Pin => "reset pin",
+            Self::Software => "software",
+            Self::Watchdog => "watchdog",
+            Self::HardFault => "hard fault",
+            Self::Panic => "panic",
+        }
+    }
+}
+
+/// How a program that failed ended; kept over the reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// Hard fault.
+    HardFault,
+    /// Panic.
+    Panic,
+}
+
+const BROWN_OUT: u32 = 1 << 21;
+const PIN: u32 = 1 << 22;
+const POWER_ON: u32 = 1 << 23;
+const SOFTWARE: u32 = 1 << 24;
+const WATCHDOG: u32 = 1 << 26;
+
+/// The memory has lost its contents: nothing that the last program left there may be believed.
+pub const fn lost_power(rsr: u32) -> bool {
+    rsr & (POWER_ON | BROWN_OUT) != 0
+}
+
+/// Cause from the register RCC_RSR and from what the last program left.
+///
+/// Any reset pulls the reset pin, so that flag is looked at last. `failure` only counts when the program itself asked
+/// for the reset, or hung before it could.
+pub const fn cause(rsr: u32, failure: Option<Failure>) -> Cause {
+    match failure {
+        _ if lost_power(rsr) => Cause::PowerOn,
+        Some(Failure::HardFault) if rsr & (SOFTWARE | WATCHDOG) != 0 => Cause::HardFault,
+        Some(Failure::Panic) if rsr & (SOFTWARE | WATCHDOG) != 0 => Cause::Panic,
+        _ if rsr & WATCHDOG != 0 => Cause::Watchdog,
+        _ if rsr & SOFTWARE != 0 => Cause::Software,
+        _ if rsr & PIN != 0 => Cause::Pin,
+        _ => Cause::PowerOn,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_cause_is_told_from_the_others() {
+        // As the chip reports them: all but a wake-up pull the pin.
+        assert_eq!(cause(POWER_ON | BROWN_OUT | PIN, None), Cause::PowerOn);
+        assert_eq!(cause(BROWN_OUT | PIN, None), Cause::PowerOn);
+        assert_eq!(cause(PIN, None), Cause::Pin);
+        assert_eq!(cause(PIN | SOFTWARE, None), Cause::Software);
+        assert_eq!(cause(PIN | WATCHDOG, None), Cause::Watchdog);
+        for (failure, expected) in [(Failure::HardFault, Cause::HardFault), (Failure::Panic, Cause::Panic)] {
+            assert_eq!(cause(PIN | SOFTWARE, Some(failure)), expected);
+            assert_eq!(
+                cause(PIN | WATCHDOG, Some(failure)),
+                expected,
+                "the watchdog was faster than the reset"
+            );
+            assert_eq!(
+                cause(POWER_ON | PIN, Some(failure)),
+                Cause::PowerOn,
+                "memory without power is random"
+            );
+            assert_eq!(cause(PIN, Some(failure)), Cause::Pin, "somebody pressed the button since");
+            assert!(expected.failed());
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! The tick: TIM7 at the highest priority, a thousand times a second. It owns the controller and everything that moves or
+//! stops the arm; all it shares with the rest is the slot and a summary for the log.
+use core::cell::RefCell;
+
+use critical_section::Mutex;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::peripherals::{IWDG1, TIM7};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{interrupt, pac, rcc};
+use jtc_core::{Config, Controller, Inputs, Outputs};
+use jtc_wire::{RawPoint, STATUS_LEN};
+use openjtc_firmware::clock;
+use openjtc_firmware::flight::Flight;
+use openjtc_firmware::lines::{self, Awaiting};
+use static_cell::StaticCell;
+
+use crate::board::Pins;
+use crate::fault::Boot;
+use crate::fdcan::{Counters, Fdcan, Heard};
+use crate::link::{self, SlotOut};
+use crate::uart::Transmitter;
+
+/// The controller with its trajectory elsewhere.
+type Jtc = Controller<&'static mut [RawPoint]>;
+
+/// What a tick needs.
+pub struct Parts {
+    /// Memory of the trajectory.
+    pub points: &'static mut [RawPoint],
+    /// Joint bus.
+    pub can: Fdcan,
+    /// Safety wires and LEDs.
+    pub pins: Pins,
+    /// Events of the host.
+    pub slot: SlotOut,
+    /// RS422, USB.
+    pub lines: [Transmitter; lines::LINES],
+    /// Reset unless a tick completes.
+    pub watchdog: IndependentWatchdog<'static, IWDG1>,
+    /// How this start came about.
+    pub boot: Boot,
+}
+
+/// What the log says about the tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, defmt::Format)]
+pub struct Summary {
+    /// State of the controller.
+    pub state: u8,
+    /// Current error word.
+    pub errors: u16,
+    /// Joint bus.
+    pub bus: Counters,
+}
+
+struct Tick {
+    controller: Jtc,
+    can: Fdcan,
+    heard: Heard,
+    pins: Pins,
+    slot: SlotOut,
+    lines: [Transmitter; lines::LINES],
+    awaiting: Awaiting,
+    watchdog: IndependentWatchdog<'static, IWDG1>,
+    flight: &'static mut Flight,
+}
+
+/// The tick's own; nobody else locks it for longer than it takes to copy the summary.
+static TICK: Mutex<RefCell<Option<&'static mut Tick>>> = Mutex::new(RefCell::new(None));
+static SUMMARY: Mutex<RefCell<Option<Summary>>> = Mutex::new(RefCell::new(None));
+
+/// Starts the ticks.
+pub fn start(parts: Parts) {
+    static PLACE: StaticCell<Tick> = StaticCell::new();
+    let Parts { points, can, pins, slot, lines, watchdog, boot } = parts;
+    let tick = PLACE.init_with(|| Tick {
+        controller: Controller::new(Config::default(), points),
+        can,
+        heard: Heard::new(),
+        pins,
+        slot,
+        lines,
+        awaiting: Awaiting::new(),
+        watchdog,
+        flight: boot.flight,
+    });
+    if boot.cause.failed() {
+        tick.controller.raise_internal();
+    }
+    critical_section::with(|cs| TICK.borrow_ref_mut(cs).replace(tick));
+
+    rcc::enable_and_reset::<TIM7>();
+    pac::TIM7.psc().write_value((clock::TICK_PRESCALER - 1) as u16);
+    pac::TIM7.arr().write(|w| w.set_arr((clock::TICK_US - 1) as u16));
+    // Prescaler and period take effect with an update, which is not a tick.
+    pac::TIM7.egr().write(|w| w.set_ug(true));
+    pac::TIM7.sr().write(|w| w.set_uif(false));
+    pac::TIM7.dier().write(|w| w.set_uie(true));
+    interrupt::TIM7.set_priority(Priority::P0);
+    // The time driver of the HAL would be on a level with the tick.
+    interrupt::TIM5.set_priority(crate::clocks::LOW);
+    // SAFETY: everything that its handler uses is in place.
+    unsafe { interrupt::TIM7.enable() };
+    pac::TIM7.cr1().write(|w| w.set_cen(true));
+}
+
+/// What the log should know, as of the last tick.
+pub fn summary() -> Summary {
+    critical_section::with(|cs| *SUMMARY.borrow_ref(cs)).unwrap_or_default()
+}
+
+#[interrupt]
+fn TIM7() {
+    pac::TIM7.sr().write(|w| w.set_uif(false));
+    critical_section::with(|cs| {
+        if let Some(tick) = TICK.borrow_ref_mut(cs).as_mut() {
+            let summary = tick.run();
+            SUMMARY.borrow_ref_mut(cs).replace(summary);
+        }
+    });
+    link::WORK.signal(());
+}
+
+impl Tick {
+    fn run(&mut self) -> Summary {
+        let bus_state = self.can.look(&mut self.heard);
+        let counters = self.can.counters();
+        let handover = self.slot.try_receive();
+        let line = handover.as_ref().map_or(lines::RS422, |handover| handover.line());
+        let inputs = Inputs {
+            bus: self.heard.frames(),
+            bus_state,
+            safety_input: self.pins.safety_input.is_high(),
+            host: handover.as_ref().map(|handover| handover.event()),
+            status_free: self.lines.iter().all(Transmitter::is_free),
+        };
+        self.flight.begin(&inputs, line, counters.wrong_format);
+        let outputs = control_step(&mut self.controller, &inputs);
+
+        self.pins.safety_output.set_level(outputs.safety_output.into());
+        if let Some(frame) = &outputs.bus {
+            self.can.send(frame);
+        }
+        if outputs.host_done {
+            self.slot.receive_done();
+            self.awaiting.push(line);
+        }
+        if let Some(status) = &outputs.status {
+            send(&mut self.lines, &mut self.awaiting, status);
+        }
+        let telemetry = self.controller.telemetry();
+        let (state, errors) = (telemetry.state, telemetry.errors);
+        self.flight.complete(&outputs, telemetry);
+        self.pins.show(state);
+        // Everything is done: this, and only this, keeps the processor from being reset.
+        self.watchdog.pet();
+        Summary { state: state as u8, errors, bus: counters }
+    }
+}
+
+/// One step of the controller. A function of its own, under its own name, so that its instructions can be counted.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn control_step(controller: &mut Jtc, inputs: &Inputs<'_>) -> Outputs {
+    controller.tick(inputs)
+}
+
+/// A status goes to both lines, its record only to the line that it answers (J-04).
+fn send(lines: &mut [Transmitter; lines::LINES], awaiting: &mut Awaiting, status: &[u8; STATUS_LEN]) {
+    if !lines::has_record(status) {
+        for line in lines {
+            line.send(status);
+        }
+        return;
+    }
+    let answered = awaiting.pop();
+    let other = lines::without_record(status);
+    for (n, line) in lines.iter_mut().enumerate() {
+        line.send(if answered == Some(n) { status } else { &other });
+    }
+}

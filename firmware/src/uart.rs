@@ -1,0 +1,234 @@
+//! A serial line: bytes come in through a ring that DMA fills and never stops filling, whatever errors the line has;
+//! statuses go out by DMA, started by the tick.
+//!
+//! No byte causes an interrupt. The links look at the ring after every tick, and at once when the line falls idle.
+use core::sync::atomic::{Ordering, fence};
+
+use embassy_stm32::interrupt::InterruptExt;
+use embassy_stm32::pac::dma::vals::{Dir, Pl, Size};
+use embassy_stm32::pac::usart::Usart;
+use embassy_stm32::pac::usart::vals::Over8;
+use embassy_stm32::pac::{DMA1, DMAMUX1};
+use embassy_stm32::peripherals::{USART2, USART3};
+use embassy_stm32::{Peri, interrupt, pac, rcc};
+use jtc_wire::STATUS_LEN;
+use openjtc_firmware::clock::Baud;
+
+use crate::{clocks, link};
+
+/// Bytes of a ring: 21 ms at 15 MBd.
+pub const RING: usize = 32 * 1024;
+
+/// A USART and the streams of DMA1 that serve it.
+pub struct Line {
+    usart: Usart,
+    receive: Stream,
+    transmit: Stream,
+    interrupt: pac::Interrupt,
+}
+
+impl Line {
+    /// USART2.
+    pub fn usart2(_usart: Peri<'static, USART2>) -> Self {
+        rcc::enable_and_reset::<USART2>();
+        Self {
+            usart: pac::USART2,
+            receive: Stream { number: 0, request: 43 },
+            transmit: Stream { number: 1, request: 44 },
+            interrupt: pac::Interrupt::USART2,
+        }
+    }
+
+    /// USART3.
+    pub fn usart3(_usart: Peri<'static, USART3>) -> Self {
+        rcc::enable_and_reset::<USART3>();
+        Self {
+            usart: pac::USART3,
+            receive: Stream { number: 2, request: 45 },
+            transmit: Stream { number: 3, request: 46 },
+            interrupt: pac::Interrupt::USART3,
+        }
+    }
+}
+
+/// A stream of DMA1, and which request of the multiplexer starts its transfers.
+#[derive(Clone, Copy)]
+struct Stream {
+    number: usize,
+    request: u8,
+}
+
+impl Stream {
+    /// Sets up byte transfers between a register and memory; `start` starts them.
+    fn configure(self, direction: Dir, register: *mut (), memory: *mut u8, ring: bool) {
+        DMAMUX1.ccr(self.number).write(|w| w.set_dmareq_id(self.request));
+        let stream = DMA1.st(self.number);
+        stream.par().write_value(register as u32);
+        stream.m0ar().write_value(memory as u32);
+        stream.cr().write(|w| {
+            w.set_dir(direction);
+            w.set_circ(ring);
+            w.set_minc(true);
+            w.set_psize(Size::BITS8);
+            w.set_msize(Size::BITS8);
+            // Reception must not wait, transmission may.
+            w.set_pl(if ring { Pl::VERY_HIGH } else { Pl::LOW });
+            // A USART needs buffered transfers; without them the stream can lock up.
+            w.set_trbuff(true);
+        });
+    }
+
+    /// Transfers `count` bytes. The stream must have stopped.
+    fn start(self, count: usize) {
+        // A stream with flags of its last transfer does not start.
+        DMA1.ifcr(self.number / 4).write(|w| {
+            let n = self.number % 4;
+            w.set_feif(n, true);
+            w.set_dmeif(n, true);
+            w.set_teif(n, true);
+            w.set_htif(n, true);
+            w.set_tcif(n, true);
+        });
+        let stream = DMA1.st(self.number);
+        stream.ndtr().write(|w| w.set_ndt(count as u16));
+        // What was written to memory is there before the stream reads it.
+        fence(Ordering::SeqCst);
+        cortex_m::asm::dmb();
+        stream.cr().modify(|w| w.set_en(true));
+    }
+
+    fn running(self) -> bool {
+        DMA1.st(self.number).cr().read().en()
+    }
+}
+
+/// Starts a line.
+pub fn open(
+    line: Line,
+    ring: &'static mut [u8; RING],
+    status: &'static mut [u8; STATUS_LEN],
+    rate: u32,
+) -> (Receiver, Transmitter) {
+    let usart = line.usart;
+    let baud = defmt::unwrap!(Baud::new(rate), "{=u32} Bd cannot be made", rate);
+    usart.brr().write_value(pac::usart::regs::Brr(baud.brr));
+    usart.cr3().write(|w| {
+        w.set_dmar(true);
+        w.set_dmat(true);
+    });
+    usart.cr1().write(|w| {
+        w.set_over8(if baud.over8 { Over8::OVERSAMPLING8 } else { Over8::OVERSAMPLING16 });
+        // 16 bytes of patience with the DMA.
+        w.set_fifoen(true);
+        w.set_te(true);
+        w.set_re(true);
+        w.set_idleie(true);
+    });
+    line.receive.configure(Dir::PERIPHERAL_TO_MEMORY, usart.rdr().as_ptr().cast(), ring.as_mut_ptr(), true);
+    line.transmit.configure(
+        Dir::MEMORY_TO_PERIPHERAL,
+        usart.tdr().as_ptr().cast(),
+        status.as_mut_ptr(),
+        false,
+    );
+    line.receive.start(RING);
+    usart.cr1().modify(|w| w.set_ue(true));
+
+    line.interrupt.set_priority(clocks::LOW);
+    // SAFETY: its handler only touches the line's flags and wakes the links.
+    unsafe { line.interrupt.enable() };
+    (
+        Receiver { usart, stream: line.receive, ring: ring.as_ptr(), next: 0, errors: 0 },
+        Transmitter { stream: line.transmit, buffer: status },
+    )
+}
+
+/// The receiving half of a line.
+pub struct Receiver {
+    usart: Usart,
+    stream: Stream,
+    /// Written by DMA: no reference to it may exist.
+    ring: *const u8,
+    /// First byte that was not taken.
+    next: usize,
+    /// Overruns, framing errors and noise seen since the start.
+    errors: u32,
+}
+
+impl Receiver {
+    /// Bytes that have arrived and were not taken.
+    pub fn waiting(&self) -> usize {
+        let end = RING - usize::from(DMA1.st(self.stream.number).ndtr().read().ndt());
+        (end + RING - self.next) % RING
+    }
+
+    /// Copies the oldest bytes without taking them; as many as are in one piece and fit.
+    pub fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
+        let count = self.waiting().min(into.len()).min(RING - self.next);
+        cortex_m::asm::dmb();
+        // SAFETY: `next + count` is at most the ring's length. DMA has written these bytes and comes to them again only after
+        // all others.
+        unsafe { core::ptr::copy_nonoverlapping(self.ring.add(self.next), into.as_mut_ptr(), count) };
+        &into[..count]
+    }
+
+    /// Takes `count` bytes of those that wait.
+    pub fn take(&mut self, count: usize) {
+        self.next = (self.next + count) % RING;
+    }
+
+    /// Errors of the line since the start. Reception goes on: the parser finds what is wrong with the bytes.
+    pub fn errors(&mut self) -> u32 {
+        let flags = self.usart.isr().read();
+        if flags.ore() || flags.fe() || flags.ne() {
+            self.errors = self.errors.wrapping_add(1);
+            self.usart.icr().write(|w| {
+                w.set_ore(true);
+                w.set_fe(true);
+                w.set_ne(true);
+            });
+        }
+        self.errors
+    }
+}
+
+/// The sending half of a line.
+pub struct Transmitter {
+    stream: Stream,
+    /// Read by DMA while the stream runs.
+    buffer: &'static mut [u8; STATUS_LEN],
+}
+
+// SAFETY: registers can be used from any context, and the buffer belongs to this alone.
+unsafe impl Send for Transmitter {}
+
+impl Transmitter {
+    /// The last status has left the buffer.
+    pub fn is_free(&self) -> bool {
+        !self.stream.running()
+    }
+
+    /// Sends a status; nothing is sent while the last one still is.
+    pub fn send(&mut self, status: &[u8; STATUS_LEN]) {
+        if self.is_free() {
+            *self.buffer = *status;
+            self.stream.start(STATUS_LEN);
+        }
+    }
+}
+
+#[interrupt]
+fn USART2() {
+    idle(pac::USART2);
+}
+
+#[interrupt]
+fn USART3() {
+    idle(pac::USART3);
+}
+
+/// The line has been silent for the time of a byte.
+fn idle(usart: Usart) {
+    usart.icr().write(|w| w.set_idle(true));
+    link::WORK.signal(());
+}

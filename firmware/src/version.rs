@@ -1,0 +1,86 @@
+//! What this firmware is: a record at a fixed place in flash, for tools that have nothing but the file or the memory.
+use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
+
+use crate::{BAUD, BOARD, clock};
+
+/// Where the record is.
+pub const ADDRESS: usize = 0x0800_0400;
+/// First bytes of the record.
+pub const MAGIC: [u8; 8] = *b"OPENJTC\0";
+
+/// The record; little-endian like everything in this processor. Texts are filled up with zeros.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct Version {
+    /// [`MAGIC`].
+    pub magic: [u8; 8],
+    /// Form of this record: 1.
+    pub layout: u16,
+    /// Bytes of this record.
+    pub size: u16,
+    /// Version of the firmware, for example `0.1.0`.
+    pub version: [u8; 12],
+    /// Board, as its feature is called.
+    pub board: [u8; 24],
+    /// Commit, with `+` when files were changed since, or `unknown`.
+    pub build: [u8; 24],
+    /// Points that the trajectory store holds.
+    pub points: u32,
+    /// Segments of a trajectory.
+    pub segments: u32,
+    /// Points of a segment.
+    pub segment_points: u32,
+    /// Ticks in a second.
+    pub tick_hz: u32,
+    /// Rate of the serial lines, Bd.
+    pub baud: u32,
+    /// Frequency of the core, Hz.
+    pub core_hz: u32,
+}
+
+impl Version {
+    /// The record of this build.
+    pub const fn this() -> Self {
+        Self {
+            magic: MAGIC,
+            layout: 1,
+            size: size_of::<Self>() as u16,
+            version: padded(env!("CARGO_PKG_VERSION")),
+            board: padded(BOARD),
+            build: padded(env!("OPENJTC_BUILD")),
+            points: POINTS_MAX as u32,
+            segments: SEGMENTS_MAX as u32,
+            segment_points: SEGMENT_POINTS_MAX as u32,
+            tick_hz: clock::TICK_HZ,
+            baud: BAUD,
+            core_hz: clock::CORE_HZ,
+        }
+    }
+}
+
+/// A text with zeros behind it, cut where it does not fit.
+const fn padded<const N: usize>(text: &str) -> [u8; N] {
+    let mut bytes = [0; N];
+    let mut i = 0;
+    while i < N && i < text.len() {
+        bytes[i] = text.as_bytes()[i];
+        i += 1;
+    }
+    bytes
+}
+
+const _: () = assert!(size_of::<Version>() == 96);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_record_names_this_build() {
+        let version = Version::this();
+        assert!(version.board.starts_with(BOARD.as_bytes()) && version.board[BOARD.len()] == 0);
+        assert_eq!((version.points, version.segments, version.segment_points), (12_000, 100, 1_500));
+        assert_eq!((version.tick_hz, version.size), (1_000, 96));
+        assert_eq!(padded::<3>("abcd"), *b"abc");
+    }
+}

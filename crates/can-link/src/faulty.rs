@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use crate::{CanBus, CanError, CanFrame};
+use crate::{CanBus, CanError, CanFrame, ControllerState};
 
 /// What happens to frames in one direction. Probabilities are shares of 1 per frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -54,7 +54,7 @@ pub struct Counts {
 }
 
 /// One direction: frames that are under way.
-struct Line {
+pub(crate) struct Line {
     faults: Faults,
     random: fastrand::Rng,
     /// Sorted by the time when they are due; equal times in order of arrival.
@@ -70,13 +70,13 @@ fn seconds(value: f64) -> Duration {
 }
 
 impl Line {
-    fn new(faults: Faults, seed: u64) -> Self {
+    pub(crate) fn new(faults: Faults, seed: u64) -> Self {
         let random = fastrand::Rng::with_seed(seed);
         Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, counts: Counts::default() }
     }
 
     /// Draws in the same number and order whatever happens: one setting does not change the others' faults.
-    fn put(&mut self, now: Duration, mut frame: CanFrame) {
+    pub(crate) fn put(&mut self, now: Duration, mut frame: CanFrame) {
         let Faults { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
             [loss, corruption, duplication, reordering].map(|share| self.random.f64() < share);
@@ -112,7 +112,7 @@ impl Line {
         self.under_way.insert(at, (due, frame));
     }
 
-    fn take(&mut self, now: Duration) -> Option<CanFrame> {
+    pub(crate) fn take(&mut self, now: Duration) -> Option<CanFrame> {
         let (due, frame) = *self.under_way.first()?;
         (due <= now).then(|| {
             self.under_way.remove(0);
@@ -120,8 +120,17 @@ impl Line {
         })
     }
 
-    fn next_due(&self) -> Option<Duration> {
+    pub(crate) fn next_due(&self) -> Option<Duration> {
         self.under_way.first().map(|(due, _)| *due)
+    }
+
+    /// Frames under way.
+    pub(crate) fn len(&self) -> usize {
+        self.under_way.len()
+    }
+
+    pub(crate) fn counts(&self) -> Counts {
+        self.counts
     }
 }
 
@@ -215,6 +224,10 @@ impl<B: CanBus> CanBus for Faulty<B> {
                 None => waited += wait,
             }
         }
+    }
+
+    fn state(&mut self) -> ControllerState {
+        self.bus.state()
     }
 }
 

@@ -22,6 +22,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! [`TimedBus`] is a classic bus in virtual time for simulators: arbitration, bit timing, error counters, collisions.
+//! [`SocketcandGateway`] lets clients of the socketcand protocol join such a bus.
+//!
 //! A bus that loses, corrupts, delays, doubles or reorders frames is any bus in a [`Faulty`] wrapper.
 #![forbid(unsafe_code)]
 
@@ -33,6 +36,7 @@ mod frame;
 mod multicast;
 mod socketcand;
 mod state;
+mod timed;
 mod url;
 mod virtual_bus;
 
@@ -46,5 +50,8 @@ pub use socketcand::{
     SocketcandServer,
 };
 pub use state::{ControllerState, ErrorState};
+pub use timed::{
+    BusError, BusStats, Happening, MemberId, QueueError, TimedBus, TimedEvent, classic_frame_bits,
+};
 pub use url::{CanUrl, UrlError};
 pub use virtual_bus::{VirtualBus, VirtualHub};

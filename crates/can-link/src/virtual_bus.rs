@@ -124,6 +124,14 @@ impl VirtualHub {
         VirtualBus { membership: Arc::new(membership) }
     }
 
+    /// Gives a frame to one member, without waiting for it.
+    pub(crate) fn deliver_to(&self, frame: &CanFrame, number: u64) {
+        if let Some(member) = self.shared.state().members.get_mut(&number) {
+            member.hear(frame);
+        }
+        self.shared.changed.notify_all();
+    }
+
     /// Puts a frame on the bus for all members but one, without waiting for any.
     pub(crate) fn deliver(&self, frame: &CanFrame, except: Option<u64>) {
         let mut state = self.shared.state();

@@ -422,6 +422,10 @@ fn a_host_can_run_the_bus_itself() {
     assert_eq!([take(&mut a), take(&mut a)], [numbered(2), numbered(3)]);
     assert_eq!([take(&mut b), take(&mut b), take(&mut b)], [numbered(2), numbered(1), numbered(3)]);
     assert_eq!(other.receive(Duration::ZERO).unwrap(), None);
+    gateway.deliver_to(id_b, &numbered(5));
+    gateway.deliver(0, &numbered(6), None);
+    assert_eq!([take(&mut b), take(&mut b)], [numbered(5), numbered(6)]);
+    assert_eq!(take(&mut a), numbered(6));
     drop(a);
     let event = gateway.next(PATIENCE).unwrap();
     assert_eq!((event.client, event.event), (id_a, ClientEvent::Left));

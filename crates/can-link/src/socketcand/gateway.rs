@@ -73,6 +73,12 @@ impl SocketcandGateway {
         self.server.deliver(channel, frame, except);
     }
 
+    /// Only this client hears a frame: for hosts where each client is a member of its own, such as of a
+    /// [`TimedBus`](crate::TimedBus). Never waits.
+    pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
+        self.server.deliver_to(client, frame);
+    }
+
     /// Where it listens, with the port that was taken.
     pub fn local_addr(&self) -> SocketAddr {
         self.server.local_addr()

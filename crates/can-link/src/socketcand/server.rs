@@ -80,7 +80,8 @@ pub(super) struct Inner {
 
 struct Client {
     stream: TcpStream,
-    member: Option<VirtualBus>,
+    /// Channel and membership of its hub.
+    opened: Option<(usize, VirtualBus)>,
 }
 
 impl Inner {
@@ -89,19 +90,22 @@ impl Inner {
         self.clients.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn set_member(&self, client: ClientId, member: &VirtualBus) {
+    pub(super) fn set_opened(&self, client: ClientId, channel: usize, member: &VirtualBus) {
         if let Some(client) = self.clients().get_mut(&client) {
-            client.member = Some(member.second_handle());
+            client.opened = Some((channel, member.second_handle()));
         }
     }
 
-    pub(super) fn member_number(&self, client: ClientId) -> Option<u64> {
-        self.clients().get(&client)?.member.as_ref().map(VirtualBus::number)
+    /// Channel and number in its hub.
+    fn member_number(&self, client: ClientId) -> Option<(usize, u64)> {
+        let clients = self.clients();
+        let (channel, member) = clients.get(&client)?.opened.as_ref()?;
+        Some((*channel, member.number()))
     }
 
     fn forget(&self, client: ClientId) {
         let mut clients = self.clients();
-        if let Some(Client { member: Some(member), .. }) = clients.remove(&client) {
+        if let Some(Client { opened: Some((_, member)), .. }) = clients.remove(&client) {
             self.missed.fetch_add(member.missed(), Ordering::Relaxed);
             member.leave();
         }
@@ -185,8 +189,8 @@ impl SocketcandServer {
         let inner = &self.inner;
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let clients = inner.clients();
-        let missing: u64 =
-            clients.values().filter_map(|client| client.member.as_ref()).map(VirtualBus::missed).sum();
+        let missing = |client: &Client| client.opened.as_ref().map_or(0, |(_, member)| member.missed());
+        let missing: u64 = clients.values().map(missing).sum();
         ServerStats {
             clients: clients.len(),
             accepted: count(&inner.accepted),
@@ -199,8 +203,18 @@ impl SocketcandServer {
         }
     }
 
+    pub(super) fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
+        let member = self.inner.member_number(client);
+        if let Some((channel, number)) = member
+            && let Some(channel) = self.inner.channels.get(channel)
+        {
+            channel.hub.deliver_to(frame, number);
+        }
+    }
+
     pub(super) fn deliver(&self, channel: usize, frame: &CanFrame, except: Option<ClientId>) {
         let except = except.and_then(|client| self.inner.member_number(client));
+        let except = except.filter(|(its, _)| *its == channel).map(|(_, number)| number);
         if let Some(channel) = self.inner.channels.get(channel) {
             channel.hub.deliver(frame, except);
         }
@@ -260,7 +274,7 @@ fn start(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) -> io::Result<
     if clients.len() >= MOST_CLIENTS {
         return Err(io::ErrorKind::QuotaExceeded.into());
     }
-    clients.insert(client, Client { stream: kept, member: None });
+    clients.insert(client, Client { stream: kept, opened: None });
     drop(clients);
     let shared = Arc::clone(inner);
     let session = move || {

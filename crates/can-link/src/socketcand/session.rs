@@ -153,7 +153,7 @@ impl Session<'_> {
             return Ok(false);
         };
         let member = channels[number].hub.join_as_guest(WAITING);
-        self.inner.set_member(self.client, &member);
+        self.inner.set_opened(self.client, number, &member);
         self.opened = Some((number, member));
         if let Route::Host(tell) = &channels[number].route
             && !tell(self.client, Happened::Joined)

@@ -1,0 +1,77 @@
+//! Fault confinement: a controller's error counters (ISO 11898-1).
+
+use crate::{ControllerState, ErrorState};
+
+/// Error counters of a member.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Counters {
+    tec: u16,
+    rec: u16,
+}
+
+impl Counters {
+    pub(crate) fn state(self) -> ControllerState {
+        ControllerState::of_counters(self.tec, self.rec)
+    }
+
+    /// Its error flags no longer destroy frames.
+    pub(crate) fn passive(self) -> bool {
+        self.state().errors >= ErrorState::Passive
+    }
+
+    pub(crate) fn bus_off(self) -> bool {
+        self.state().errors == ErrorState::BusOff
+    }
+
+    pub(crate) fn sent(&mut self) {
+        self.tec = self.tec.saturating_sub(1);
+    }
+
+    pub(crate) fn send_failed(&mut self) {
+        self.tec = self.tec.saturating_add(8);
+    }
+
+    /// A passive sender that nobody acknowledges does not count on: a member that is alone never leaves the bus for it.
+    pub(crate) fn not_acknowledged(&mut self) {
+        if !self.passive() {
+            self.send_failed();
+        }
+    }
+
+    pub(crate) fn heard(&mut self) {
+        self.rec = if self.rec > 127 { 119 } else { self.rec.saturating_sub(1) };
+    }
+
+    pub(crate) fn heard_error(&mut self) {
+        self.rec = (self.rec + 1).min(255);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counters_move_by_the_numbers_of_the_standard() {
+        let mut counters = Counters::default();
+        for failures in 1..=32 {
+            counters.send_failed();
+            assert_eq!(counters.state().tec, Some(8 * failures));
+            assert_eq!((counters.passive(), counters.bus_off()), (failures >= 16, failures >= 32));
+        }
+        let mut alone = Counters::default();
+        for _ in 0..1000 {
+            alone.not_acknowledged();
+        }
+        assert_eq!(alone.state(), ControllerState::of_counters(128, 0));
+        alone.sent();
+        assert!(!alone.passive());
+        let mut listener = Counters::default();
+        for _ in 0..1000 {
+            listener.heard_error();
+        }
+        assert!(listener.passive() && !listener.bus_off());
+        listener.heard();
+        assert_eq!(listener.state().rec, Some(119));
+    }
+}

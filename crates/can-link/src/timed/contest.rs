@@ -1,0 +1,81 @@
+//! Who sends when several start at once.
+
+use super::confinement::Counters;
+use super::event::MemberId;
+use super::wire::{DOMINANT, WireBits, arbitration};
+use crate::CanFrame;
+
+/// A member at the start of a frame.
+#[derive(Clone, Copy)]
+pub(super) struct Starter {
+    pub(super) member: MemberId,
+    pub(super) frame: CanFrame,
+    pub(super) counters: Counters,
+}
+
+/// How the start of a frame ends.
+pub(super) struct Contest {
+    /// They send the same bits to the end; none when the frame is destroyed.
+    pub(super) senders: Vec<MemberId>,
+    /// What is on the wire.
+    pub(super) frame: CanFrame,
+    /// Its bits from start to CRC; up to the error when it is destroyed.
+    pub(super) bits: u32,
+    /// All who sent the winning identifier, when their frames differ.
+    pub(super) collision: Vec<MemberId>,
+    /// Those of a collision whose send failed.
+    pub(super) failed: Vec<MemberId>,
+}
+
+impl Contest {
+    /// The member has sent more than its arbitration.
+    pub(super) fn involves(&self, member: MemberId) -> bool {
+        self.senders.contains(&member) || self.failed.contains(&member)
+    }
+
+    /// `None` without starters.
+    pub(super) fn of(starters: &[Starter]) -> Option<Self> {
+        let best = starters.iter().map(|starter| arbitration(&starter.frame)).min()?;
+        let mut sending: Vec<(Starter, WireBits)> = starters
+            .iter()
+            .filter(|starter| arbitration(&starter.frame) == best)
+            .filter_map(|starter| Some((*starter, WireBits::of(&starter.frame)?)))
+            .collect();
+        let members =
+            |sending: &[(Starter, WireBits)]| sending.iter().map(|(s, _)| s.member).collect::<Vec<_>>();
+        let all = members(&sending);
+        let mut failed = Vec::new();
+        while let Some(at) = first_difference(&sending) {
+            // Whoever sends a recessive bit sees a dominant one: a bit error.
+            let (lost, on): (Vec<_>, Vec<_>) =
+                sending.iter().partition(|(_, wire)| wire.bits().get(at) != Some(&DOMINANT));
+            if lost.iter().any(|(starter, _)| !starter.counters.passive()) {
+                // An active error flag destroys the frame for everyone.
+                failed.extend(members(&sending));
+                let frame = sending.first()?.0.frame;
+                return Some(Self {
+                    senders: Vec::new(),
+                    frame,
+                    bits: at as u32 + 1,
+                    collision: all,
+                    failed,
+                });
+            }
+            // A passive error flag is recessive: the others do not notice.
+            failed.extend(members(&lost));
+            sending = on;
+        }
+        let (first, wire) = sending.first()?;
+        let (frame, bits) = (first.frame, wire.bits().len() as u32);
+        let collision = if failed.is_empty() { Vec::new() } else { all };
+        Some(Self { senders: members(&sending), frame, bits, collision, failed })
+    }
+}
+
+/// The first bit in which the frames differ.
+fn first_difference(sending: &[(Starter, WireBits)]) -> Option<usize> {
+    let (_, first) = sending.first()?;
+    let differs =
+        |(_, other): &(Starter, WireBits)| first.bits().iter().zip(other.bits()).position(|(a, b)| a != b);
+    sending.iter().filter_map(differs).min()
+}

@@ -1,0 +1,115 @@
+//! What happens on a bus in virtual time.
+
+use crate::{CanFrame, ControllerState};
+
+/// A member of a [`TimedBus`](crate::TimedBus), of use with that bus alone: another one may panic. The numbers count up and
+/// are never used twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MemberId(pub(super) usize);
+
+/// Something that happened, and when.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TimedEvent {
+    /// Virtual time, ns.
+    pub at_ns: u64,
+    /// What it was.
+    pub what: Happening,
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Happening {
+    /// A member has heard a frame.
+    Received {
+        /// Who heard it.
+        member: MemberId,
+        /// The frame.
+        frame: CanFrame,
+    },
+    /// A member's frame was on the bus and was acknowledged.
+    Sent {
+        /// Who sent it.
+        member: MemberId,
+        /// The frame.
+        frame: CanFrame,
+    },
+    /// A member's frame is given up: its sender sends once only, or is bus-off.
+    Failed {
+        /// Who wanted to send it.
+        member: MemberId,
+        /// The frame.
+        frame: CanFrame,
+    },
+    /// Something went wrong with a frame. Its senders try again unless they send once only.
+    Error {
+        /// What went wrong.
+        error: BusError,
+        /// The frame (of a collision: of its first sender).
+        frame: CanFrame,
+        /// Its senders.
+        senders: Vec<MemberId>,
+    },
+    /// A member's error state has changed.
+    State {
+        /// Whose.
+        member: MemberId,
+        /// The new state.
+        state: ControllerState,
+    },
+}
+
+/// What can go wrong with a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BusError {
+    /// Several members sent one identifier with different data at the same time, which CAN forbids.
+    Collision,
+    /// Nobody acknowledged.
+    NotAcknowledged,
+    /// A bit was disturbed on the wire.
+    Disturbed,
+}
+
+/// Why a frame cannot be queued.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum QueueError {
+    /// This bus is a classic one.
+    #[error("CAN FD frames are none of a bus in virtual time, which is classic")]
+    NotClassic,
+    /// The member's controller has left the bus until it recovers.
+    #[error("the member is bus-off; its controller must recover first")]
+    BusOff,
+    /// The member's queue has no room.
+    #[error("{0} frames of this member wait already; is the bus overloaded, or does nobody acknowledge?")]
+    Full(usize),
+    /// The member has left.
+    #[error("the member has left the bus")]
+    Left,
+}
+
+/// What a bus has carried since its beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BusStats {
+    /// Virtual time, ns.
+    pub now_ns: u64,
+    /// Time in which the bus was taken, intermissions and error frames included, ns.
+    pub busy_ns: u64,
+    /// Frames that were acknowledged.
+    pub frames: u64,
+    /// Frames that several members sent in one, bit for bit alike (counted in `frames` as one).
+    pub shared: u64,
+    /// Collisions.
+    pub collisions: u64,
+    /// Frames that nobody acknowledged.
+    pub not_acknowledged: u64,
+    /// Disturbed frames.
+    pub disturbed: u64,
+}
+
+impl BusStats {
+    /// Share of the time since `earlier` in which the bus was taken, 0 to 1.
+    pub fn load_since(&self, earlier: &Self) -> f64 {
+        let time = self.now_ns.saturating_sub(earlier.now_ns);
+        let busy = self.busy_ns.saturating_sub(earlier.busy_ns);
+        if time == 0 { 0.0 } else { (busy as f64 / time as f64).min(1.0) }
+    }
+}

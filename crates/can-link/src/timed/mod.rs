@@ -1,0 +1,449 @@
+//! A classic CAN bus in virtual time: deterministic, without threads and without a clock.
+
+mod confinement;
+mod contest;
+mod event;
+mod wire;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use crate::faulty::Line;
+use crate::{CanFrame, ControllerState, Counts, Plan};
+use confinement::Counters;
+use contest::{Contest, Starter};
+pub use event::{BusError, BusStats, Happening, MemberId, QueueError, TimedEvent};
+pub use wire::classic_frame_bits;
+use wire::{ERROR_FRAME, INTERMISSION, RECOVERY, SUSPENDED, TO_ACKNOWLEDGE};
+
+/// Frames of a member that wait at most.
+const QUEUE: usize = 65_536;
+
+/// A classic CAN bus in virtual time.
+///
+/// Frames take as long as they do on a wire of the bit rate, stuffing counted bit by bit. Among the first frames of all
+/// queues the identifier arbitrates as on the wire. Members acknowledge, count errors, become passive and leave the bus as
+/// ISO 11898-1 has it; two members that send one identifier with different data at once collide. The same calls and the same
+/// seed give the same events.
+///
+/// ```
+/// use can_link::{CanFrame, Happening, Id, TimedBus};
+/// let mut bus = TimedBus::new(1_000_000, 1);
+/// let (tool, board) = (bus.join(), bus.join());
+/// bus.queue(tool, CanFrame::classic(Id::standard(0x281)?, &[])?)?;
+/// while let Some(event) = bus.advance_to(1_000_000) {
+///     // It is the time of the event now: what is queued here competes from this moment on.
+///     if let Happening::Received { member, frame } = event.what {
+///         assert_eq!((member, frame.to_string()), (board, "281 #".to_owned()));
+///     }
+/// }
+/// assert_eq!(bus.stats().frames, 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct TimedBus {
+    bitrate: u32,
+    now: u64,
+    members: Vec<Member>,
+    random: fastrand::Rng,
+    disturbance: f64,
+    /// What is on the wire.
+    transfer: Option<Transfer>,
+    /// End of the intermission.
+    free_from: u64,
+    events: VecDeque<Happening>,
+    stats: BusStats,
+}
+
+struct Member {
+    /// First in, first out.
+    queue: VecDeque<CanFrame>,
+    /// Faults on the way to the queue and from the bus.
+    lines: Option<Box<(Line, Line)>>,
+    counters: Counters,
+    /// A passive member lets others go first.
+    may_start: u64,
+    /// When it is on the bus again after bus-off.
+    recovers: Option<u64>,
+    one_shot: bool,
+    /// What it is sending was forgotten meanwhile: there is no second try.
+    last_try: bool,
+    acknowledges: bool,
+    left: bool,
+}
+
+impl Member {
+    fn on_bus(&self) -> bool {
+        !self.left && !self.counters.bus_off()
+    }
+}
+
+struct Transfer {
+    end: u64,
+    contest: Contest,
+    /// What is wrong with it, if not a collision.
+    error: Option<BusError>,
+}
+
+fn time(ns: u64) -> Duration {
+    Duration::from_nanos(ns)
+}
+
+/// What is due after the end of all time is never due.
+fn ns(time: Duration) -> Option<u64> {
+    u64::try_from(time.as_nanos()).ok()
+}
+
+/// Nearly 300 years, ns; virtual time goes no further.
+const END_OF_TIME: u64 = u64::MAX / 2;
+
+impl TimedBus {
+    /// A bus without members at time 0; `bitrate` in bit/s, 0 counts as 1. The seed is that of the disturbances.
+    pub fn new(bitrate: u32, seed: u64) -> Self {
+        Self {
+            bitrate: bitrate.max(1),
+            now: 0,
+            members: Vec::new(),
+            random: fastrand::Rng::with_seed(seed),
+            disturbance: 0.0,
+            transfer: None,
+            free_from: 0,
+            events: VecDeque::new(),
+            stats: BusStats::default(),
+        }
+    }
+
+    /// A new member. It acknowledges, hears what ends from now on, and tries again when sending fails.
+    pub fn join(&mut self) -> MemberId {
+        self.members.push(Member {
+            queue: VecDeque::new(),
+            lines: None,
+            counters: Counters::default(),
+            may_start: 0,
+            recovers: None,
+            one_shot: false,
+            last_try: false,
+            acknowledges: true,
+            left: false,
+        });
+        MemberId(self.members.len() - 1)
+    }
+
+    /// The member is gone for good, and what it had queued; a frame that it is sending is cut off.
+    pub fn leave(&mut self, member: MemberId) {
+        let member = &mut self.members[member.0];
+        member.queue.clear();
+        member.lines = None;
+        member.recovers = None;
+        member.left = true;
+    }
+
+    /// Forgets what the member has queued, as a reset does. A frame on the wire ends as it would have, but is not tried again.
+    pub fn clear(&mut self, member: MemberId) {
+        let sends = self.transfer.as_ref().is_some_and(|transfer| transfer.contest.involves(member));
+        let member = &mut self.members[member.0];
+        member.queue.truncate(usize::from(sends));
+        member.last_try = sends;
+    }
+
+    /// A member that gives up a frame after one failure instead of trying again.
+    pub fn set_one_shot(&mut self, member: MemberId, one_shot: bool) {
+        self.members[member.0].one_shot = one_shot;
+    }
+
+    /// A member that acknowledges what it hears, or does not.
+    pub fn set_acknowledges(&mut self, member: MemberId, acknowledges: bool) {
+        self.members[member.0].acknowledges = acknowledges;
+    }
+
+    /// Faults between a member and the bus, as behind a gateway: the bus itself does not notice them.
+    pub fn set_faults(&mut self, member: MemberId, plan: Plan) {
+        let mut seeds = fastrand::Rng::with_seed(plan.seed);
+        let send = Line::new(plan.send, seeds.u64(..));
+        let receive = Line::new(plan.receive, seeds.u64(..));
+        self.members[member.0].lines = Some(Box::new((send, receive)));
+    }
+
+    /// What these faults did so far to frames sent and received by the member.
+    pub fn fault_counts(&self, member: MemberId) -> (Counts, Counts) {
+        let lines = self.members[member.0].lines.as_deref();
+        lines.map_or_else(Default::default, |(send, receive)| (send.counts(), receive.counts()))
+    }
+
+    /// Share of the frames in which a bit is disturbed on the wire, 0 to 1: they are destroyed by an error frame.
+    pub fn set_disturbance(&mut self, share: f64) {
+        self.disturbance = share;
+    }
+
+    /// Puts a frame at the end of a member's queue.
+    pub fn queue(&mut self, member: MemberId, frame: CanFrame) -> Result<(), QueueError> {
+        let now = time(self.now);
+        let member = &mut self.members[member.0];
+        if frame.is_fd() {
+            return Err(QueueError::NotClassic);
+        }
+        if member.left {
+            return Err(QueueError::Left);
+        }
+        if member.counters.bus_off() {
+            return Err(QueueError::BusOff);
+        }
+        let waiting = member.queue.len() + member.lines.as_ref().map_or(0, |lines| lines.0.len());
+        if waiting >= QUEUE {
+            return Err(QueueError::Full(waiting));
+        }
+        match &mut member.lines {
+            Some(lines) => lines.0.put(now, frame),
+            None => member.queue.push_back(frame),
+        }
+        Ok(())
+    }
+
+    /// Frames of the member that wait, the one on the wire included.
+    pub fn pending(&self, member: MemberId) -> usize {
+        self.members[member.0].queue.len()
+    }
+
+    /// How the member's controller gets on.
+    pub fn state(&self, member: MemberId) -> ControllerState {
+        self.members[member.0].counters.state()
+    }
+
+    /// Starts the recovery of a member that is bus-off: it is back after 128 times 11 bit times.
+    pub fn recover(&mut self, member: MemberId) {
+        let due = self.now + self.bits_ns(RECOVERY);
+        let member = &mut self.members[member.0];
+        if member.counters.bus_off() && member.recovers.is_none() {
+            member.recovers = Some(due);
+        }
+    }
+
+    /// Virtual time, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.now
+    }
+
+    /// What the bus has carried.
+    pub fn stats(&self) -> BusStats {
+        BusStats { now_ns: self.now, ..self.stats }
+    }
+
+    /// When the next thing happens if nobody does anything, ns; it may have no event.
+    pub fn next_ns(&self) -> Option<u64> {
+        if !self.events.is_empty() {
+            return Some(self.now);
+        }
+        let lines = self.members.iter().filter_map(|member| member.lines.as_deref());
+        let due =
+            lines.flat_map(|(send, receive)| [send.next_due(), receive.next_due()]).flatten().filter_map(ns);
+        let recoveries = self.members.iter().filter_map(|member| member.recovers);
+        let wire = match &self.transfer {
+            Some(transfer) => Some(transfer.end),
+            None => self.next_start(),
+        };
+        due.chain(recoveries).chain(wire).min().map(|at| at.max(self.now))
+    }
+
+    /// Goes on to the next event, or to `at_ns` when none comes before. Call it until it gives none: while it gives events,
+    /// it is the time of the event, and what is queued competes from then on.
+    pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
+        let at_ns = at_ns.min(END_OF_TIME);
+        loop {
+            if let Some(what) = self.events.pop_front() {
+                return Some(TimedEvent { at_ns: self.now, what });
+            }
+            match self.next_ns() {
+                Some(next) if next <= at_ns => {
+                    self.now = next;
+                    self.step();
+                }
+                _ => {
+                    self.now = self.now.max(at_ns);
+                    return None;
+                }
+            }
+        }
+    }
+
+    fn bits_ns(&self, bits: u32) -> u64 {
+        (u64::from(bits) * 1_000_000_000).div_ceil(u64::from(self.bitrate))
+    }
+
+    /// When the bus and a member with a frame are ready.
+    fn next_start(&self) -> Option<u64> {
+        let ready = |member: &Member| member.on_bus() && !member.queue.is_empty();
+        let start = |member: &Member| member.may_start.max(self.free_from);
+        self.members.iter().filter(|member| ready(member)).map(start).min()
+    }
+
+    /// What is due now.
+    fn step(&mut self) {
+        let now = time(self.now);
+        if self.transfer.as_ref().is_some_and(|transfer| transfer.end <= self.now)
+            && let Some(transfer) = self.transfer.take()
+        {
+            self.finish(transfer);
+        }
+        for number in 0..self.members.len() {
+            let member = &mut self.members[number];
+            if member.recovers.is_some_and(|due| due <= self.now) {
+                member.recovers = None;
+                member.counters = Counters::default();
+                let state = member.counters.state();
+                self.events.push_back(Happening::State { member: MemberId(number), state });
+            }
+            let member = &mut self.members[number];
+            let off = !member.on_bus();
+            let Some(lines) = &mut member.lines else { continue };
+            while let Some(frame) = lines.0.take(now) {
+                match off {
+                    true => self.events.push_back(Happening::Failed { member: MemberId(number), frame }),
+                    false => member.queue.push_back(frame),
+                }
+            }
+            while let Some(frame) = lines.1.take(now) {
+                self.events.push_back(Happening::Received { member: MemberId(number), frame });
+            }
+        }
+        // Events of this moment come first: who reacts to them takes part in the next arbitration.
+        if self.events.is_empty() && self.transfer.is_none() {
+            self.start();
+        }
+    }
+
+    fn start(&mut self) {
+        let ready = |(number, member): (usize, &Member)| {
+            let frame = *member.queue.front()?;
+            let starts = member.on_bus() && member.may_start.max(self.free_from) <= self.now;
+            starts.then_some(Starter { member: MemberId(number), frame, counters: member.counters })
+        };
+        let starters: Vec<_> = self.members.iter().enumerate().filter_map(ready).collect();
+        let Some(contest) = Contest::of(&starters) else { return };
+        // Drawn for every frame: what happens to one does not change the luck of the others.
+        let (luck, place) = (self.random.f64(), self.random.f64());
+        let (bits, error) = if contest.senders.is_empty() {
+            (contest.bits + ERROR_FRAME, None)
+        } else if luck < self.disturbance {
+            ((place * f64::from(contest.bits)) as u32 + 1 + ERROR_FRAME, Some(BusError::Disturbed))
+        } else if !self.acknowledged(&contest.senders) {
+            (contest.bits + TO_ACKNOWLEDGE + ERROR_FRAME, Some(BusError::NotAcknowledged))
+        } else {
+            (classic_frame_bits(&contest.frame).unwrap_or(0) - INTERMISSION, None)
+        };
+        let end = self.now + self.bits_ns(bits);
+        self.free_from = end + self.bits_ns(INTERMISSION);
+        self.stats.busy_ns += self.free_from - self.now;
+        self.transfer = Some(Transfer { end, contest, error });
+    }
+
+    /// Senders do not acknowledge.
+    fn acknowledged(&self, senders: &[MemberId]) -> bool {
+        let hears = |(number, member): (usize, &Member)| {
+            member.on_bus() && member.acknowledges && !senders.contains(&MemberId(number))
+        };
+        self.members.iter().enumerate().any(hears)
+    }
+
+    fn finish(&mut self, transfer: Transfer) {
+        let Transfer { contest, mut error, .. } = transfer;
+        if !contest.collision.is_empty() {
+            self.stats.collisions += 1;
+            self.report(BusError::Collision, contest.frame, &contest.collision);
+        }
+        for member in &contest.failed {
+            self.send_failed(*member, BusError::Collision);
+        }
+        let frame = contest.frame;
+        let mut senders = contest.senders;
+        let destroyed = senders.is_empty();
+        // Whoever left cut its frame off.
+        senders.retain(|member| !self.members[member.0].left);
+        if senders.is_empty() && !destroyed && error.is_none() {
+            error = Some(BusError::Disturbed);
+        }
+        if destroyed || error.is_some() {
+            if let Some(error) = error {
+                match error {
+                    BusError::NotAcknowledged => self.stats.not_acknowledged += 1,
+                    _ => self.stats.disturbed += 1,
+                }
+                self.report(error, frame, &senders);
+                for member in &senders {
+                    self.send_failed(*member, error);
+                }
+            }
+            let involved = |number| contest.failed.contains(&number) || senders.contains(&number);
+            for number in (0..self.members.len()).map(MemberId).filter(|number| !involved(*number)) {
+                self.count(number, Counters::heard_error);
+            }
+            return;
+        }
+        self.stats.frames += 1;
+        self.stats.shared += u64::from(senders.len() > 1);
+        for member in &senders {
+            self.members[member.0].queue.pop_front();
+            self.members[member.0].last_try = false;
+            self.events.push_back(Happening::Sent { member: *member, frame });
+            self.count(*member, Counters::sent);
+            self.suspend(*member);
+        }
+        let now = time(self.now);
+        for number in (0..self.members.len()).map(MemberId) {
+            if senders.contains(&number) || !self.members[number.0].on_bus() {
+                continue;
+            }
+            // Who fell out of a collision goes on as a listener, and so it does on the wire.
+            self.count(number, Counters::heard);
+            match &mut self.members[number.0].lines {
+                Some(lines) => lines.1.put(now, frame),
+                None => self.events.push_back(Happening::Received { member: number, frame }),
+            }
+        }
+    }
+
+    fn report(&mut self, error: BusError, frame: CanFrame, senders: &[MemberId]) {
+        self.events.push_back(Happening::Error { error, frame, senders: senders.to_vec() });
+    }
+
+    fn send_failed(&mut self, number: MemberId, error: BusError) {
+        self.count(
+            number,
+            match error {
+                BusError::NotAcknowledged => Counters::not_acknowledged,
+                _ => Counters::send_failed,
+            },
+        );
+        self.suspend(number);
+        let member = &mut self.members[number.0];
+        let give_up = match (member.counters.bus_off(), member.one_shot || member.last_try) {
+            (true, _) => member.queue.len(),
+            (false, true) => 1,
+            (false, false) => 0,
+        };
+        member.last_try = false;
+        for frame in member.queue.drain(..give_up.min(member.queue.len())) {
+            self.events.push_back(Happening::Failed { member: number, frame });
+        }
+    }
+
+    fn suspend(&mut self, number: MemberId) {
+        let until = self.free_from + self.bits_ns(SUSPENDED);
+        let member = &mut self.members[number.0];
+        if member.counters.passive() {
+            member.may_start = until;
+        }
+    }
+
+    /// Moves a member's counters; a new error state is an event.
+    fn count(&mut self, number: MemberId, how: fn(&mut Counters)) {
+        let member = &mut self.members[number.0];
+        if !member.on_bus() {
+            return;
+        }
+        let before = member.counters.state().errors;
+        how(&mut member.counters);
+        let state = member.counters.state();
+        if state.errors != before {
+            self.events.push_back(Happening::State { member: number, state });
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! Virtual time, fine enough that a period of every clock of the board is a whole number.
+
+/// A moment or a length of virtual time in grains: 1 s = [`SECOND`] grains.
+pub type Time = u64;
+
+/// Grains in a second: the least common multiple of 64, 85, 400 and 480 MHz, so that core clock, CAN bits and timer ticks
+/// never drift against each other by rounding.
+pub const SECOND: Time = 81_600_000_000;
+/// Grains in a millisecond.
+pub const MILLISECOND: Time = SECOND / 1_000;
+/// Grains in a microsecond.
+pub const MICROSECOND: Time = SECOND / 1_000_000;
+/// What never comes.
+pub const NEVER: Time = Time::MAX;
+
+/// Length of one period of a clock, rounded to the grain.
+pub fn period(hz: u64) -> Time {
+    (SECOND + hz / 2).checked_div(hz).unwrap_or(NEVER)
+}
+
+/// Whole microseconds.
+pub fn to_us(time: Time) -> u64 {
+    time / MICROSECOND
+}
+
+/// Nanoseconds, rounded down.
+pub fn to_ns(time: Time) -> u64 {
+    (u128::from(time) * 1_000_000_000 / u128::from(SECOND)) as u64
+}
+
+/// A number of nanoseconds, rounded down to the grain.
+pub fn from_ns(ns: u64) -> Time {
+    (u128::from(ns) * u128::from(SECOND) / 1_000_000_000) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn periods_of_the_boards_clocks_are_exact() {
+        for mhz in [8, 64, 85, 100, 120, 200, 240, 400, 480] {
+            assert_eq!(period(mhz * 1_000_000) * mhz * 1_000_000, SECOND, "{mhz} MHz");
+        }
+        assert_eq!(period(32_000) * 32_000, SECOND);
+        assert_eq!((to_us(MILLISECOND), to_ns(MICROSECOND), from_ns(1_000)), (1_000, 1_000, MICROSECOND));
+    }
+}

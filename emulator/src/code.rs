@@ -1,0 +1,123 @@
+//! What the machine must know of an instruction before it runs, remembered per address.
+//!
+//! Unicorn executes `SEV` as nothing and shows no change of the stack pointer, so the few instructions that matter are
+//! recognised by their first half-words the first time an address is executed.
+
+/// Not looked at yet.
+pub const UNKNOWN: u8 = 0;
+/// Nothing of interest.
+pub const PLAIN: u8 = 1;
+/// Sets the event register.
+pub const SEV: u8 = 2;
+/// May lower the stack pointer.
+pub const LOWERS_SP: u8 = 4;
+/// An observer waits for this address.
+pub const WATCHED: u8 = 8;
+
+const FLASH: u32 = 0x0800_0000;
+const FLASH_SIZE: u32 = 0x20_0000;
+const ITCM_SIZE: u32 = 0x1_0000;
+
+/// Classes of the instructions in ITCM and flash; elsewhere every instruction is looked at each time.
+pub struct Code {
+    flash: Vec<u8>,
+    itcm: Vec<u8>,
+}
+
+impl Default for Code {
+    fn default() -> Self {
+        Self { flash: vec![UNKNOWN; FLASH_SIZE as usize / 2], itcm: vec![UNKNOWN; ITCM_SIZE as usize / 2] }
+    }
+}
+
+impl Code {
+    /// Class of the instruction at an address.
+    #[inline]
+    pub fn class(&self, address: u32) -> u8 {
+        let in_flash = address.wrapping_sub(FLASH);
+        if in_flash < FLASH_SIZE {
+            return self.flash[in_flash as usize / 2];
+        }
+        if address < ITCM_SIZE { self.itcm[address as usize / 2] } else { UNKNOWN }
+    }
+
+    fn place(&mut self, address: u32) -> Option<&mut u8> {
+        let in_flash = address.wrapping_sub(FLASH);
+        if in_flash < FLASH_SIZE {
+            return self.flash.get_mut(in_flash as usize / 2);
+        }
+        self.itcm.get_mut(address as usize / 2)
+    }
+
+    /// Remember a class; what observers asked for stays.
+    pub fn learn(&mut self, address: u32, class: u8) {
+        if let Some(place) = self.place(address) {
+            *place = class | *place & WATCHED;
+        }
+    }
+
+    /// Have the machine stop by at an address; false when code there cannot be watched.
+    pub fn watch(&mut self, address: u32) -> bool {
+        match self.place(address) {
+            Some(place) => {
+                *place |= WATCHED;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// ITCM was or will be filled anew.
+    pub fn forget_itcm(&mut self) {
+        for place in &mut self.itcm {
+            *place &= WATCHED;
+        }
+    }
+}
+
+/// Class of an instruction by its first two half-words.
+pub fn classify(first: u16, second: u16) -> u8 {
+    let lowers = first & 0xFE00 == 0xB400 // PUSH
+        || first & 0xFF80 == 0xB080 // SUB SP, #
+        || first == 0xE92D // PUSH.W, STMDB SP!
+        || first & 0xFFBF == 0xED2D // VPUSH
+        || matches!(first, 0xF1AD | 0xF5AD | 0xF2AD | 0xF6AD | 0xEBAD) && second & 0x0F00 == 0x0D00 // SUB SP
+        || first == 0xF84D && second & 0x0F00 == 0x0D00 // STR [SP, #-]!
+        || first & 0xFF7F == 0xE96D // STRD [SP, #-]!
+        || first & 0xFF87 == 0x4685 // MOV SP
+        || first & 0xFFF0 == 0xF380 && matches!(second & 0xFF, 8 | 9); // MSR MSP, PSP
+    let sev = first == 0xBF40 || first == 0xF3AF && second == 0x8004;
+    if lowers {
+        LOWERS_SP
+    } else if sev {
+        SEV
+    } else {
+        PLAIN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn instructions_that_matter_are_found() {
+        for (first, second) in
+            [(0xB510, 0), (0xB082, 0), (0xE92D, 0x4FF0), (0xED2D, 0x8B04), (0xF5AD, 0x5D80), (0xF84D, 0x4D04)]
+        {
+            assert_eq!(classify(first, second), LOWERS_SP, "{first:04x} {second:04x}");
+        }
+        assert_eq!(classify(0xBF40, 0), SEV);
+        assert_eq!(classify(0xBF00, 0), PLAIN);
+        assert_eq!(classify(0xBD10, 0), PLAIN);
+    }
+
+    #[test]
+    fn a_watched_address_stays_watched() {
+        let mut code = Code::default();
+        assert!(code.watch(FLASH + 2));
+        code.learn(FLASH + 2, PLAIN);
+        assert_eq!(code.class(FLASH + 2), PLAIN | WATCHED);
+        assert!(!code.watch(0x2000_0000));
+    }
+}

@@ -1,0 +1,435 @@
+//! The Cortex-M7 itself: Unicorn executes instructions, this loop gives it time, exceptions and sleep.
+//!
+//! Every instruction takes one cycle of the core clock. A hook before each instruction counts it and stops the run exactly
+//! where the next event is due; instructions of an IT block that its condition skips are not counted, and nothing interrupts
+//! an IT block.
+use unicorn_engine::unicorn_const::{Arch, HookType, Mode, uc_error};
+use unicorn_engine::{ArmCpuModel, RegisterARM, Unicorn};
+
+use crate::chip::Chip;
+use crate::clock::Time;
+use crate::code::{LOWERS_SP, PLAIN, SEV, UNKNOWN, WATCHED, classify};
+use crate::dma::Memory;
+use crate::elf::Elf;
+use crate::exception;
+use crate::memory;
+use crate::nvic::{self, Masks};
+use crate::observe::{Fault, FaultKind, Reset, ResetCause};
+use crate::rcc::flag;
+
+/// Numbers that Unicorn gives to exceptions of the core.
+mod raised {
+    pub const SVC: u32 = 2;
+    pub const PREFETCH_ABORT: u32 = 3;
+    pub const BREAKPOINT: u32 = 7;
+    pub const EXCEPTION_EXIT: u32 = 8;
+}
+
+/// Addresses from here on are exception returns.
+const EXC_RETURN: u32 = 0xFFFF_FFE0;
+
+/// Memory as the peripherals reach it.
+pub(crate) struct Ram<'a>(pub Unicorn<'a, Chip>);
+
+impl Memory for Ram<'_> {
+    fn read(&mut self, address: u32, bytes: &mut [u8]) -> bool {
+        self.0.mem_read(u64::from(address), bytes).is_ok()
+    }
+    fn write(&mut self, address: u32, bytes: &[u8]) -> bool {
+        self.0.mem_write(u64::from(address), bytes).is_ok()
+    }
+}
+
+/// The machine: core, memory and peripherals of the controller board, with a firmware in its flash.
+pub struct Machine {
+    pub(crate) uc: Unicorn<'static, Chip>,
+    elf: Elf,
+    sleep: Sleep,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sleep {
+    Awake,
+    /// In WFI.
+    Interrupt,
+    /// In WFE.
+    Event,
+    /// Locked up: only a reset helps.
+    Lockup,
+}
+
+impl Machine {
+    /// A board with this firmware in its flash; power is switched on. `seed` decides what RAM holds before anything was
+    /// written to it.
+    ///
+    /// # Panics
+    /// When Unicorn refuses its set-up, which no input can cause.
+    pub fn new(elf: Elf, seed: u64) -> Self {
+        let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, Chip::default()).expect("Unicorn");
+        uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M7 as i32).expect("the model of the core");
+        uc.ctl_exits_enable().expect("no exit addresses");
+        memory::map(&mut uc, seed);
+        for (address, bytes) in &elf.segments {
+            // Segments for places that this board does not have are the linker's business.
+            let _ = uc.mem_write(u64::from(*address), bytes);
+        }
+        hook(&mut uc);
+        let mut machine = Self { uc, elf, sleep: Sleep::Awake };
+        let reset = Reset { time: 0, cause: ResetCause::PowerOn, pc: 0 };
+        machine.chip().observers.note_reset(reset);
+        machine.boot();
+        machine
+    }
+
+    /// The chip around the core.
+    pub fn chip(&mut self) -> &mut Chip {
+        self.uc.get_data_mut()
+    }
+
+    /// The firmware's file.
+    pub fn elf(&self) -> &Elf {
+        &self.elf
+    }
+
+    /// Virtual time since power-on.
+    pub fn now(&self) -> Time {
+        self.uc.get_data().now()
+    }
+
+    /// Instructions executed since power-on.
+    pub fn instructions(&self) -> u64 {
+        self.uc.get_data().core.instructions
+    }
+
+    /// A core register.
+    pub fn register(&self, register: RegisterARM) -> u32 {
+        self.uc.reg_read(register).unwrap_or(0) as u32
+    }
+
+    /// The instruction that comes next.
+    pub fn pc(&self) -> u32 {
+        self.register(RegisterARM::PC)
+    }
+
+    /// The core stands still after a fault within a fault.
+    pub fn locked_up(&self) -> bool {
+        self.sleep == Sleep::Lockup
+    }
+
+    /// Run until a moment of virtual time.
+    pub fn run_until(&mut self, end: Time) {
+        while self.now() < end {
+            self.slice(end);
+        }
+        self.catch_up();
+    }
+
+    /// Let peripherals happen up to now.
+    pub(crate) fn catch_up(&mut self) {
+        let mut ram = Ram(self.uc.clone());
+        self.uc.get_data_mut().advance(&mut ram);
+    }
+
+    /// Pull the reset pin or write SYSRESETREQ: RAM and reset flags stay.
+    pub fn reset(&mut self, cause: ResetCause) {
+        let flags = match cause {
+            ResetCause::PowerOn => flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU,
+            ResetCause::Pin => flag::PIN | flag::CPU,
+            ResetCause::Software => flag::SFT | flag::PIN | flag::CPU,
+            ResetCause::Watchdog => flag::IWDG1 | flag::PIN | flag::CPU,
+        };
+        let chip = self.chip();
+        let reset = Reset { time: chip.now(), cause, pc: chip.core.pc };
+        chip.observers.note_reset(reset);
+        chip.reset(flags & flag::ALL);
+        self.boot();
+    }
+
+    /// First fetch after a reset: stack pointer and entry from the vector table in flash.
+    fn boot(&mut self) {
+        use RegisterARM::*;
+        for register in [R0, R1, R2, R3, R4, R5, R6, R7, R8, R9, R10, R11, R12] {
+            self.set(register, 0);
+        }
+        for register in [PRIMASK, BASEPRI, FAULTMASK, CONTROL, FPSCR] {
+            self.set(register, 0);
+        }
+        self.chip().scs.vtor = memory::FLASH;
+        self.set(XPSR_NZCVQG, 1 << 24);
+        let sp = self.word(memory::FLASH).unwrap_or(0);
+        let entry = self.word(memory::FLASH + 4).unwrap_or(0);
+        self.set(SP, sp);
+        self.set(LR, 0xFFFF_FFFF);
+        self.set(PC, entry | 1);
+        self.sleep = Sleep::Awake;
+        self.remap();
+    }
+
+    pub(crate) fn set(&mut self, register: RegisterARM, value: u32) {
+        // Every register named here exists on this core.
+        let _ = self.uc.reg_write(register, u64::from(value));
+    }
+
+    /// A word of memory; `None` where nothing is.
+    pub fn word(&self, address: u32) -> Option<u32> {
+        let mut bytes = [0; 4];
+        self.uc.mem_read(u64::from(address), &mut bytes).ok()?;
+        Some(u32::from_le_bytes(bytes))
+    }
+
+    /// Bytes of memory; `None` where nothing is.
+    pub fn memory(&self, address: u32, length: usize) -> Option<Vec<u8>> {
+        self.uc.mem_read_as_vec(u64::from(address), length).ok()
+    }
+
+    /// Change memory from outside, as a debugger does; false where nothing is.
+    pub fn poke(&mut self, address: u32, bytes: &[u8]) -> bool {
+        self.uc.mem_write(u64::from(address), bytes).is_ok()
+    }
+
+    pub(crate) fn masks(&self) -> Masks {
+        Masks {
+            primask: self.register(RegisterARM::PRIMASK) & 1 == 1,
+            faultmask: self.register(RegisterARM::FAULTMASK) & 1 == 1,
+            basepri: self.register(RegisterARM::BASEPRI) as u8,
+        }
+    }
+
+    /// D2 SRAM can be used as far as its clocks are enabled.
+    fn remap(&mut self) {
+        self.chip().remap = false;
+        memory::protect(&mut self.uc);
+    }
+
+    /// Up to the next event, but not beyond `end`.
+    fn slice(&mut self, end: Time) {
+        self.catch_up();
+        let chip = self.uc.get_data_mut();
+        chip.core.attention = false;
+        if chip.iwdg.bites() <= chip.now() {
+            return self.reset(ResetCause::Watchdog);
+        }
+        if core::mem::take(&mut chip.scs.reset_request) {
+            return self.reset(ResetCause::Software);
+        }
+        if chip.remap {
+            self.remap();
+        }
+        let waiting = self.uc.get_data().nvic.any_waiting() && self.sleep != Sleep::Lockup;
+        let mut masked = false;
+        if waiting {
+            let masks = self.masks();
+            if let Some(next) = self.uc.get_data().nvic.next(masks) {
+                self.sleep = Sleep::Awake;
+                return exception::enter(self, next);
+            }
+            masked = self.uc.get_data().nvic.held_by_masks(masks);
+            self.wake(masks);
+        } else {
+            self.wake(Masks::default());
+        }
+        let chip = self.uc.get_data_mut();
+        let now = chip.now();
+        let next = chip.next_event().min(end);
+        if self.sleep != Sleep::Awake {
+            let cycle = chip.cycle();
+            return chip.sleep_until(next.max(now + cycle));
+        }
+        let budget = next.saturating_sub(now).div_ceil(chip.cycle()).max(1);
+        chip.core.masked = masked;
+        chip.core.stop_at = chip.core.instructions + budget;
+        chip.core.look_at = if masked || chip.core.check_sp { 0 } else { chip.core.stop_at };
+        self.execute();
+    }
+
+    /// End a sleep when its condition is there.
+    fn wake(&mut self, masks: Masks) {
+        let chip = self.uc.get_data_mut();
+        let pended = core::mem::take(&mut chip.nvic.pended);
+        if pended && chip.scs.scr & 0x10 != 0 {
+            chip.core.event = true;
+        }
+        match self.sleep {
+            Sleep::Interrupt if chip.nvic.any_waiting() && chip.nvic.wakes(masks) => {
+                self.sleep = Sleep::Awake;
+            }
+            Sleep::Event if chip.core.event || chip.nvic.any_waiting() && chip.nvic.wakes(masks) => {
+                chip.core.event = false;
+                self.sleep = Sleep::Awake;
+            }
+            _ => {}
+        }
+    }
+
+    fn execute(&mut self) {
+        let begin = u64::from(self.pc() | 1);
+        let core = &mut self.uc.get_data_mut().core;
+        core.stopping = None;
+        core.raised = None;
+        core.fault_address = 0;
+        let result = self.uc.emu_start(begin, 0, 0, 0);
+        let pc = self.pc();
+        let core = &mut self.uc.get_data_mut().core;
+        if let Some(at) = core.stopping.take() {
+            if pc != at {
+                // It was within an IT block, which goes on to its end.
+                core.instructions += 1;
+            }
+            return;
+        }
+        let last = core.pc;
+        match core.raised.take() {
+            Some(raised::EXCEPTION_EXIT | raised::PREFETCH_ABORT) if pc >= EXC_RETURN & !1 => {
+                return exception::leave(self, pc);
+            }
+            Some(raised::SVC) => {
+                let now = self.now();
+                return self.chip().nvic.pend(nvic::exception::SV_CALL, now);
+            }
+            Some(raised::BREAKPOINT) => return self.fault(FaultKind::Breakpoint, last),
+            Some(_) => return self.fault(FaultKind::BadJump, pc),
+            None => {}
+        }
+        match result {
+            // WFI ends a run without a word.
+            Ok(()) => self.sleep = Sleep::Interrupt,
+            Err(uc_error::INSN_INVALID) => self.hint_or_undefined(last),
+            Err(uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT) if pc >= EXC_RETURN & !1 => {
+                exception::leave(self, pc);
+            }
+            Err(uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT) => self.fault(FaultKind::BadJump, pc),
+            Err(uc_error::EXCEPTION) => self.fault(FaultKind::Undefined, last),
+            Err(_) => self.fault(FaultKind::BadAccess, last),
+        }
+    }
+
+    /// WFE and YIELD come back as invalid instructions.
+    fn hint_or_undefined(&mut self, pc: u32) {
+        let word = self.word(pc & !1).unwrap_or(0);
+        let (first, second) = (word as u16, (word >> 16) as u16);
+        let (wfe, length) = match (first, second) {
+            (0xBF20, _) => (true, 2),
+            (0xBF10, _) => (false, 2),
+            (0xF3AF, 0x8002) => (true, 4),
+            (0xF3AF, 0x8001) => (false, 4),
+            _ => return self.fault(FaultKind::Undefined, pc),
+        };
+        self.set(RegisterARM::PC, pc + length | 1);
+        if wfe {
+            let core = &mut self.chip().core;
+            if !core::mem::take(&mut core.event) {
+                self.sleep = Sleep::Event;
+            }
+        }
+    }
+
+    /// A fault at an instruction: HardFault, or lock-up within it.
+    pub(crate) fn fault(&mut self, kind: FaultKind, pc: u32) {
+        let masks = self.masks();
+        let chip = self.chip();
+        let address = chip.core.fault_address;
+        let hard = nvic::exception::HARD_FAULT;
+        let lockup = chip.nvic.is_active(hard) || masks.faultmask;
+        chip.observers.faults.push(Fault { time: chip.now(), kind, pc, address, lockup });
+        chip.scs.hfsr |= 1 << 30;
+        match kind {
+            FaultKind::BadAccess => {
+                chip.scs.cfsr |= 1 << 9 | 1 << 15;
+                chip.scs.bfar = address;
+            }
+            FaultKind::BadJump => chip.scs.cfsr |= 1 << 8,
+            FaultKind::Undefined => chip.scs.cfsr |= 1 << 16,
+            FaultKind::BadReturn => chip.scs.cfsr |= 1 << 18,
+            FaultKind::Breakpoint => {}
+        }
+        self.set(RegisterARM::PC, pc | 1);
+        if lockup {
+            self.sleep = Sleep::Lockup;
+            return;
+        }
+        let now = self.now();
+        self.chip().nvic.pend(hard, now);
+    }
+}
+
+/// Hooks of instructions, raised exceptions and failed accesses.
+fn hook(uc: &mut Unicorn<'static, Chip>) {
+    let code = uc.add_code_hook(1, 0, |uc, address, _| {
+        let chip = uc.get_data_mut();
+        let address = address as u32;
+        if chip.core.instructions < chip.core.look_at && chip.code.class(address) == PLAIN {
+            chip.core.instructions += 1;
+            chip.core.pc = address;
+            return;
+        }
+        look(uc, address);
+    });
+    let raised = uc.add_intr_hook(|uc, number| {
+        uc.get_data_mut().core.raised = Some(number);
+        let _ = uc.emu_stop();
+    });
+    let invalid = uc.add_mem_hook(HookType::MEM_INVALID, 1, 0, |uc, _, address, _, _| {
+        uc.get_data_mut().core.fault_address = address as u32;
+        false
+    });
+    assert!(code.is_ok() && raised.is_ok() && invalid.is_ok(), "Unicorn takes hooks");
+}
+
+/// Before an instruction that needs a closer look.
+fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
+    if uc.get_data().core.check_sp {
+        let sp = uc.reg_read(RegisterARM::SP).unwrap_or(0) as u32;
+        let chip = uc.get_data_mut();
+        chip.core.check_sp = false;
+        chip.observers.note_sp(sp);
+    }
+    let core = &uc.get_data().core;
+    let stop = core.instructions >= core.stop_at || core.attention || core.masked && unmasked(uc);
+    if stop {
+        let core = &mut uc.get_data_mut().core;
+        if core.stopping.is_some_and(|at| at != address) {
+            core.instructions += 1;
+        }
+        core.stopping = Some(address);
+        core.look_at = 0;
+        // The instruction before this one is complete: only here may a run be stopped.
+        let _ = uc.emu_stop();
+        return;
+    }
+    let mut class = uc.get_data().code.class(address);
+    if class & !WATCHED == UNKNOWN {
+        let mut bytes = [0; 4];
+        let _ = uc.mem_read(u64::from(address), &mut bytes);
+        let (first, second) = ([bytes[0], bytes[1]], [bytes[2], bytes[3]]);
+        class = class & WATCHED | classify(u16::from_le_bytes(first), u16::from_le_bytes(second));
+        uc.get_data_mut().code.learn(address, class);
+    }
+    if class & WATCHED != 0 {
+        let sp = uc.reg_read(RegisterARM::SP).unwrap_or(0) as u32;
+        let lr = uc.reg_read(RegisterARM::LR).unwrap_or(0) as u32;
+        let chip = uc.get_data_mut();
+        let instructions = chip.core.instructions;
+        if let Some(back) = chip.observers.at(address, sp, lr, instructions) {
+            chip.code.watch(back);
+        }
+    }
+    let core = &mut uc.get_data_mut().core;
+    if class & SEV != 0 {
+        core.event = true;
+    }
+    core.check_sp = class & LOWERS_SP != 0;
+    core.look_at = if core.check_sp || core.masked { 0 } else { core.stop_at };
+    core.instructions += 1;
+    core.pc = address;
+}
+
+/// The masks no longer hold back what waits.
+fn unmasked(uc: &Unicorn<'_, Chip>) -> bool {
+    let read = |register: RegisterARM| uc.reg_read(register).unwrap_or(0);
+    let masks = Masks {
+        primask: read(RegisterARM::PRIMASK) & 1 == 1,
+        faultmask: read(RegisterARM::FAULTMASK) & 1 == 1,
+        basepri: read(RegisterARM::BASEPRI) as u8,
+    };
+    uc.get_data().nvic.next(masks).is_some()
+}

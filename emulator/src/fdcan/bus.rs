@@ -1,0 +1,226 @@
+//! The wire between the controller and the other members of the joint bus: arbitration, frame times, acknowledge, errors.
+use std::collections::VecDeque;
+
+use can_link::CanFrame;
+
+use crate::clock::{MICROSECOND, NEVER, Time, from_ns};
+
+/// Bit times of the bus.
+pub const NOMINAL_BIT: Time = MICROSECOND;
+/// Error flag, its echo, delimiter and intermission.
+pub const ERROR_FRAME: Time = 20 * NOMINAL_BIT;
+/// Entries of the log that are kept.
+const LOG: usize = 100_000;
+
+/// The other members of the bus.
+pub trait CanPeers {
+    /// A frame of the controller has passed at `end`; answers with the moments at which they are ready go to `answers`.
+    fn hear(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>);
+    /// Some member acknowledges frames.
+    fn acknowledge(&self) -> bool;
+}
+
+/// What became of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It passed.
+    Good,
+    /// Destroyed by an error.
+    Error,
+    /// Nobody acknowledged it.
+    NoAcknowledge,
+}
+
+/// A frame that was on the bus.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BusEntry {
+    /// Start of frame.
+    pub start: Time,
+    /// End of intermission.
+    pub end: Time,
+    /// The frame.
+    pub frame: CanFrame,
+    /// Sent by the controller.
+    pub from_controller: bool,
+    /// What became of it.
+    pub outcome: Outcome,
+}
+
+/// What is wrong with the bus at the moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WireFault {
+    /// Frames that are destroyed from now on.
+    pub destroy_next: u32,
+    /// Every frame is destroyed.
+    pub destroy_all: bool,
+    /// The controller's line is cut.
+    pub cut: bool,
+}
+
+struct Queued {
+    ready: Time,
+    frame: CanFrame,
+}
+
+/// A frame that is being sent.
+pub struct Transmission {
+    /// Start and end.
+    pub entry: BusEntry,
+    /// Transmit buffer of the controller; `None`: another member sends.
+    pub buffer: Option<u32>,
+}
+
+/// The wire.
+#[derive(Default)]
+pub struct Wire {
+    /// The other members; without any, nobody acknowledges.
+    pub peers: Option<Box<dyn CanPeers>>,
+    queue: Vec<Queued>,
+    on_wire: Option<Transmission>,
+    free: Time,
+    /// What is wrong.
+    pub fault: WireFault,
+    log: VecDeque<BusEntry>,
+    answers: Vec<(Time, CanFrame)>,
+}
+
+impl Wire {
+    /// Another member wants to send a frame from `ready` on.
+    pub fn put(&mut self, ready: Time, frame: CanFrame) {
+        self.queue.push(Queued { ready, frame });
+    }
+
+    /// Frames of other members that wait.
+    pub fn waiting(&self) -> usize {
+        self.queue.len()
+    }
+
+    /// Everything that was on the bus, oldest first; the last 100 000.
+    pub fn log(&self) -> &VecDeque<BusEntry> {
+        &self.log
+    }
+
+    /// Forget the log.
+    pub fn clear_log(&mut self) {
+        self.log.clear();
+    }
+
+    /// The controller is gone in the middle of a frame.
+    pub fn drop_controller(&mut self) {
+        if self.on_wire.as_ref().is_some_and(|t| t.buffer.is_some()) {
+            self.on_wire = None;
+        }
+    }
+
+    /// When the wire changes next without the controller's doing.
+    pub fn next_change(&self) -> Time {
+        match &self.on_wire {
+            Some(t) => t.entry.end,
+            None => self.queue.iter().map(|q| q.ready.max(self.free)).min().unwrap_or(NEVER),
+        }
+    }
+
+    /// The frame that ended by `now`.
+    pub fn finished(&mut self, now: Time) -> Option<Transmission> {
+        let done = self.on_wire.take_if(|t| t.entry.end <= now)?;
+        self.free = done.entry.end;
+        if self.log.len() == LOG {
+            self.log.pop_front();
+        }
+        self.log.push_back(done.entry.clone());
+        Some(done)
+    }
+
+    /// Buffer of the controller that is being sent.
+    pub fn sending(&self) -> Option<u32> {
+        self.on_wire.as_ref().and_then(|t| t.buffer)
+    }
+
+    /// A frame is on the wire.
+    pub fn busy(&self) -> bool {
+        self.on_wire.is_some()
+    }
+
+    /// Earliest start of a frame up to `now`, when the controller could start its own at `own`.
+    pub fn start_time(&self, own: Time, now: Time) -> Option<Time> {
+        let first = self.queue.iter().map(|q| q.ready).min().unwrap_or(NEVER).min(own);
+        let start = first.max(self.free);
+        (self.on_wire.is_none() && first != NEVER && start <= now).then_some(start)
+    }
+
+    /// Arbitration at `start`: the lowest identifier wins. `readable`: the controller's rates are those of the bus.
+    pub fn arbitrate(&mut self, start: Time, own: Option<(u32, CanFrame)>, readable: bool) {
+        let best = (0..self.queue.len())
+            .filter(|&i| self.queue[i].ready <= start)
+            .min_by_key(|&i| (rank(&self.queue[i].frame), i));
+        let own_wins = match (&own, best) {
+            (Some((_, frame)), Some(i)) => rank(frame) < rank(&self.queue[i].frame),
+            (own, _) => own.is_some(),
+        };
+        let cut = self.fault.cut;
+        let acknowledged = self.peers.as_ref().is_some_and(|p| p.acknowledge());
+        let (buffer, frame) = match (own, best) {
+            (Some((buffer, frame)), _) if own_wins => (Some(buffer), frame),
+            (_, Some(i)) => (None, self.queue.remove(i).frame),
+            _ => return,
+        };
+        let length = frame_time(&frame);
+        let from_controller = buffer.is_some();
+        let destroyed = self.destroyed() || from_controller && !readable;
+        let (outcome, length) = if destroyed {
+            (Outcome::Error, length / 2 + ERROR_FRAME)
+        } else if from_controller && (cut || !acknowledged) {
+            (Outcome::NoAcknowledge, length + ERROR_FRAME)
+        } else {
+            (Outcome::Good, length)
+        };
+        if outcome != Outcome::Good && !from_controller {
+            // The sender repeats it.
+            self.queue.push(Queued { ready: start + length, frame: frame.clone() });
+        }
+        let entry = BusEntry { start, end: start + length, frame, from_controller, outcome };
+        self.on_wire = Some(Transmission { entry, buffer });
+    }
+
+    fn destroyed(&mut self) -> bool {
+        let one = self.fault.destroy_next > 0;
+        self.fault.destroy_next -= u32::from(one);
+        one || self.fault.destroy_all
+    }
+
+    /// Tell the other members of a frame of the controller.
+    pub fn tell(&mut self, end: Time, frame: &CanFrame) {
+        let Some(peers) = &mut self.peers else { return };
+        peers.hear(end, frame, &mut self.answers);
+        self.queue.extend(self.answers.drain(..).map(|(ready, frame)| Queued { ready, frame }));
+    }
+}
+
+/// Order of arbitration: an 11-bit identifier beats a 29-bit one with the same first bits.
+pub fn rank(frame: &CanFrame) -> u32 {
+    let id = frame.id();
+    if id.is_extended() { id.value() << 1 | 1 } else { id.value() << 19 }
+}
+
+/// Time of a frame on the wire, intermission included.
+pub fn frame_time(frame: &CanFrame) -> Time {
+    let joint = u16::try_from(frame.id().value()).ok().and_then(|id| jtc_bus::Frame::new(id, frame.data()));
+    if let Some(joint) = joint
+        && frame.is_fd()
+        && frame.is_brs()
+        && !frame.is_extended()
+    {
+        return from_ns(u64::from(jtc_bus::duration_ns(&joint)));
+    }
+    // Frames that the joint bus does not have: without their stuff bits, counted as one in ten.
+    let id_bits = if frame.is_extended() { 38 } else { 19 };
+    let data_bits = 8 * frame.data().len() as u64;
+    let bits = if !frame.is_fd() {
+        (id_bits + data_bits + 15) * 11 / 10 + 13
+    } else if frame.is_brs() {
+        (id_bits * 11 / 10 + 13) + (data_bits * 11 / 10 + 35) / 5
+    } else {
+        (id_bits + data_bits) * 11 / 10 + 48
+    };
+    bits * NOMINAL_BIT
+}

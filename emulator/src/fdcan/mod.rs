@@ -1,0 +1,406 @@
+//! FDCAN1 (RM0399 chapter 56, a Bosch M_CAN) with its message RAM: filters, dedicated buffers, FIFOs, transmission by
+//! identifier, error counters and bus-off.
+mod bus;
+mod ram;
+mod registers;
+mod transmit;
+
+use can_link::CanFrame;
+
+pub use bus::{BusEntry, CanPeers, Outcome, Wire, WireFault, frame_time};
+pub use ram::{MessageRam, Target};
+
+use crate::clock::{NEVER, SECOND, Time};
+use bus::NOMINAL_BIT;
+use ram::ELEMENT_SIZES;
+use transmit::Pending;
+
+/// Bits of CCCR.
+mod cccr {
+    pub const INIT: u32 = 1;
+    pub const CCE: u32 = 2;
+    pub const CSR: u32 = 0x10;
+    pub const MON: u32 = 0x20;
+    pub const DAR: u32 = 0x40;
+    pub const FDOE: u32 = 0x100;
+    pub const BRSE: u32 = 0x200;
+    /// Bits that need INIT and CCE to change.
+    pub const PROTECTED: u32 = 0xF3E0;
+}
+
+/// Bits of IR.
+mod ir {
+    pub const RF0N: u32 = 1;
+    pub const RF0F: u32 = 4;
+    pub const RF0L: u32 = 8;
+    pub const TC: u32 = 1 << 9;
+    pub const TCF: u32 = 1 << 10;
+    pub const TFE: u32 = 1 << 11;
+    pub const DRX: u32 = 1 << 19;
+    pub const EP: u32 = 1 << 23;
+    pub const EW: u32 = 1 << 24;
+    pub const BO: u32 = 1 << 25;
+    pub const PEA: u32 = 1 << 27;
+    pub const PED: u32 = 1 << 28;
+}
+
+/// Codes of PSR.LEC.
+mod lec {
+    pub const NONE: u32 = 0;
+    pub const ACK: u32 = 3;
+    pub const BIT1: u32 = 4;
+    pub const BIT0: u32 = 5;
+    pub const CRC: u32 = 6;
+    pub const UNCHANGED: u32 = 7;
+}
+
+/// Receive sequence after bus-off: 129 times 11 recessive bits.
+const RECOVERY: Time = 129 * 11 * NOMINAL_BIT;
+/// Recessive bits before a node takes part after INIT.
+const INTEGRATION: Time = 11 * NOMINAL_BIT;
+
+/// A receive FIFO.
+#[derive(Clone, Copy, Default)]
+struct Fifo {
+    config: u32,
+    fill: u32,
+    get: u32,
+    put: u32,
+    lost: bool,
+}
+
+/// What an observer sees of the controller's state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FdcanState {
+    /// CCCR.
+    pub cccr: u32,
+    /// NBTP.
+    pub nbtp: u32,
+    /// DBTP.
+    pub dbtp: u32,
+    /// TDCR.
+    pub tdcr: u32,
+    /// Transmit error counter.
+    pub tec: u32,
+    /// Receive error counter.
+    pub rec: u32,
+    /// Bus-off.
+    pub bus_off: bool,
+    /// It takes part on the bus.
+    pub online: bool,
+    /// Nominal and data bit rate, bit/s.
+    pub rates: (u32, u32),
+    /// Transmit requests that wait.
+    pub pending: u32,
+    /// Frames lost in a full FIFO.
+    pub lost: u32,
+}
+
+/// The controller.
+pub struct Fdcan {
+    /// The message RAM, which the core sees from 0x4000_AC00.
+    pub ram: MessageRam,
+    /// The bus.
+    pub wire: Wire,
+    kernel_hz: u64,
+    cccr: u32,
+    nbtp: u32,
+    dbtp: u32,
+    tdcr: u32,
+    psr: u32,
+    tec: u32,
+    rec: u32,
+    ir: u32,
+    ie: u32,
+    ils: u32,
+    ile: u32,
+    gfc: u32,
+    sidfc: u32,
+    xidfc: u32,
+    xidam: u32,
+    ndat: [u32; 2],
+    fifos: [Fifo; 2],
+    rxbc: u32,
+    rxesc: u32,
+    txbc: u32,
+    txesc: u32,
+    tx: Pending,
+    txbtie: u32,
+    txbcie: u32,
+    plain: crate::plain::Plain,
+    /// When it takes part; `NEVER` in INIT.
+    online: Time,
+    /// End of the sequence after bus-off.
+    recovers: Time,
+    lost: u32,
+    /// Frames received and stored.
+    pub stored: u64,
+    /// Frames that the filters rejected.
+    pub rejected: u64,
+}
+
+impl Default for Fdcan {
+    fn default() -> Self {
+        Self {
+            ram: MessageRam::default(),
+            wire: Wire::default(),
+            kernel_hz: 0,
+            cccr: cccr::INIT,
+            nbtp: 0x0600_0A03,
+            dbtp: 0x0000_0A33,
+            tdcr: 0,
+            psr: 0x0707,
+            tec: 0,
+            rec: 0,
+            ir: 0,
+            ie: 0,
+            ils: 0,
+            ile: 0,
+            gfc: 0,
+            sidfc: 0,
+            xidfc: 0,
+            xidam: 0x1FFF_FFFF,
+            ndat: [0; 2],
+            fifos: [Fifo::default(); 2],
+            rxbc: 0,
+            rxesc: 0,
+            txbc: 0,
+            txesc: 0,
+            tx: Pending::default(),
+            txbtie: 0,
+            txbcie: 0,
+            plain: crate::plain::Plain::default(),
+            online: NEVER,
+            recovers: NEVER,
+            lost: 0,
+            stored: 0,
+            rejected: 0,
+        }
+    }
+}
+
+impl Fdcan {
+    /// Registers as after reset; the bus goes on and the message RAM keeps its contents.
+    pub fn reset(&mut self) {
+        let old = core::mem::take(self);
+        self.ram = old.ram;
+        self.wire = old.wire;
+        self.wire.drop_controller();
+        self.kernel_hz = old.kernel_hz;
+        (self.lost, self.stored, self.rejected) = (old.lost, old.stored, old.rejected);
+    }
+
+    /// Kernel clock.
+    pub fn set_clock(&mut self, hz: u64) {
+        self.kernel_hz = hz;
+    }
+
+    /// Nominal and data bit rate that the registers give, bit/s.
+    pub fn rates(&self) -> (u32, u32) {
+        let rate =
+            |prescaler: u32, quanta: u32| (self.kernel_hz / u64::from((prescaler + 1) * quanta)) as u32;
+        let nominal = rate(self.nbtp >> 16 & 0x1FF, (self.nbtp >> 8 & 0xFF) + (self.nbtp & 0x7F) + 3);
+        let data = rate(self.dbtp >> 16 & 0x1F, (self.dbtp >> 8 & 0x1F) + (self.dbtp >> 4 & 15) + 3);
+        (nominal, data)
+    }
+
+    /// Its rates are those of the bus within 1 %.
+    fn readable(&self) -> bool {
+        let near = |rate: u32, of: u32| u64::from(rate.abs_diff(of)) * 100 <= u64::from(of);
+        let (nominal, data) = self.rates();
+        near(nominal, 1_000_000) && (self.cccr & cccr::BRSE == 0 || near(data, 5_000_000))
+    }
+
+    /// State for observers.
+    pub fn state(&self) -> FdcanState {
+        FdcanState {
+            cccr: self.cccr,
+            nbtp: self.nbtp,
+            dbtp: self.dbtp,
+            tdcr: self.tdcr,
+            tec: self.tec,
+            rec: self.rec,
+            bus_off: self.bus_off(),
+            online: self.online != NEVER && !self.bus_off(),
+            rates: self.rates(),
+            pending: self.tx.requests,
+            lost: self.lost,
+        }
+    }
+
+    fn bus_off(&self) -> bool {
+        self.psr & 0x80 != 0
+    }
+
+    /// It sends and receives from `online` on.
+    fn takes_part(&self) -> Time {
+        if self.bus_off() || self.cccr & (cccr::INIT | cccr::CSR) != 0 { NEVER } else { self.online }
+    }
+
+    /// When something happens next.
+    pub fn next_event(&self) -> Time {
+        let own = if self.wire.busy() { NEVER } else { self.tx.since().max(self.takes_part()) };
+        self.wire.next_change().min(own).min(self.recovers)
+    }
+
+    /// Let everything up to `now` happen.
+    pub fn advance(&mut self, now: Time) {
+        loop {
+            if self.recovers <= now {
+                self.recover();
+            }
+            if let Some(done) = self.wire.finished(now) {
+                self.finish(done);
+                continue;
+            }
+            let own = if self.tx.requests == 0 || self.cccr & cccr::MON != 0 {
+                NEVER
+            } else {
+                self.tx.since().max(self.takes_part())
+            };
+            let Some(start) = self.wire.start_time(own, now) else { return };
+            let buffer = if own <= start { self.next_buffer() } else { None };
+            let frame = buffer.and_then(|b| Some((b, self.load(b)?)));
+            let readable = self.readable();
+            self.wire.arbitrate(start, frame, readable);
+            if !self.wire.busy() {
+                return;
+            }
+        }
+    }
+
+    fn finish(&mut self, done: bus::Transmission) {
+        let end = done.entry.end;
+        match (done.buffer, done.entry.outcome) {
+            (Some(buffer), Outcome::Good) => {
+                self.sent(buffer);
+                self.wire.tell(end, &done.entry.frame);
+            }
+            (Some(buffer), outcome) => self.failed(buffer, outcome, end),
+            (None, Outcome::Good) if end >= self.takes_part() => {
+                if self.wire.fault.cut {
+                    return;
+                }
+                if self.readable() {
+                    self.rec = self.rec.saturating_sub(1).min(127);
+                    self.last_error(lec::NONE);
+                    self.receive(&done.entry.frame);
+                } else {
+                    self.receive_error();
+                }
+            }
+            (None, Outcome::Error) if end >= self.takes_part() => self.receive_error(),
+            _ => {}
+        }
+        self.update_status();
+    }
+
+    fn receive_error(&mut self) {
+        self.rec = (self.rec + 1).min(128);
+        self.last_error(lec::CRC);
+    }
+
+    fn last_error(&mut self, code: u32) {
+        self.psr = self.psr & !7 | code;
+        if code != lec::NONE {
+            self.ir |= ir::PEA;
+        }
+    }
+
+    /// Warning, passive and bus-off follow from the counters.
+    fn update_status(&mut self) {
+        let passive = self.tec >= 128 || self.rec >= 128;
+        let warning = self.tec >= 96 || self.rec >= 96;
+        let status = u32::from(passive) << 5 | u32::from(warning) << 6;
+        let changed = (self.psr ^ status) & 0x60;
+        self.psr = self.psr & !0x60 | status;
+        if changed & 0x20 != 0 {
+            self.ir |= ir::EP;
+        }
+        if changed & 0x40 != 0 {
+            self.ir |= ir::EW;
+        }
+        if self.tec > 255 && !self.bus_off() {
+            self.psr |= 0x80;
+            self.ir |= ir::BO;
+            self.cccr |= cccr::INIT;
+            self.online = NEVER;
+            self.recovers = NEVER;
+        }
+    }
+
+    /// The sequence after bus-off is over.
+    fn recover(&mut self) {
+        self.online = self.recovers;
+        self.recovers = NEVER;
+        (self.tec, self.rec) = (0, 0);
+        self.psr &= !0x80;
+        self.ir |= ir::BO;
+        self.update_status();
+    }
+
+    fn receive(&mut self, frame: &CanFrame) {
+        let id = frame.id();
+        let ndat = self.ndat;
+        let busy = |b: u32| ndat[b as usize / 32] >> (b % 32) & 1 == 1;
+        let remote = if id.is_extended() { self.gfc & 1 } else { self.gfc >> 1 & 1 };
+        let target = if frame.is_remote() && remote == 1 {
+            Target::Reject
+        } else if id.is_extended() {
+            self.ram.extended(id.value(), self.xidfc, self.xidam, self.gfc, busy)
+        } else {
+            self.ram.standard(id.value(), self.sidfc, self.gfc, busy)
+        };
+        self.psr |= u32::from(frame.is_fd()) << 13 | u32::from(frame.is_brs()) << 12;
+        match target {
+            Target::Reject => self.rejected += 1,
+            Target::Buffer(buffer, filter) => {
+                let room = ELEMENT_SIZES[(self.rxesc >> 8 & 7) as usize];
+                let start = (self.rxbc & 0xFFFC) + buffer * (room + 8);
+                self.ram.store(start, room, frame, Some(filter), 0);
+                self.ndat[buffer as usize / 32] |= 1 << (buffer % 32);
+                self.ir |= ir::DRX;
+                self.stored += 1;
+            }
+            Target::Fifo(n, filter) => self.receive_fifo(n, filter, frame),
+        }
+    }
+
+    fn receive_fifo(&mut self, n: usize, filter: Option<u32>, frame: &CanFrame) {
+        let room = ELEMENT_SIZES[(self.rxesc >> (4 * n) & 7) as usize];
+        let flags = 4 * n;
+        let fifo = &mut self.fifos[n];
+        let size = (fifo.config >> 16 & 0x7F).min(64);
+        if fifo.fill >= size {
+            let overwrite = fifo.config >> 31 == 1 && size > 0;
+            fifo.lost = true;
+            self.lost += 1;
+            self.ir |= ir::RF0L << flags;
+            if !overwrite {
+                return;
+            }
+            fifo.get = (fifo.get + 1) % size;
+            fifo.fill -= 1;
+        }
+        let start = (fifo.config & 0xFFFC) + fifo.put * (room + 8);
+        fifo.put = (fifo.put + 1) % size;
+        fifo.fill += 1;
+        self.ir |= ir::RF0N << flags;
+        if fifo.fill == size {
+            self.ir |= ir::RF0F << flags;
+        }
+        self.stored += 1;
+        self.ram.store(start, room, frame, filter, 0);
+    }
+
+    /// Interrupt lines 0 and 1.
+    pub fn lines(&self) -> [bool; 2] {
+        let active = self.ir & self.ie;
+        [active & !self.ils != 0 && self.ile & 1 != 0, active & self.ils != 0 && self.ile & 2 != 0]
+    }
+
+    /// Nominal bit time that the registers give.
+    pub fn nominal_bit(&self) -> Time {
+        SECOND.checked_div(u64::from(self.rates().0)).unwrap_or(NEVER)
+    }
+}

@@ -1,0 +1,30 @@
+//! An emulator of the controller board for tests.
+#![forbid(unsafe_code)]
+
+mod chip;
+pub mod clock;
+mod code;
+mod cpu;
+pub mod dma;
+mod elf;
+mod exception;
+pub mod fdcan;
+mod gpio;
+mod iwdg;
+mod memory;
+mod nvic;
+pub mod observe;
+mod plain;
+mod rcc;
+mod scs;
+mod timer;
+mod usart;
+
+pub use chip::{Access, Chip};
+pub use cpu::Machine;
+pub use elf::{Elf, ElfError, Symbol};
+pub use gpio::{Gpio, Pin, PinChange};
+pub use nvic::{FIRST_LINE, LINES};
+pub use rcc::Clocks;
+pub use unicorn_engine::RegisterARM;
+pub use usart::{Usart, WireByte};

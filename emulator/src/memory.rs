@@ -1,0 +1,68 @@
+//! The memory map of the STM32H745 and H743 as the Cortex-M7 sees it (RM0399 chapter 2).
+use unicorn_engine::Unicorn;
+use unicorn_engine::unicorn_const::Prot;
+
+use crate::chip::Chip;
+use crate::cpu::Ram;
+use crate::rcc::Gate;
+
+/// Start of flash bank 1; bank 2 follows 1 MiB behind.
+pub const FLASH: u32 = 0x0800_0000;
+
+const FLASH_SIZE: u64 = 0x20_0000;
+const SYSTEM: u64 = 0x1FF0_0000;
+const SYSTEM_SIZE: u64 = 0x2_0000;
+/// Peripherals of all domains.
+const PERIPHERALS: u64 = 0x4000_0000;
+const PERIPHERALS_SIZE: u64 = 0x2000_0000;
+/// Private peripherals of the core.
+const PRIVATE: u64 = 0xE000_0000;
+const PRIVATE_SIZE: u64 = 0x10_0000;
+
+/// RAM that can always be used: ITCM, DTCM, AXI SRAM, SRAM4, backup SRAM.
+const RAM: [(u64, u64); 5] = [
+    (0x0000_0000, 0x1_0000),
+    (0x2000_0000, 0x2_0000),
+    (0x2400_0000, 0x8_0000),
+    (0x3800_0000, 0x1_0000),
+    (0x3880_0000, 0x1000),
+];
+
+/// SRAM1..3 of domain D2, each with a clock of its own.
+const D2: [(u64, u64); 3] = [(0x3000_0000, 0x2_0000), (0x3002_0000, 0x2_0000), (0x3004_0000, 0x8000)];
+
+/// Map everything; RAM is filled with chance from `seed`.
+pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
+    let mut rng = fastrand::Rng::with_seed(seed ^ 0x7261_6D00);
+    for (address, size) in RAM.into_iter().chain(D2) {
+        uc.mem_map(address, size, Prot::ALL).expect("RAM");
+        let bytes: Vec<u8> = core::iter::repeat_with(|| rng.u8(..)).take(size as usize).collect();
+        uc.mem_write(address, &bytes).expect("RAM");
+    }
+    uc.mem_map(u64::from(FLASH), FLASH_SIZE, Prot::READ | Prot::EXEC).expect("flash");
+    uc.mem_write(u64::from(FLASH), &vec![0xFF; FLASH_SIZE as usize]).expect("flash");
+    uc.mem_map(SYSTEM, SYSTEM_SIZE, Prot::READ).expect("system memory");
+    for (start, size) in [(PERIPHERALS, PERIPHERALS_SIZE), (PRIVATE, PRIVATE_SIZE)] {
+        uc.mmio_map(
+            start,
+            size,
+            Some(move |uc: &mut Unicorn<'_, Chip>, offset: u64, size: usize| {
+                let mut ram = Ram(uc.clone());
+                u64::from(uc.get_data_mut().load((start + offset) as u32, size, &mut ram))
+            }),
+            Some(move |uc: &mut Unicorn<'_, Chip>, offset: u64, size: usize, value: u64| {
+                let mut ram = Ram(uc.clone());
+                uc.get_data_mut().store((start + offset) as u32, size, value as u32, &mut ram);
+            }),
+        )
+        .expect("registers");
+    }
+}
+
+/// Let SRAM of D2 be used as far as its clocks are enabled.
+pub fn protect(uc: &mut Unicorn<'static, Chip>) {
+    for (n, (address, size)) in D2.into_iter().enumerate() {
+        let on = uc.get_data().rcc.enabled(Gate::Sram(n as u32 + 1));
+        let _ = uc.mem_protect(address, size, if on { Prot::ALL } else { Prot::NONE });
+    }
+}

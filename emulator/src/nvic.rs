@@ -1,0 +1,280 @@
+//! Exceptions: which are pending, which may run, in which order (ARMv7-M B1.5, four priority bits as on STM32).
+use crate::clock::Time;
+
+/// Interrupt lines of the device.
+pub const LINES: usize = 150;
+/// Number of the first interrupt line among the exceptions.
+pub const FIRST_LINE: usize = 16;
+/// All exceptions.
+pub const EXCEPTIONS: usize = FIRST_LINE + LINES;
+
+/// Numbers of the core's own exceptions.
+pub mod exception {
+    /// Non-maskable interrupt.
+    pub const NMI: usize = 2;
+    /// Hard fault.
+    pub const HARD_FAULT: usize = 3;
+    /// Supervisor call.
+    pub const SV_CALL: usize = 11;
+    /// Pendable request.
+    pub const PEND_SV: usize = 14;
+    /// System tick timer.
+    pub const SYS_TICK: usize = 15;
+}
+
+/// Lower is more urgent; this is what runs without any exception.
+const THREAD: i32 = 256;
+
+/// Mask registers of the core.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Masks {
+    /// PRIMASK.PM.
+    pub primask: bool,
+    /// FAULTMASK.FM.
+    pub faultmask: bool,
+    /// BASEPRI; 0: no mask.
+    pub basepri: u8,
+}
+
+/// The interrupt controller and the priorities of the core's own exceptions.
+pub struct Nvic {
+    enabled: [bool; EXCEPTIONS],
+    pending: [bool; EXCEPTIONS],
+    /// When each became pending.
+    since: [Time; EXCEPTIONS],
+    active: [bool; EXCEPTIONS],
+    level: [bool; EXCEPTIONS],
+    priority: [u8; EXCEPTIONS],
+    /// Pending and enabled exceptions, unordered.
+    waiting: Vec<usize>,
+    /// AIRCR.PRIGROUP.
+    pub prigroup: u32,
+    /// An interrupt became pending since this was last cleared: what wakes WFE with SCR.SEVONPEND.
+    pub pended: bool,
+}
+
+impl Default for Nvic {
+    fn default() -> Self {
+        let mut enabled = [false; EXCEPTIONS];
+        enabled[..FIRST_LINE].fill(true);
+        Self {
+            enabled,
+            pending: [false; EXCEPTIONS],
+            since: [0; EXCEPTIONS],
+            active: [false; EXCEPTIONS],
+            level: [false; EXCEPTIONS],
+            priority: [0; EXCEPTIONS],
+            waiting: Vec::with_capacity(16),
+            prigroup: 0,
+            pended: false,
+        }
+    }
+}
+
+impl Nvic {
+    fn update(&mut self, exception: usize) {
+        let waits = self.pending[exception] && self.enabled[exception];
+        let at = self.waiting.iter().position(|&e| e == exception);
+        match (waits, at) {
+            (true, None) => self.waiting.push(exception),
+            (false, Some(at)) => {
+                self.waiting.swap_remove(at);
+            }
+            _ => {}
+        }
+    }
+
+    /// Make an exception pending.
+    pub fn pend(&mut self, exception: usize, now: Time) {
+        if !self.pending[exception] {
+            self.pending[exception] = true;
+            self.since[exception] = now;
+            self.pended = true;
+            self.update(exception);
+        }
+    }
+
+    /// Take a pending exception back.
+    pub fn unpend(&mut self, exception: usize) {
+        self.pending[exception] = false;
+        self.update(exception);
+    }
+
+    /// Level of an interrupt line: a rising one makes the interrupt pending.
+    pub fn set_line(&mut self, line: usize, level: bool, now: Time) {
+        let exception = FIRST_LINE + line;
+        let before = core::mem::replace(&mut self.level[exception], level);
+        if level && !before {
+            self.pend(exception, now);
+        }
+    }
+
+    /// The exception is pending.
+    pub fn is_pending(&self, exception: usize) -> bool {
+        self.pending[exception]
+    }
+
+    /// The exception runs or is preempted.
+    pub fn is_active(&self, exception: usize) -> bool {
+        self.active[exception]
+    }
+
+    /// The exception may run.
+    pub fn is_enabled(&self, exception: usize) -> bool {
+        self.enabled[exception]
+    }
+
+    /// Allow or forbid an exception to run.
+    pub fn enable(&mut self, exception: usize, enabled: bool) {
+        self.enabled[exception] = enabled;
+        self.update(exception);
+    }
+
+    /// Priority byte of an exception.
+    pub fn priority(&self, exception: usize) -> u8 {
+        self.priority[exception]
+    }
+
+    /// Set a priority byte; only the upper four bits exist.
+    pub fn set_priority(&mut self, exception: usize, priority: u8) {
+        self.priority[exception] = priority & 0xF0;
+    }
+
+    /// Since when an exception has been pending.
+    pub fn pending_since(&self, exception: usize) -> Time {
+        self.since[exception]
+    }
+
+    /// Anything enabled is pending.
+    pub fn any_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// Priority within the group: PRIGROUP cuts the lower bits off for preemption.
+    fn group(&self, priority: i32) -> i32 {
+        if priority < 0 { priority } else { priority >> (self.prigroup + 1) << (self.prigroup + 1) }
+    }
+
+    fn raw_priority(&self, exception: usize) -> i32 {
+        match exception {
+            exception::NMI => -2,
+            exception::HARD_FAULT => -1,
+            _ => i32::from(self.priority[exception]),
+        }
+    }
+
+    /// Priority of what runs, masks not counted.
+    pub fn running_priority(&self) -> i32 {
+        let active = (0..EXCEPTIONS).filter(|&e| self.active[e]);
+        active.map(|e| self.group(self.raw_priority(e))).min().unwrap_or(THREAD)
+    }
+
+    /// The most urgent exception that waits.
+    fn most_urgent(&self) -> Option<usize> {
+        self.waiting.iter().copied().min_by_key(|&e| (self.raw_priority(e), e))
+    }
+
+    fn masked(&self, running: i32, masks: Masks) -> i32 {
+        let mut limit = running;
+        if masks.basepri != 0 {
+            limit = limit.min(self.group(i32::from(masks.basepri)));
+        }
+        if masks.primask {
+            limit = limit.min(0);
+        }
+        if masks.faultmask {
+            limit = limit.min(-1);
+        }
+        limit
+    }
+
+    /// The exception to enter now.
+    pub fn next(&self, masks: Masks) -> Option<usize> {
+        let exception = self.most_urgent()?;
+        let running = self.running_priority();
+        (self.group(self.raw_priority(exception)) < self.masked(running, masks)).then_some(exception)
+    }
+
+    /// Something waits that only the masks hold back.
+    pub fn held_by_masks(&self, masks: Masks) -> bool {
+        self.next(masks).is_none() && self.next(Masks::default()).is_some()
+    }
+
+    /// WFI ends: something would run if PRIMASK were not set.
+    pub fn wakes(&self, masks: Masks) -> bool {
+        self.next(Masks { primask: false, ..masks }).is_some()
+    }
+
+    /// An exception begins to run.
+    pub fn enter(&mut self, exception: usize) {
+        self.active[exception] = true;
+        self.unpend(exception);
+    }
+
+    /// An exception has returned; a line that is still high makes it pending again.
+    pub fn leave(&mut self, exception: usize, now: Time) {
+        self.active[exception] = false;
+        if self.level[exception] {
+            self.pend(exception, now);
+        }
+    }
+
+    /// ICSR.VECTPENDING.
+    pub fn vect_pending(&self) -> usize {
+        self.most_urgent().unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: usize = FIRST_LINE + 3;
+    const B: usize = FIRST_LINE + 7;
+
+    fn with(priorities: [u8; 2]) -> Nvic {
+        let mut nvic = Nvic::default();
+        for (exception, priority) in [A, B].into_iter().zip(priorities) {
+            nvic.set_priority(exception, priority);
+            nvic.enable(exception, true);
+            nvic.pend(exception, 5);
+        }
+        nvic
+    }
+
+    #[test]
+    fn the_more_urgent_goes_first_and_equals_by_number() {
+        assert_eq!(with([0x20, 0x10]).next(Masks::default()), Some(B));
+        assert_eq!(with([0x10, 0x10]).next(Masks::default()), Some(A));
+    }
+
+    #[test]
+    fn only_a_more_urgent_one_preempts() {
+        let mut nvic = with([0x20, 0x20]);
+        nvic.enter(A);
+        assert_eq!(nvic.next(Masks::default()), None);
+        nvic.set_priority(B, 0x10);
+        assert_eq!(nvic.next(Masks::default()), Some(B));
+    }
+
+    #[test]
+    fn masks_hold_back() {
+        let nvic = with([0x20, 0x30]);
+        assert!(nvic.held_by_masks(Masks { primask: true, ..Masks::default() }));
+        assert!(nvic.wakes(Masks { primask: true, ..Masks::default() }));
+        assert_eq!(nvic.next(Masks { basepri: 0x30, ..Masks::default() }), Some(A));
+        assert_eq!(nvic.next(Masks { basepri: 0x20, ..Masks::default() }), None);
+    }
+
+    #[test]
+    fn a_high_line_comes_again_after_return() {
+        let mut nvic = Nvic::default();
+        nvic.enable(A, true);
+        nvic.set_line(3, true, 1);
+        nvic.enter(A);
+        assert!(!nvic.is_pending(A));
+        nvic.leave(A, 9);
+        assert!(nvic.is_pending(A));
+        assert_eq!(nvic.pending_since(A), 9);
+    }
+}

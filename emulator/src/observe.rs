@@ -1,0 +1,236 @@
+//! What an observer counts while the firmware runs: instructions of functions and handlers, interrupt latencies, stack
+//! pointers, resets, faults.
+use crate::clock::Time;
+use crate::nvic::EXCEPTIONS;
+
+/// Instructions of a function or a handler, without those of exceptions that interrupted it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Count {
+    /// Calls that have returned.
+    pub calls: u64,
+    /// Fewest.
+    pub min: u64,
+    /// Most.
+    pub max: u64,
+    /// The last call's.
+    pub last: u64,
+    /// All calls'.
+    pub total: u64,
+}
+
+impl Count {
+    fn add(&mut self, n: u64) {
+        self.min = if self.calls == 0 { n } else { self.min.min(n) };
+        self.max = self.max.max(n);
+        self.last = n;
+        self.total += n;
+        self.calls += 1;
+    }
+}
+
+/// Delay from pending to the first instruction of a handler.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Latency {
+    /// Times it was entered.
+    pub entries: u64,
+    /// Longest delay.
+    pub worst: Time,
+    /// When the longest was.
+    pub at: Time,
+    /// Delay of the last entry.
+    pub last: Time,
+}
+
+/// Why the machine was reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResetCause {
+    /// Power was switched on.
+    PowerOn,
+    /// The reset pin.
+    Pin,
+    /// AIRCR.SYSRESETREQ.
+    Software,
+    /// The independent watchdog.
+    Watchdog,
+}
+
+/// A reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reset {
+    /// When.
+    pub time: Time,
+    /// Why.
+    pub cause: ResetCause,
+    /// The instruction that ran.
+    pub pc: u32,
+}
+
+/// What the core stumbled over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// Load or store where nothing is, or where it is forbidden.
+    BadAccess,
+    /// Jump to where nothing is.
+    BadJump,
+    /// Instruction that does not exist.
+    Undefined,
+    /// BKPT without a debugger.
+    Breakpoint,
+    /// Exception return that makes no sense.
+    BadReturn,
+}
+
+/// A fault; the machine goes on with HardFault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// When.
+    pub time: Time,
+    /// What.
+    pub kind: FaultKind,
+    /// Instruction.
+    pub pc: u32,
+    /// Address of the access.
+    pub address: u32,
+    /// It happened in HardFault or NMI: the core stands still until a reset.
+    pub lockup: bool,
+}
+
+struct Call {
+    probe: usize,
+    depth: usize,
+    sp: u32,
+    back: u32,
+    start: u64,
+    excluded: u64,
+}
+
+struct Probe {
+    entry: u32,
+    count: Count,
+}
+
+struct Running {
+    exception: usize,
+    start: u64,
+    excluded: u64,
+}
+
+/// All observers.
+pub struct Observers {
+    probes: Vec<Probe>,
+    calls: Vec<Call>,
+    running: Vec<Running>,
+    /// Per exception number.
+    pub handlers: Vec<Count>,
+    /// Per exception number.
+    pub latencies: Vec<Latency>,
+    /// Lowest stack pointer while exception n ran; 0: no exception.
+    pub lowest_sp: Vec<u32>,
+    /// Resets, oldest first.
+    pub resets: Vec<Reset>,
+    /// Faults, oldest first.
+    pub faults: Vec<Fault>,
+}
+
+impl Default for Observers {
+    fn default() -> Self {
+        Self {
+            probes: Vec::new(),
+            calls: Vec::new(),
+            running: Vec::new(),
+            handlers: vec![Count::default(); EXCEPTIONS],
+            latencies: vec![Latency::default(); EXCEPTIONS],
+            lowest_sp: vec![u32::MAX; EXCEPTIONS],
+            resets: Vec::new(),
+            faults: Vec::new(),
+        }
+    }
+}
+
+impl Observers {
+    /// Count instructions from this entry on; the number of the counter.
+    pub fn add_probe(&mut self, entry: u32) -> usize {
+        self.probes.push(Probe { entry, count: Count::default() });
+        self.probes.len() - 1
+    }
+
+    /// A counter's count.
+    pub fn probe(&self, probe: usize) -> Count {
+        self.probes[probe].count
+    }
+
+    /// Set all counts, latencies and lowest stack pointers back.
+    pub fn clear(&mut self) {
+        for probe in &mut self.probes {
+            probe.count = Count::default();
+        }
+        self.handlers.fill(Count::default());
+        self.latencies.fill(Latency::default());
+        self.lowest_sp.fill(u32::MAX);
+    }
+
+    /// A watched instruction comes; the return address to watch when a function begins here.
+    pub fn at(&mut self, pc: u32, sp: u32, lr: u32, instructions: u64) -> Option<u32> {
+        let depth = self.running.len();
+        while let Some(i) = self.calls.iter().rposition(|c| c.back == pc && c.sp == sp && c.depth == depth) {
+            self.finish(i, instructions);
+        }
+        let mut back = None;
+        for probe in 0..self.probes.len() {
+            if self.probes[probe].entry == pc {
+                let call = Call { probe, depth, sp, back: lr & !1, start: instructions, excluded: 0 };
+                back = Some(call.back);
+                self.calls.push(call);
+            }
+        }
+        back.filter(|&b| b < 0xFFFF_FF00)
+    }
+
+    fn finish(&mut self, i: usize, instructions: u64) {
+        let call = self.calls.remove(i);
+        self.probes[call.probe].count.add(instructions - call.start - call.excluded);
+    }
+
+    /// An exception begins to run.
+    pub fn enter(&mut self, exception: usize, since: Time, now: Time, instructions: u64) {
+        let latency = &mut self.latencies[exception];
+        latency.entries += 1;
+        latency.last = now.saturating_sub(since);
+        if latency.last >= latency.worst {
+            latency.worst = latency.last;
+            latency.at = now;
+        }
+        self.running.push(Running { exception, start: instructions, excluded: 0 });
+    }
+
+    /// The innermost exception returns.
+    pub fn leave(&mut self, instructions: u64) {
+        let depth = self.running.len();
+        // Functions that were handlers themselves end with them.
+        while let Some(i) = self.calls.iter().rposition(|c| c.depth >= depth) {
+            self.finish(i, instructions);
+        }
+        let Some(done) = self.running.pop() else { return };
+        let elapsed = instructions - done.start;
+        self.handlers[done.exception].add(elapsed - done.excluded);
+        if let Some(outer) = self.running.last_mut() {
+            outer.excluded += elapsed;
+        }
+        for call in self.calls.iter_mut().filter(|c| c.depth == depth - 1) {
+            call.excluded += elapsed;
+        }
+    }
+
+    /// The stack pointer now.
+    pub fn note_sp(&mut self, sp: u32) {
+        let context = self.running.last().map_or(0, |r| r.exception);
+        self.lowest_sp[context] = self.lowest_sp[context].min(sp);
+    }
+
+    /// The machine was reset.
+    pub fn note_reset(&mut self, reset: Reset) {
+        self.resets.push(reset);
+        self.calls.clear();
+        self.running.clear();
+    }
+}

@@ -1,0 +1,297 @@
+//! Basic and general timers TIM2..TIM7 (RM0399 chapters 40, 43): counter, prescaler, update and compare events.
+use crate::clock::{NEVER, Time, period};
+
+const CEN: u32 = 1;
+const UDIS: u32 = 2;
+const URS: u32 = 4;
+const OPM: u32 = 8;
+const ARPE: u32 = 0x80;
+
+/// A timer that counts up.
+pub struct Timer {
+    wide: bool,
+    basic: bool,
+    cr1: u32,
+    cr2: u32,
+    smcr: u32,
+    dier: u32,
+    sr: u32,
+    ccmr: [u32; 2],
+    ccer: u32,
+    psc: u32,
+    psc_active: u32,
+    arr: u32,
+    arr_active: u32,
+    ccr: [u32; 4],
+    /// Counter at `at`; it goes on from there while the timer runs.
+    count: u32,
+    at: Time,
+    /// Length of a clock period.
+    clock: Time,
+    /// Update events since reset.
+    pub updates: u64,
+}
+
+impl Timer {
+    /// TIM2..TIM7 by number.
+    pub fn new(number: u32) -> Self {
+        let wide = number == 2 || number == 5;
+        let max = if wide { u32::MAX } else { 0xFFFF };
+        Self {
+            wide,
+            basic: number >= 6,
+            cr1: 0,
+            cr2: 0,
+            smcr: 0,
+            dier: 0,
+            sr: 0,
+            ccmr: [0; 2],
+            ccer: 0,
+            psc: 0,
+            psc_active: 0,
+            arr: max,
+            arr_active: max,
+            ccr: [0; 4],
+            count: 0,
+            at: 0,
+            clock: NEVER,
+            updates: 0,
+        }
+    }
+
+    /// Kernel clock; call it with the timer advanced to `now`.
+    pub fn set_clock(&mut self, hz: u64, now: Time) {
+        let clock = period(hz);
+        if clock != self.clock {
+            self.settle(now);
+            self.clock = clock;
+        }
+    }
+
+    fn tick(&self) -> Time {
+        self.clock.saturating_mul(u64::from(self.psc_active) + 1)
+    }
+
+    fn runs(&self) -> bool {
+        self.cr1 & CEN != 0 && self.clock != NEVER
+    }
+
+    /// Counter at a moment before which no event is left.
+    fn value(&self, now: Time) -> u32 {
+        if !self.runs() {
+            return self.count;
+        }
+        self.count + (now.saturating_sub(self.at) / self.tick()) as u32
+    }
+
+    /// Make `count` and `at` current without losing the part of a tick that has passed.
+    fn settle(&mut self, now: Time) {
+        if self.runs() {
+            let ticks = now.saturating_sub(self.at) / self.tick();
+            self.count += ticks as u32;
+            self.at += ticks * self.tick();
+        } else {
+            self.at = now;
+        }
+    }
+
+    /// Ticks from `count` until the counter overflows to 0.
+    fn to_overflow(&self) -> u64 {
+        if self.count > self.arr_active {
+            // ARR went below the counter: it runs through its whole range first.
+            let top = if self.wide { 1u64 << 32 } else { 1 << 16 };
+            return top - u64::from(self.count);
+        }
+        u64::from(self.arr_active - self.count) + 1
+    }
+
+    /// When the flag of a compare channel is set next before the overflow.
+    fn to_match(&self, channel: usize) -> Option<u64> {
+        let compare = self.ccr[channel];
+        (compare > self.count && compare <= self.arr_active).then(|| u64::from(compare - self.count))
+    }
+
+    fn next_ticks(&self) -> u64 {
+        let overflow = self.to_overflow();
+        if self.basic {
+            return overflow;
+        }
+        (0..4).filter_map(|c| self.to_match(c)).fold(overflow, u64::min)
+    }
+
+    /// When the next flag is set that is not set already or whose interrupt is on.
+    pub fn next_event(&self) -> Time {
+        if !self.runs() {
+            return NEVER;
+        }
+        // Flags without interrupt need no stop: they are made when somebody looks.
+        let mut ticks = NEVER;
+        if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
+            ticks = self.to_overflow();
+        }
+        if !self.basic {
+            for c in (0..4).filter(|c| self.dier >> (c + 1) & 1 == 1) {
+                // A match behind the overflow is found when the overflow is passed.
+                ticks = ticks.min(self.to_match(c).unwrap_or_else(|| self.to_overflow()));
+            }
+        }
+        if ticks == NEVER { NEVER } else { self.at.saturating_add(ticks.saturating_mul(self.tick())) }
+    }
+
+    /// Let every event up to `now` happen.
+    pub fn advance(&mut self, now: Time) {
+        while self.runs() {
+            let ticks = self.next_ticks();
+            let when = self.at.saturating_add(ticks.saturating_mul(self.tick()));
+            if when > now {
+                return;
+            }
+            let overflow = ticks == self.to_overflow();
+            self.at = when;
+            if overflow {
+                self.count = 0;
+                self.update(true);
+                if self.cr1 & OPM != 0 {
+                    self.cr1 &= !CEN;
+                }
+            } else {
+                self.count += ticks as u32;
+            }
+            if !self.basic {
+                for c in 0..4 {
+                    if self.ccr[c] == self.count && self.ccr[c] <= self.arr_active {
+                        self.sr |= 2 << c;
+                    }
+                }
+            }
+        }
+    }
+
+    fn update(&mut self, overflow: bool) {
+        if self.cr1 & UDIS != 0 {
+            return;
+        }
+        self.psc_active = self.psc;
+        self.arr_active = self.arr;
+        self.updates += 1;
+        if overflow || self.cr1 & URS == 0 {
+            self.sr |= 1;
+        }
+    }
+
+    /// Interrupt line.
+    pub fn line(&self) -> bool {
+        self.sr & self.dier & 0x1F != 0
+    }
+
+    /// Read a word.
+    pub fn read(&mut self, offset: u32, now: Time) -> u32 {
+        self.advance(now);
+        match offset {
+            0x00 => self.cr1,
+            0x04 => self.cr2,
+            0x08 => self.smcr,
+            0x0C => self.dier,
+            0x10 => self.sr,
+            0x18 | 0x1C => self.ccmr[(offset as usize - 0x18) / 4],
+            0x20 => self.ccer,
+            0x24 => self.value(now),
+            0x28 => self.psc,
+            0x2C => self.arr,
+            0x34..=0x40 => self.ccr[(offset as usize - 0x34) / 4],
+            _ => 0,
+        }
+    }
+
+    /// Write a word.
+    pub fn write(&mut self, offset: u32, value: u32, now: Time) {
+        self.advance(now);
+        self.settle(now);
+        let mask = if self.wide { u32::MAX } else { 0xFFFF };
+        match offset {
+            0x00 => {
+                if value & CEN != 0 && self.cr1 & CEN == 0 {
+                    self.at = now;
+                }
+                self.cr1 = value;
+            }
+            0x04 => self.cr2 = value,
+            0x08 => self.smcr = value,
+            0x0C => self.dier = value,
+            // Flags are cleared by writing 0.
+            0x10 => self.sr &= value,
+            0x14 => {
+                if value & 1 != 0 {
+                    self.count = 0;
+                    self.at = now;
+                    self.update(false);
+                }
+                self.sr |= value & 0x1E;
+            }
+            0x18 | 0x1C => self.ccmr[(offset as usize - 0x18) / 4] = value,
+            0x20 => self.ccer = value,
+            0x24 => {
+                self.count = value & mask;
+                self.at = now;
+            }
+            0x28 => self.psc = value & 0xFFFF,
+            0x2C => {
+                self.arr = value & mask;
+                if self.cr1 & ARPE == 0 {
+                    self.arr_active = self.arr;
+                }
+            }
+            0x34..=0x40 => self.ccr[(offset as usize - 0x34) / 4] = value & mask,
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::{MICROSECOND, MILLISECOND};
+
+    fn millisecond_timer() -> Timer {
+        let mut timer = Timer::new(7);
+        timer.set_clock(200_000_000, 0);
+        timer.write(0x28, 199, 0);
+        timer.write(0x2C, 999, 0);
+        timer.write(0x14, 1, 0);
+        timer.write(0x10, 0, 0);
+        timer.write(0x0C, 1, 0);
+        timer.write(0x00, 1, 0);
+        timer
+    }
+
+    #[test]
+    fn a_basic_timer_fires_every_millisecond() {
+        let mut timer = millisecond_timer();
+        for ms in 1..5 {
+            assert_eq!(timer.next_event(), ms * MILLISECOND);
+            timer.advance(ms * MILLISECOND - 1);
+            assert!(!timer.line());
+            timer.advance(ms * MILLISECOND);
+            assert!(timer.line());
+            timer.write(0x10, !1, ms * MILLISECOND);
+            assert!(!timer.line());
+        }
+        assert_eq!(timer.read(0x24, 4 * MILLISECOND + 17 * MICROSECOND), 17);
+    }
+
+    #[test]
+    fn compare_flags_come_at_their_count() {
+        let mut timer = Timer::new(5);
+        timer.set_clock(200_000_000, 0);
+        timer.write(0x28, 199, 0);
+        timer.write(0x2C, 0xFFFF, 0);
+        timer.write(0x14, 1, 0);
+        timer.write(0x10, 0, 0);
+        timer.write(0x38, 100, 0);
+        timer.write(0x0C, 4, 0);
+        timer.write(0x00, 1, 0);
+        assert_eq!(timer.next_event(), 100 * MICROSECOND);
+        timer.advance(100 * MICROSECOND);
+        assert_eq!(timer.read(0x10, 100 * MICROSECOND), 4);
+    }
+}

@@ -1,1 +1,265 @@
-//! The board side.
+//! The board side: a UCoM board as a state machine without clock, heap or I/O, usable in a board's firmware as
+//! it is and behind every simulated board.
+//!
+//! The caller hands in what was received ([`Node::receive`]), asks what to send ([`Node::poll`]) and says when
+//! that has left the controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`]
+//! tells until when nothing will happen by itself. Flash, pins, lasting memory and the application are traits
+//! ([`Flash`], [`Pins`], [`Store`], [`Application`]); `memory` (feature `std`) has all four for tests and
+//! simulations.
+//!
+//! The node offers one frame at a time: the next comes after `sent`. Strings and dumps are made frame by frame
+//! when the bus takes them, so a node needs no queue for them.
+
+mod answers;
+mod application;
+mod config;
+mod hardware;
+#[cfg(feature = "std")]
+pub mod memory;
+mod outbox;
+mod programming;
+mod rate;
+mod receive;
+mod record;
+mod status;
+mod timers;
+
+use answers::Jobs;
+pub use config::{Counters, NodeConfig};
+pub use hardware::{Application, Area, Flash, FlashError, FlashState, Pins, RECORD_LEN, Store, Text};
+use outbox::Outbox;
+use programming::Programming;
+use rate::RateLimit;
+pub use record::Record;
+
+use crate::admin::Admin;
+use crate::error_code::ErrorCode;
+use crate::frame::Frame;
+use crate::function::Sequence;
+use crate::message::FromBoard;
+
+/// What the board is doing; the states S1 to S6 of the protocol page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Phase {
+    /// Between reset and listening.
+    Booting,
+    /// S1: no number.
+    Uninitialised,
+    /// S2: exloader, has a number.
+    Idle,
+    /// S3: exloader, program data are taken.
+    Programming,
+    /// S3x: as S3, but after an error: program data are discarded until PC_XRESET or PROG 0→1.
+    Aborted,
+    /// S4: the application is starting.
+    Starting,
+    /// S5: the application serves requests.
+    Ready,
+    /// S6: the control loop runs.
+    Running,
+}
+
+/// How far the application is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum App {
+    Stopped,
+    Starting,
+    Up,
+    Running,
+}
+
+/// A board.
+#[derive(Debug)]
+pub struct Node<F, P, S, A> {
+    /// Flash and exloader RAM.
+    pub flash: F,
+    /// Init pins.
+    pub pins: P,
+    /// Lasting memory.
+    pub store: S,
+    /// The program.
+    pub application: A,
+    config: NodeConfig,
+    counters: Counters,
+    random: u32,
+    now_us: u64,
+    /// Until when the board does not listen; `None` after that.
+    boot_until: Option<u64>,
+    number: Option<Sequence>,
+    /// A number whose INITACK has not left yet: INIT follows when it has (D-24).
+    taking: Option<Sequence>,
+    /// Level of the outgoing init pin.
+    opinit: bool,
+    prog: bool,
+    app: App,
+    /// The flags but for `run`, which is `app == Running`.
+    active: bool,
+    debug: bool,
+    global_debug: bool,
+    autostart_at: Option<u64>,
+    /// When the PC counts as lost; while the loop runs.
+    pc_lost_at: Option<u64>,
+    step_at: Option<u64>,
+    so_at: Option<u64>,
+    alive_at: Option<u64>,
+    record: Option<Record>,
+    programming: Programming,
+    outbox: Outbox,
+    jobs: Jobs,
+    error_rates: [RateLimit<10>; ErrorCode::ALL.len()],
+    debug_rate: RateLimit<20>,
+}
+
+impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
+    /// A board at power-up.
+    pub fn new(config: NodeConfig, flash: F, pins: P, store: S, application: A, now_us: u64) -> Self {
+        let mut node = Self {
+            flash,
+            pins,
+            store,
+            application,
+            config,
+            counters: Counters::default(),
+            // Boards with one seed must still differ, or their back-offs collide.
+            random: (config.seed ^ u32::from(config.flash_number).wrapping_mul(0x9E37_79B9)).max(1),
+            now_us,
+            boot_until: None,
+            number: None,
+            taking: None,
+            opinit: false,
+            prog: false,
+            app: App::Stopped,
+            active: false,
+            debug: false,
+            global_debug: false,
+            autostart_at: None,
+            pc_lost_at: None,
+            step_at: None,
+            so_at: None,
+            alive_at: None,
+            record: None,
+            programming: Programming::new(&config.profile),
+            outbox: Outbox::new(),
+            jobs: Jobs::new(),
+            error_rates: [const { RateLimit::new() }; ErrorCode::ALL.len()],
+            debug_rate: RateLimit::new(),
+        };
+        node.reboot(now_us, false);
+        node
+    }
+
+    /// The board rebooted by itself: crash, watchdog, brown-out. It sends one report unasked (D-26).
+    pub fn restart(&mut self, now_us: u64) {
+        self.now_us = self.now_us.max(now_us);
+        self.reboot(self.now_us, true);
+    }
+
+    /// Power came back: everything but flash and [`Store`] is lost. Nothing is sent.
+    pub fn power_up(&mut self, now_us: u64) {
+        self.now_us = self.now_us.max(now_us);
+        self.reboot(self.now_us, false);
+    }
+
+    /// What the bus shall get next; `None` while nothing is due or the frame before has not left. What is not
+    /// confirmed by [`Node::sent`] or [`Node::not_sent`] blocks what comes after it, as in a controller.
+    pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
+        self.advance(now_us);
+        if self.outbox.in_flight.is_some() || self.boot_until.is_some() {
+            return None;
+        }
+        let frame = self.next_frame()?;
+        self.outbox.in_flight = Some(frame);
+        Some(frame)
+    }
+
+    /// The frame of the last [`Node::poll`] has left the controller; other frames are ignored.
+    pub fn sent(&mut self, now_us: u64, frame: &Frame) {
+        self.advance(now_us);
+        if self.outbox.in_flight != Some(*frame) {
+            return;
+        }
+        self.outbox.in_flight = None;
+        if core::mem::take(&mut self.outbox.trouble) {
+            self.error(ErrorCode::CanTransmit);
+        }
+        match FromBoard::decode(frame, &self.config.profile) {
+            Ok((_, FromBoard::InitAck(_))) => self.numbered(),
+            Ok((_, FromBoard::Ready)) => self.programming.answered(),
+            _ => {}
+        }
+    }
+
+    /// The controller gave the frame of the last [`Node::poll`] up (bus-off). An INITACK is offered again, other
+    /// frames are lost; DSP_ERROR 6 follows when the bus works again.
+    pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
+        self.advance(now_us);
+        if self.outbox.in_flight != Some(*frame) {
+            return;
+        }
+        self.outbox.in_flight = None;
+        self.outbox.trouble = true;
+        self.counters.not_sent = self.counters.not_sent.saturating_add(1);
+        match FromBoard::decode(frame, &self.config.profile) {
+            Ok((_, FromBoard::InitAck(_))) => self.outbox.ack = true,
+            Ok((_, FromBoard::Ready)) => self.programming.answered(),
+            _ => {}
+        }
+    }
+
+    /// The controller's receive buffer overran: frames were lost (DSP_ERROR 8).
+    pub fn overrun(&mut self, now_us: u64) {
+        self.advance(now_us);
+        if self.boot_until.is_none() {
+            self.error(ErrorCode::CanOverrun);
+        }
+    }
+
+    /// Until when the node does nothing by itself: call [`Node::poll`] then. A time in the past means at once.
+    pub fn next_deadline(&self) -> u64 {
+        self.deadline()
+    }
+
+    /// Settings of the board.
+    pub const fn config(&self) -> &NodeConfig {
+        &self.config
+    }
+
+    /// What was counted since [`Node::new`].
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// The sequence number.
+    pub const fn number(&self) -> Option<Sequence> {
+        self.number
+    }
+
+    /// The application in the flash.
+    pub const fn record(&self) -> Option<Record> {
+        self.record
+    }
+
+    /// What the board is doing.
+    pub const fn phase(&self) -> Phase {
+        match self.app {
+            _ if self.boot_until.is_some() => Phase::Booting,
+            _ if self.number.is_none() => Phase::Uninitialised,
+            App::Stopped if self.prog && self.programming.discarding() => Phase::Aborted,
+            App::Stopped if self.prog => Phase::Programming,
+            App::Stopped => Phase::Idle,
+            App::Starting => Phase::Starting,
+            App::Up => Phase::Ready,
+            App::Running => Phase::Running,
+        }
+    }
+
+    /// The flags that MCA_ADMIN_DATA tells.
+    pub const fn admin(&self) -> Admin {
+        Admin {
+            run: matches!(self.app, App::Running),
+            active: self.active,
+            debug: self.debug,
+            global_debug: self.global_debug,
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Answers of several frames, made one frame at a time: DSP_INFO, dumps, outputs, texts.
+
+use super::{App, Application, Flash, Node, Pins, Store, Text};
+use crate::buffer::{BufferPackage, package_count};
+use crate::frame::Payload;
+use crate::info::BoardInfo;
+use crate::message::FromBoard;
+use crate::profile::Profile;
+use crate::string::string_package;
+
+/// Where an answer stands: nothing sent, or the next package of the string `string`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Place {
+    First,
+    String { string: u32, package: u16 },
+}
+
+/// Answers under way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Jobs {
+    info: Option<Place>,
+    info_again: bool,
+    dump_io: Option<Place>,
+    dump_io_at: u64,
+    dump_io_again: bool,
+    /// Offset of the next package.
+    dump_ci: Option<u16>,
+    dump_ci_again: bool,
+    /// Offset of the next package of the outputs.
+    pub so: Option<u16>,
+    /// Next package of the text under way, and whether it is the node's own.
+    text: Option<(u16, bool)>,
+    /// A text of the node itself.
+    pub own_text: Option<&'static [u8]>,
+}
+
+impl Jobs {
+    pub const fn new() -> Self {
+        Self {
+            info: None,
+            info_again: false,
+            dump_io: None,
+            dump_io_at: 0,
+            dump_io_again: false,
+            dump_ci: None,
+            dump_ci_again: false,
+            so: None,
+            text: None,
+            own_text: None,
+        }
+    }
+
+    /// A request during its own answer is served after it: strings are never mixed (D-14).
+    pub fn ask_info(&mut self) {
+        self.info_again = self.info.is_some();
+        self.info = self.info.or(Some(Place::First));
+    }
+
+    pub fn ask_dump_io(&mut self, due_us: u64) {
+        self.dump_io_again = self.dump_io.is_some();
+        if !self.dump_io_again {
+            self.dump_io = Some(Place::First);
+            self.dump_io_at = due_us;
+        }
+    }
+
+    pub fn ask_dump_ci(&mut self) {
+        self.dump_ci_again = self.dump_ci.is_some();
+        self.dump_ci = self.dump_ci.or(Some(0));
+    }
+
+    pub fn forget_application(&mut self) {
+        *self = Self { info: self.info, info_again: self.info_again, ..Self::new() };
+    }
+
+    pub fn deadline(&self) -> u64 {
+        if self.info.is_some() || self.so.is_some() || self.dump_ci.is_some() || self.text.is_some() {
+            0
+        } else if self.dump_io.is_some() {
+            self.dump_io_at
+        } else {
+            u64::MAX
+        }
+    }
+}
+
+/// A package of the `string`-th text, and where the answer goes on; `None` when there is no such package.
+fn package(text: &[u8], string: u32, package: u16, profile: &Profile) -> Option<(Payload, Place)> {
+    let payload = string_package(text, package, profile)?;
+    let last = string_package(text, package + 1, profile).is_none();
+    let next = if last {
+        Place::String { string: string + 1, package: 0 }
+    } else {
+        Place::String { string, package: package + 1 }
+    };
+    Some((payload, next))
+}
+
+impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
+    /// The next frame of the most urgent answer.
+    pub(super) fn next_of_answers(&mut self) -> Option<FromBoard> {
+        if self.jobs.info.is_some() {
+            return self.next_of_info();
+        }
+        self.next_of_so()
+            .or_else(|| self.next_of_dump_io())
+            .or_else(|| self.next_of_dump_ci())
+            .or_else(|| self.next_of_text())
+    }
+
+    fn board_info(&self, number: u8) -> BoardInfo {
+        BoardInfo {
+            flash_number: self.config.flash_number,
+            sequence: number,
+            status: self.status(),
+            program_id: self.record.map_or(0xFFFF, |record| record.program_id),
+            date: self.record.map_or(0xFFFF, |record| record.date),
+        }
+    }
+
+    fn next_of_info(&mut self) -> Option<FromBoard> {
+        let profile = &self.config.profile;
+        let (payload, next) = match self.jobs.info? {
+            Place::First => {
+                let info = self.board_info(self.number?.number());
+                (info.payload(profile.endian), Place::String { string: 0, package: 0 })
+            }
+            Place::String { package: at, .. } => package(self.store.description(), 0, at, profile)?,
+        };
+        let done = matches!(next, Place::String { string: 1, .. });
+        let again = done && core::mem::take(&mut self.jobs.info_again);
+        self.jobs.info = if again { Some(Place::First) } else { (!done).then_some(next) };
+        Some(FromBoard::Info(payload))
+    }
+
+    /// The text of the `string`-th string of the IO description (D-36).
+    fn io_text(&self, string: u32) -> &[u8] {
+        let dimensions = self.application.dimensions();
+        let Some(mut index) = string.checked_sub(1) else { return self.application.text(Text::Application) };
+        for (dimension, text) in [
+            (dimensions.ci, Text::Ci as fn(u16) -> Text),
+            (dimensions.so, Text::So),
+            (dimensions.par, Text::Par),
+        ] {
+            match index.checked_sub(u32::from(dimension)) {
+                Some(rest) => index = rest,
+                None => return self.application.text(text(index as u16)),
+            }
+        }
+        &[]
+    }
+
+    fn next_of_dump_io(&mut self) -> Option<FromBoard> {
+        if self.jobs.dump_io_at > self.now_us {
+            return None;
+        }
+        let profile = &self.config.profile;
+        let dimensions = self.application.dimensions();
+        let (payload, next) = match self.jobs.dump_io? {
+            Place::First => (dimensions.payload(profile.endian), Place::String { string: 0, package: 0 }),
+            Place::String { string, package: at } => package(self.io_text(string), string, at, profile)?,
+        };
+        let done = matches!(next, Place::String { string, .. } if string >= dimensions.strings());
+        let again = done && core::mem::take(&mut self.jobs.dump_io_again);
+        self.jobs.dump_io = if again { Some(Place::First) } else { (!done).then_some(next) };
+        Some(FromBoard::IoDescription(payload))
+    }
+
+    fn next_of_so(&mut self) -> Option<FromBoard> {
+        let offset = self.jobs.so?;
+        let dimension = usize::from(self.application.dimensions().so);
+        let so = self.application.so();
+        let package = BufferPackage::at(so.get(..dimension).unwrap_or(so), offset);
+        let last = package.is_none_or(|package| package.covers_last(dimension));
+        self.jobs.so = if last { None } else { offset.checked_add(3) };
+        package.map(FromBoard::So)
+    }
+
+    fn next_of_dump_ci(&mut self) -> Option<FromBoard> {
+        let offset = self.jobs.dump_ci?;
+        let dimension = self.application.dimensions().ci;
+        let mut package = BufferPackage { offset, count: 0, words: [0; 3] };
+        for (index, place) in (offset..dimension).zip(&mut package.words) {
+            *place = self.application.initial_ci(index);
+            package.count += 1;
+        }
+        let done = package.count == 0 || offset / 3 + 1 >= package_count(dimension);
+        let again = done && core::mem::take(&mut self.jobs.dump_ci_again) && dimension > 0;
+        self.jobs.dump_ci = if again { Some(0) } else { offset.checked_add(3).filter(|_| !done) };
+        (package.count > 0).then_some(FromBoard::Ci(package))
+    }
+
+    /// Whether a text waits that is not under way yet.
+    pub(super) fn wants_text(&self) -> bool {
+        let up = matches!(self.app, App::Up | App::Running);
+        up && self.jobs.text.is_none()
+            && (self.jobs.own_text.is_some() || self.application.debug_text().is_some())
+    }
+
+    /// Debug texts: only when wanted, and not too many (D-38).
+    fn next_of_text(&mut self) -> Option<FromBoard> {
+        if self.wants_text() {
+            let own = self.jobs.own_text.is_some();
+            let wanted = self.debug || self.global_debug;
+            if wanted && self.debug_rate.allow(self.now_us, self.config.profile.debug_rate) {
+                self.jobs.text = Some((0, own));
+            } else {
+                self.counters.texts_dropped = self.counters.texts_dropped.saturating_add(1);
+                self.text_done(own);
+            }
+        }
+        let (at, own) = self.jobs.text?;
+        let text = if own { self.jobs.own_text } else { self.application.debug_text() };
+        let Some((payload, next)) = package(text.unwrap_or(&[]), 0, at, &self.config.profile) else {
+            self.text_done(own);
+            return None;
+        };
+        match next {
+            Place::String { string: 0, package } => self.jobs.text = Some((package, own)),
+            _ => self.text_done(own),
+        }
+        Some(FromBoard::Debug(payload))
+    }
+
+    fn text_done(&mut self, own: bool) {
+        self.jobs.text = None;
+        if own {
+            self.jobs.own_text = None;
+        } else {
+            self.application.debug_done();
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! What a board is set to, and what it counts.
+
+use crate::profile::Profile;
+
+/// Settings of one board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeConfig {
+    /// Number chosen when the bootloader was flashed; the low byte is the UCoM id (D-07).
+    pub flash_number: u16,
+    /// How this board reads the protocol.
+    pub profile: Profile,
+    /// Start of its random numbers (back-off of D-05).
+    pub seed: u32,
+    /// From reset until it listens, µs; at most 200 000 (D-07).
+    pub boot_us: u64,
+    /// From the last frame of a block until its answer at the earliest, µs.
+    pub block_us: u64,
+    /// Between control cycles, µs.
+    pub control_period_us: u64,
+    /// Length of an image when `prog.header` is `none`, words; 0 for the whole area.
+    pub headerless_words: u32,
+}
+
+impl NodeConfig {
+    /// A board with the default profile.
+    pub const fn new(flash_number: u16) -> Self {
+        Self {
+            flash_number,
+            profile: Profile::DEFAULT,
+            seed: 1,
+            boot_us: 20_000,
+            block_us: 400,
+            control_period_us: 1000,
+            headerless_words: 0,
+        }
+    }
+}
+
+/// What a board counts; nothing of it goes over the bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Frames that are not of this protocol (D-02).
+    pub foreign: u32,
+    /// Messages for this board that its state does not allow, answered with silence.
+    pub ignored: u32,
+    /// Messages that were too short or had a wrong length (D-12).
+    pub wrong_length: u32,
+    /// Errors that were not sent because of the rate limit or a full queue.
+    pub errors_dropped: u32,
+    /// Debug texts that were not sent (D-38).
+    pub texts_dropped: u32,
+    /// Transfers of the outputs left out because the one before was not finished (D-33).
+    pub so_skipped: u32,
+    /// Frames that the controller gave up.
+    pub not_sent: u32,
+}

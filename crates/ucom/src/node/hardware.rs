@@ -1,0 +1,158 @@
+//! What a board has: flash, init pins, a little lasting memory, and the application.
+
+use crate::header::Memory;
+use crate::info::Dimensions;
+
+/// A range of word addresses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Area {
+    /// First word.
+    pub start: u32,
+    /// Number of words.
+    pub words: u32,
+}
+
+impl Area {
+    /// Whether `other` lies inside, and has at least one word.
+    pub const fn holds(&self, other: Self) -> bool {
+        let end = self.start as u64 + self.words as u64;
+        other.words > 0 && other.start >= self.start && other.start as u64 + other.words as u64 <= end
+    }
+}
+
+/// What the flash is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlashState {
+    /// The last operation is done and was good, or there was none.
+    Ready,
+    /// An operation is under way.
+    Busy,
+    /// The last operation failed; so it stays until the next one starts.
+    Failed,
+}
+
+/// An operation could not be started or done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlashError;
+
+/// Bytes of the validity record.
+pub const RECORD_LEN: usize = 16;
+
+/// Flash of the board, and the RAM that an exloader may be loaded into.
+///
+/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] says when it is done. The node
+/// starts none while another is under way. Implementations MUST keep the validity record apart from the
+/// application area: erasing one leaves the other.
+pub trait Flash {
+    /// Where applications may lie in a memory; `None` when the board has no such memory.
+    fn area(&self, memory: Memory) -> Option<Area>;
+
+    /// Progress of the last operation.
+    fn state(&mut self, now_us: u64) -> FlashState;
+
+    /// Starts to erase what `area` covers; whole sectors may go, but never beyond the application area.
+    fn erase(&mut self, now_us: u64, memory: Memory, area: Area) -> Result<(), FlashError>;
+
+    /// Starts to write up to 64 bytes, an even number, in wire order from a word address on.
+    fn write(&mut self, now_us: u64, memory: Memory, address: u32, data: &[u8]) -> Result<(), FlashError>;
+
+    /// Reads bytes back in the order they were written, from a word address on.
+    fn read(&self, memory: Memory, address: u32, data: &mut [u8]) -> Result<(), FlashError>;
+
+    /// The validity record as it stands; anything when none was written.
+    fn record(&self) -> [u8; RECORD_LEN];
+
+    /// Starts to make the record invalid.
+    fn erase_record(&mut self, now_us: u64) -> Result<(), FlashError>;
+
+    /// Starts to write the record.
+    fn write_record(&mut self, now_us: u64, record: &[u8; RECORD_LEN]) -> Result<(), FlashError>;
+}
+
+/// The init pins of the chain (section 5 of the protocol).
+pub trait Pins {
+    /// Level of the incoming pin; strapped active on the first board.
+    fn init_in(&self) -> bool;
+
+    /// Drives the outgoing pin. After power-up it MUST be inactive by itself.
+    fn set_init_out(&mut self, active: bool);
+}
+
+/// What lasts over power loss, and what is fixed.
+pub trait Store {
+    /// ASTART.
+    fn autostart(&self) -> bool;
+
+    /// Keeps ASTART; called on changes only.
+    fn set_autostart(&mut self, on: bool);
+
+    /// Description of the board in DSP_INFO, Latin-1.
+    fn description(&self) -> &[u8];
+}
+
+/// A text of the application.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Text {
+    /// The application itself; may differ from the board's description (D-36).
+    Application,
+    /// A controller input.
+    Ci(u16),
+    /// A sensor output.
+    So(u16),
+    /// A parameter.
+    Par(u16),
+}
+
+/// The program in the application area. Its methods are called only between [`Application::start`] and
+/// [`Application::stop`], but for [`Application::outputs`] with `false`.
+pub trait Application {
+    /// The exloader starts the program.
+    fn start(&mut self, now_us: u64);
+
+    /// The program ends; what it drives MUST be safe when this returns.
+    fn stop(&mut self);
+
+    /// Whether the start is over and requests can be served.
+    fn is_up(&mut self, now_us: u64) -> bool;
+
+    /// How many inputs, outputs and parameters there are. MUST NOT change while the program runs.
+    fn dimensions(&self) -> Dimensions;
+
+    /// A description, Latin-1; empty for what does not exist.
+    fn text(&self, text: Text) -> &[u8];
+
+    /// The inputs as they are when nobody has set them; as many as there are inputs.
+    fn initial_ci(&self, index: u16) -> u16;
+
+    /// Where received inputs are put; as many as there are inputs. They count from [`Application::latch_ci`] on.
+    fn ci(&mut self) -> &mut [u16];
+
+    /// The inputs in [`Application::ci`] take effect together.
+    fn latch_ci(&mut self);
+
+    /// Where received parameters are put; they count from the next control cycle on (D-35).
+    fn par(&mut self) -> &mut [u16];
+
+    /// Takes a snapshot of the outputs for [`Application::so`].
+    fn sample_so(&mut self);
+
+    /// The outputs of the last snapshot; as many as there are outputs.
+    fn so(&self) -> &[u16];
+
+    /// The control loop starts or ends.
+    fn run(&mut self, now_us: u64, running: bool);
+
+    /// One control cycle; only while the loop runs.
+    fn step(&mut self, now_us: u64);
+
+    /// Enables what the board drives, or makes it safe.
+    fn outputs(&mut self, active: bool);
+
+    /// The oldest text for people that waits, Latin-1. MUST stay the same until [`Application::debug_done`].
+    fn debug_text(&self) -> Option<&[u8]> {
+        None
+    }
+
+    /// Forgets that text: it was sent, or nobody wants it.
+    fn debug_done(&mut self) {}
+}

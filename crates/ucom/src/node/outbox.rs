@@ -1,0 +1,180 @@
+//! Single frames that wait, and the order in which frames go out.
+
+use super::{Application, Flash, Node, Pins, Store};
+use crate::error_code::ErrorCode;
+use crate::frame::Frame;
+use crate::function::Sequence;
+use crate::message::FromBoard;
+use crate::report::Report;
+
+/// Errors that may wait for the bus.
+const ERRORS: usize = 8;
+/// Reports that may wait for their time.
+const REPORTS: usize = 4;
+
+/// Frames that wait.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outbox {
+    /// With the controller, not yet left.
+    pub in_flight: Option<Frame>,
+    /// A frame was given up; DSP_ERROR 6 follows the next that leaves.
+    pub trouble: bool,
+    /// INITACK.
+    pub ack: bool,
+    errors: [Option<(ErrorCode, Sequence)>; ERRORS],
+    /// DSP_READY.
+    pub block_taken: bool,
+    /// DSP_PROGFINISHED.
+    pub finished: bool,
+    /// When each report is due and which of its frames is next.
+    reports: [Option<(u64, u8)>; REPORTS],
+    /// A report is due after the boot.
+    pub report_after_boot: bool,
+    /// MCA_DSP_READY.
+    pub mca_ready: bool,
+    /// Life sign.
+    pub alive: bool,
+    /// When MCA_ADMIN_DATA is due.
+    pub admin_at: Option<u64>,
+}
+
+impl Outbox {
+    pub const fn new() -> Self {
+        Self {
+            in_flight: None,
+            trouble: false,
+            ack: false,
+            errors: [None; ERRORS],
+            block_taken: false,
+            finished: false,
+            reports: [None; REPORTS],
+            report_after_boot: false,
+            mca_ready: false,
+            alive: false,
+            admin_at: None,
+        }
+    }
+
+    /// Answers of a transfer that no longer is.
+    pub fn forget_transfer(&mut self) {
+        self.block_taken = false;
+        self.finished = false;
+    }
+
+    /// What only an application says.
+    pub fn forget_application(&mut self) {
+        self.mca_ready = false;
+        self.alive = false;
+        self.admin_at = None;
+    }
+
+    /// `false` when the queue is full.
+    pub fn push_error(&mut self, code: ErrorCode, from: Sequence) -> bool {
+        let place = self.errors.iter_mut().find(|place| place.is_none());
+        place.map(|place| *place = Some((code, from))).is_some()
+    }
+
+    fn pop_error(&mut self) -> Option<(ErrorCode, Sequence)> {
+        let first = self.errors.first().copied().flatten();
+        self.errors.rotate_left(1);
+        if let Some(last) = self.errors.last_mut() {
+            *last = None;
+        }
+        first
+    }
+
+    fn push_report(&mut self, due_us: u64) {
+        if let Some(place) = self.reports.iter_mut().find(|place| place.is_none()) {
+            *place = Some((due_us, 0));
+        }
+    }
+
+    /// When the next of these frames is due.
+    pub fn deadline(&self) -> u64 {
+        let first_error = self.errors.first().is_some_and(Option::is_some);
+        if self.ack || first_error || self.block_taken || self.finished || self.mca_ready || self.alive {
+            return 0;
+        }
+        let reports = self.reports.iter().flatten().map(|(due, _)| *due);
+        reports.chain(self.admin_at).min().unwrap_or(u64::MAX)
+    }
+}
+
+impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
+    /// What the board puts into its identifiers: its number, without one what the profile says (D-06).
+    pub(super) fn own_number(&self) -> Sequence {
+        self.number.unwrap_or(self.config.profile.unnumbered())
+    }
+
+    /// DSP_REPORT, as many milliseconds from now as the UCoM id (D-07).
+    pub(super) fn report(&mut self) {
+        let wait = u32::from(self.config.flash_number & 0xFF);
+        self.outbox.push_report(self.after_ms(wait));
+    }
+
+    /// MCA_ADMIN_DATA as an answer: not at once, the PC's frame with this identifier must be gone (D-05).
+    pub(super) fn answer_admin(&mut self) {
+        let due = self.after_ms(self.config.profile.shared_delay);
+        self.outbox.admin_at = Some(self.outbox.admin_at.map_or(due, |at| at.min(due)));
+    }
+
+    /// MCA_ADMIN_DATA unasked: after a random time, the PC may be about to send the same identifier (D-05).
+    pub(super) fn tell_admin_unasked(&mut self) {
+        let wait = self.random(self.config.profile.shared_backoff);
+        let due = self.after_ms(wait);
+        self.outbox.admin_at = Some(self.outbox.admin_at.map_or(due, |at| at.min(due)));
+    }
+
+    /// The next frame: single ones by urgency, then the answers of several frames.
+    pub(super) fn next_frame(&mut self) -> Option<Frame> {
+        let profile = self.config.profile;
+        if let Some(number) = self.taking.or(self.number)
+            && core::mem::take(&mut self.outbox.ack)
+        {
+            return Some(FromBoard::InitAck(number.number()).encode(number, &profile));
+        }
+        if let Some((code, from)) = self.outbox.pop_error() {
+            return Some(FromBoard::Error(code).encode(from, &profile));
+        }
+        if let Some(report) = self.due_report() {
+            return Some(FromBoard::Report(report).encode(self.own_number(), &profile));
+        }
+        // Everything else needs a number.
+        let number = self.number?;
+        let message = self.single_message().or_else(|| self.next_of_answers())?;
+        Some(message.encode(number, &profile))
+    }
+
+    fn single_message(&mut self) -> Option<FromBoard> {
+        use core::mem::take;
+        if take(&mut self.outbox.block_taken) {
+            return Some(FromBoard::Ready);
+        }
+        if take(&mut self.outbox.finished) {
+            return Some(FromBoard::ProgFinished);
+        }
+        if take(&mut self.outbox.mca_ready) {
+            return Some(FromBoard::McaReady);
+        }
+        if take(&mut self.outbox.alive) {
+            return Some(FromBoard::Alive);
+        }
+        if self.outbox.admin_at.is_some_and(|at| at <= self.now_us) {
+            self.outbox.admin_at = None;
+            return Some(FromBoard::Admin(self.admin()));
+        }
+        None
+    }
+
+    fn due_report(&mut self) -> Option<Report> {
+        let own = self.own_number();
+        let (mode, flash_number) = (self.config.profile.report_mode, self.config.flash_number);
+        let now = self.now_us;
+        let place = self.outbox.reports.iter_mut().find(|place| place.is_some_and(|(due, _)| due <= now))?;
+        let (due, i) = (*place)?;
+        let report = Report::nth(mode, i, flash_number, own)?;
+        let more = Report::nth(mode, i + 1, flash_number, own).is_some();
+        *place = more.then_some((due, i + 1));
+        Some(report)
+    }
+}

@@ -1,0 +1,398 @@
+//! Taking a new application: blocks, cycles, checks, flash (D-40 to D-46).
+
+use super::{Application, Area, Flash, FlashState, Node, NodeConfig, Pins, RECORD_LEN, Record, Store};
+use crate::error_code::ErrorCode;
+use crate::header::{BLOCK_LEN, Header, Memory};
+use crate::profile::{HeaderForm, Plan, Profile};
+use crate::program::{Checksum, Digest};
+
+/// Bytes of flash read back in one step, so that a step stays short.
+const VERIFY_STEP: usize = 1024;
+
+/// What is being done with the last block, or after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Work {
+    /// Waits for frames.
+    None,
+    /// A whole block came; it is looked at at this time.
+    Block(u64),
+    /// The validity record goes first.
+    ClearRecord,
+    Erase,
+    AwaitErase,
+    AwaitWrite,
+    /// The image is read back, bytes done so far.
+    Verify(u32),
+    WriteRecord,
+    AwaitRecord,
+    /// DSP_READY is on its way; until it has left, the block buffer is in use.
+    Answer,
+}
+
+/// A cycle under way.
+#[derive(Clone, Debug)]
+struct Cycle {
+    header: Header,
+    area: Area,
+    memory: Memory,
+    /// Whether its data go to memory, or are only checked.
+    writes: bool,
+    /// Bytes of the image that came.
+    done: u32,
+    /// Over what came, later over what was read back.
+    digest: Digest,
+}
+
+impl Cycle {
+    fn bytes(&self) -> u32 {
+        self.header.length.saturating_mul(2)
+    }
+}
+
+/// State of a transfer.
+#[derive(Clone, Debug)]
+pub(super) struct Programming {
+    block: [u8; BLOCK_LEN],
+    filled: usize,
+    last_frame_us: u64,
+    work: Work,
+    /// 1 or 2.
+    number: u16,
+    cycle: Option<Cycle>,
+    /// Header of the first cycle once that is over.
+    first: Option<Header>,
+    /// After an error frames are dropped silently (D-43).
+    discard: bool,
+}
+
+impl Programming {
+    pub fn new(_: &Profile) -> Self {
+        Self {
+            block: [0; BLOCK_LEN],
+            filled: 0,
+            last_frame_us: 0,
+            work: Work::None,
+            number: 1,
+            cycle: None,
+            first: None,
+            discard: false,
+        }
+    }
+
+    /// A transfer starts anew with cycle 1.
+    pub fn restart(&mut self, profile: &Profile) {
+        *self = Self::new(profile);
+    }
+
+    /// The transfer is dropped; an error keeps the board silent all the same.
+    pub fn cancel(&mut self, profile: &Profile) {
+        *self = Self { discard: self.discard, ..Self::new(profile) };
+    }
+
+    pub const fn discarding(&self) -> bool {
+        self.discard
+    }
+
+    /// DSP_READY has left: the next block may come.
+    pub fn answered(&mut self) {
+        if self.work == Work::Answer {
+            self.work = Work::None;
+        }
+    }
+
+    pub fn deadline(&self, now_us: u64, config: &NodeConfig) -> u64 {
+        let pause = u64::from(config.profile.prog_frame_timeout) * 1000 + 1;
+        match self.work {
+            Work::None if self.filled > 0 => self.last_frame_us.saturating_add(pause),
+            Work::None | Work::Answer => u64::MAX,
+            Work::Block(at) => at,
+            Work::Verify(_) => 0,
+            // The flash is asked again soon.
+            _ => now_us.saturating_add(500),
+        }
+    }
+}
+
+impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
+    /// Whether the flash holds a valid application.
+    pub fn has_application(&self) -> bool {
+        self.record.is_some()
+    }
+
+    /// The transfer failed: one error, then silence until PC_XRESET or PROG 0→1 (D-43).
+    pub(super) fn abort(&mut self, code: ErrorCode) {
+        self.programming.cancel(&self.config.profile);
+        self.programming.discard = true;
+        self.outbox.forget_transfer();
+        self.error(code);
+    }
+
+    /// An eighth of a block.
+    pub(super) fn program(&mut self, data: [u8; 8], to_everybody: bool) {
+        if self.programming.discard {
+            return;
+        }
+        if !self.prog {
+            // A group update goes past the boards that are not in it (D-46).
+            if !to_everybody {
+                self.abort(ErrorCode::MemProtected);
+            }
+            return;
+        }
+        let now = self.now_us;
+        let programming = &mut self.programming;
+        if programming.work != Work::None {
+            return self.abort(ErrorCode::Overrun);
+        }
+        let place = programming.block.get_mut(programming.filled..programming.filled + 8);
+        if let Some(place) = place {
+            place.copy_from_slice(&data);
+        }
+        programming.filled += 8;
+        programming.last_frame_us = now;
+        if programming.filled >= BLOCK_LEN {
+            programming.filled = 0;
+            programming.work = Work::Block(now.saturating_add(self.config.block_us));
+        }
+    }
+
+    /// Pauses, and one step of the work under way.
+    pub(super) fn program_timers(&mut self) {
+        let programming = &self.programming;
+        let pause = u64::from(self.config.profile.prog_frame_timeout) * 1000;
+        if programming.filled > 0 && self.now_us.saturating_sub(programming.last_frame_us) > pause {
+            return self.abort(ErrorCode::ExloadCycle);
+        }
+        if let Err(code) = self.program_work() {
+            self.abort(code);
+        }
+    }
+
+    fn program_work(&mut self) -> Result<(), ErrorCode> {
+        let now = self.now_us;
+        match self.programming.work {
+            Work::None | Work::Answer => return Ok(()),
+            Work::Block(at) if at > now => return Ok(()),
+            Work::Block(_) => return self.take_block(),
+            _ => {}
+        }
+        // Nothing is started on a busy flash, whoever made it busy.
+        let state = self.flash.state(now);
+        if state == FlashState::Busy {
+            return Ok(());
+        }
+        let waited = !matches!(self.programming.work, Work::ClearRecord | Work::Verify(_));
+        if waited && state == FlashState::Failed {
+            return Err(ErrorCode::Flash);
+        }
+        let cycle = self.programming.cycle.as_ref().ok_or(ErrorCode::ExloadCycle)?;
+        let (memory, area) = (cycle.memory, cycle.area);
+        let flash = |result: Result<(), super::FlashError>| result.map_err(|_| ErrorCode::Flash);
+        self.programming.work = match self.programming.work {
+            Work::ClearRecord => {
+                self.record = None;
+                flash(self.flash.erase_record(now))?;
+                Work::Erase
+            }
+            Work::Erase => {
+                flash(self.flash.erase(now, memory, area))?;
+                Work::AwaitErase
+            }
+            Work::AwaitErase if self.config.profile.prog_header == HeaderForm::None => {
+                return self.take_data();
+            }
+            Work::AwaitErase => return self.block_taken(),
+            Work::AwaitWrite => return self.after_data(),
+            Work::Verify(done) => return self.verify(done),
+            Work::WriteRecord => {
+                let record = self.new_record().ok_or(ErrorCode::ExloadCycle)?;
+                flash(self.flash.write_record(now, &record.build()))?;
+                Work::AwaitRecord
+            }
+            Work::AwaitRecord => return self.finish(),
+            other => other,
+        };
+        Ok(())
+    }
+
+    fn take_block(&mut self) -> Result<(), ErrorCode> {
+        match (&self.programming.cycle, self.config.profile.prog_header) {
+            (Some(_), _) => self.take_data(),
+            (None, HeaderForm::V1) => self.take_header(),
+            (None, HeaderForm::None) => {
+                let header = self.header_by_itself().ok_or(ErrorCode::MemProtected)?;
+                self.begin_cycle(header)?;
+                if self.programming.work == Work::ClearRecord { Ok(()) } else { self.take_data() }
+            }
+        }
+    }
+
+    /// D-41, and what of it this board refuses.
+    fn take_header(&mut self) -> Result<(), ErrorCode> {
+        let endian = self.config.profile.prog_endian;
+        let header = Header::parse(&self.programming.block, endian).map_err(|_| ErrorCode::Data)?;
+        if header.cycle != self.programming.number {
+            return Err(ErrorCode::ExloadCycle);
+        }
+        if header.target != Header::ANY_BOARD && header.target != self.config.flash_number {
+            return Err(ErrorCode::MemProtected);
+        }
+        if header.length == 0 {
+            return Err(ErrorCode::Data);
+        }
+        self.begin_cycle(header)?;
+        if self.programming.work == Work::ClearRecord { Ok(()) } else { self.block_taken() }
+    }
+
+    /// The header of a board whose images have none: as long as the board says.
+    fn header_by_itself(&self) -> Option<Header> {
+        let cycle = self.programming.number;
+        let memory = match (self.config.profile.prog_plan, cycle) {
+            (Plan::ExloaderApp, 1) => Memory::Ram,
+            (Plan::PmemXmem, 2) => Memory::Data,
+            _ => Memory::Program,
+        };
+        let area = self.flash.area(memory)?;
+        let length = match self.config.headerless_words {
+            0 => area.words,
+            words => words.min(area.words),
+        };
+        let first = self.programming.first.filter(|_| self.config.profile.prog_plan == Plan::VerifyWrite);
+        let program_id = first.map_or(0, |first| first.program_id);
+        let (address, target) = (area.start, Header::ANY_BOARD);
+        Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })
+    }
+
+    fn begin_cycle(&mut self, header: Header) -> Result<(), ErrorCode> {
+        let profile = &self.config.profile;
+        let memory = Memory::from_number(header.memory).ok_or(ErrorCode::MemProtected)?;
+        let area = Area { start: header.address, words: header.length };
+        if !self.flash.area(memory).is_some_and(|allowed| allowed.holds(area)) {
+            return Err(ErrorCode::MemProtected);
+        }
+        let second = self.programming.number == 2;
+        let (fits, writes) = match profile.prog_plan {
+            Plan::VerifyWrite | Plan::Raw => (memory != Memory::Ram, second),
+            Plan::ExloaderApp => ((memory == Memory::Ram) != second, true),
+            Plan::PmemXmem => (memory == if second { Memory::Data } else { Memory::Program }, true),
+        };
+        if !fits {
+            return Err(ErrorCode::MemProtected);
+        }
+        if let (Plan::VerifyWrite, Some(first)) = (profile.prog_plan, self.programming.first)
+            && (first.memory, first.address, first.length, first.program_id)
+                != (header.memory, header.address, header.length, header.program_id)
+        {
+            return Err(ErrorCode::ExloadCycle);
+        }
+        let digest = Digest::new(profile.prog_checksum, profile.prog_endian);
+        self.programming.cycle = Some(Cycle { header, area, memory, writes, done: 0, digest });
+        // RAM needs no erasing, and the application in the flash stays valid.
+        if writes && memory != Memory::Ram {
+            self.programming.work = Work::ClearRecord;
+        }
+        Ok(())
+    }
+
+    fn take_data(&mut self) -> Result<(), ErrorCode> {
+        let cycle = self.programming.cycle.as_mut().ok_or(ErrorCode::ExloadCycle)?;
+        let len = (cycle.bytes().saturating_sub(cycle.done) as usize).min(BLOCK_LEN);
+        let data = self.programming.block.get(..len).unwrap_or(&[]);
+        cycle.digest.update(data);
+        let address = cycle.area.start.saturating_add(cycle.done / 2);
+        cycle.done = cycle.done.saturating_add(len as u32);
+        if !cycle.writes {
+            return self.after_data();
+        }
+        // In wire order, as the checksum is.
+        self.flash.write(self.now_us, cycle.memory, address, data).map_err(|_| ErrorCode::Flash)?;
+        self.programming.work = Work::AwaitWrite;
+        Ok(())
+    }
+
+    /// The block is where it belongs; was it the last of the cycle?
+    fn after_data(&mut self) -> Result<(), ErrorCode> {
+        let profile = self.config.profile;
+        let headerless = profile.prog_header == HeaderForm::None;
+        let second = self.programming.number == 2;
+        let cycle = self.programming.cycle.as_mut().ok_or(ErrorCode::ExloadCycle)?;
+        if cycle.done < cycle.bytes() {
+            return self.block_taken();
+        }
+        let came = cycle.digest.finish();
+        let known = !headerless || (second && profile.prog_plan == Plan::VerifyWrite);
+        if !known {
+            cycle.header.program_id = came;
+        } else if profile.prog_checksum != Checksum::None && came != cycle.header.program_id {
+            return Err(ErrorCode::Checksum);
+        }
+        if cycle.writes {
+            cycle.digest = Digest::new(profile.prog_checksum, profile.prog_endian);
+            self.programming.work = Work::Verify(0);
+            Ok(())
+        } else {
+            self.end_first_cycle()
+        }
+    }
+
+    /// Reads the image back (D-44: the Program ID must be that of what is in the flash).
+    fn verify(&mut self, done: u32) -> Result<(), ErrorCode> {
+        let checksum = self.config.profile.prog_checksum;
+        let cycle = self.programming.cycle.as_mut().ok_or(ErrorCode::ExloadCycle)?;
+        let mut done = done;
+        let end = cycle.bytes().min(done.saturating_add(VERIFY_STEP as u32));
+        while done < end {
+            let mut buffer = [0; BLOCK_LEN];
+            let len = ((end - done) as usize).min(BLOCK_LEN);
+            let Some(piece) = buffer.get_mut(..len) else { break };
+            let address = cycle.area.start.saturating_add(done / 2);
+            self.flash.read(cycle.memory, address, piece).map_err(|_| ErrorCode::Flash)?;
+            cycle.digest.update(piece);
+            done += len as u32;
+        }
+        if done < cycle.bytes() {
+            self.programming.work = Work::Verify(done);
+            return Ok(());
+        }
+        if checksum != Checksum::None && cycle.digest.finish() != cycle.header.program_id {
+            return Err(ErrorCode::Checksum);
+        }
+        if self.programming.number == 1 {
+            return self.end_first_cycle();
+        }
+        self.programming.work = Work::WriteRecord;
+        Ok(())
+    }
+
+    fn end_first_cycle(&mut self) -> Result<(), ErrorCode> {
+        self.programming.first = self.programming.cycle.take().map(|cycle| cycle.header);
+        self.programming.number = 2;
+        self.block_taken()
+    }
+
+    fn block_taken(&mut self) -> Result<(), ErrorCode> {
+        self.programming.work = Work::Answer;
+        self.outbox.block_taken = true;
+        Ok(())
+    }
+
+    /// Program memory gives the board its Program ID, also where data memory came last.
+    fn new_record(&self) -> Option<Record> {
+        let header = match self.config.profile.prog_plan {
+            Plan::PmemXmem => self.programming.first?,
+            _ => self.programming.cycle.as_ref()?.header,
+        };
+        let Header { program_id, date, address, length, .. } = header;
+        Some(Record { program_id, date, address, words: length })
+    }
+
+    fn finish(&mut self) -> Result<(), ErrorCode> {
+        let stored: [u8; RECORD_LEN] = self.flash.record();
+        let record = Record::parse(&stored).filter(|record| Some(*record) == self.new_record());
+        self.record = Some(record.ok_or(ErrorCode::Flash)?);
+        self.prog = false;
+        self.programming.cancel(&self.config.profile);
+        self.outbox.finished = true;
+        Ok(())
+    }
+}

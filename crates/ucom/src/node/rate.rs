@@ -1,0 +1,52 @@
+//! A limit on events in any second.
+
+const SECOND_US: u64 = 1_000_000;
+
+/// Times of the last events, at most `N` in any second.
+#[derive(Clone, Copy, Debug)]
+pub struct RateLimit<const N: usize> {
+    /// The times, the oldest at `next`; 0 before the first event.
+    times: [Option<u64>; N],
+    next: usize,
+}
+
+impl<const N: usize> RateLimit<N> {
+    pub const fn new() -> Self {
+        Self { times: [None; N], next: 0 }
+    }
+
+    /// Whether an event may happen now, at most `limit` (and `N`) in any second; it is then remembered.
+    pub fn allow(&mut self, now_us: u64, limit: u32) -> bool {
+        let recent = |time: &&Option<u64>| time.is_some_and(|time| now_us.saturating_sub(time) < SECOND_US);
+        if self.times.iter().filter(recent).count() >= (limit as usize).min(N) {
+            return false;
+        }
+        if let Some(place) = self.times.get_mut(self.next) {
+            *place = Some(now_us);
+        }
+        self.next = (self.next + 1) % N.max(1);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn never_more_than_the_limit_in_any_second() {
+        let mut limit = RateLimit::<10>::new();
+        let mut taken = std::vec::Vec::new();
+        for now in (0..5_000_000).step_by(7_000) {
+            if limit.allow(now, 10) {
+                taken.push(now);
+            }
+        }
+        for (i, start) in taken.iter().enumerate() {
+            let within = taken[i..].iter().take_while(|time| **time < start + 1_000_000).count();
+            assert!(within <= 10, "{within} from {start}");
+        }
+        assert!(taken.len() >= 45, "{}", taken.len());
+        assert!(!RateLimit::<10>::new().allow(0, 0));
+    }
+}

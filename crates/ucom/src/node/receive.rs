@@ -1,0 +1,133 @@
+//! What the board does with what it hears.
+
+use super::{App, Application, Flash, Node, Pins, Store};
+use crate::error_code::ErrorCode;
+use crate::frame::{Foreign, Format, Frame};
+use crate::function::{Function, Sequence};
+use crate::message::{DecodeError, ToBoard};
+use crate::profile::AliveMode;
+
+impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
+    /// A frame from the bus.
+    pub fn receive(&mut self, now_us: u64, frame: &Frame) {
+        self.advance(now_us);
+        if self.boot_until.is_some() {
+            return;
+        }
+        let Ok((function, to)) = frame.address() else { return self.count_foreign() };
+        if !function.from_pc() || !self.is_meant(function, to) {
+            return;
+        }
+        match ToBoard::decode(frame, &self.config.profile) {
+            Ok((_, message)) => self.act(to, message),
+            Err(error) if error.is_length() => self.wrong_length(function, to),
+            Err(DecodeError::Foreign(_)) => self.count_foreign(),
+            // A board's own answer, or a flag that is neither 0 nor 1.
+            Err(_) => self.ignore(),
+        }
+    }
+
+    /// A frame as a driver hears it, of any format (D-02).
+    pub fn receive_any(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) -> Result<(), Foreign> {
+        match Frame::received(id, format, data) {
+            Ok(frame) => {
+                self.receive(now_us, &frame);
+                Ok(())
+            }
+            Err(foreign) => {
+                self.count_foreign();
+                Err(foreign)
+            }
+        }
+    }
+
+    fn count_foreign(&mut self) {
+        self.counters.foreign = self.counters.foreign.saturating_add(1);
+    }
+
+    fn ignore(&mut self) {
+        self.counters.ignored = self.counters.ignored.saturating_add(1);
+    }
+
+    fn is_everybody(&self, to: Sequence) -> bool {
+        self.config.profile.everybody() == Some(to)
+    }
+
+    /// Whether a message concerns this board (D-04).
+    fn is_meant(&self, function: Function, to: Sequence) -> bool {
+        match (function, self.number) {
+            (Function::Init, _) => self.config.profile.is_board(to),
+            (Function::Reset | Function::AskReport, None) => to == self.config.profile.unnumbered(),
+            (_, None) => false,
+            (function, Some(number)) => number == to || (function.broadcast() && self.is_everybody(to)),
+        }
+    }
+
+    /// D-12: DSP_ERROR 7, but not for what would be ignored anyway.
+    fn wrong_length(&mut self, function: Function, to: Sequence) {
+        self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);
+        let served = matches!(self.app, App::Up | App::Running);
+        match function {
+            Function::Init if self.number != Some(to) => {}
+            Function::Prog if self.programming.discarding() => {}
+            Function::Prog if self.prog => self.abort(ErrorCode::CanReceive),
+            Function::Prog if self.is_everybody(to) => {}
+            Function::Ci | Function::Par | Function::McaStart | Function::Admin | Function::DumpCi
+                if !served => {}
+            _ => self.error(ErrorCode::CanReceive),
+        }
+    }
+
+    fn act(&mut self, to: Sequence, message: ToBoard) {
+        let served = matches!(self.app, App::Up | App::Running);
+        match message {
+            ToBoard::Reset => self.reboot(self.now_us, true),
+            ToBoard::Report => self.report(),
+            ToBoard::Init => self.init(to),
+            ToBoard::XReset => self.xreset(),
+            ToBoard::SetStatus { mask, value } => self.set_status(mask, value),
+            ToBoard::Info => self.jobs.ask_info(),
+            ToBoard::Prog(data) => self.program(data, self.is_everybody(to)),
+            ToBoard::Start => self.start(),
+            ToBoard::Alive => self.pc_is_alive(to),
+            // The application level exists only while the application is up.
+            _ if !served => self.ignore(),
+            ToBoard::Ci(package) => self.receive_ci(&package),
+            ToBoard::Par(package) => self.receive_par(&package),
+            ToBoard::McaStart => {
+                self.run_loop();
+                self.answer_admin();
+            }
+            ToBoard::Admin(admin) => self.set_admin(admin),
+            ToBoard::DumpIo => {
+                let due = self.after_ms(self.config.profile.shared_delay);
+                self.jobs.ask_dump_io(due);
+            }
+            ToBoard::DumpCi => self.jobs.ask_dump_ci(),
+        }
+    }
+
+    /// PC_INIT(n): the next board of the chain takes the number (section 5.2).
+    fn init(&mut self, number: Sequence) {
+        match self.number {
+            Some(own) if own == number => self.outbox.ack = true,
+            Some(_) => {}
+            None if !self.pins.init_in() => self.ignore(),
+            None if self.taking.is_some() => self.error(ErrorCode::Reinit),
+            None => {
+                self.taking = Some(number);
+                self.outbox.ack = true;
+            }
+        }
+    }
+
+    fn pc_is_alive(&mut self, to: Sequence) {
+        let unicast_only = self.config.profile.alive_mode == AliveMode::Unicast;
+        if unicast_only && self.number != Some(to) {
+            return self.ignore();
+        }
+        if self.pc_lost_at.is_some() {
+            self.pc_lost_at = Some(self.after_ms(self.config.profile.alive_pc_lost));
+        }
+    }
+}

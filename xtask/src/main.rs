@@ -4,6 +4,8 @@
 mod bench;
 mod dependencies;
 mod docs;
+mod emulate;
+mod firmware;
 mod fuzz;
 mod links;
 // For the checks of the board's program.
@@ -30,8 +32,12 @@ Usage: cargo xtask COMMAND
                                performance and tracking figures beside their anchors, all measured in this run
   soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)
   fuzz [TARGET] [--runs N]     run one fuzz target, or each of them (default: 20000000 executions each)
+  firmware [BOARD...]          build the boards' programs; sizes, and that the tick cannot panic
+  emulate [--update]           boot those programs in an emulator of the chip: tests, and figures that must be those of
+                               docs/board-figures.txt (--update: write them there)
+  emulate --serial PATH        an emulated board with simulated drives behind a serial port, until interrupted
   docs                         write the generated parts of docs/ again: picture and fault matrix
-  size                         static memory of the controller against its limit
+  size                         static memory of the controller against its limit, and of the boards' programs by region
   help                         this text
 ";
 
@@ -56,6 +62,8 @@ fn dispatch(arguments: &[String]) -> anyhow::Result<ExitCode> {
         "bench" => bench::main(rest),
         "soak" => soak::main(rest),
         "fuzz" => fuzz::main(rest),
+        "firmware" => firmware::main(rest),
+        "emulate" => emulate::main(rest),
         "docs" => docs::main(rest),
         "size" => size::main(rest),
         "help" | "--help" | "-h" => {

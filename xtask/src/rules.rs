@@ -1,20 +1,25 @@
-//! Rule coverage: every rule of docs/protocol-jtc.md is named by a test in the Rust sources.
+//! Rule coverage: every rule of the protocol pages is named by a test in the Rust sources.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};
 
 use crate::shell::{files, root};
 
-/// The rules that the protocol page defines (`**J-13**`), as numbers.
-fn defined(page: &str) -> BTreeSet<u32> {
-    page.split("**J-").skip(1).filter_map(|rest| rest.split_once("**")?.0.parse().ok()).collect()
+/// The protocol pages, the letter of their rules, and how many rules each has at least.
+const PAGES: [(&str, char, usize); 2] =
+    [("docs/protocol-jtc.md", 'J', 30), ("docs/protocol-ucom.md", 'D', 30)];
+
+/// The rules that a protocol page defines (`**J-13**`), as numbers.
+fn defined(page: &str, letter: char) -> BTreeSet<u32> {
+    let start = format!("**{letter}-");
+    page.split(&start).skip(1).filter_map(|rest| rest.split_once("**")?.0.parse().ok()).collect()
 }
 
 /// The rules that a source names: `j13_…`, `J-13`, `j_13`, in either case.
-fn named(source: &str) -> BTreeSet<u32> {
+fn named(source: &str, letter: char) -> BTreeSet<u32> {
     let mut rules = BTreeSet::new();
     let bytes = source.as_bytes();
-    for (at, _) in source.match_indices(['j', 'J']) {
+    for (at, _) in source.match_indices([letter.to_ascii_lowercase(), letter]) {
         if at > 0 && (bytes[at - 1].is_ascii_alphanumeric()) {
             continue;
         }
@@ -42,18 +47,23 @@ fn test_part<'a>(path: &std::path::Path, source: &'a str) -> &'a str {
 
 /// An error that lists the rules without a test.
 pub fn check() -> Result<()> {
-    let page =
-        std::fs::read_to_string(root().join("docs/protocol-jtc.md")).context("docs/protocol-jtc.md")?;
-    let defined = defined(&page);
-    ensure!(defined.len() >= 30, "docs/protocol-jtc.md defines {} rules only", defined.len());
-    let mut tested = BTreeSet::new();
-    for path in files(&root().join("crates"), &["rs"]) {
-        let source = std::fs::read_to_string(&path)?;
-        tested.extend(named(test_part(&path, &source)));
+    let mut tests = Vec::new();
+    for directory in ["crates", "emulator", "firmware"] {
+        for path in files(&root().join(directory), &["rs"]) {
+            let source = std::fs::read_to_string(&path)?;
+            tests.push(test_part(&path, &source).to_owned());
+        }
     }
-    let missing: Vec<String> = defined.difference(&tested).map(|rule| format!("J-{rule:02}")).collect();
+    let mut missing = Vec::new();
+    for (page, letter, at_least) in PAGES {
+        let text = std::fs::read_to_string(root().join(page)).context(page)?;
+        let defined = defined(&text, letter);
+        ensure!(defined.len() >= at_least, "{page} defines {} rules only", defined.len());
+        let tested: BTreeSet<u32> = tests.iter().flat_map(|source| named(source, letter)).collect();
+        missing.extend(defined.difference(&tested).map(|rule| format!("{letter}-{rule:02}")));
+        println!("{page}: {} rules", defined.len());
+    }
     ensure!(missing.is_empty(), "no test names {}", missing.join(", "));
-    println!("{} rules, each named by a test", defined.len());
     Ok(())
 }
 
@@ -63,8 +73,9 @@ mod tests {
 
     #[test]
     fn names_are_read_in_every_form() {
-        assert_eq!(named("fn j13_saturates() {} // J-44, j_07"), BTreeSet::from([7, 13, 44]));
-        assert_eq!(named("obj13 j1 j130 J-"), BTreeSet::new());
-        assert_eq!(defined("- **J-01** a\n- **J-02**, see J-03"), BTreeSet::from([1, 2]));
+        assert_eq!(named("fn j13_saturates() {} // J-44, j_07, d22_x", 'J'), BTreeSet::from([7, 13, 44]));
+        assert_eq!(named("obj13 j1 j130 J-", 'J'), BTreeSet::new());
+        assert_eq!(named("fn d22_mask() {} // D-T17, D-07", 'D'), BTreeSet::from([7, 22]));
+        assert_eq!(defined("- **J-01** a\n- **J-02**, see J-03, **D-04**", 'J'), BTreeSet::from([1, 2]));
     }
 }

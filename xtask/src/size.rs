@@ -1,8 +1,9 @@
-//! `cargo xtask size`: the controller's static memory, its trajectory included, against the limit.
+//! `cargo xtask size`: static memory: the controller's with its trajectory against the limit, the boards' by region.
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::firmware;
 use crate::shell::{self, cargo};
 
 /// Bytes that the controller may take with its trajectory; the receive buffer of 60 000 bytes comes beside it.
@@ -38,9 +39,19 @@ pub fn check() -> Result<()> {
     Ok(())
 }
 
+/// Memory that the program of a board, which must be built, takes by region: one line each.
+pub fn regions(board: &str) -> Result<String> {
+    let used = firmware::used(&firmware::elf(board))?;
+    Ok(used.iter().map(|(name, bytes, size)| format!("  {name}: {bytes} of {size} B\n")).collect())
+}
+
 /// No arguments.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     shell::nothing_left(arguments)?;
     check()?;
+    for board in firmware::BOARDS {
+        firmware::build(board)?;
+        print!("{board}\n{}", regions(board)?);
+    }
     Ok(ExitCode::SUCCESS)
 }

@@ -7,11 +7,10 @@ use serde_json::Value;
 
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Counts, Outcome, Tally};
-use crate::{dependencies, links, python, rules, size, worked_bytes};
+use crate::{dependencies, emulate, firmware, links, python, rules, size, worked_bytes};
 
 /// Crates that run on the board.
-const BOARD_CRATES: [&str; 4] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core"];
-const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
+const BOARD_CRATES: [&str; 5] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core", "ucom"];
 /// Largest tracking error of the demo, mrad RMS of any joint.
 const RMS_LIMIT_MRAD: f64 = 2.0;
 
@@ -43,6 +42,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         python::checks(&mut tally, scratch.path());
+        emulate::steps(&mut tally, false);
     }
     tally.step("the working tree is as it was", || {
         let (Some(before), Some(after)) = (before, tree()) else {
@@ -69,17 +69,21 @@ fn tree() -> Option<String> {
 /// Tests of the workspace; cargo's own counts are summed up.
 fn workspace_tests() -> Result<Outcome> {
     let mut counts = Counts::default();
-    let result = shell::run_lines(&mut cargo(&["test", "--workspace", "--no-fail-fast"]), |line| {
-        let Some(rest) = line.strip_prefix("test result: ") else { return };
-        counts.passed += count(rest, "passed");
-        counts.failed += count(rest, "failed");
-        counts.skipped += count(rest, "ignored");
-    });
+    let mut test = cargo(&["test", "--workspace", "--no-fail-fast"]);
+    let result = shell::run_lines(&mut test, |line| count_results(line, &mut counts));
     if counts.failed == 0 {
         result?;
         ensure!(counts.passed > 0, "cargo ran no test at all");
     }
     Ok(Outcome::Counted(counts))
+}
+
+/// Adds the numbers of a line of cargo's, if it is one with results.
+pub fn count_results(line: &str, counts: &mut Counts) {
+    let Some(rest) = line.strip_prefix("test result: ") else { return };
+    counts.passed += count(rest, "passed");
+    counts.failed += count(rest, "failed");
+    counts.skipped += count(rest, "ignored");
 }
 
 /// The number before `word` in cargo's result line.
@@ -89,14 +93,16 @@ fn count(line: &str, word: &str) -> u64 {
 }
 
 fn board_builds() -> Result<()> {
-    // A toolchain that is not rustup's brings its own targets.
-    if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
-        && !installed.lines().any(|target| target == BOARD_TARGET)
-    {
-        run(shell::command("rustup").args(["target", "add", BOARD_TARGET]))?;
-    }
+    firmware::add_target()?;
     for name in BOARD_CRATES {
-        run(&mut cargo(&["build", "--package", name, "--target", BOARD_TARGET]))?;
+        run(&mut cargo(&[
+            "build",
+            "--no-default-features",
+            "--package",
+            name,
+            "--target",
+            firmware::TARGET,
+        ]))?;
     }
     Ok(())
 }

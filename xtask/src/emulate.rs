@@ -1,0 +1,135 @@
+//! `cargo xtask emulate`: the boards' programs in an emulator of the chip: tests, figures, or a live controller on a serial port.
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::shell::{self, run, run_lines, works};
+use crate::tally::{Counts, Outcome, Tally};
+use crate::test::count_results;
+use crate::{firmware, size};
+
+/// Figures of the boards' programs, kept in the repository so that a change to them is a decision.
+const FIGURES: &str = "docs/board-figures.txt";
+
+/// `arguments`: `--update`, or `--serial PATH` and what the emulator itself understands.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    if arguments.iter().any(|a| a.starts_with("--serial")) {
+        return live(arguments);
+    }
+    let mut arguments = arguments.to_vec();
+    let update = shell::flag(&mut arguments, "--update");
+    shell::nothing_left(&arguments)?;
+    let mut tally = Tally::new(None);
+    steps(&mut tally, update);
+    Ok(tally.finish())
+}
+
+/// The steps, as a part of `cargo xtask test` too.
+pub fn steps(tally: &mut Tally, update: bool) {
+    tally.step("board: lints, every unsafe block explained", || firmware::lints().map(|()| Outcome::Passed));
+    tally.step("board: tests of what needs no hardware", firmware::tests);
+    tally.step("board: programs, sizes, no panic within reach of the tick", || {
+        for board in firmware::BOARDS {
+            firmware::check(board, &firmware::build(board)?)?;
+        }
+        Ok(Outcome::Passed)
+    });
+    tally.step("board: sessions on the emulated chip", tests);
+    tally.step("board: figures", || figures(update).map(|()| Outcome::Passed));
+}
+
+/// Unicorn is built from C: cmake, and libclang for its bindings.
+fn install_tools() -> Result<()> {
+    if !works(shell::command("cmake").arg("--version")) {
+        shell::apt_install(&["cmake"])?;
+    }
+    if !has_libclang() {
+        shell::apt_install(&["libclang-dev"])?;
+    }
+    Ok(())
+}
+
+/// Where bindgen looks for the library on Debian, or where it is told to look.
+fn has_libclang() -> bool {
+    let entries = |place: &Path| std::fs::read_dir(place).into_iter().flatten().flatten();
+    let of_llvm = entries(Path::new("/usr/lib")).map(|entry| entry.path().join("lib"));
+    let places = of_llvm.chain(["/usr/lib".into(), "/usr/lib/x86_64-linux-gnu".into()]);
+    let is_library = |name: &str| {
+        let rest = name.strip_prefix("libclang").unwrap_or_default();
+        let version = rest.strip_prefix('-').unwrap_or_default();
+        rest.starts_with(".so") || version.starts_with(|c: char| c.is_ascii_digit())
+    };
+    let found = |place: PathBuf| entries(&place).any(|file| is_library(&file.file_name().to_string_lossy()));
+    std::env::var_os("LIBCLANG_PATH").is_some() || places.into_iter().any(found)
+}
+
+/// Cargo in `emulator/`.
+fn cargo(arguments: &[&str]) -> Command {
+    let mut cargo = shell::cargo(arguments);
+    cargo.current_dir(shell::root().join("emulator"));
+    cargo.env("CARGO_TARGET_DIR", shell::target().join("emulator"));
+    cargo.env("OPENJTC_FIRMWARE", firmware::directory());
+    cargo
+}
+
+/// The host program that drives the emulated board.
+fn build_jtc() -> Result<PathBuf> {
+    run(&mut shell::cargo(&["build", "--release", "--package", "jtc-cli"]))?;
+    Ok(shell::target().join("release/jtc"))
+}
+
+fn tests() -> Result<Outcome> {
+    install_tools()?;
+    let jtc = build_jtc()?;
+    run(&mut cargo(&["clippy", "--release", "--all-targets", "--", "-D", "warnings"]))?;
+    let mut counts = Counts::default();
+    let mut test = cargo(&["test", "--release", "--no-fail-fast"]);
+    let result = run_lines(test.env("OPENJTC_JTC", jtc), |line| count_results(line, &mut counts));
+    if counts.failed == 0 {
+        result?;
+        ensure!(counts.passed > 0, "cargo ran no test at all");
+    }
+    Ok(Outcome::Counted(counts))
+}
+
+/// Measures, prints, and compares with what is kept.
+fn figures(update: bool) -> Result<()> {
+    install_tools()?;
+    let mut text = String::new();
+    for board in firmware::BOARDS {
+        text += &format!("{board}\n{}", size::regions(board)?);
+        text += &shell::read(
+            cargo(&["run", "--release", "--quiet", "--example", "figures", "--"]).arg(firmware::elf(board)),
+        )?;
+        text.push('\n');
+    }
+    print!("{text}");
+    let kept = shell::root().join(FIGURES);
+    if update {
+        std::fs::write(&kept, &text).with_context(|| kept.display().to_string())?;
+        println!("written to {FIGURES}");
+        return Ok(());
+    }
+    compare(&kept, &text)
+}
+
+fn compare(kept: &Path, text: &str) -> Result<()> {
+    let old = std::fs::read_to_string(kept).with_context(|| kept.display().to_string())?;
+    if old == text {
+        return Ok(());
+    }
+    for (old, new) in old.lines().zip(text.lines()).filter(|(old, new)| old != new) {
+        println!("- {old}\n+ {new}");
+    }
+    bail!("the figures are not those of {FIGURES}; if that is meant: cargo xtask emulate --update")
+}
+
+/// A board that a host program can open, until it is interrupted.
+fn live(arguments: &[String]) -> Result<ExitCode> {
+    install_tools()?;
+    let elf = firmware::build(firmware::BOARDS[0])?;
+    let mut emulate = cargo(&["run", "--release", "--quiet", "--bin", "openjtc-emulate", "--"]);
+    run(emulate.arg(elf).args(arguments))?;
+    Ok(ExitCode::SUCCESS)
+}

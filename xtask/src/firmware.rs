@@ -1,0 +1,171 @@
+//! `cargo xtask firmware`: the ELF of each board, its sizes by region, and that no panic can be reached from the tick.
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail, ensure};
+use object::{Object, ObjectSection, ObjectSegment, SectionFlags};
+
+use crate::panics::reachable_panics;
+use crate::shell::{self, run};
+use crate::tally::{Counts, Outcome};
+use crate::test::count_results;
+
+/// What the board's code is compiled for.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The boards, by the feature that selects each.
+pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
+
+/// What runs at the priority of the tick, or instead of it.
+const ROOTS: [&str; 1] = ["TIM7"];
+
+/// A memory of the chip: name, first address, bytes.
+const REGIONS: [(&str, u64, u64); 8] = [
+    ("flash bank 1", 0x0800_0000, 1024 * 1024),
+    ("flash bank 2", 0x0810_0000, 1024 * 1024),
+    ("ITCM", 0x0000_0000, 64 * 1024),
+    ("DTCM", 0x2000_0000, 128 * 1024),
+    ("AXI SRAM", 0x2400_0000, 512 * 1024),
+    ("SRAM1", 0x3000_0000, 128 * 1024),
+    ("SRAM2 and 3", 0x3002_0000, 160 * 1024),
+    ("SRAM4", 0x3800_0000, 64 * 1024),
+];
+
+/// Adds the compiler's target for the board where rustup manages the toolchain.
+pub fn add_target() -> Result<()> {
+    // A toolchain that is not rustup's brings its own targets.
+    if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
+        && !installed.lines().any(|target| target == TARGET)
+    {
+        run(shell::command("rustup").args(["target", "add", TARGET]))?;
+    }
+    Ok(())
+}
+
+/// Cargo in `firmware/`, for one board.
+fn cargo_for(board: &str, subcommand: &str) -> std::process::Command {
+    let mut cargo = shell::cargo(&[subcommand, "--release", "--no-default-features", "--features", board]);
+    cargo.current_dir(shell::root().join("firmware"));
+    cargo.env("CARGO_TARGET_DIR", directory());
+    // Paths of one machine would make the sizes those of one machine.
+    for (from, to) in [(shell::root().to_owned(), "openjtc"), (cargo_home(), "cargo")] {
+        cargo
+            .arg("--config")
+            .arg(format!("target.{TARGET}.rustflags=[\"--remap-path-prefix={}={to}\"]", from.display()));
+    }
+    cargo
+}
+
+fn cargo_home() -> PathBuf {
+    std::env::var_os("CARGO_HOME")
+        .map(PathBuf::from)
+        .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))
+}
+
+/// Where the boards' programs are.
+pub fn directory() -> PathBuf {
+    shell::target().join("firmware")
+}
+
+/// Where the program of a board is once it is built.
+pub fn elf(board: &str) -> PathBuf {
+    directory().join(format!("{board}.elf"))
+}
+
+/// Builds the ELF of a board and says where it is.
+pub fn build(board: &str) -> Result<PathBuf> {
+    add_target()?;
+    run(&mut cargo_for(board, "build"))?;
+    let built = directory().join(TARGET).join("release/openjtc-firmware");
+    let elf = elf(board);
+    std::fs::copy(&built, &elf).with_context(|| format!("{} to {}", built.display(), elf.display()))?;
+    Ok(elf)
+}
+
+/// Bytes of static data in each region, in the order of [`REGIONS`].
+pub fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
+    let bytes = std::fs::read(elf)?;
+    let file = object::File::parse(&*bytes)?;
+    let mut used = REGIONS.map(|(name, _, size)| (name, 0_u64, size));
+    let mut add = |address: u64, size: u64| -> Result<()> {
+        let at = REGIONS.iter().position(|(_, start, len)| (*start..start + len).contains(&address));
+        let at = at.with_context(|| format!("{size} B at {address:#x} are in no known memory"))?;
+        used[at].1 += size;
+        Ok(())
+    };
+    for section in file.sections().filter(|section| section.size() > 0) {
+        let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
+        if sh_flags & u64::from(object::elf::SHF_ALLOC) != 0 {
+            add(section.address(), section.size())?;
+        }
+    }
+    // Initial values of .data lie in flash too.
+    for segment in file.segments() {
+        let (_, in_file) = segment.file_range();
+        if in_file > 0 && segment.address() >= 0x2000_0000 {
+            used[0].1 += in_file;
+        }
+    }
+    Ok(used.into_iter().filter(|(_, bytes, _)| *bytes > 0).collect())
+}
+
+/// Everything that is checked about a board's ELF; prints what it found.
+pub fn check(board: &str, elf: &Path) -> Result<()> {
+    for (name, bytes, size) in used(elf)? {
+        println!("{board}: {name}: {bytes} of {size} B");
+        ensure!(bytes <= size, "{name} holds {size} B, the program takes {bytes} B");
+    }
+    let report = reachable_panics(&std::fs::read(elf)?, &ROOTS)?;
+    println!("{board}: {report}");
+    ensure!(report.paths.is_empty(), "the tick can reach a panic");
+    Ok(())
+}
+
+/// Lints of the board's code, with every `unsafe` block explained; prints how many there are.
+pub fn lints() -> Result<()> {
+    add_target()?;
+    for board in BOARDS {
+        let mut clippy = cargo_for(board, "clippy");
+        clippy.args(["--", "-D", "warnings", "-D", "clippy::undocumented_unsafe_blocks"]);
+        run(&mut clippy)?;
+    }
+    let mut blocks = 0;
+    for path in shell::files(&shell::root().join("firmware/src"), &["rs"]) {
+        let source = std::fs::read_to_string(path)?;
+        let code = source.lines().map(|line| line.split("//").next().unwrap_or_default());
+        blocks += code.map(|line| line.matches("unsafe {").count()).sum::<usize>();
+    }
+    println!("{blocks} unsafe blocks in firmware/, each with its reason beside it");
+    Ok(())
+}
+
+/// Tests of the part that needs no hardware, on this machine.
+pub fn tests() -> Result<Outcome> {
+    let host = shell::read(shell::command("rustc").args(["--print", "host-tuple"]))?;
+    let mut cargo = shell::cargo(&["test", "--lib", "--target", host.trim()]);
+    cargo.current_dir(shell::root().join("firmware")).env("CARGO_TARGET_DIR", directory());
+    let mut counts = Counts::default();
+    let result = shell::run_lines(&mut cargo, |line| count_results(line, &mut counts));
+    if counts.failed == 0 {
+        result?;
+    }
+    Ok(Outcome::Counted(counts))
+}
+
+/// `arguments`: names of boards; none means all.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    let boards: Vec<&str> = match arguments {
+        [] => BOARDS.to_vec(),
+        some => some.iter().map(String::as_str).collect(),
+    };
+    if let Some(other) = boards.iter().find(|board| !BOARDS.contains(board)) {
+        bail!("no board `{other}`; there are {}", BOARDS.join(", "));
+    }
+    for board in boards {
+        let elf = build(board)?;
+        check(board, &elf)?;
+        println!("{}", elf.display());
+    }
+    println!("to flash a connected board: cd firmware && cargo run --release");
+    Ok(ExitCode::SUCCESS)
+}

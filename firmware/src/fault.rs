@@ -177,13 +177,12 @@ extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
     let (bottom, top) = (&raw const _stack_end as usize, &raw const _stack_start as usize);
     let word = |n: usize| {
         let at = frame + 4 * n;
-        // SAFETY: within the stack, aligned, and the new stack has not come down to it in these few calls unless the old one
-        // was nearly empty, in which case the value is wrong and harmless.
-        if at >= bottom && at + 4 <= top && at % 4 == 0 {
-            unsafe { (at as *const u32).read_volatile() }
-        } else {
-            0
+        if at < bottom || at + 4 > top || !at.is_multiple_of(4) {
+            return 0;
         }
+        // SAFETY: within the stack and aligned. If the old stack was nearly empty the new one may have overwritten it;
+        // then the value is wrong, and harmless.
+        unsafe { (at as *const u32).read_volatile() }
     };
     let (pc, lr) = (word(PC), word(LR));
     // SAFETY: registers that are only read.

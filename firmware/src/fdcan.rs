@@ -35,7 +35,7 @@ impl Heard {
 
     /// The frames, by identifier.
     pub fn frames(&self) -> &[Frame] {
-        &self.frames[..self.count]
+        self.frames.get(..self.count).unwrap_or(&[])
     }
 
     fn push(&mut self, frame: Frame) {
@@ -47,7 +47,7 @@ impl Heard {
 }
 
 /// Error counters of the controller, for the log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, defmt::Format)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub struct Counters {
     /// Transmit error counter.
     pub transmit: u8,
@@ -59,6 +59,13 @@ pub struct Counters {
     pub bus_off: u32,
     /// Frames that were not CAN FD with an 11-bit identifier (J-15).
     pub wrong_format: u32,
+}
+
+impl Counters {
+    /// Nothing yet.
+    pub const fn new() -> Self {
+        Self { transmit: 0, receive: 0, cancelled: 0, bus_off: 0, wrong_format: 0 }
+    }
 }
 
 /// The bus.
@@ -115,7 +122,7 @@ impl Fdcan {
         CAN.txesc().write(|w| w.set_tbds(ram::SIZE_CODE));
 
         leave_init();
-        Self { last: 0, sent: false, recovering: false, counters: Counters::default() }
+        Self { last: 0, sent: false, recovering: false, counters: Counters::new() }
     }
 
     /// What happened since the last tick: frames heard, and how the bus is. Before `send`, once a tick.
@@ -247,9 +254,11 @@ fn request(n: usize, frame: &Frame) -> bool {
     let put = |i: usize, value: u32| FDCANRAM.ram(ram::tx(n) + i).write_value(value);
     put(0, u32::from(frame.id) << 18);
     put(1, u32::from(frame.dlc()) << 16 | FD | BIT_RATE_SWITCH);
-    for (i, bytes) in frame.data().chunks(4).enumerate() {
+    for (i, bytes) in frame.data().chunks(4).take(MAX_LEN / 4).enumerate() {
         let mut word = [0; 4];
-        word[..bytes.len()].copy_from_slice(bytes);
+        for (to, from) in word.iter_mut().zip(bytes) {
+            *to = *from;
+        }
         put(2 + i, u32::from_le_bytes(word));
     }
     compiler_fence(Ordering::SeqCst);

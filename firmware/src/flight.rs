@@ -33,7 +33,9 @@ impl FlightFrame {
     fn of(frame: &Frame) -> Self {
         let mut data = [0; MAX_LEN];
         let payload = frame.data();
-        data[..payload.len()].copy_from_slice(payload);
+        for (to, from) in data.iter_mut().zip(payload) {
+            *to = *from;
+        }
         Self { id: frame.id, len: payload.len() as u16, data }
     }
 

@@ -1,13 +1,14 @@
 //! From bytes to frames: each line has a parser of its own; what the parsers find goes to the tick through one slot.
 //!
 //! The slot holds a copy, so that a parser can take more bytes while the tick works a long frame off, slice by slice.
+use core::cell::Cell;
+
+use critical_section::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_sync::zerocopy_channel::{Channel, Receiver as SlotReceiver, Sender};
 use embassy_time::{Duration, Instant};
 use jtc_wire::{DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Receiver, Response};
 use openjtc_firmware::{BAUD, lines};
-use static_cell::StaticCell;
 
 use crate::uart;
 
@@ -74,15 +75,48 @@ impl Handover {
     }
 }
 
-/// The end of the slot where events are put in.
-pub type SlotIn = Sender<'static, CriticalSectionRawMutex, Handover>;
-/// The end of the slot where the tick takes them out.
-pub type SlotOut = SlotReceiver<'static, CriticalSectionRawMutex, Handover>;
+/// Where the slot is put for the other side to take. Whoever has the reference may use it; there is but one.
+type Place = Mutex<Cell<Option<&'static mut Handover>>>;
+static FULL: Place = Mutex::new(Cell::new(None));
+static EMPTY: Place = Mutex::new(Cell::new(None));
 
-/// Both ends of the slot.
-pub fn slot(memory: &'static mut [Handover; 1]) -> (SlotIn, SlotOut) {
-    static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Handover>> = StaticCell::new();
-    CHANNEL.init(Channel::new(memory)).split()
+/// The links' end of the slot.
+pub struct SlotIn(());
+
+/// The tick's end of the slot, with the event that it works on.
+pub struct SlotOut(Option<&'static mut Handover>);
+
+/// Both ends of the slot, which is empty.
+pub fn slot(memory: &'static mut Handover) -> (SlotIn, SlotOut) {
+    critical_section::with(|cs| EMPTY.borrow(cs).set(Some(memory)));
+    (SlotIn(()), SlotOut(None))
+}
+
+impl SlotIn {
+    /// Hands an event to the tick; false when it still has one.
+    fn send(&mut self, line: usize, event: LinkEvent<'_>) -> bool {
+        let Some(slot) = critical_section::with(|cs| EMPTY.borrow(cs).take()) else { return false };
+        slot.set(line, event);
+        critical_section::with(|cs| FULL.borrow(cs).set(Some(slot)));
+        true
+    }
+}
+
+impl SlotOut {
+    /// The oldest event, until it is done.
+    pub fn event(&mut self) -> Option<&Handover> {
+        if self.0.is_none() {
+            self.0 = critical_section::with(|cs| FULL.borrow(cs).take());
+        }
+        self.0.as_deref()
+    }
+
+    /// The event is worked off.
+    pub fn done(&mut self) {
+        if let Some(slot) = self.0.take() {
+            critical_section::with(|cs| EMPTY.borrow(cs).set(Some(slot)));
+        }
+    }
 }
 
 /// A line and its parser.
@@ -140,9 +174,10 @@ impl Link {
         if !self.found {
             return false;
         }
-        let (Some(place), Some(event)) = (slot.try_send(), self.parser.event()) else { return false };
-        place.set(self.line, event);
-        slot.send_done();
+        let Some(event) = self.parser.event() else { return false };
+        if !slot.send(self.line, event) {
+            return false;
+        }
         self.parser.release();
         self.found = false;
         true
@@ -190,7 +225,7 @@ struct Report {
 
 impl Report {
     fn new() -> Self {
-        Self { next: Instant::now(), line_errors: [0; lines::LINES], tick: crate::tick::Summary::default() }
+        Self { next: Instant::now(), line_errors: [0; lines::LINES], tick: crate::tick::Summary::new() }
     }
 
     fn log(&mut self, links: &mut [Link; lines::LINES]) {

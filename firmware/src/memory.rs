@@ -27,6 +27,7 @@ impl<T> Place<T> {
     ///
     /// # Safety
     /// Called once, and zero bytes are a value of `T`.
+    #[allow(clippy::mut_from_ref, reason = "the only reference, by the contract")]
     unsafe fn take(&'static self) -> &'static mut T {
         // SAFETY: the only reference there will ever be, by the contract.
         let place = unsafe { &mut *self.0.get() };
@@ -41,7 +42,7 @@ impl<T> Place<T> {
 static POINTS: Place<[RawPoint; POINTS_MAX]> = Place::new();
 /// The frame that the controller works on.
 #[unsafe(link_section = ".axisram")]
-static HANDOVER: Place<[Handover; 1]> = Place::new();
+static HANDOVER: Place<Handover> = Place::new();
 /// What the lines' DMA writes; not cached.
 #[unsafe(link_section = ".sram1")]
 static RINGS: Place<[[u8; RING]; 2]> = Place::new();
@@ -63,7 +64,7 @@ pub struct Memory {
     /// Receive buffers of the lines.
     pub receive: [&'static mut [u8; FRAME_MAX]; 2],
     /// The slot between links and tick.
-    pub handover: &'static mut [Handover; 1],
+    pub handover: &'static mut Handover,
 }
 
 /// Hands out the buffers, zeroed. Once; after [`init`].

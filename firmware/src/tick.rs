@@ -1,6 +1,6 @@
 //! The tick: TIM7 at the highest priority, a thousand times a second. It owns the controller and everything that moves or
 //! stops the arm; all it shares with the rest is the slot and a summary for the log.
-use core::cell::RefCell;
+use core::cell::Cell;
 
 use critical_section::Mutex;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
@@ -17,7 +17,7 @@ use static_cell::StaticCell;
 use crate::board::Pins;
 use crate::fault::Boot;
 use crate::fdcan::{Counters, Fdcan, Heard};
-use crate::link::{self, SlotOut};
+use crate::link::{self, Handover, SlotOut};
 use crate::uart::Transmitter;
 
 /// The controller with its trajectory elsewhere.
@@ -42,7 +42,7 @@ pub struct Parts {
 }
 
 /// What the log says about the tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, defmt::Format)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub struct Summary {
     /// State of the controller.
     pub state: u8,
@@ -50,6 +50,13 @@ pub struct Summary {
     pub errors: u16,
     /// Joint bus.
     pub bus: Counters,
+}
+
+impl Summary {
+    /// Before the first tick.
+    pub const fn new() -> Self {
+        Self { state: 0, errors: 0, bus: Counters::new() }
+    }
 }
 
 struct Tick {
@@ -64,9 +71,9 @@ struct Tick {
     flight: &'static mut Flight,
 }
 
-/// The tick's own; nobody else locks it for longer than it takes to copy the summary.
-static TICK: Mutex<RefCell<Option<&'static mut Tick>>> = Mutex::new(RefCell::new(None));
-static SUMMARY: Mutex<RefCell<Option<Summary>>> = Mutex::new(RefCell::new(None));
+/// The tick's own; it takes it out while it runs.
+static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
+static SUMMARY: Mutex<Cell<Summary>> = Mutex::new(Cell::new(Summary::new()));
 
 /// Starts the ticks.
 pub fn start(parts: Parts) {
@@ -86,7 +93,7 @@ pub fn start(parts: Parts) {
     if boot.cause.failed() {
         tick.controller.raise_internal();
     }
-    critical_section::with(|cs| TICK.borrow_ref_mut(cs).replace(tick));
+    critical_section::with(|cs| TICK.borrow(cs).set(Some(tick)));
 
     rcc::enable_and_reset::<TIM7>();
     pac::TIM7.psc().write_value((clock::TICK_PRESCALER - 1) as u16);
@@ -105,17 +112,17 @@ pub fn start(parts: Parts) {
 
 /// What the log should know, as of the last tick.
 pub fn summary() -> Summary {
-    critical_section::with(|cs| *SUMMARY.borrow_ref(cs)).unwrap_or_default()
+    critical_section::with(|cs| SUMMARY.borrow(cs).get())
 }
 
 #[interrupt]
 fn TIM7() {
     pac::TIM7.sr().write(|w| w.set_uif(false));
+    let Some(tick) = critical_section::with(|cs| TICK.borrow(cs).take()) else { return };
+    let summary = tick.run();
     critical_section::with(|cs| {
-        if let Some(tick) = TICK.borrow_ref_mut(cs).as_mut() {
-            let summary = tick.run();
-            SUMMARY.borrow_ref_mut(cs).replace(summary);
-        }
+        TICK.borrow(cs).set(Some(tick));
+        SUMMARY.borrow(cs).set(summary);
     });
     link::WORK.signal(());
 }
@@ -124,13 +131,13 @@ impl Tick {
     fn run(&mut self) -> Summary {
         let bus_state = self.can.look(&mut self.heard);
         let counters = self.can.counters();
-        let handover = self.slot.try_receive();
-        let line = handover.as_ref().map_or(lines::RS422, |handover| handover.line());
+        let handover = self.slot.event();
+        let line = handover.map_or(lines::RS422, Handover::line);
         let inputs = Inputs {
             bus: self.heard.frames(),
             bus_state,
             safety_input: self.pins.safety_input.is_high(),
-            host: handover.as_ref().map(|handover| handover.event()),
+            host: handover.map(Handover::event),
             status_free: self.lines.iter().all(Transmitter::is_free),
         };
         self.flight.begin(&inputs, line, counters.wrong_format);
@@ -141,7 +148,7 @@ impl Tick {
             self.can.send(frame);
         }
         if outputs.host_done {
-            self.slot.receive_done();
+            self.slot.done();
             self.awaiting.push(line);
         }
         if let Some(status) = &outputs.status {

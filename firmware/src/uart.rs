@@ -5,7 +5,11 @@
 use core::sync::atomic::{Ordering, fence};
 
 use embassy_stm32::interrupt::InterruptExt;
+use embassy_stm32::pac::common::{RW, Reg, W};
+use embassy_stm32::pac::dma::St;
+use embassy_stm32::pac::dma::regs::Ixr;
 use embassy_stm32::pac::dma::vals::{Dir, Pl, Size};
+use embassy_stm32::pac::dmamux::regs::Ccr;
 use embassy_stm32::pac::usart::Usart;
 use embassy_stm32::pac::usart::vals::Over8;
 use embassy_stm32::pac::{DMA1, DMAMUX1};
@@ -33,8 +37,8 @@ impl Line {
         rcc::enable_and_reset::<USART2>();
         Self {
             usart: pac::USART2,
-            receive: Stream { number: 0, request: 43 },
-            transmit: Stream { number: 1, request: 44 },
+            receive: Stream::new(0, 43),
+            transmit: Stream::new(1, 44),
             interrupt: pac::Interrupt::USART2,
         }
     }
@@ -44,8 +48,8 @@ impl Line {
         rcc::enable_and_reset::<USART3>();
         Self {
             usart: pac::USART3,
-            receive: Stream { number: 2, request: 45 },
-            transmit: Stream { number: 3, request: 46 },
+            receive: Stream::new(2, 45),
+            transmit: Stream::new(3, 46),
             interrupt: pac::Interrupt::USART3,
         }
     }
@@ -54,15 +58,31 @@ impl Line {
 /// A stream of DMA1, and which request of the multiplexer starts its transfers.
 #[derive(Clone, Copy)]
 struct Stream {
-    number: usize,
+    registers: St,
+    /// Register and bits that clear its flags.
+    clear: Reg<Ixr, W>,
+    flags: Ixr,
+    multiplexer: Reg<Ccr, RW>,
     request: u8,
 }
 
 impl Stream {
+    const fn new(number: usize, request: u8) -> Self {
+        // Five flags of each stream; four streams share a register.
+        const SHIFT: [u32; 4] = [0, 6, 16, 22];
+        Self {
+            registers: DMA1.st(number),
+            clear: DMA1.ifcr(number / 4),
+            flags: Ixr(0b11_1101 << SHIFT[number % 4]),
+            multiplexer: DMAMUX1.ccr(number),
+            request,
+        }
+    }
+
     /// Sets up byte transfers between a register and memory; `start` starts them.
     fn configure(self, direction: Dir, register: *mut (), memory: *mut u8, ring: bool) {
-        DMAMUX1.ccr(self.number).write(|w| w.set_dmareq_id(self.request));
-        let stream = DMA1.st(self.number);
+        self.multiplexer.write(|w| w.set_dmareq_id(self.request));
+        let stream = self.registers;
         stream.par().write_value(register as u32);
         stream.m0ar().write_value(memory as u32);
         stream.cr().write(|w| {
@@ -81,15 +101,8 @@ impl Stream {
     /// Transfers `count` bytes. The stream must have stopped.
     fn start(self, count: usize) {
         // A stream with flags of its last transfer does not start.
-        DMA1.ifcr(self.number / 4).write(|w| {
-            let n = self.number % 4;
-            w.set_feif(n, true);
-            w.set_dmeif(n, true);
-            w.set_teif(n, true);
-            w.set_htif(n, true);
-            w.set_tcif(n, true);
-        });
-        let stream = DMA1.st(self.number);
+        self.clear.write_value(self.flags);
+        let stream = self.registers;
         stream.ndtr().write(|w| w.set_ndt(count as u16));
         // What was written to memory is there before the stream reads it.
         fence(Ordering::SeqCst);
@@ -98,7 +111,12 @@ impl Stream {
     }
 
     fn running(self) -> bool {
-        DMA1.st(self.number).cr().read().en()
+        self.registers.cr().read().en()
+    }
+
+    /// Bytes that are still to be transferred.
+    fn remaining(self) -> usize {
+        self.registers.ndtr().read().ndt().into()
     }
 }
 
@@ -158,7 +176,7 @@ pub struct Receiver {
 impl Receiver {
     /// Bytes that have arrived and were not taken.
     pub fn waiting(&self) -> usize {
-        let end = RING - usize::from(DMA1.st(self.stream.number).ndtr().read().ndt());
+        let end = RING - self.stream.remaining();
         (end + RING - self.next) % RING
     }
 

@@ -99,7 +99,7 @@ pub struct Nodes {
 
 impl Nodes {
     /// Any node acknowledges frames.
-    fn any_on_bus(&self) -> bool {
+    pub fn any_on_bus(&self) -> bool {
         self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
     }
 
@@ -107,6 +107,19 @@ impl Nodes {
     pub fn states(&self) -> [u8; NODES] {
         let gripper = self.gripper.as_ref().map_or(255, Gripper::state);
         core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
+    }
+
+    /// What a node answers to a request that ended at `now_us`, and how long after that it is ready, µs.
+    pub fn answer(
+        &mut self,
+        node: usize,
+        now_us: u64,
+        request: &Request,
+        scales: &[Scale; JOINTS],
+    ) -> Option<(u32, Frame)> {
+        let answer = self.receive(node, now_us, request)?;
+        let frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
+        Some((ANSWER_US.0 + ANSWER_US.1 * node as u32, frame))
     }
 
     fn receive(&mut self, node: usize, now_us: u64, request: &Request) -> Option<Answer> {
@@ -238,10 +251,9 @@ impl Bus {
                 self.statistics.lost += 1;
                 continue;
             }
-            if let Some(answer) = nodes.receive(node, now_us + u64::from(time), request) {
-                let frame = answer.emit(*self.scales.get(node).unwrap_or(&self.scales[0]));
-                let ready_us = time + ANSWER_US.0 + ANSWER_US.1 * node as u32;
-                self.pending.push(Pending { ready_us, frame });
+            let answer = nodes.answer(node, now_us + u64::from(time), request, &self.scales);
+            if let Some((delay_us, frame)) = answer {
+                self.pending.push(Pending { ready_us: time + delay_us, frame });
             }
         }
     }

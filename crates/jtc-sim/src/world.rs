@@ -1,16 +1,13 @@
 //! The whole world, one millisecond at a time: host line, controller, joint bus, drives, arm.
 use jtc_bus::{Frame, NODES, Scale};
-use jtc_core::{BusState, JOINTS, State};
-use jtc_dynamics::ArmModel;
+use jtc_core::{BusState, State};
 
-use crate::arm::Arm;
 use crate::board::{Board, Pins, Worked};
-use crate::bus::{Bus, BusFault, Nodes};
-use crate::config::{SimConfig, Support};
-use crate::drive::{Drive, DriveFault};
+use crate::bus::{Bus, BusFault};
+use crate::config::SimConfig;
 use crate::event::{Event, Log};
 use crate::faults::{Change, FaultKind, Running};
-use crate::gripper::Gripper;
+use crate::plant::Plant;
 use crate::serial::{Line, LineFault};
 
 mod access;
@@ -26,11 +23,7 @@ pub struct World {
     ticks: u64,
     board: Board,
     bus: Bus,
-    nodes: Nodes,
-    arm: Arm,
-    truth: Truth,
-    model: ArmModel,
-    stand: bool,
+    plant: Plant,
     to_device: Line,
     to_host: Line,
     /// Bytes that have arrived at the device and wait for the parser.
@@ -65,27 +58,14 @@ struct Seen {
 impl World {
     /// A world in which all power was just switched on.
     pub fn new(config: SimConfig) -> Self {
-        let (parts, friction) = config.model_error.apply(&config.arm, config.seed);
-        let ceiling = parts.torque_ceiling;
-        let model = parts.model;
-        let drives = core::array::from_fn(|j| {
-            let mut drive = Drive::new(j as u8, config.drives[j], ceiling[j]);
-            drive.absent = config.absent_drives & (1 << j) != 0;
-            drive
-        });
-        let older = config.drives[0].one_message_per_interrupt;
-        let nodes = Nodes { drives, gripper: config.gripper.then(|| Gripper::new(older)) };
+        let plant = Plant::new(&config);
         let scales = config.drives.map(|d| Scale { velocity: d.velocity_full_scale });
         let mut world = Self {
             ticks: 0,
             board: Board::new(config.controller.clone(), config.gap_us, config.watchdog_ms),
             bus: Bus::new(scales, config.seed ^ 0x6275_7300),
-            node_states: nodes.states(),
-            nodes,
-            arm: Arm::new(parts, friction, config.start),
-            truth: Truth::default(),
-            model,
-            stand: config.support == Support::Stand,
+            node_states: plant.node_states(),
+            plant,
             to_device: Line::new(config.baud),
             to_host: Line::new(config.baud),
             arriving: Vec::new(),
@@ -108,7 +88,6 @@ impl World {
             config,
         };
         world.bus.monitored = world.config.bus_monitored;
-        world.read_truth();
         world
     }
 
@@ -118,9 +97,8 @@ impl World {
         self.receive();
         self.tick_controller();
         let now = self.now_us();
-        self.bus_state = self.bus.tick(now, self.sent.as_ref(), &mut self.nodes, &mut self.received);
-        self.step_nodes();
-        self.step_arm();
+        self.bus_state = self.bus.tick(now, self.sent.as_ref(), &mut self.plant.nodes, &mut self.received);
+        self.plant.step(self.safety_output);
         self.ticks += 1;
         let now = self.now_us();
         self.to_host.arrived(now, usize::MAX, &mut self.host_inbox);
@@ -132,14 +110,14 @@ impl World {
         let telemetry = self.board.telemetry();
         let (state, point) = (telemetry.state, telemetry.point);
         let time = self.now_us();
-        let (log, nodes) = (&mut self.log, &mut self.nodes);
+        let (log, plant) = (&mut self.log, &mut self.plant);
         let mut changed = false;
         self.faults.step(self.ticks, state, point, |change| {
             changed = true;
             match change {
                 Change::Begin(kind) => {
                     log.push(time, Event::FaultBegins(kind));
-                    begin(kind, nodes);
+                    plant.begin(kind);
                 }
                 Change::End(kind) => log.push(time, Event::FaultEnds(kind)),
             }
@@ -153,30 +131,10 @@ impl World {
     fn apply_faults(&mut self) {
         let mut bus = BusFault::default();
         let mut line = LineFault::default();
-        let mut drives = [DriveFault::default(); JOINTS];
-        let (mut gripper_silent, mut gripper_line) = (false, false);
-        let mut friction = [1.0; JOINTS];
         self.overrun = false;
         self.input_fault = false;
         for kind in self.faults.active() {
             match kind {
-                FaultKind::NodeReboot { .. } | FaultKind::FaultState { .. } => {}
-                FaultKind::NodeSilent { node } => match drives.get_mut(usize::from(node)) {
-                    Some(drive) => drive.silent = true,
-                    None => gripper_silent = true,
-                },
-                FaultKind::SafetyLine { node } => match drives.get_mut(usize::from(node)) {
-                    Some(drive) => drive.safety_line = true,
-                    None => gripper_line = true,
-                },
-                FaultKind::MotorFault { joint, bits } => drives[usize::from(joint)].motor_control |= bits,
-                FaultKind::HardwareFault { joint } => drives[usize::from(joint)].hardware = true,
-                FaultKind::EncoderJump { joint, rad } => drives[usize::from(joint)].encoder_offset += rad,
-                FaultKind::NotAccurate { joint } => drives[usize::from(joint)].not_accurate = true,
-                FaultKind::Friction { joint, factor } => friction[usize::from(joint)] *= factor,
-                FaultKind::Temperature { joint, celsius } => {
-                    self.arm.temperature[usize::from(joint)] = celsius
-                }
                 FaultKind::FramesLost { probability } => bus.lost = probability,
                 FaultKind::FramesCorrupted { probability } => bus.corrupted = probability,
                 FaultKind::FramesGarbled { probability } => bus.garbled = probability,
@@ -187,21 +145,13 @@ impl World {
                 FaultKind::SerialFlipped { probability } => line.flipped = probability,
                 FaultKind::SerialDelayed => line.held = true,
                 FaultKind::TickOverrun => self.overrun = true,
+                // The others are the plant's.
+                _ => {}
             }
         }
         self.bus.fault = bus;
         self.line_fault = line;
-        for (drive, fault) in self.nodes.drives.iter_mut().zip(drives) {
-            drive.fault = fault;
-        }
-        if let Some(gripper) = &mut self.nodes.gripper {
-            gripper.silent = gripper_silent;
-            gripper.safety_line = gripper_line;
-        }
-        if self.arm.friction_fault != friction {
-            self.arm.friction_fault = friction;
-            self.arm.friction_changed();
-        }
+        self.plant.set_faults(self.faults.active());
     }
 
     /// Bytes from the host reach the parser.
@@ -264,45 +214,6 @@ impl World {
         self.arriving.clear();
     }
 
-    fn step_nodes(&mut self) {
-        let wired = self.config.safety_wired && !self.safety_output;
-        for (j, drive) in self.nodes.drives.iter_mut().enumerate() {
-            let own = drive.fault.safety_line;
-            drive.fault.safety_line |= wired;
-            drive.tick(self.arm.q[j], self.arm.temperature[j]);
-            drive.fault.safety_line = own;
-        }
-        if let Some(gripper) = &mut self.nodes.gripper {
-            let own = gripper.safety_line;
-            gripper.safety_line |= wired;
-            gripper.tick();
-            gripper.safety_line = own;
-        }
-    }
-
-    fn step_arm(&mut self) {
-        let enabled = |drive: &Drive| drive.state() == jtc_bus::fsm::ENABLED;
-        if self.stand && self.nodes.drives.iter().all(enabled) {
-            self.stand = false;
-        }
-        for (j, drive) in self.nodes.drives.iter().enumerate() {
-            self.truth.torque[j] = drive.torque();
-            self.arm.braked[j] = match self.config.support {
-                Support::Limp => false,
-                Support::Stand => self.stand,
-                Support::Brakes => !enabled(drive),
-            };
-        }
-        self.arm.step(&self.truth.torque, TICK_US as f64 * 1e-6);
-        self.read_truth();
-    }
-
-    fn read_truth(&mut self) {
-        self.truth.q = self.arm.q;
-        self.truth.qd = self.arm.qd;
-        self.truth.temperature = self.arm.temperature;
-    }
-
     /// Log what has changed.
     fn note(&mut self) {
         let time = self.now_us();
@@ -320,7 +231,7 @@ impl World {
                 self.log.push(time, Event::Errors { from: before.errors, to: now.errors });
             }
         }
-        let states = self.nodes.states();
+        let states = self.plant.node_states();
         if states != self.node_states {
             for node in 0..NODES {
                 let (from, to) = (self.node_states[node], states[node]);
@@ -330,21 +241,5 @@ impl World {
             }
             self.node_states = states;
         }
-    }
-}
-
-/// What a fault does once, when it begins.
-fn begin(kind: FaultKind, nodes: &mut Nodes) {
-    match kind {
-        FaultKind::NodeReboot { node } => match nodes.drives.get_mut(usize::from(node)) {
-            Some(drive) => drive.reset(),
-            None => {
-                if let Some(gripper) = &mut nodes.gripper {
-                    gripper.reset();
-                }
-            }
-        },
-        FaultKind::FaultState { joint } => nodes.drives[usize::from(joint)].force_fault(),
-        _ => {}
     }
 }

@@ -83,12 +83,12 @@ impl World {
 
     /// How the arm really is.
     pub fn truth(&self) -> &Truth {
-        &self.truth
+        self.plant.truth()
     }
 
     /// The arm as it is after model errors.
     pub fn true_model(&self) -> &ArmModel {
-        &self.model
+        self.plant.true_model()
     }
 
     /// Settings of the world.
@@ -149,9 +149,7 @@ impl World {
 
     /// Something is where the gripper can hold it (from the start it is).
     pub fn set_part_present(&mut self, present: bool) {
-        if let Some(gripper) = &mut self.nodes.gripper {
-            gripper.part_present = present;
-        }
+        self.plant.set_part_present(present);
     }
 
     /// One more fault; `Trigger::At` counts from the start of the world.
@@ -172,7 +170,7 @@ impl World {
             time_us: self.now_us(),
             ticked: self.ticked,
             telemetry: self.board.telemetry(),
-            truth: &self.truth,
+            truth: self.plant.truth(),
             sent: self.sent.as_ref(),
             worked: self.board.worked,
             safety_output: self.safety_output,

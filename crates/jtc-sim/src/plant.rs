@@ -1,0 +1,208 @@
+//! What is behind the joint bus: drives, gripper and the arm that they move. It knows nothing of the controller, which may be
+//! the simulated one of [`World`](crate::World) or any other that sends frames.
+use jtc_bus::{Frame, JOINTS, NODES, Request, Scale};
+use jtc_dynamics::ArmModel;
+
+use crate::arm::Arm;
+use crate::bus::Nodes;
+use crate::config::{SimConfig, Support};
+use crate::drive::{Drive, DriveFault};
+use crate::faults::FaultKind;
+use crate::gripper::Gripper;
+use crate::world::Truth;
+
+/// Length of a drive's tick and of a step of the arm, s.
+const TICK: f64 = 1e-3;
+
+/// An answer of a node and how long after the end of the request it is ready, µs.
+pub type ReadyAnswer = (u32, Frame);
+
+/// Drives, gripper and arm.
+///
+/// ```
+/// use jtc_bus::Request;
+/// use jtc_sim::{Plant, SimConfig};
+///
+/// let mut plant = Plant::new(&SimConfig::default());
+/// for _ in 0..300 {
+///     plant.step(true); // the drives boot
+/// }
+/// let request = Request::Move { torque: [0.0; 6], pump: false }.emit();
+/// let mut answers = Vec::new();
+/// plant.hear(300_000, &request, &mut answers);
+/// assert_eq!(answers.len(), 7);
+/// ```
+pub struct Plant {
+    pub(crate) nodes: Nodes,
+    pub(crate) arm: Arm,
+    truth: Truth,
+    model: ArmModel,
+    scales: [Scale; JOINTS],
+    support: Support,
+    stand: bool,
+    safety_wired: bool,
+}
+
+impl Plant {
+    /// A plant whose power was just switched on.
+    pub fn new(config: &SimConfig) -> Self {
+        let (parts, friction) = config.model_error.apply(&config.arm, config.seed);
+        let ceiling = parts.torque_ceiling;
+        let model = parts.model;
+        let drives = core::array::from_fn(|j| {
+            let mut drive = Drive::new(j as u8, config.drives[j], ceiling[j]);
+            drive.absent = config.absent_drives & (1 << j) != 0;
+            drive
+        });
+        let older = config.drives[0].one_message_per_interrupt;
+        let mut plant = Self {
+            nodes: Nodes { drives, gripper: config.gripper.then(|| Gripper::new(older)) },
+            arm: Arm::new(parts, friction, config.start),
+            truth: Truth::default(),
+            model,
+            scales: config.drives.map(|d| Scale { velocity: d.velocity_full_scale }),
+            support: config.support,
+            stand: config.support == Support::Stand,
+            safety_wired: config.safety_wired,
+        };
+        plant.read_truth();
+        plant
+    }
+
+    /// A frame has ended on the bus at `now_us`; the nodes' answers are added to `answers`. Answers of nodes and frames that
+    /// are no request are passed over.
+    pub fn hear(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
+        let Ok(request) = Request::parse(frame) else { return };
+        for node in 0..NODES {
+            answers.extend(self.nodes.answer(node, now_us, &request, &self.scales));
+        }
+    }
+
+    /// Any node is on the bus and acknowledges frames.
+    pub fn acknowledges(&self) -> bool {
+        self.nodes.any_on_bus()
+    }
+
+    /// One millisecond: drives and gripper do their tick, the arm moves. `safety_output`: the controller's safety output is at
+    /// the level that means no error.
+    pub fn step(&mut self, safety_output: bool) {
+        self.step_nodes(safety_output);
+        self.step_arm();
+    }
+
+    fn step_nodes(&mut self, safety_output: bool) {
+        let wired = self.safety_wired && !safety_output;
+        for (j, drive) in self.nodes.drives.iter_mut().enumerate() {
+            let own = drive.fault.safety_line;
+            drive.fault.safety_line |= wired;
+            drive.tick(self.arm.q[j], self.arm.temperature[j]);
+            drive.fault.safety_line = own;
+        }
+        if let Some(gripper) = &mut self.nodes.gripper {
+            let own = gripper.safety_line;
+            gripper.safety_line |= wired;
+            gripper.tick();
+            gripper.safety_line = own;
+        }
+    }
+
+    fn step_arm(&mut self) {
+        let enabled = |drive: &Drive| drive.state() == jtc_bus::fsm::ENABLED;
+        if self.stand && self.nodes.drives.iter().all(enabled) {
+            self.stand = false;
+        }
+        for (j, drive) in self.nodes.drives.iter().enumerate() {
+            self.truth.torque[j] = drive.torque();
+            self.arm.braked[j] = match self.support {
+                Support::Limp => false,
+                Support::Stand => self.stand,
+                Support::Brakes => !enabled(drive),
+            };
+        }
+        self.arm.step(&self.truth.torque, TICK);
+        self.read_truth();
+    }
+
+    fn read_truth(&mut self) {
+        self.truth.q = self.arm.q;
+        self.truth.qd = self.arm.qd;
+        self.truth.temperature = self.arm.temperature;
+    }
+
+    /// What a fault of a node does once, when it begins; other faults do nothing here.
+    pub fn begin(&mut self, kind: FaultKind) {
+        match kind {
+            FaultKind::NodeReboot { node } => match self.nodes.drives.get_mut(usize::from(node)) {
+                Some(drive) => drive.reset(),
+                None => {
+                    if let Some(gripper) = &mut self.nodes.gripper {
+                        gripper.reset();
+                    }
+                }
+            },
+            FaultKind::FaultState { joint } => self.nodes.drives[usize::from(joint)].force_fault(),
+            _ => {}
+        }
+    }
+
+    /// Make these faults, as far as they are faults of nodes or of the arm, and no others act.
+    pub fn set_faults(&mut self, kinds: impl Iterator<Item = FaultKind>) {
+        let mut drives = [DriveFault::default(); JOINTS];
+        let (mut gripper_silent, mut gripper_line) = (false, false);
+        let mut friction = [1.0; JOINTS];
+        for kind in kinds {
+            match kind {
+                FaultKind::NodeSilent { node } => match drives.get_mut(usize::from(node)) {
+                    Some(drive) => drive.silent = true,
+                    None => gripper_silent = true,
+                },
+                FaultKind::SafetyLine { node } => match drives.get_mut(usize::from(node)) {
+                    Some(drive) => drive.safety_line = true,
+                    None => gripper_line = true,
+                },
+                FaultKind::MotorFault { joint, bits } => drives[usize::from(joint)].motor_control |= bits,
+                FaultKind::HardwareFault { joint } => drives[usize::from(joint)].hardware = true,
+                FaultKind::EncoderJump { joint, rad } => drives[usize::from(joint)].encoder_offset += rad,
+                FaultKind::NotAccurate { joint } => drives[usize::from(joint)].not_accurate = true,
+                FaultKind::Friction { joint, factor } => friction[usize::from(joint)] *= factor,
+                FaultKind::Temperature { joint, celsius } => {
+                    self.arm.temperature[usize::from(joint)] = celsius;
+                }
+                _ => {}
+            }
+        }
+        for (drive, fault) in self.nodes.drives.iter_mut().zip(drives) {
+            drive.fault = fault;
+        }
+        if let Some(gripper) = &mut self.nodes.gripper {
+            gripper.silent = gripper_silent;
+            gripper.safety_line = gripper_line;
+        }
+        if self.arm.friction_fault != friction {
+            self.arm.friction_fault = friction;
+            self.arm.friction_changed();
+        }
+    }
+
+    /// How the arm really is.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    /// The arm as it is after model errors.
+    pub fn true_model(&self) -> &ArmModel {
+        &self.model
+    }
+
+    /// State bytes of joints and gripper (255: no gripper).
+    pub fn node_states(&self) -> [u8; NODES] {
+        self.nodes.states()
+    }
+
+    /// Something is where the gripper can hold it (from the start it is).
+    pub fn set_part_present(&mut self, present: bool) {
+        if let Some(gripper) = &mut self.nodes.gripper {
+            gripper.part_present = present;
+        }
+    }
+}

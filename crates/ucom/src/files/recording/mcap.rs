@@ -1,0 +1,178 @@
+//! MCAP with one channel `/can` of JSON messages, readable by Foxglove, PlotJuggler and the MCAP tools.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+use std::path::PathBuf;
+use std::prelude::v1::*;
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Compression, MessageStream, Summary, WriteOptions};
+use serde::{Deserialize, Serialize};
+
+use super::{Direction, FrameKind, Record, RecordedFrame, Recording, RecordingError, hex_bytes};
+
+const TOPIC: &str = "/can";
+const METADATA: &str = "ucom";
+/// JSON schema of a message.
+const SCHEMA: &str = r#"{
+  "title": "CanFrame",
+  "type": "object",
+  "properties": {
+    "channel": {"type": "string", "description": "interface"},
+    "id": {"type": "integer", "description": "identifier"},
+    "extended": {"type": "boolean"},
+    "kind": {"enum": ["data", "remote", "fd", "error"]},
+    "length": {"type": "integer", "description": "bytes; of a remote frame the bytes asked for"},
+    "data": {"type": "string", "description": "payload, hexadecimal"},
+    "sent": {"type": "boolean", "description": "by the recorder itself"},
+    "name": {"type": "string", "description": "decoded meaning"},
+    "fd_flags": {"type": "integer"},
+    "dlc": {"type": "integer", "description": "raw DLC above 8 of a classic frame"}
+  },
+  "required": ["channel", "id", "extended", "kind", "length", "data"]
+}"#;
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    Data,
+    Remote,
+    Fd,
+    Error,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Message {
+    channel: String,
+    id: u32,
+    extended: bool,
+    kind: Kind,
+    length: u8,
+    data: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sent: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fd_flags: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dlc: Option<u8>,
+}
+
+impl Message {
+    fn of(record: &Record, name: Option<&str>) -> Self {
+        let f = &record.frame;
+        let (kind, fd_flags) = match f.kind {
+            FrameKind::Data => (Kind::Data, None),
+            FrameKind::Remote { .. } => (Kind::Remote, None),
+            FrameKind::Fd { flags } => (Kind::Fd, Some(flags)),
+            FrameKind::Error => (Kind::Error, None),
+        };
+        let length = if let FrameKind::Remote { length } = f.kind { length } else { f.data.len() as u8 };
+        Self {
+            channel: record.channel.clone(),
+            id: f.id,
+            extended: f.extended,
+            kind,
+            length,
+            data: f.data.iter().map(|b| format!("{b:02X}")).collect(),
+            sent: record.direction.map(|d| d == Direction::Sent),
+            name: name.map(str::to_owned),
+            fd_flags,
+            dlc: f.dlc,
+        }
+    }
+
+    fn record(self, time_ns: u64) -> Option<Record> {
+        let kind = match self.kind {
+            Kind::Data => FrameKind::Data,
+            Kind::Remote => FrameKind::Remote { length: self.length },
+            Kind::Fd => FrameKind::Fd { flags: self.fd_flags.unwrap_or(0) },
+            Kind::Error => FrameKind::Error,
+        };
+        let most = if matches!(kind, FrameKind::Fd { .. }) { 64 } else { 8 };
+        let data = hex_bytes(&self.data, most)?;
+        if self.id > if self.extended || kind == FrameKind::Error { 0x1FFF_FFFF } else { 0x7FF } {
+            return None;
+        }
+        let direction = self.sent.map(|sent| if sent { Direction::Sent } else { Direction::Received });
+        let frame = RecordedFrame { id: self.id, extended: self.extended, kind, data, dlc: self.dlc };
+        Some(Record { time_ns, channel: self.channel, direction, frame })
+    }
+}
+
+fn mcap_error(e: mcap::McapError) -> RecordingError {
+    match e {
+        mcap::McapError::Io(e) => e.into(),
+        e => damaged(e.to_string()),
+    }
+}
+
+fn damaged(problem: String) -> RecordingError {
+    RecordingError::Mcap { path: PathBuf::new(), problem }
+}
+
+/// Writes records.
+pub struct McapWriter<W: Write + Seek> {
+    out: mcap::Writer<W>,
+    channel: u16,
+    sequence: u32,
+}
+
+impl<W: Write + Seek> McapWriter<W> {
+    /// Begins with the profile as metadata.
+    pub fn new(out: W, profile: &str) -> Result<Self, RecordingError> {
+        let mut out = WriteOptions::new()
+            .library(concat!("openjtc ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Lz4))
+            .create(out)
+            .map_err(mcap_error)?;
+        let metadata = BTreeMap::from([("profile".to_owned(), profile.to_owned())]);
+        out.write_metadata(&Metadata { name: METADATA.into(), metadata }).map_err(mcap_error)?;
+        let schema = out.add_schema("CanFrame", "jsonschema", SCHEMA.as_bytes()).map_err(mcap_error)?;
+        let channel = out.add_channel(schema, TOPIC, "json", &BTreeMap::new()).map_err(mcap_error)?;
+        Ok(Self { out, channel, sequence: 0 })
+    }
+
+    /// Adds a frame, with the words for it.
+    pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
+        let header = MessageHeader {
+            channel_id: self.channel,
+            sequence: self.sequence,
+            log_time: record.time_ns,
+            publish_time: record.time_ns,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        let json = serde_json::to_vec(&Message::of(record, name)).map_err(|e| damaged(e.to_string()))?;
+        self.out.write_to_known_channel(&header, &json).map_err(mcap_error)
+    }
+
+    /// Writes index and end.
+    pub fn finish(mut self) -> Result<W, RecordingError> {
+        self.out.finish().map_err(mcap_error)?;
+        Ok(self.out.into_inner())
+    }
+}
+
+/// Reads a whole file.
+pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
+    let mut recording = Recording::default();
+    if let Some(summary) = Summary::read(file).map_err(mcap_error)? {
+        for index in &summary.metadata_indexes {
+            if index.name == METADATA {
+                let metadata = mcap::read::metadata(file, index).map_err(mcap_error)?;
+                recording.profile = metadata.metadata.get("profile").cloned();
+            }
+        }
+    }
+    for message in MessageStream::new(file).map_err(mcap_error)? {
+        let message = message.map_err(mcap_error)?;
+        if message.channel.topic != TOPIC || message.channel.message_encoding != "json" {
+            continue;
+        }
+        let record = serde_json::from_slice::<Message>(&message.data).map_err(|e| damaged(e.to_string()))?;
+        let bad = || damaged(format!("message {}: not a CAN frame", message.sequence));
+        recording.records.push(record.record(message.log_time).ok_or_else(bad)?);
+    }
+    Ok(recording)
+}

@@ -1,0 +1,297 @@
+//! Single acts: status, resets, start, stop, flags.
+
+use std::prelude::v1::*;
+
+use super::link::Link;
+use super::request::{TRIES, admin, info, numbers, set_status};
+use super::scan::{REPORTS, Reports, collect_reports};
+use super::times::MS;
+use super::{BoardSeen, Error, Outcome};
+use crate::{Admin, BoardInfo, FromBoard, Function, Status, ToBoard};
+
+/// Changes to the flags of a board; `None` leaves one as it is (D-37).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AdminChange {
+    /// The control loop runs.
+    pub run: Option<bool>,
+    /// Outputs are enabled.
+    pub active: Option<bool>,
+    /// The module sends its texts.
+    pub debug: Option<bool>,
+    /// All texts of the board are sent.
+    pub global_debug: Option<bool>,
+}
+
+impl AdminChange {
+    /// The flags after the change.
+    pub fn apply(&self, old: Admin) -> Admin {
+        let run = self.run.unwrap_or(old.run);
+        Admin {
+            run,
+            // Outputs need a running loop.
+            active: self.active.unwrap_or(old.active) && run,
+            debug: self.debug.unwrap_or(old.debug),
+            global_debug: self.global_debug.unwrap_or(old.global_debug),
+        }
+    }
+}
+
+/// How far to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopLevel {
+    /// Outputs off, the control loop runs on.
+    Outputs,
+    /// The control loop ends, the application stays.
+    Loop,
+    /// Back to the exloader.
+    Application,
+}
+
+pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Error> {
+    info(&link, board).await.map(Outcome::Info)
+}
+
+/// PC_SETSTATUS with read-back. What takes longer than one answer is waited for.
+pub(crate) async fn set_status_procedure(
+    link: Link,
+    board: u8,
+    mask: Status,
+    value: Status,
+    force: bool,
+) -> Result<Outcome, Error> {
+    let to = link.board(board)?;
+    link.become_master(force).await?;
+    let value = value & mask;
+    if mask.has(Status::INIT) && !value.has(Status::INIT) {
+        return forget_number(&link, board, mask, value).await;
+    }
+    if mask.has(Status::MSTART) && value.has(Status::MSTART) {
+        // As PC_START: the application needs its time.
+        let before = numbers(&link, board).await?;
+        link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
+        if !before.status.has(Status::MSTART) {
+            let what = "the application did not start";
+            wait_status(&link, board, Status::MSTART, Status::MSTART, link.times().start, what).await?;
+            link.with(|core| core.forget_parameters(board));
+        }
+    }
+    let now = set_status(&link, board, mask, value).await?;
+    Ok(Outcome::Status { board, info: now })
+}
+
+/// INIT off: the board forgets its number, so its silence is the confirmation.
+async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> Result<Outcome, Error> {
+    let to = link.board(board)?;
+    let before = numbers(link, board).await?;
+    for _ in 0..TRIES {
+        link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
+        match numbers(link, board).await {
+            Err(Error::NoAnswer { .. }) => {
+                link.with(|core| *core.boards.of(board) = Default::default());
+                let status = before.status.with(Status::INIT, false);
+                return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
+            }
+            Err(e) => return Err(e),
+            Ok(_) => {}
+        }
+    }
+    let status = before.status;
+    Err(Error::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES })
+}
+
+/// Polls PC_INFO every 200 ms until some bits are as wanted.
+pub(crate) async fn wait_status(
+    link: &Link,
+    board: u8,
+    mask: Status,
+    value: Status,
+    limit: u64,
+    what: &'static str,
+) -> Result<BoardInfo, Error> {
+    let since = link.now();
+    let mut last = None;
+    loop {
+        match numbers(link, board).await {
+            Ok(info) if info.status & mask == value => return Ok(info),
+            Ok(info) => last = Some(info.status),
+            Err(Error::NoAnswer { .. } | Error::Incomplete { .. }) => {}
+            Err(e) => return Err(e),
+        }
+        let waited = link.now().saturating_sub(since);
+        if waited >= limit {
+            let waited_ms = waited / MS;
+            return Err(match last {
+                Some(status) => Error::NotReached { board, what, waited_ms, status },
+                None => link.no_answer(board, Function::Info, TRIES, since),
+            });
+        }
+        link.sleep(200 * MS).await;
+    }
+}
+
+/// PC_RESET to one board or to all; who reports. Never repeated: the user decides.
+pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<Outcome, Error> {
+    let to = match board {
+        Some(board) => link.board(board)?,
+        None => link.everybody(),
+    };
+    link.become_master(force).await?;
+    link.listen(0, &REPORTS);
+    link.ask(to, ToBoard::Reset).await;
+    let expected = link.with(|core| match board {
+        Some(board) => {
+            let known = core.boards.get(board).and_then(|b| b.info);
+            *core.boards.of(board) = Default::default();
+            core.data.remove(&board);
+            known.map(|info| info.flash_number as u8)
+        }
+        None => {
+            core.boards.clear();
+            core.data.clear();
+            None
+        }
+    });
+    let mut reports = Reports::default();
+    collect_reports(&link, link.times().report_window, &mut reports).await;
+    if let Some(board) = board
+        && (reports.ids.is_empty() || expected.is_some_and(|id| !reports.ids.contains(&id)))
+    {
+        let since = link.now().saturating_sub(link.times().report_window);
+        return Err(link.no_answer(board, Function::Reset, 1, since));
+    }
+    Ok(Outcome::Reset(reports))
+}
+
+/// PC_XRESET, and the board back in its exloader with programming enabled (D-23).
+pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    let info = enter_exloader(&link, board, None).await?;
+    Ok(Outcome::Status { board, info })
+}
+
+/// XRESET, wait, poll PC_INFO until the exloader runs; PROG by SETSTATUS when it is off (U-4).
+///
+/// A board that does not answer any more is repaired when its flash number is known.
+pub(crate) async fn enter_exloader(link: &Link, board: u8, flash_number: Option<u16>) -> Result<BoardInfo, Error> {
+    let to = link.board(board)?;
+    link.send(to, ToBoard::XReset).await;
+    link.with(|core| {
+        core.boards.of(board).application_ended();
+        core.forget_parameters(board);
+    });
+    link.sleep(link.times().xreset_wait).await;
+    let what = "its exloader did not come up";
+    let limit = 3_000 * MS;
+    let exloader = wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what);
+    let info = match (exloader.await, flash_number) {
+        (Err(Error::NoAnswer { .. }), Some(flash_number)) => {
+            link.note(format!("board {board} lost its number: giving it back"));
+            repair(link, board, flash_number).await?;
+            wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await?
+        }
+        (result, _) => result?,
+    };
+    if info.status.has(Status::PROG) {
+        return Ok(info);
+    }
+    set_status(link, board, Status::PROG, Status::PROG).await
+}
+
+use super::init::repair;
+
+/// PC_START and the application up: MCA_DSP_READY, or PC_INFO that shows MSTART (D-30).
+pub(crate) async fn start_application(link: &Link, board: u8) -> Result<BoardSeen, Error> {
+    let to = link.board(board)?;
+    let before = info(link, board).await?;
+    if before.info.status.has(Status::MSTART) {
+        return Ok(before);
+    }
+    let since = link.now();
+    let mut last = before.info.status;
+    for _ in 0..TRIES {
+        link.listen(1 << board, &[Function::McaReady]);
+        link.ask(to, ToBoard::Start).await;
+        let until = link.now() + link.times().start;
+        while let Some(heard) = link.next(until).await {
+            match heard.message {
+                FromBoard::McaReady => break,
+                message => {
+                    if let Some(error) = Link::device(board, &message, "PC_START") {
+                        return Err(error);
+                    }
+                }
+            }
+        }
+        let now = info(link, board).await?;
+        last = now.info.status;
+        if last.has(Status::MSTART) {
+            link.with(|core| core.forget_parameters(board));
+            return Ok(now);
+        }
+    }
+    let waited_ms = link.now().saturating_sub(since) / MS;
+    Err(Error::NotReached { board, what: "the application did not start", waited_ms, status: last })
+}
+
+pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    start_application(&link, board).await.map(Outcome::Started)
+}
+
+/// The flags to change from: those the board told last, else what its status says with outputs off (D-37).
+async fn flags(link: &Link, board: u8) -> Result<Admin, Error> {
+    let known = info(link, board).await?.info;
+    if !known.status.has(Status::MSTART) {
+        return Err(Error::NoApplication { board, valid: known.has_application() });
+    }
+    let told = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
+    let run = known.status.has(Status::MCARUN);
+    // A frame of it may have been lost: the status byte knows whether the loop runs.
+    Ok(told.map_or(Admin { run, ..Admin::default() }, |told| Admin { run, active: told.active && run, ..told }))
+}
+
+/// Read-modify-write of the flags.
+pub(crate) async fn change_flags(link: &Link, board: u8, change: AdminChange) -> Result<Admin, Error> {
+    let wanted = change.apply(flags(link, board).await?);
+    admin(link, board, wanted).await
+}
+
+pub(crate) async fn admin_procedure(
+    link: Link,
+    board: u8,
+    change: AdminChange,
+    force: bool,
+) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    let admin = change_flags(&link, board, change).await?;
+    Ok(Outcome::Admin { board, admin })
+}
+
+/// Outputs off, then the loop, then the application: the start order in reverse.
+pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    let known = info(&link, board).await?.info;
+    let mut now = known;
+    if known.status.has(Status::MSTART) {
+        let off = AdminChange { active: Some(false), ..Default::default() };
+        change_flags(&link, board, off).await?;
+        if level != StopLevel::Outputs {
+            link.with(|core| {
+                if let Some(data) = core.data.get_mut(&board) {
+                    data.repeat = None;
+                }
+            });
+            change_flags(&link, board, AdminChange { run: Some(false), ..off }).await?;
+        }
+        if level == StopLevel::Application {
+            link.with(|core| core.boards.of(board).application_ended());
+            set_status(&link, board, Status::MSTART, Status(0)).await?;
+        }
+        now = info(&link, board).await?.info;
+    }
+    Ok(Outcome::Status { board, info: now })
+}

@@ -1,0 +1,370 @@
+//! What can go wrong in a procedure, with the facts in it, the command that helps and the exit code of the commands.
+
+use std::prelude::v1::*;
+
+use core::fmt;
+
+use super::load::LoadForecast;
+use crate::{ErrorCode, Function, Status};
+
+/// The last frame that was heard from a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LastHeard {
+    /// What it was.
+    pub function: Function,
+    /// How long before the error, ms.
+    pub ago_ms: u64,
+}
+
+/// Prints `last heard: MCA_ALIVE 120 ms ago`, or that there was nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heard(pub Option<LastHeard>);
+
+impl fmt::Display for Heard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(LastHeard { function, ago_ms }) => write!(f, "last heard: {} {ago_ms} ms ago", function.name()),
+            None => f.write_str("nothing heard from it at all"),
+        }
+    }
+}
+
+/// Why a procedure did not do what was asked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A board did not answer.
+    #[error("board {board} does not answer {} ({tries} tries, {waited_ms} ms; {})", asked.name(), Heard(*last))]
+    NoAnswer {
+        /// Its number.
+        board: u8,
+        /// What was asked.
+        asked: Function,
+        /// How often.
+        tries: u32,
+        /// Time from the first request to giving up, ms.
+        waited_ms: u64,
+        /// What was last heard from it.
+        last: Option<LastHeard>,
+    },
+    /// An answer never came whole.
+    #[error("board {board}: the answer to {} never came whole ({tries} tries): {problem}", asked.name())]
+    Incomplete {
+        /// Its number.
+        board: u8,
+        /// What was asked.
+        asked: Function,
+        /// How often.
+        tries: u32,
+        /// What was wrong with the last one.
+        problem: Incomplete,
+    },
+    /// Answers of a board contradict each other.
+    #[error("board {board}: its answers to PC_INFO contradict each other in {tries} tries (two boards with one number?)")]
+    Contradiction {
+        /// Its number.
+        board: u8,
+        /// How often it was asked.
+        tries: u32,
+    },
+    /// The board reported an error.
+    #[error("board {board} reports {code} during {during}: {}", code.meaning())]
+    Device {
+        /// Its number.
+        board: u8,
+        /// The code.
+        code: ErrorCode,
+        /// What was going on.
+        during: &'static str,
+    },
+    /// Acknowledge of PC_INIT under one number with another in it (D-24).
+    #[error("DSP_INITACK under number {id} says number {data}: the board is refused")]
+    AckMismatch {
+        /// By the identifier.
+        id: u8,
+        /// By the data.
+        data: u8,
+    },
+    /// DSP_INFO under one number with another in it.
+    #[error("board {board} says that its number is {says}: it is refused")]
+    WrongSequence {
+        /// By the identifier.
+        board: u8,
+        /// By the data.
+        says: u8,
+    },
+    /// Another board than the one that was named.
+    #[error("board {board} has flash number 0x{found:04X}, not 0x{wanted:04X}")]
+    WrongBoard {
+        /// Its number.
+        board: u8,
+        /// The flash number that was named.
+        wanted: u16,
+        /// The one it has.
+        found: u16,
+    },
+    /// A status was set and is not what was set.
+    #[error("board {board}: status is {} after {tries} tries, wanted {} of the bits {}", status, wanted, mask)]
+    StatusNotTaken {
+        /// Its number.
+        board: u8,
+        /// Bits that were to change.
+        mask: Status,
+        /// What they were to be.
+        wanted: Status,
+        /// The status that was read.
+        status: Status,
+        /// How often it was set.
+        tries: u32,
+    },
+    /// A state was not reached.
+    #[error("board {board}: {what} not within {waited_ms} ms; status {status}")]
+    NotReached {
+        /// Its number.
+        board: u8,
+        /// What was waited for.
+        what: &'static str,
+        /// How long, ms.
+        waited_ms: u64,
+        /// The last status.
+        status: Status,
+    },
+    /// Flags were sent and others came back.
+    #[error("board {board} answers MCA_ADMIN_DATA with `{is}` instead of `{wanted}`")]
+    AdminRefused {
+        /// Its number.
+        board: u8,
+        /// What was sent.
+        wanted: crate::Admin,
+        /// What it says.
+        is: crate::Admin,
+    },
+    /// Another PC is on the bus (D-08).
+    #[error("another PC is on the bus: {} to {to} was heard {ago_ms} ms ago", function.name())]
+    ForeignMaster {
+        /// What it sent.
+        function: Function,
+        /// To which number.
+        to: u8,
+        /// When, ms.
+        ago_ms: u64,
+    },
+    /// Boards run their control loop.
+    #[error("{} running: program data would outrank their process data", Boards(boards))]
+    Running {
+        /// Their numbers.
+        boards: Vec<u8>,
+    },
+    /// The bus would be too busy.
+    #[error("{0}")]
+    Load(LoadForecast),
+    /// The procedure needs a board that is at work for another one.
+    #[error("{} busy with {with}", Boards(boards))]
+    Busy {
+        /// The boards.
+        boards: Vec<u8>,
+        /// The other procedure.
+        with: &'static str,
+    },
+    /// A number that no board has.
+    #[error("{number} is no board number (1 to 31, and {first} is the first here)")]
+    NoBoard {
+        /// The number.
+        number: u8,
+        /// `addr.first`.
+        first: u32,
+    },
+    /// No application is on the board, or it is not started.
+    #[error("board {board}: {}", if *valid { "its application is not started" } else { "it has no valid application" })]
+    NoApplication {
+        /// Its number.
+        board: u8,
+        /// It has one, but it is not running.
+        valid: bool,
+    },
+    /// No edge of that name.
+    #[error("board {board} has no {kind} `{name}`{}", Near(near))]
+    NoEdge {
+        /// Its number.
+        board: u8,
+        /// `CI`, `SO` or `PAR`.
+        kind: &'static str,
+        /// What was asked for.
+        name: String,
+        /// Names like it.
+        near: Vec<String>,
+    },
+    /// The board's image or plan cannot be sent.
+    #[error("{0}")]
+    Plan(#[from] super::update::PlanError),
+    /// The update of a board failed; see [`UpdateReport`](super::update::UpdateReport).
+    #[error("board {board}: {failure}")]
+    Update {
+        /// Its number.
+        board: u8,
+        /// Why.
+        failure: super::update::UpdateFailure,
+    },
+    /// The caller asked to end.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// What is wrong with an answer of several frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Incomplete {
+    /// The first frame is not what it must be.
+    #[error("it began with {len} bytes instead of {need}")]
+    Start {
+        /// Bytes that came.
+        len: u8,
+        /// Bytes of the first frame.
+        need: u8,
+    },
+    /// Silence in the middle.
+    #[error("{complete} of {of} strings came, then silence")]
+    Silence {
+        /// Whole strings.
+        complete: u32,
+        /// How many there should be.
+        of: u32,
+    },
+    /// A frame that fits nowhere.
+    #[error("a frame of string {string} fits nowhere")]
+    Misfit {
+        /// Number of the string, from 0.
+        string: u32,
+    },
+    /// Frames beyond the end.
+    #[error("more frames came than the totals allow")]
+    Surplus,
+    /// More strings than can be.
+    #[error("it announces {strings} strings; is the byte order right?")]
+    TooMany {
+        /// How many.
+        strings: u32,
+    },
+    /// Packages of a buffer are missing.
+    #[error("{missing} of {of} packages are missing")]
+    Packages {
+        /// How many.
+        missing: u32,
+        /// How many there should be.
+        of: u32,
+    },
+}
+
+/// `board 1 is`, `boards 1, 2 are`.
+struct Boards<'a>(&'a [u8]);
+
+impl fmt::Display for Boards<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list: Vec<String> = self.0.iter().map(u8::to_string).collect();
+        match self.0 {
+            [one] => write!(f, "board {one} is"),
+            _ => write!(f, "boards {} are", list.join(", ")),
+        }
+    }
+}
+
+struct Near<'a>(&'a [String]);
+
+impl fmt::Display for Near<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() { Ok(()) } else { write!(f, "; there is `{}`", self.0.join("`, `")) }
+    }
+}
+
+impl Error {
+    /// Exit code of the commands: 1 the board reported an error, 3 no answer, 4 refused by a check, 5 fault while
+    /// running. An update has its own, see [`UpdateReport::exit_code`](super::update::UpdateReport::exit_code).
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Device { .. } | Self::AdminRefused { .. } | Self::StatusNotTaken { .. } => 1,
+            Self::NoEdge { .. } | Self::NoBoard { .. } | Self::Plan(_) => 2,
+            Self::NoAnswer { .. } | Self::Incomplete { .. } | Self::NotReached { .. } => 3,
+            Self::Contradiction { .. }
+            | Self::AckMismatch { .. }
+            | Self::WrongSequence { .. }
+            | Self::WrongBoard { .. }
+            | Self::ForeignMaster { .. }
+            | Self::Running { .. }
+            | Self::Load(_)
+            | Self::Busy { .. }
+            | Self::NoApplication { .. } => 4,
+            Self::Update { failure, .. } => failure.exit_code(),
+            Self::Cancelled => 5,
+        }
+    }
+
+    /// A short name for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoAnswer { .. } => "no-answer",
+            Self::Incomplete { .. } => "incomplete-answer",
+            Self::Contradiction { .. } => "contradiction",
+            Self::Device { .. } => "device-error",
+            Self::AckMismatch { .. } => "ack-mismatch",
+            Self::WrongSequence { .. } => "wrong-sequence",
+            Self::WrongBoard { .. } => "wrong-board",
+            Self::StatusNotTaken { .. } => "status-not-taken",
+            Self::NotReached { .. } => "not-reached",
+            Self::AdminRefused { .. } => "admin-refused",
+            Self::ForeignMaster { .. } => "foreign-master",
+            Self::Running { .. } => "running",
+            Self::Load(_) => "load",
+            Self::Busy { .. } => "busy",
+            Self::NoBoard { .. } => "no-board",
+            Self::NoApplication { .. } => "no-application",
+            Self::NoEdge { .. } => "no-edge",
+            Self::Plan(_) => "plan",
+            Self::Update { .. } => "update",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// The likely cause and the next command or act that helps.
+    pub fn hint(&self) -> String {
+        match self {
+            Self::NoAnswer { board, last: None, .. } => {
+                format!("no frame of board {board} was heard: `ucom scan` tells who is there, `ucom doctor` why not")
+            }
+            Self::NoAnswer { board, .. } => {
+                format!("board {board} talks but does not answer this: `ucom info {board}`, then `ucom doctor`")
+            }
+            Self::Incomplete { problem: Incomplete::TooMany { .. } | Incomplete::Start { .. }, .. } => {
+                "the board may read the protocol otherwise: `ucom probe` measures it".into()
+            }
+            Self::Incomplete { .. } => {
+                "frames get lost: `ucom doctor` looks at bus load, error counters and termination".into()
+            }
+            Self::Contradiction { .. } => "number the boards anew: `ucom init`".into(),
+            Self::Device { code, .. } => code.reaction().into(),
+            Self::AckMismatch { .. } | Self::WrongSequence { .. } => {
+                "two boards may share a number, or the board reads the protocol otherwise: `ucom reset`, `ucom probe`"
+                    .into()
+            }
+            Self::WrongBoard { board, .. } => {
+                format!("`ucom info {board}` shows who stands there; boards may have been swapped: `ucom init`")
+            }
+            Self::StatusNotTaken { .. } => {
+                "bits that mirror reality cannot be set, PROG only in the exloader: `ucom help status`".into()
+            }
+            Self::NotReached { board, .. } => format!("`ucom info {board}`, then `ucom reset` and `ucom init`"),
+            Self::AdminRefused { .. } => "outputs need a running control loop: `ucom start`".into(),
+            Self::ForeignMaster { .. } => {
+                "end the other program, or force this one if you know that it does not matter".into()
+            }
+            Self::Running { .. } => "`ucom stop all` first, or force it".into(),
+            Self::Load(_) => "fewer boards, longer `so.period` or `ci.period`, or force it".into(),
+            Self::Busy { .. } => "wait for it, or cancel it".into(),
+            Self::NoBoard { .. } => "`ucom scan` lists the boards".into(),
+            Self::NoApplication { board, valid: true } => format!("`ucom start {board}`"),
+            Self::NoApplication { board, valid: false } => format!("`ucom update {board} IMAGE`"),
+            Self::NoEdge { board, .. } => format!("`ucom io {board}` lists the names"),
+            Self::Plan(e) => e.hint().into(),
+            Self::Update { failure, .. } => failure.hint(),
+            Self::Cancelled => "`ucom scan` tells in what state the boards are".into(),
+        }
+    }
+}

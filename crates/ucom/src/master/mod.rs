@@ -1,0 +1,510 @@
+//! The PC side: procedures as state machines without I/O.
+//!
+//! A [`Master`] is fed with frames and with time and gives frames back; it never waits, has no clock and no thread.
+//! A driver is a loop of a few lines:
+//!
+//! 1. hand over every frame that has arrived: [`Master::handle`];
+//! 2. send while [`Master::poll`] gives frames;
+//! 3. look at [`Master::take_event`];
+//! 4. wait for the next frame, at most until [`Master::next_deadline`].
+//!
+//! What has arrived is handed over before `poll` is called: waiting ends only in `poll`, so a driver that comes late
+//! mistakes no answer for silence. Time is in microseconds from any start and must not go back (a monotonic clock).
+//!
+//! ```
+//! use ucom::master::{Event, Master, Outcome, Request};
+//! use ucom::Profile;
+//!
+//! let mut master = Master::new(Profile::default());
+//! let id = master.start(0, Request::Scan).unwrap();
+//! let mut now = 0;
+//! let report = loop {
+//!     while let Some(frame) = master.poll(now) {
+//!         println!("{frame}"); // a driver sends it; nobody answers on this bus
+//!     }
+//!     match master.take_event() {
+//!         Some(Event::Done { result: Ok(Outcome::Scan(report)), .. }) => break report,
+//!         _ => now = master.next_deadline().expect("the scan is under way"),
+//!     }
+//! };
+//! assert!(report.boards.is_empty());
+//! ```
+//!
+//! Procedures that change something make this PC the master of the bus first: it listens for another one (D-08), then
+//! sends life signs until [`Master::end_session`]. Scan, information and descriptions change nothing and send none.
+
+mod boards;
+mod control;
+pub mod doctor;
+mod error;
+mod event;
+mod init;
+pub mod io;
+mod link;
+mod load;
+pub mod probe;
+mod request;
+mod run;
+mod scan;
+mod shared;
+mod statistics;
+mod supervise;
+#[cfg(test)]
+mod tests;
+mod times;
+pub mod update;
+
+use std::collections::BTreeMap;
+use std::prelude::v1::*;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll, Waker};
+
+pub use boards::{Board, Boards, Life};
+pub use control::{AdminChange, StopLevel};
+pub use error::{Error, Heard, Incomplete, LastHeard};
+pub use event::{Event, Supervision};
+pub use init::{InitFinding, InitOptions, InitReport};
+pub use load::{LoadForecast, frame_bits};
+pub use run::{RunBoard, RunOptions, RunReport, Setting};
+pub use scan::{Reports, ScanFinding, ScanReport};
+pub use statistics::{Rate, Statistics, WINDOW_US};
+
+use crate::{Admin, BoardInfo, Foreign, Frame, Profile, Status};
+use io::{IoDescription, Kind, ParValue};
+use link::{Link, lock};
+use shared::{Core, Inbox, Session};
+
+/// A board as it answered PC_INFO.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BoardSeen {
+    /// Its number.
+    pub number: u8,
+    /// The numbers.
+    pub info: BoardInfo,
+    /// Its description; `None`: it never came whole.
+    pub description: Option<String>,
+}
+
+/// Names a procedure while it runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ProcedureId(u64);
+
+/// A procedure to start. `force`: also when another PC is on the bus, or another check refuses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Request {
+    /// Who is there; changes nothing.
+    Scan,
+    /// Numbers for the whole chain.
+    Init(InitOptions),
+    /// Gives one board its number back.
+    Repair {
+        /// Its number.
+        board: u8,
+        /// The flash number that must stand there.
+        flash_number: u16,
+        /// See above.
+        force: bool,
+    },
+    /// PC_INFO; changes nothing.
+    Info {
+        /// The board.
+        board: u8,
+    },
+    /// PC_SETSTATUS with read-back.
+    SetStatus {
+        /// The board.
+        board: u8,
+        /// Bits to change.
+        mask: Status,
+        /// Their values; bits outside the mask are not sent.
+        value: Status,
+        /// See above.
+        force: bool,
+    },
+    /// PC_RESET.
+    Reset {
+        /// The board; `None`: all.
+        board: Option<u8>,
+        /// See above.
+        force: bool,
+    },
+    /// PC_XRESET until the exloader runs with programming enabled.
+    XReset {
+        /// The board.
+        board: u8,
+        /// See above.
+        force: bool,
+    },
+    /// PC_START until the application is up.
+    Start {
+        /// The board.
+        board: u8,
+        /// See above.
+        force: bool,
+    },
+    /// The start order in reverse.
+    Stop {
+        /// The board.
+        board: u8,
+        /// How far.
+        level: StopLevel,
+        /// See above.
+        force: bool,
+    },
+    /// Flags of a board, read, changed and written.
+    Admin {
+        /// The board.
+        board: u8,
+        /// What changes.
+        change: AdminChange,
+        /// See above.
+        force: bool,
+    },
+    /// Firmware.
+    Update(update::UpdateOptions),
+    /// Descriptions of inputs, outputs and parameters; changes nothing.
+    Describe {
+        /// The board.
+        board: u8,
+        /// Read it anew although it is known.
+        fresh: bool,
+    },
+    /// MCA_DUMP_CI; changes nothing.
+    InitialInputs {
+        /// The board.
+        board: u8,
+    },
+    /// The whole way to a running control loop.
+    Run(RunOptions),
+    /// Measures what a board reads otherwise.
+    Probe(probe::ProbeOptions),
+}
+
+impl Request {
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Scan => "scan",
+            Self::Init(_) => "init",
+            Self::Repair { .. } => "repair",
+            Self::Info { .. } => "info",
+            Self::SetStatus { .. } => "status",
+            Self::Reset { .. } => "reset",
+            Self::XReset { .. } => "xreset",
+            Self::Start { .. } => "start",
+            Self::Stop { .. } => "stop",
+            Self::Admin { .. } => "admin",
+            Self::Update(_) => "update",
+            Self::Describe { .. } => "io",
+            Self::InitialInputs { .. } => "ci",
+            Self::Run(_) => "run",
+            Self::Probe(_) => "probe",
+        }
+    }
+
+    /// The boards that it works with, by bit: one procedure at a time works with a board.
+    fn claims(&self) -> u32 {
+        let one = |board: &u8| 1_u32.checked_shl((*board).into()).unwrap_or(0);
+        match self {
+            Self::Scan | Self::Init(_) | Self::Reset { board: None, .. } | Self::Probe(_) => u32::MAX,
+            // The broadcast of a group reaches all, and one board's program data must not meet another's start.
+            Self::Update(_) => u32::MAX,
+            Self::Repair { board, .. }
+            | Self::Info { board }
+            | Self::SetStatus { board, .. }
+            | Self::Reset { board: Some(board), .. }
+            | Self::XReset { board, .. }
+            | Self::Start { board, .. }
+            | Self::Stop { board, .. }
+            | Self::Admin { board, .. }
+            | Self::Describe { board, .. }
+            | Self::InitialInputs { board } => one(board),
+            Self::Run(options) => options.boards.iter().fold(0, |mask, b| mask | one(&b.board)),
+        }
+    }
+}
+
+/// What a procedure brought about.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Outcome {
+    /// Of [`Request::Scan`].
+    Scan(ScanReport),
+    /// Of [`Request::Init`]; look at [`InitReport::findings`].
+    Init(InitReport),
+    /// Of [`Request::Repair`].
+    Repaired(BoardSeen),
+    /// Of [`Request::Info`].
+    Info(BoardSeen),
+    /// Of [`Request::SetStatus`], [`Request::XReset`] and [`Request::Stop`].
+    Status {
+        /// The board.
+        board: u8,
+        /// As read back.
+        info: BoardInfo,
+    },
+    /// Of [`Request::Reset`].
+    Reset(Reports),
+    /// Of [`Request::Start`].
+    Started(BoardSeen),
+    /// Of [`Request::Admin`].
+    Admin {
+        /// The board.
+        board: u8,
+        /// Its flags now.
+        admin: Admin,
+    },
+    /// Of [`Request::Update`]; look at each board's result.
+    Update(update::UpdateReport),
+    /// Of [`Request::Describe`].
+    Description {
+        /// The board.
+        board: u8,
+        /// What it says.
+        description: IoDescription,
+    },
+    /// Of [`Request::InitialInputs`].
+    InitialInputs {
+        /// The board.
+        board: u8,
+        /// The words.
+        values: Vec<u16>,
+    },
+    /// Of [`Request::Run`].
+    Running(RunReport),
+    /// Of [`Request::Probe`].
+    Probe(probe::ProbeReport),
+}
+
+type Work = core::pin::Pin<Box<dyn Future<Output = Result<Outcome, Error>> + Send>>;
+
+/// The PC side of one bus.
+pub struct Master {
+    core: Arc<Mutex<Core>>,
+    work: BTreeMap<ProcedureId, Work>,
+    next_id: u64,
+}
+
+impl Master {
+    /// Listens; sends nothing by itself.
+    pub fn new(profile: Profile) -> Self {
+        Self { core: Arc::new(Mutex::new(Core::new(profile))), work: BTreeMap::new(), next_id: 1 }
+    }
+
+    /// Starts a procedure; its end comes as [`Event::Done`]. Refused while another one works with the same board.
+    pub fn start(&mut self, now: u64, request: Request) -> Result<ProcedureId, Error> {
+        let (id, name, claims) = (ProcedureId(self.next_id), request.name(), request.claims());
+        {
+            let mut core = lock(&self.core);
+            core.advance(now);
+            if let Some(other) = core.inboxes.values().find(|inbox| inbox.claims & claims != 0) {
+                let shared = other.claims & claims;
+                let boards = (0..32).filter(|b| shared >> b & 1 == 1).collect();
+                return Err(Error::Busy { boards, with: other.name });
+            }
+            core.inboxes.insert(id, Inbox { name, claims, ..Default::default() });
+        }
+        self.next_id += 1;
+        let link = Link { core: self.core.clone(), id };
+        self.work.insert(id, work(link, request));
+        self.run();
+        Ok(id)
+    }
+
+    /// Ends a procedure; what it has to undo on the boards it still does, then [`Event::Done`] comes.
+    pub fn cancel(&mut self, id: ProcedureId) {
+        if let Some(inbox) = lock(&self.core).inboxes.get_mut(&id) {
+            inbox.cancel = true;
+        }
+        self.run();
+    }
+
+    /// A frame has arrived; see [`Frame::received`].
+    pub fn handle(&mut self, now: u64, received: Result<Frame, Foreign>) {
+        {
+            let mut core = lock(&self.core);
+            core.advance(now);
+            core.received(received);
+        }
+        self.run();
+    }
+
+    /// The next frame to send; call it until it gives none.
+    pub fn poll(&mut self, now: u64) -> Option<Frame> {
+        {
+            let mut core = lock(&self.core);
+            core.advance(now);
+            core.fired = core.now;
+            core.duties();
+        }
+        self.run();
+        lock(&self.core).pop()
+    }
+
+    /// When [`Master::poll`] has something to do next, unless a frame arrives before. `None`: only when one arrives.
+    pub fn next_deadline(&self) -> Option<u64> {
+        let core = lock(&self.core);
+        if !core.idle() {
+            return Some(core.now);
+        }
+        let waiting = core.inboxes.values().filter_map(|inbox| inbox.wake);
+        waiting.chain(core.duties_deadline()).min()
+    }
+
+    /// What has happened, oldest first.
+    pub fn take_event(&mut self) -> Option<Event> {
+        lock(&self.core).take_event()
+    }
+
+    /// Whether a procedure is under way.
+    pub fn is_busy(&self) -> bool {
+        !self.work.is_empty()
+    }
+
+    /// Moves every procedure as far as it can go.
+    fn run(&mut self) {
+        let mut context = Context::from_waker(Waker::noop());
+        let core = self.core.clone();
+        self.work.retain(|id, work| match work.as_mut().poll(&mut context) {
+            Poll::Pending => true,
+            Poll::Ready(result) => {
+                let mut core = lock(&core);
+                core.forget_queued(*id);
+                core.inboxes.remove(id);
+                core.event(Event::Done { id: *id, result });
+                false
+            }
+        });
+    }
+
+    /// The profile in use.
+    pub fn profile(&self) -> Profile {
+        lock(&self.core).profile
+    }
+
+    /// Whether life signs go out.
+    pub fn is_master(&self) -> bool {
+        lock(&self.core).session != Session::Quiet
+    }
+
+    /// No more life signs and repeated inputs: boards that run become safe by themselves (D-50).
+    pub fn end_session(&mut self) {
+        lock(&self.core).session = Session::Quiet;
+    }
+
+    /// The boards as last seen.
+    pub fn boards(&self) -> Boards {
+        lock(&self.core).boards.clone()
+    }
+
+    /// Counters of the bus.
+    pub fn statistics(&self) -> Statistics {
+        lock(&self.core).statistics.clone()
+    }
+
+    /// Sets an input of a described board: sent at once, and repeated while the board runs (D-34).
+    pub fn set_input(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, Error> {
+        let index = self.edge(now, board, Kind::Ci, name)?;
+        let mut core = lock(&self.core);
+        if let Some(data) = core.data.get_mut(&board)
+            && let Some(place) = data.ci.get_mut(usize::from(index))
+        {
+            *place = value;
+            core.send_input(board, index);
+        }
+        Ok(index)
+    }
+
+    /// Writes a parameter of a described board; there is no answer, the shadow takes it as assumed (D-35).
+    pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, Error> {
+        let index = self.edge(now, board, Kind::Par, name)?;
+        lock(&self.core).send_parameter(board, index, value);
+        Ok(index)
+    }
+
+    fn edge(&mut self, now: u64, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
+        lock(&self.core).advance(now);
+        let description = self.description(board).ok_or(Error::NoApplication { board, valid: true })?;
+        description.find(board, kind, name)
+    }
+
+    /// The description of a board, when it is known.
+    pub fn description(&self, board: u8) -> Option<IoDescription> {
+        let core = lock(&self.core);
+        let key = core.data.get(&board)?.description?;
+        core.descriptions.get(&key).cloned()
+    }
+
+    /// All known descriptions by Program ID and flash date, to be kept for the next time.
+    pub fn descriptions(&self) -> BTreeMap<(u16, u16), IoDescription> {
+        lock(&self.core).descriptions.clone()
+    }
+
+    /// Descriptions from the last time (D-36).
+    pub fn know_description(&mut self, key: (u16, u16), description: IoDescription) {
+        lock(&self.core).descriptions.insert(key, description);
+    }
+
+    /// Inputs of a board as last set.
+    pub fn inputs(&self, board: u8) -> Vec<u16> {
+        lock(&self.core).data.get(&board).map(|d| d.ci.clone()).unwrap_or_default()
+    }
+
+    /// Parameters of a board as this PC believes them to be.
+    pub fn parameters(&self, board: u8) -> Vec<ParValue> {
+        lock(&self.core).data.get(&board).map(|d| d.par.values().to_vec()).unwrap_or_default()
+    }
+
+    /// Snapshots of a board's sensor outputs as [`Event::Snapshot`]; `dimension` where it is not described yet.
+    pub fn watch(&mut self, board: u8, dimension: Option<u16>, on: bool) {
+        let mut core = lock(&self.core);
+        let data = core.data.entry(board & 31).or_default();
+        data.watched = on;
+        if let Some(dimension) = dimension.filter(|d| usize::from(*d) != data.so.dimension()) {
+            data.so = io::SnapshotAssembler::new(dimension);
+        }
+    }
+
+    /// Snapshots of a board: whole ones, those with a gap, packages beyond the dimension.
+    pub fn snapshot_counts(&self, board: u8) -> (u64, u64, u64) {
+        let core = lock(&self.core);
+        core.data.get(&board).map_or((0, 0, 0), |d| (d.so.complete, d.so.incomplete, d.so.beyond))
+    }
+
+    /// Makes this PC the master without a procedure: life signs from now on.
+    pub fn begin_session(&mut self, now: u64) {
+        let mut core = lock(&self.core);
+        core.advance(now);
+        core.start_session();
+    }
+}
+
+fn work(link: Link, request: Request) -> Work {
+    let outer = link.clone();
+    let inner: Work = match request {
+        // An update has something to undo when it is cancelled.
+        Request::Update(options) => return Box::pin(update::update(link, options)),
+        Request::Scan => Box::pin(scan::scan(link)),
+        Request::Init(options) => Box::pin(init::init(link, options)),
+        Request::Repair { board, flash_number, force } => {
+            Box::pin(init::repair_procedure(link, board, flash_number, force))
+        }
+        Request::Info { board } => Box::pin(control::info_procedure(link, board)),
+        Request::SetStatus { board, mask, value, force } => {
+            Box::pin(control::set_status_procedure(link, board, mask, value, force))
+        }
+        Request::Reset { board, force } => Box::pin(control::reset(link, board, force)),
+        Request::XReset { board, force } => Box::pin(control::xreset(link, board, force)),
+        Request::Start { board, force } => Box::pin(control::start(link, board, force)),
+        Request::Stop { board, level, force } => Box::pin(control::stop(link, board, level, force)),
+        Request::Admin { board, change, force } => {
+            Box::pin(control::admin_procedure(link, board, change, force))
+        }
+        Request::Describe { board, fresh } => Box::pin(io::describe_procedure(link, board, fresh)),
+        Request::InitialInputs { board } => Box::pin(io::initial_inputs_procedure(link, board)),
+        Request::Run(options) => Box::pin(run::run(link, options)),
+        Request::Probe(options) => Box::pin(probe::probe(link, options)),
+    };
+    Box::pin(async move { outer.or_cancel(inner).await })
+}

@@ -1,0 +1,268 @@
+//! What all procedures share: the clock, frames on their way out, inboxes, the boards as last seen.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::prelude::v1::*;
+
+use super::boards::Boards;
+use super::error::LastHeard;
+use super::io::{IoDescription, ProcessData};
+use super::statistics::Statistics;
+use super::times::Times;
+use super::{Event, ProcedureId};
+use crate::{Foreign, Frame, FromBoard, Function, Profile, Sequence, ToBoard};
+
+/// Most events that wait for their user.
+const MAX_EVENTS: usize = 4096;
+/// Most frames that wait for a procedure.
+const MAX_HEARD: usize = 16_384;
+
+/// A frame of a board for a procedure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heard {
+    pub at: u64,
+    pub from: u8,
+    pub message: FromBoard,
+}
+
+/// What a procedure wants to hear.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Filter {
+    /// Boards by bit.
+    pub boards: u32,
+    /// Functions by bit.
+    pub functions: u32,
+}
+
+impl Filter {
+    pub(crate) fn new(boards: u32, functions: &[Function]) -> Self {
+        let functions = functions.iter().fold(0, |bits, f| bits | 1 << f.number());
+        // A board's error is an answer to anything.
+        Self { boards, functions: functions | 1 << Function::Error.number() }
+    }
+
+    fn takes(&self, from: u8, function: Function) -> bool {
+        let report = (16..20).contains(&function.number());
+        self.functions >> function.number() & 1 == 1 && (report || self.boards >> from & 1 == 1)
+    }
+}
+
+/// What a procedure has heard and waits for.
+#[derive(Debug, Default)]
+pub(crate) struct Inbox {
+    pub name: &'static str,
+    pub claims: u32,
+    pub filter: Filter,
+    pub heard: VecDeque<Heard>,
+    pub wake: Option<u64>,
+    pub cancel: bool,
+}
+
+/// What a procedure forgets when one of its frames leaves: it cannot be an answer to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Forget {
+    Nothing,
+    /// All but errors.
+    Answers,
+    All,
+}
+
+struct Outgoing {
+    serial: u64,
+    owner: Option<ProcedureId>,
+    /// What of that which the owner has heard is forgotten when this frame leaves.
+    forget: Forget,
+    frame: Frame,
+}
+
+/// Whether this PC is master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Session {
+    /// Only listens and asks.
+    Quiet,
+    /// Sends ALIVE.
+    Master { next_alive: u64 },
+}
+
+pub(crate) struct Core {
+    pub profile: Profile,
+    pub times: Times,
+    /// Time of the last call.
+    pub now: u64,
+    /// Time up to which waiting ends: that of the last `poll`, so that a late caller first hands over what came.
+    pub fired: u64,
+    /// Since when the bus has been listened to.
+    pub since: Option<u64>,
+    pub session: Session,
+    /// Another PC's last frame.
+    pub foreign_master: Option<(u64, Function, u8)>,
+    /// Reports until then are answers.
+    pub report_until: u64,
+    pub boards: Boards,
+    pub data: BTreeMap<u8, ProcessData>,
+    pub descriptions: BTreeMap<(u16, u16), IoDescription>,
+    pub statistics: Statistics,
+    pub inboxes: BTreeMap<ProcedureId, Inbox>,
+    urgent: VecDeque<Frame>,
+    normal: VecDeque<Outgoing>,
+    queued: u64,
+    sent: u64,
+    events: VecDeque<Event>,
+    dropped: u64,
+}
+
+impl Core {
+    pub(crate) fn new(profile: Profile) -> Self {
+        Self {
+            profile,
+            times: Times::of(&profile),
+            now: 0,
+            fired: 0,
+            since: None,
+            session: Session::Quiet,
+            foreign_master: None,
+            report_until: 0,
+            boards: Boards::default(),
+            data: BTreeMap::new(),
+            descriptions: BTreeMap::new(),
+            statistics: Statistics::new(profile.bitrate),
+            inboxes: BTreeMap::new(),
+            urgent: VecDeque::new(),
+            normal: VecDeque::new(),
+            queued: 0,
+            sent: 0,
+            events: VecDeque::new(),
+            dropped: 0,
+        }
+    }
+
+    /// Time never goes back.
+    pub(crate) fn advance(&mut self, now: u64) {
+        self.now = self.now.max(now);
+        self.since.get_or_insert(self.now);
+    }
+
+    pub(crate) fn event(&mut self, event: Event) {
+        // The end of a procedure must arrive, whatever else is lost.
+        if self.events.len() >= MAX_EVENTS && !matches!(event, Event::Done { .. }) {
+            self.dropped += 1;
+        } else {
+            self.events.push_back(event);
+        }
+    }
+
+    pub(crate) fn take_event(&mut self) -> Option<Event> {
+        let event = self.events.pop_front();
+        if event.is_none() && self.dropped > 0 {
+            return Some(Event::Overflow { dropped: core::mem::take(&mut self.dropped) });
+        }
+        event
+    }
+
+    /// Queues a frame that must not wait behind others: life signs and stops.
+    pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
+        self.urgent.push_back(message.encode(to, &self.profile));
+    }
+
+    /// Queues a frame; its serial number is that of [`Core::left`].
+    pub(crate) fn queue(&mut self, owner: Option<ProcedureId>, to: Sequence, message: ToBoard, forget: Forget) -> u64 {
+        self.queue_frame(owner, message.encode(to, &self.profile), forget)
+    }
+
+    pub(crate) fn queue_frame(&mut self, owner: Option<ProcedureId>, frame: Frame, forget: Forget) -> u64 {
+        self.queued += 1;
+        self.normal.push_back(Outgoing { serial: self.queued, owner, forget, frame });
+        self.queued
+    }
+
+    /// Serial number of the last frame queued.
+    pub(crate) fn queued(&self) -> u64 {
+        self.queued
+    }
+
+    /// Whether a frame has left.
+    pub(crate) fn left(&self, serial: u64) -> bool {
+        self.sent >= serial
+    }
+
+    /// The next frame for the bus.
+    pub(crate) fn pop(&mut self) -> Option<Frame> {
+        let frame = match self.urgent.pop_front() {
+            Some(frame) => frame,
+            None => {
+                let next = self.normal.pop_front()?;
+                self.sent = next.serial;
+                if let Some(inbox) = next.owner.and_then(|owner| self.inboxes.get_mut(&owner)) {
+                    match next.forget {
+                        Forget::Nothing => {}
+                        Forget::Answers => inbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
+                        Forget::All => inbox.heard.clear(),
+                    }
+                }
+                next.frame
+            }
+        };
+        self.note_sent(&frame);
+        Some(frame)
+    }
+
+    fn note_sent(&mut self, frame: &Frame) {
+        let now = self.now;
+        self.statistics.sent(now, frame);
+        let Ok((function, _)) = frame.address() else { return };
+        match function {
+            Function::Reset => self.report_until = self.report_until.max(now + self.times.report_window + 500_000),
+            Function::AskReport => self.report_until = self.report_until.max(now + self.times.report_ask + 500_000),
+            _ => {}
+        }
+    }
+
+    /// Drops what a procedure has queued.
+    pub(crate) fn forget_queued(&mut self, owner: ProcedureId) {
+        self.normal.retain(|next| next.owner != Some(owner));
+        // Whoever waits for a frame in front of the first one left must not wait for ever.
+        let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
+        self.sent = self.sent.max(before_first);
+    }
+
+    pub(crate) fn idle(&self) -> bool {
+        self.urgent.is_empty() && self.normal.is_empty()
+    }
+
+    /// Gives a board's message to the procedures that want it.
+    pub(crate) fn deliver(&mut self, from: u8, message: FromBoard) {
+        let at = self.now;
+        for inbox in self.inboxes.values_mut() {
+            if inbox.filter.takes(from, message.function()) && inbox.heard.len() < MAX_HEARD {
+                inbox.heard.push_back(Heard { at, from, message });
+            }
+        }
+    }
+
+    /// The procedure that has claimed a board.
+    pub(crate) fn owner(&self, board: u8) -> Option<ProcedureId> {
+        self.inboxes.iter().find(|(_, inbox)| inbox.claims >> board & 1 == 1).map(|(id, _)| *id)
+    }
+
+    pub(crate) fn last_heard(&self, board: u8) -> Option<LastHeard> {
+        let (at, function) = self.boards.get(board)?.last?;
+        Some(LastHeard { function, ago_ms: self.now.saturating_sub(at) / 1000 })
+    }
+
+    /// A frame that is not ours.
+    pub(crate) fn foreign(&mut self, foreign: Foreign) {
+        if self.statistics.foreign(self.now, foreign) {
+            self.event(Event::Foreign(foreign));
+        }
+    }
+
+    /// A frame that only a PC sends.
+    pub(crate) fn foreign_pc(&mut self, function: Function, to: u8) {
+        self.statistics.foreign_pc += 1;
+        // Once a second at most.
+        let news = self.foreign_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
+        self.foreign_master = Some((self.now, function, to));
+        if news {
+            self.event(Event::ForeignMaster { function, to });
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! The master's own duties beside the procedures: life signs of both sides, policies, repeated inputs.
+
+use std::prelude::v1::*;
+
+use super::boards::Life;
+use super::shared::{Core, Forget, Session};
+use super::event::Supervision;
+use super::io::Snapshot;
+use super::Event;
+use crate::profile::{AliveMode, OnLost};
+use crate::{Admin, Assembled, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status, StringAssembler, ToBoard};
+
+impl Core {
+    /// From now on life signs go out.
+    pub(crate) fn start_session(&mut self) {
+        if self.session == Session::Quiet {
+            self.session = Session::Master { next_alive: self.now };
+        }
+    }
+
+    /// What has to happen by `now` whether a procedure runs or not.
+    pub(crate) fn duties(&mut self) {
+        let now = self.now;
+        if let Session::Master { next_alive } = self.session
+            && now >= next_alive
+        {
+            self.send_alive();
+            let period = self.times.alive_pc;
+            // After a long pause of the caller the rhythm starts anew instead of catching up.
+            let next = if now - next_alive >= period { now + period } else { next_alive + period };
+            self.session = Session::Master { next_alive: next };
+        }
+        let mut lost = Vec::new();
+        let mut events = Vec::new();
+        for (number, board) in self.boards.iter_mut() {
+            let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
+            let age = now.saturating_sub(at);
+            if age >= self.times.alive_lost && board.life != Life::Lost {
+                board.life = Life::Lost;
+                events.push((number, Supervision::Lost));
+                lost.push(number);
+            } else if age > self.times.alive_late && board.life == Life::Alive {
+                board.life = Life::Late;
+                events.push((number, Supervision::Late));
+            }
+        }
+        for (board, change) in events {
+            self.event(Event::Supervision { board, change });
+        }
+        lost.into_iter().for_each(|number| self.on_lost(number));
+        self.repeat_inputs();
+    }
+
+    fn send_alive(&mut self) {
+        let mode = self.profile.alive_mode;
+        let everybody = self.profile.everybody();
+        if mode != AliveMode::Unicast
+            && let Some(everybody) = everybody
+        {
+            self.urgent(everybody, ToBoard::Alive);
+        }
+        if mode != AliveMode::Broadcast || everybody.is_none() {
+            let known: Vec<u8> = self.boards.iter().filter(|(_, b)| b.info.is_some()).map(|(n, _)| n).collect();
+            for number in known.into_iter().filter_map(Sequence::new) {
+                self.urgent(number, ToBoard::Alive);
+            }
+        }
+    }
+
+    /// The policy for a board whose life signs are gone; only a master stops boards.
+    fn on_lost(&mut self, board: u8) {
+        self.stop_inputs(board);
+        if self.session == Session::Quiet {
+            return;
+        }
+        match (self.profile.on_lost, self.profile.everybody()) {
+            (OnLost::Report, _) => {}
+            (OnLost::StopAll, Some(everybody)) => self.urgent(everybody, ToBoard::Admin(Admin::default())),
+            (OnLost::StopAll, None) => {
+                let known: Vec<u8> = self.boards.iter().map(|(n, _)| n).collect();
+                for number in known.into_iter().filter_map(Sequence::new) {
+                    self.urgent(number, ToBoard::Admin(Admin::default()));
+                }
+            }
+            (OnLost::StopBoard, _) => {
+                if let Some(number) = Sequence::new(board) {
+                    self.urgent(number, ToBoard::Admin(Admin::default()));
+                }
+            }
+        }
+        if self.profile.on_lost == OnLost::StopAll {
+            let all: Vec<u8> = self.data.keys().copied().collect();
+            all.into_iter().for_each(|number| self.stop_inputs(number));
+        }
+    }
+
+    fn stop_inputs(&mut self, board: u8) {
+        if let Some(data) = self.data.get_mut(&board) {
+            data.repeat = None;
+        }
+    }
+
+    /// CI again every `ci.period`, so that a lost frame heals (D-34).
+    fn repeat_inputs(&mut self) {
+        if self.session == Session::Quiet {
+            return;
+        }
+        let due: Vec<u8> =
+            self.data.iter().filter(|(_, d)| d.repeat.is_some_and(|at| self.now >= at)).map(|(n, _)| *n).collect();
+        for board in due {
+            self.send_inputs(board);
+        }
+    }
+
+    /// All CI of a board, and the time of the next repetition.
+    pub(crate) fn send_inputs(&mut self, board: u8) {
+        let (Some(to), Some(data)) = (Sequence::new(board), self.data.get_mut(&board)) else { return };
+        if let Some(at) = data.repeat {
+            let next = at + self.times.ci;
+            data.repeat = Some(if self.now >= next { self.now + self.times.ci } else { next });
+        }
+        let packages: Vec<_> = crate::Packages::new(&data.ci).collect();
+        for package in packages {
+            self.queue(None, to, ToBoard::Ci(package), Forget::Nothing);
+        }
+    }
+
+    /// The package of CI with one word (it is atomic, D-34), at once.
+    pub(crate) fn send_input(&mut self, board: u8, index: u16) {
+        let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
+        if let Some(package) = crate::BufferPackage::at(&data.ci, index - index % 3) {
+            self.queue(None, to, ToBoard::Ci(package), Forget::Nothing);
+        }
+    }
+
+    /// When duties are due next.
+    pub(crate) fn duties_deadline(&self) -> Option<u64> {
+        let alive = match self.session {
+            Session::Quiet => None,
+            Session::Master { next_alive } => Some(next_alive),
+        };
+        let supervised = self.boards.iter().filter_map(|(_, board)| {
+            let at = board.alive_at?;
+            match board.life {
+                Life::Alive => Some(at + self.times.alive_late + 1),
+                Life::Late => Some(at + self.times.alive_lost),
+                Life::Unarmed | Life::Lost => None,
+            }
+        });
+        let quiet = self.session == Session::Quiet;
+        let inputs = self.data.values().filter_map(|data| data.repeat.filter(|_| !quiet));
+        alive.into_iter().chain(supervised).chain(inputs).min()
+    }
+
+    /// A frame from the bus.
+    pub(crate) fn received(&mut self, received: Result<Frame, Foreign>) {
+        let frame = match received.and_then(|frame| frame.address().map(|address| (frame, address))) {
+            Ok((frame, (function, number))) => {
+                self.statistics.received(self.now, &frame);
+                if self.is_pc(function, number, &frame) {
+                    return self.foreign_pc(function, number.number());
+                }
+                frame
+            }
+            Err(foreign) => return self.foreign(foreign),
+        };
+        match FromBoard::decode(&frame, &self.profile) {
+            Ok((from, FromBoard::Report(report))) => self.report(from, report),
+            Ok((from, message)) => self.board_says(from.number(), message),
+            Err(_) => self.statistics.undecodable += 1,
+        }
+    }
+
+    /// Whether only a PC can have sent it (D-08, D-12).
+    fn is_pc(&self, function: Function, number: Sequence, frame: &Frame) -> bool {
+        let everybody = number == self.profile.unnumbered();
+        match function {
+            Function::DumpIo => frame.dlc() == 0,
+            Function::Admin | Function::Alive => everybody,
+            _ => !function.from_board(),
+        }
+    }
+
+    fn report(&mut self, from: Sequence, report: Report) {
+        let message = FromBoard::Report(report);
+        let asked = self.now <= self.report_until;
+        self.deliver(from.number(), message);
+        if asked {
+            return;
+        }
+        let ucom_id = report.ucom_id;
+        match self.boards.with_ucom_id(ucom_id) {
+            Some(board) => {
+                let was_running = self.boards.get(board).is_some_and(|b| b.life != Life::Unarmed || b.running(self.now));
+                let known = self.boards.of(board);
+                if core::mem::replace(&mut known.rebooted, true) && !was_running {
+                    return;
+                }
+                known.application_ended();
+                known.info = known.info.map(|info| BoardInfo { status: Status(0), ..info });
+                self.forget_parameters(board);
+                self.event(Event::Supervision { board, change: Supervision::Rebooted { ucom_id } });
+                if was_running {
+                    self.on_lost(board);
+                }
+            }
+            None => {
+                let board = self.profile.unnumbered().number();
+                self.event(Event::Supervision { board, change: Supervision::UnknownRebooted { ucom_id } });
+            }
+        }
+    }
+
+    fn board_says(&mut self, from: u8, message: FromBoard) {
+        let now = self.now;
+        let unnumbered = from == self.profile.unnumbered().number();
+        if unnumbered {
+            // Without a number a board can only complain (D-06).
+            if let FromBoard::Error(code) = message {
+                let during = self.inboxes.keys().next().copied();
+                self.event(Event::BoardError { board: from, code, during });
+                self.deliver(from, message);
+            } else {
+                self.statistics.undecodable += 1;
+            }
+            return;
+        }
+        self.boards.of(from).last = Some((now, message.function()));
+        match message {
+            FromBoard::Alive => {
+                let board = self.boards.of(from);
+                board.alive_at = Some(now);
+                if core::mem::replace(&mut board.life, Life::Alive) == Life::Lost {
+                    self.event(Event::Supervision { board: from, change: Supervision::Back });
+                }
+            }
+            FromBoard::Error(code) => {
+                self.boards.of(from).error(now, code);
+                let during = self.owner(from);
+                self.event(Event::BoardError { board: from, code, during });
+            }
+            FromBoard::Admin(admin) => {
+                let board = self.boards.of(from);
+                if board.admin.replace(admin) != Some(admin) {
+                    self.event(Event::Admin { board: from, admin });
+                }
+                if !admin.run {
+                    self.stop_inputs(from);
+                }
+            }
+            FromBoard::So(package) => {
+                self.boards.of(from).so_at = Some(now);
+                let snapshot = self.data.get_mut(&from).and_then(|data| data.so.push(now, &package));
+                if let Some(snapshot) = snapshot.filter(|_| self.data.get(&from).is_some_and(|d| d.watched)) {
+                    let snapshot: Snapshot = snapshot;
+                    self.event(Event::Snapshot { board: from, snapshot });
+                }
+            }
+            FromBoard::Debug(payload) => {
+                let board = self.boards.of(from);
+                let assembler = board.debug.get_or_insert_with(|| Box::new(StringAssembler::new()));
+                let text = match assembler.push(now, &payload, &self.profile) {
+                    Assembled::Complete(text) => Some(text.to_string()),
+                    Assembled::Partial => None,
+                    Assembled::Refused => {
+                        board.bad_strings += 1;
+                        None
+                    }
+                };
+                if let Some(text) = text {
+                    self.event(Event::Debug { board: from, text });
+                }
+            }
+            // After PC_START it is an answer; another one means nothing by itself (D-30).
+            FromBoard::McaReady => self.boards.of(from).ready_count += 1,
+            _ => {}
+        }
+        self.deliver(from, message);
+    }
+
+    /// After a restart of its application nothing is known of a board's parameters (D-35).
+    pub(crate) fn forget_parameters(&mut self, board: u8) {
+        if let Some(data) = self.data.get_mut(&board) {
+            data.par.forget();
+            data.repeat = None;
+        }
+    }
+}

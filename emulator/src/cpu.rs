@@ -314,7 +314,7 @@ impl Machine {
             (0xF3AF, 0x8001) => (false, 4),
             _ => return self.fault(FaultKind::Undefined, pc),
         };
-        self.set(RegisterARM::PC, pc + length | 1);
+        self.set(RegisterARM::PC, (pc + length) | 1);
         if wfe {
             let core = &mut self.chip().core;
             if !core::mem::take(&mut core.event) {

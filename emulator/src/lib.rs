@@ -1,6 +1,7 @@
-//! An emulator of the controller board for tests.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod board;
 mod chip;
 pub mod clock;
 mod code;
@@ -19,12 +20,17 @@ mod rcc;
 mod scs;
 mod timer;
 mod usart;
+mod watch;
 
+pub use board::{Board, BoardConfig, Port};
 pub use chip::{Access, Chip};
 pub use cpu::Machine;
 pub use elf::{Elf, ElfError, Symbol};
 pub use gpio::{Gpio, Pin, PinChange};
+pub use jtc_sim::{FaultKind, SimConfig};
 pub use nvic::{FIRST_LINE, LINES};
+pub use observe::ResetCause;
 pub use rcc::Clocks;
 pub use unicorn_engine::RegisterARM;
 pub use usart::{Usart, WireByte};
+pub use watch::Counter;

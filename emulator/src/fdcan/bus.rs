@@ -176,7 +176,7 @@ impl Wire {
         };
         if outcome != Outcome::Good && !from_controller {
             // The sender repeats it.
-            self.queue.push(Queued { ready: start + length, frame: frame.clone() });
+            self.queue.push(Queued { ready: start + length, frame });
         }
         let entry = BusEntry { start, end: start + length, frame, from_controller, outcome };
         self.on_wire = Some(Transmission { entry, buffer });

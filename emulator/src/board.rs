@@ -1,0 +1,214 @@
+//! The board in its world: firmware, simulated arm with drives and gripper on the joint bus, a host on a serial line.
+use std::cell::{Ref, RefCell, RefMut};
+use std::rc::Rc;
+
+use can_link::{CanFrame, Id};
+use jtc_sim::{FaultKind, Plant, SimConfig};
+
+use crate::clock::{MICROSECOND, MILLISECOND, Time};
+use crate::cpu::Machine;
+use crate::elf::Elf;
+use crate::fdcan::{CanPeers, WireFault};
+use crate::gpio::Pin;
+use crate::usart::WireByte;
+
+/// Safety input and output of the Nucleo boards.
+const SAFETY: (Pin, Pin) = (Pin('D', 3), Pin('D', 4));
+
+/// A serial port of the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// Next to the connector of the host.
+    Usart2,
+    /// The ST-LINK's virtual port.
+    Usart3,
+}
+
+/// Settings of a [`Board`].
+#[derive(Clone, Debug)]
+pub struct BoardConfig {
+    /// Arm, drives and gripper; what belongs to the simulator's own controller and line is not used.
+    pub sim: SimConfig,
+    /// Nothing is connected to the joint bus.
+    pub no_bus: bool,
+    /// Rate of the hosts, bit/s.
+    pub baud: u32,
+    /// Safety input and safety output.
+    pub safety_pins: (Pin, Pin),
+    /// Seed of what RAM holds at first.
+    pub seed: u64,
+}
+
+impl Default for BoardConfig {
+    fn default() -> Self {
+        Self { sim: SimConfig::default(), no_bus: false, baud: 115_200, safety_pins: SAFETY, seed: 1 }
+    }
+}
+
+/// The plant as members of the bus.
+struct Nodes {
+    plant: Rc<RefCell<Plant>>,
+    answers: Vec<jtc_sim::ReadyAnswer>,
+}
+
+impl CanPeers for Nodes {
+    fn hear(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>) {
+        let id = u16::try_from(frame.id().value()).ok().filter(|_| !frame.is_extended() && frame.is_fd());
+        let Some(frame) = id.and_then(|id| jtc_bus::Frame::new(id, frame.data())) else { return };
+        self.plant.borrow_mut().hear(end / MICROSECOND, &frame, &mut self.answers);
+        for (delay, answer) in self.answers.drain(..) {
+            let frame =
+                Id::standard(u32::from(answer.id)).and_then(|id| CanFrame::fd_padded(id, answer.data()));
+            // Every frame of the joint bus has such an id and length.
+            let Ok(frame) = frame else { continue };
+            answers.push((end + u64::from(delay) * MICROSECOND, frame.with_brs(true)));
+        }
+    }
+
+    fn acknowledge(&self) -> bool {
+        self.plant.borrow().acknowledges()
+    }
+}
+
+/// Machine and world, one millisecond after the other.
+pub struct Board {
+    /// The machine.
+    pub machine: Machine,
+    plant: Rc<RefCell<Plant>>,
+    faults: Vec<FaultKind>,
+    safety: (Pin, Pin),
+    ms: u64,
+}
+
+impl Board {
+    /// Power is switched on everywhere.
+    pub fn new(elf: Elf, config: &BoardConfig) -> Self {
+        let plant = Rc::new(RefCell::new(Plant::new(&config.sim)));
+        let mut machine = Machine::new(elf, config.seed);
+        let chip = machine.chip();
+        if !config.no_bus {
+            let nodes = Nodes { plant: Rc::clone(&plant), answers: Vec::new() };
+            chip.fdcan.wire.peers = Some(Box::new(nodes));
+        }
+        for usart in &mut chip.usarts {
+            usart.host_baud = config.baud;
+        }
+        chip.gpio.drive(config.safety_pins.0, Some(true));
+        Self { machine, plant, faults: Vec::new(), safety: config.safety_pins, ms: 0 }
+    }
+
+    /// Milliseconds since power-on.
+    pub fn now_ms(&self) -> u64 {
+        self.ms
+    }
+
+    /// One millisecond of everything: first the machine and the bus, then drives and arm.
+    pub fn step(&mut self) {
+        self.ms += 1;
+        self.machine.run_until(self.ms * MILLISECOND);
+        let safety = self.safety_output() == Some(true);
+        self.plant.borrow_mut().step(safety);
+    }
+
+    /// Many milliseconds.
+    pub fn run_ms(&mut self, ms: u64) {
+        for _ in 0..ms {
+            self.step();
+        }
+    }
+
+    /// Steps until `done` says so, at most `ms` milliseconds; whether it did.
+    pub fn run_while(&mut self, ms: u64, mut go_on: impl FnMut(&mut Self) -> bool) -> bool {
+        for _ in 0..ms {
+            if !go_on(self) {
+                return true;
+            }
+            self.step();
+        }
+        !go_on(self)
+    }
+
+    /// The arm and its drives.
+    pub fn plant(&self) -> Ref<'_, Plant> {
+        self.plant.borrow()
+    }
+
+    /// The arm and its drives, to change something.
+    pub fn plant_mut(&mut self) -> RefMut<'_, Plant> {
+        self.plant.borrow_mut()
+    }
+
+    /// Begin a fault of a node, of the arm, of the safety input or of the bus; `FaultKind`s of the simulator's own serial
+    /// line and tick do nothing here.
+    pub fn inject(&mut self, kind: FaultKind) {
+        self.plant.borrow_mut().begin(kind);
+        self.faults.push(kind);
+        self.apply_faults();
+    }
+
+    /// End a fault.
+    pub fn heal(&mut self, kind: FaultKind) {
+        self.faults.retain(|&k| k != kind);
+        self.apply_faults();
+    }
+
+    fn apply_faults(&mut self) {
+        self.plant.borrow_mut().set_faults(self.faults.iter().copied());
+        let has = |kind| self.faults.contains(&kind);
+        let fault = WireFault {
+            cut: has(FaultKind::NoAcknowledge),
+            destroy_all: has(FaultKind::BusOff),
+            ..self.machine.chip().fdcan.wire.fault
+        };
+        let input = !has(FaultKind::SafetyInput);
+        let chip = self.machine.chip();
+        chip.fdcan.wire.fault = fault;
+        chip.gpio.drive(self.safety.0, Some(input));
+    }
+
+    /// Drive the safety input; `None`: the wire is broken.
+    pub fn set_safety_input(&mut self, level: Option<bool>) {
+        let pin = self.safety.0;
+        self.machine.chip().gpio.drive(pin, level);
+    }
+
+    /// Level of the safety output; `None` while the pin is not driven.
+    pub fn safety_output(&mut self) -> Option<bool> {
+        let pin = self.safety.1;
+        self.machine.chip().gpio.output(pin)
+    }
+
+    fn index(port: Port) -> usize {
+        match port {
+            Port::Usart2 => 0,
+            Port::Usart3 => 1,
+        }
+    }
+
+    /// Rate of the host at a port, bit/s.
+    pub fn set_baud(&mut self, port: Port, baud: u32) {
+        self.machine.chip().usarts[Self::index(port)].host_baud = baud;
+    }
+
+    /// The host sends bytes; they follow those that wait already.
+    pub fn write(&mut self, port: Port, bytes: &[u8]) {
+        let chip = self.machine.chip();
+        let now = chip.now();
+        chip.usarts[Self::index(port)].host_write(now, bytes);
+    }
+
+    /// Bytes of the host that are not through yet.
+    pub fn write_pending(&mut self, port: Port) -> usize {
+        self.machine.chip().usarts[Self::index(port)].host_pending()
+    }
+
+    /// Bytes that have reached the host since the last call, with their times.
+    pub fn read_timed(&mut self, port: Port) -> Vec<WireByte> {
+        self.machine.chip().usarts[Self::index(port)].take_output().collect()
+    }
+
+    /// Bytes that have reached the host since the last call.
+    pub fn read(&mut self, port: Port) -> Vec<u8> {
+        self.read_timed(port).into_iter().map(|b| b.byte).collect()
+    }
+}

@@ -1,0 +1,56 @@
+//! Observers by the names of the firmware's symbols, and its log.
+use crate::cpu::Machine;
+use crate::elf::ElfError;
+use crate::observe::Count;
+
+/// A counter of a function's instructions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Counter(usize);
+
+/// Where defmt's channel stands in the control block of RTT: behind the identifier and two counts.
+const RTT_CHANNEL: u32 = 24;
+
+impl Machine {
+    /// Count the instructions of a function from now on: its full name, or a part that no other symbol has. Functions that
+    /// the compiler has inlined have no symbol.
+    pub fn count(&mut self, name: &str) -> Result<Counter, ElfError> {
+        let entry = self.elf().symbol(name)?.address;
+        let chip = self.chip();
+        chip.code.watch(entry);
+        Ok(Counter(chip.observers.add_probe(entry)))
+    }
+
+    /// What was counted.
+    pub fn counted(&self, counter: Counter) -> Count {
+        self.uc.get_data().observers.probe(counter.0)
+    }
+
+    /// Contents of a variable.
+    pub fn symbol_bytes(&self, name: &str) -> Result<Vec<u8>, ElfError> {
+        let symbol = self.elf().symbol(name)?;
+        Ok(self.memory(symbol.address, symbol.size as usize).unwrap_or_default())
+    }
+
+    /// Change a variable's first bytes from outside, as a debugger does.
+    pub fn set_symbol(&mut self, name: &str, bytes: &[u8]) -> Result<(), ElfError> {
+        let symbol = self.elf().symbol(name)?;
+        self.poke(symbol.address, &bytes[..bytes.len().min(symbol.size as usize)]);
+        Ok(())
+    }
+
+    /// What the firmware has written into RTT's first channel since the last call, as a probe reads it: encoded by defmt.
+    pub fn defmt(&mut self) -> Vec<u8> {
+        let Ok(block) = self.elf().symbol("_SEGGER_RTT") else { return Vec::new() };
+        let at = block.address + RTT_CHANNEL;
+        let fields = [4, 8, 12, 16].map(|offset| self.word(at + offset).unwrap_or(0));
+        let [buffer, size, write, read] = fields;
+        if size == 0 || size > 0x10_0000 || write >= size || read >= size {
+            return Vec::new(); // not set up yet
+        }
+        let part = |from: u32, to: u32| self.memory(buffer + from, (to - from) as usize).unwrap_or_default();
+        let bytes =
+            if write >= read { part(read, write) } else { [part(read, size), part(0, write)].concat() };
+        self.poke(at + 16, &write.to_le_bytes());
+        bytes
+    }
+}

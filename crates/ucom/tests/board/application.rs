@@ -1,0 +1,207 @@
+//! Times and rates of a running board, beyond the acceptance table.
+
+use ucom::profile::CiLatch;
+use ucom::{Frame, FromBoard, Profile, StringAssembler};
+
+use crate::bus::{Bus, MS, frames};
+
+/// Debug texts in what was heard.
+fn texts(heard: &[Frame]) -> Vec<String> {
+    let profile = Profile::default();
+    let mut assembler = StringAssembler::<512>::new();
+    let mut texts = Vec::new();
+    for frame in heard {
+        if let Ok((_, FromBoard::Debug(payload))) = FromBoard::decode(frame, &profile)
+            && let ucom::Assembled::Complete(text) = assembler.push(0, &payload, &profile)
+        {
+            texts.push(text.to_string());
+        }
+    }
+    texts
+}
+
+/// D-05: answers on shared identifiers come 2 ms after the request, unasked ones after 1 to 8 ms, and not all
+/// boards at the same time.
+#[test]
+fn d05_shared_identifiers() {
+    let mut delays = std::collections::BTreeSet::new();
+    for flash_number in 1..40 {
+        let mut bus = Bus::new(&[flash_number], Profile::default());
+        bus.number(1);
+        bus.send("301#");
+        bus.run(50);
+        let at = |id: u16, bus: &Bus| bus.heard.iter().find(|(_, frame)| frame.id() == id).unwrap().0;
+        let delay = at(0x601, &bus) - at(0x501, &bus);
+        assert!((MS..=9 * MS).contains(&(delay + 200)), "{delay} µs");
+        delays.insert(delay / MS);
+        bus.take();
+        bus.send("601#00000100");
+        let asked = bus.now;
+        bus.run(10);
+        assert!((2 * MS..3 * MS).contains(&(at(0x601, &bus) - asked)));
+    }
+    assert!(delays.len() >= 6, "{delays:?}");
+}
+
+/// D-33: all outputs every 10 ms, ascending, as one snapshot.
+#[test]
+fn d33_outputs() {
+    let mut bus = Bus::running();
+    bus.heard.clear();
+    let start = bus.now;
+    for i in 0..50u16 {
+        bus.boards[0].application.so = vec![i; 4];
+        bus.run(10);
+    }
+    let outputs: Vec<_> = bus.heard.iter().filter(|(_, frame)| frame.id() == 0x381).collect();
+    assert_eq!(outputs.len(), 100);
+    for (i, pair) in outputs.chunks(2).enumerate() {
+        assert_eq!((pair[0].1.data()[0], pair[1].1.data()[0]), (0, 3));
+        assert_eq!(pair[0].1.data()[2], pair[1].1.data()[2], "one snapshot");
+        let late = (pair[0].0 - start) as i64 - 10 * MS as i64 * i as i64;
+        assert!((0..=10 * MS as i64).contains(&late), "{late}");
+    }
+}
+
+/// D-33: on a bus that cannot take them outputs are left out, never queued without bound.
+#[test]
+fn d33_outputs_on_a_blocked_bus() {
+    let mut bus = Bus::running();
+    bus.hold = |_| true;
+    bus.run(1000);
+    assert!(bus.boards[0].counters().so_skipped > 50);
+    bus.heard.clear();
+    bus.release();
+    bus.run(9);
+    assert!(bus.take().len() <= 6);
+}
+
+/// D-34: with the latch `last` inputs take effect together.
+#[test]
+fn d34_latch_last() {
+    let profile = Profile { ci_latch: CiLatch::Last, ..Profile::default() };
+    let mut bus = Bus::new(&[0x21], profile);
+    bus.boards[0].application =
+        ucom::node::memory::MemoryApplication::new("x", &["a", "b", "c", "d"], &[], &[]);
+    bus.number(1);
+    bus.send("301#");
+    bus.run(50);
+    bus.send("341#0000010002000300");
+    assert_eq!(bus.boards[0].application.latched_ci, [0; 4]);
+    bus.send("341#0300040000000000");
+    assert_eq!(bus.boards[0].application.latched_ci, [1, 2, 3, 4]);
+}
+
+/// D-38: texts only when wanted, at most 20 in any second.
+#[test]
+fn d38_debug_texts() {
+    let mut bus = Bus::started();
+    let text = |i: u32| format!("text {i}").into_bytes();
+    bus.boards[0].application.debug = (0..5).map(text).collect();
+    bus.run(100);
+    assert!(texts(&bus.take()).is_empty());
+    assert!(bus.boards[0].application.debug.is_empty(), "what nobody wants is dropped");
+    for flags in ["601#00000100", "601#00000001"] {
+        bus.send(flags);
+        bus.run(5);
+        bus.take();
+        let start = bus.now;
+        for i in 0..200 {
+            bus.boards[0].application.debug.push(text(i));
+            bus.run(10);
+        }
+        let heard = texts(&bus.take());
+        let seconds = (bus.now - start).div_ceil(1000 * MS) as usize;
+        assert!((20..=20 * (seconds + 1)).contains(&heard.len()), "{}", heard.len());
+        assert_eq!(heard[0], "text 0");
+        bus.run(1500);
+        bus.take();
+    }
+    assert!(bus.boards[0].counters().texts_dropped > 300);
+}
+
+/// D-50: the loss of the PC is said in words when texts are wanted; the debug flags stay.
+#[test]
+fn d50_text_when_the_pc_is_lost() {
+    let mut bus = Bus::started();
+    bus.send("601#01010100");
+    bus.run(1600);
+    let heard = bus.take();
+    assert_eq!(texts(&heard), ["PC alive lost"]);
+    assert!(heard.contains(&frames("601#00000100")[0]));
+}
+
+/// A board's life sign, every second while the application is up, and only then (D-51 is what the PC makes of it).
+#[test]
+fn d51_life_sign_of_the_board() {
+    let mut bus = Bus::started();
+    bus.run(10_000);
+    assert_eq!(bus.take(), vec![frames("681#")[0]; 10]);
+    bus.send("1C1#8000");
+    bus.run(3000);
+    assert_eq!(bus.take(), []);
+}
+
+/// Section 9: the same code at most ten times a second; others are not held up by it.
+#[test]
+fn d34_error_rate() {
+    let mut bus = Bus::started();
+    for i in 0..100 {
+        bus.send("341#FFFF0000");
+        if i == 50 {
+            bus.send("1C1#00");
+        }
+        bus.run(5);
+    }
+    let heard = bus.take();
+    assert_eq!(heard.iter().filter(|frame| frame.data() == [5]).count(), 10);
+    assert_eq!(heard.iter().filter(|frame| frame.data() == [7]).count(), 1);
+    assert_eq!(bus.boards[0].counters().errors_dropped, 90);
+}
+
+/// D-14: a request during its own answer is answered after it; strings are not mixed.
+#[test]
+fn d14_requests_during_their_answers() {
+    let mut bus = Bus::started();
+    let one = bus.ask("581#", 50);
+    bus.send("581#");
+    bus.run(3);
+    bus.send("581#");
+    bus.run(50);
+    assert_eq!(bus.take(), [one.clone(), one].concat());
+    let one = bus.ask("201#", 50);
+    bus.send("201#");
+    bus.send("201#");
+    bus.run(50);
+    assert_eq!(bus.take(), [one.clone(), one].concat());
+}
+
+/// D-34, D-35: the control loop is stepped at its period while it runs, and only then.
+#[test]
+fn d35_control_cycles() {
+    let mut bus = Bus::started();
+    bus.run(100);
+    assert_eq!(bus.boards[0].application.steps, 0);
+    bus.send("541#");
+    bus.run(100);
+    let steps = bus.boards[0].application.steps;
+    assert!((99..=101).contains(&steps), "{steps}");
+    bus.send("601#00000000");
+    bus.run(100);
+    assert_eq!(bus.boards[0].application.steps, steps);
+}
+
+/// Errors 6 and 8 come from the controller.
+#[test]
+fn controller_troubles_are_told() {
+    let mut bus = Bus::initialised();
+    let now = bus.now;
+    bus.boards[0].overrun(now);
+    bus.run(1);
+    assert_eq!(bus.take(), frames("081#08"));
+    bus.send("281#");
+    let frame = bus.boards[0].poll(bus.now).unwrap();
+    bus.boards[0].not_sent(bus.now, &frame);
+    bus.run(5);
+    assert_eq!(bus.take(), frames("0C1#01 081#06"), "INITACK is sent again");
+}

@@ -1,0 +1,278 @@
+//! A chain of boards on an in-memory bus, in virtual time.
+
+use ucom::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+use ucom::node::{Node, NodeConfig, Record};
+use ucom::{BoardInfo, Frame, Header, Profile, checksum, data_block};
+
+pub type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
+
+pub const MS: u64 = 1000;
+
+/// Boards, and what is on the bus with them.
+pub struct Bus {
+    pub boards: Vec<Board>,
+    pub now: u64,
+    /// What the boards sent and when, since the last look.
+    pub heard: Vec<(u64, Frame)>,
+    /// Every DSP_ERROR so far.
+    pub errors: Vec<Frame>,
+    /// Frames that the bus holds back: their boards wait for `sent`.
+    pub hold: fn(&Frame) -> bool,
+    pub held: Vec<(usize, Frame)>,
+    /// Frames to boards counted from 0; this one is lost.
+    pub lose_to_boards: Option<usize>,
+    pub frames_to_boards: usize,
+    /// Frames from boards counted from 0; this one is lost (the board saw it leave).
+    pub lose_from_boards: Option<usize>,
+    pub frames_from_boards: usize,
+}
+
+/// Worst-case duration of a classic frame at 1 Mbit/s, µs.
+pub fn duration(frame: &Frame) -> u64 {
+    55 + 10 * u64::from(frame.dlc())
+}
+
+pub fn application() -> MemoryApplication {
+    MemoryApplication::new(
+        "UCoM2 head pan",
+        &["pos_soll", "velocity"],
+        &["pos_ist", "current", "temp", "state"],
+        &["kp", "ki", "mode"],
+    )
+}
+
+/// The application of the golden vectors: Program ID 0x1234, 2008-03-14.
+pub const GOLDEN: Record = Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 };
+
+impl Bus {
+    /// Boards with these flash numbers, programmed, powered up at time 0 and ready to listen.
+    pub fn new(flash_numbers: &[u16], profile: Profile) -> Self {
+        let mut boards = Vec::new();
+        for (flash_number, pins) in flash_numbers.iter().zip(WirePins::chain(flash_numbers.len())) {
+            let mut flash = MemoryFlash::default();
+            flash.install(GOLDEN, &[0x11; 8]);
+            let store = MemoryStore { description: b"UCoM2 head pan".to_vec(), ..MemoryStore::default() };
+            let config = NodeConfig { profile, ..NodeConfig::new(*flash_number) };
+            boards.push(Node::new(config, flash, pins, store, application(), 0));
+        }
+        let mut bus = Self {
+            boards,
+            now: 0,
+            heard: Vec::new(),
+            errors: Vec::new(),
+            hold: |_| false,
+            held: Vec::new(),
+            lose_to_boards: None,
+            frames_to_boards: 0,
+            lose_from_boards: None,
+            frames_from_boards: 0,
+        };
+        bus.run(50);
+        assert!(bus.heard.is_empty(), "nothing is said at power-up");
+        bus
+    }
+
+    pub fn one() -> Self {
+        Self::new(&[0x21], Profile::default())
+    }
+
+    /// One board with number 1 and its pin on, nothing in `heard`.
+    pub fn initialised() -> Self {
+        let mut bus = Self::one();
+        bus.number(1);
+        bus
+    }
+
+    /// One board whose application is up.
+    pub fn started() -> Self {
+        let mut bus = Self::initialised();
+        bus.send("301#");
+        bus.run(50);
+        assert_eq!(bus.take(), frames("501# 681# 601#00000000"));
+        bus
+    }
+
+    /// One board whose control loop runs.
+    pub fn running() -> Self {
+        let mut bus = Self::started();
+        bus.send("541#");
+        bus.run(5);
+        assert_eq!(bus.take(), frames("601#01000000"));
+        bus
+    }
+
+    /// Gives the next board its number.
+    pub fn number(&mut self, number: u8) {
+        self.send(&format!("{:03X}#", 0x280 + u16::from(number)));
+        self.run(5);
+        self.send(&format!("{:03X}#0202", 0x1C0 + u16::from(number)));
+        self.run(1);
+        assert_eq!(self.take(), frames(&format!("{:03X}#{number:02X}", 0x0C0 + u16::from(number))));
+    }
+
+    /// A frame of the PC, put on the bus now.
+    pub fn send(&mut self, text: &str) {
+        self.send_frame(&text.parse().unwrap_or_else(|e| panic!("{text}: {e}")));
+    }
+
+    pub fn send_frame(&mut self, frame: &Frame) {
+        self.run_us(duration(frame));
+        let number = self.frames_to_boards;
+        self.frames_to_boards += 1;
+        if self.lose_to_boards == Some(number) {
+            return;
+        }
+        for board in &mut self.boards {
+            board.receive(self.now, frame);
+        }
+        self.check();
+    }
+
+    /// Lets milliseconds pass.
+    pub fn run(&mut self, ms: u64) {
+        self.run_us(ms * MS);
+    }
+
+    pub fn run_us(&mut self, us: u64) {
+        let end = self.now + us;
+        // Steps that end without a frame; far more than there are reasons to wake up.
+        let mut quiet = 0;
+        loop {
+            let now = self.now;
+            // Arbitration: every board offers a frame, the lowest identifier goes first, the rest wait.
+            let mut offers: Vec<(u16, usize, Frame)> = Vec::new();
+            for (i, board) in self.boards.iter_mut().enumerate() {
+                if let Some(frame) = board.poll(now) {
+                    offers.push((frame.id(), i, frame));
+                }
+            }
+            offers.sort_by_key(|(id, ..)| *id);
+            self.check();
+            for (_, i, frame) in offers {
+                if (self.hold)(&frame) {
+                    self.held.push((i, frame));
+                    continue;
+                }
+                self.now += duration(&frame);
+                self.boards[i].sent(self.now, &frame);
+                self.heard.push((self.now, frame));
+                if (0x080..0x0A0).contains(&frame.id()) {
+                    self.errors.push(frame);
+                }
+                let number = self.frames_from_boards;
+                self.frames_from_boards += 1;
+                if self.lose_from_boards == Some(number) {
+                    self.heard.pop();
+                }
+                for (other, board) in self.boards.iter_mut().enumerate() {
+                    if other != i {
+                        board.receive(self.now, &frame);
+                    }
+                }
+                quiet = 0;
+            }
+            let next = self.boards.iter().map(Board::next_deadline).min().unwrap_or(u64::MAX);
+            if next > end || self.now >= end {
+                break;
+            }
+            quiet += 1;
+            assert!(quiet < 100_000, "a board wakes up without end at {next}, now {}", self.now);
+            self.now = self.now.max(next);
+        }
+        self.now = self.now.max(end);
+        self.check();
+    }
+
+    /// What was held back leaves now.
+    pub fn release(&mut self) {
+        self.hold = |_| false;
+        for (i, frame) in std::mem::take(&mut self.held) {
+            self.boards[i].sent(self.now, &frame);
+            self.heard.push((self.now, frame));
+        }
+    }
+
+    /// The invariants of the status byte (D-20), always.
+    pub fn check(&self) {
+        for board in &self.boards {
+            let status = board.status();
+            assert_eq!(status.contradiction(), None, "{status} at {}", self.now);
+        }
+    }
+
+    /// What was heard since the last look.
+    pub fn take(&mut self) -> Vec<Frame> {
+        std::mem::take(&mut self.heard).into_iter().map(|(_, frame)| frame).collect()
+    }
+
+    /// Sends, waits and returns what was heard from the sending on.
+    pub fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
+        self.heard.clear();
+        self.send(text);
+        self.run(ms);
+        self.take()
+    }
+
+    /// DSP_INFO of board `n`; `None` without an answer.
+    pub fn info(&mut self, n: u8) -> Option<BoardInfo> {
+        let id = 0x140 + u16::from(n);
+        let endian = self.boards[0].config().profile.endian;
+        let heard = self.ask(&format!("{:03X}#", 0x200 + u16::from(n)), 20);
+        let first = heard.iter().find(|frame| frame.id() == id)?;
+        BoardInfo::parse(&first.payload(), endian)
+    }
+
+    /// Status byte of board `n` by PC_INFO.
+    pub fn status(&mut self, n: u8) -> u8 {
+        self.info(n).unwrap_or_else(|| panic!("board {n} does not answer")).status.0
+    }
+
+    /// Sends a block in frames 200 µs apart and waits for an answer of board 1; returns what came.
+    pub fn block(&mut self, block: &[u8; 64], wait_ms: u64) -> Vec<Frame> {
+        self.heard.clear();
+        for data in block.chunks_exact(8) {
+            self.send_frame(&Frame::new(0x2C1, data).unwrap());
+            self.run_us(70);
+        }
+        for _ in 0..wait_ms {
+            if !self.heard.is_empty() {
+                break;
+            }
+            self.run(1);
+        }
+        self.take()
+    }
+}
+
+/// Frames in candump's form, separated by blanks.
+pub fn frames(text: &str) -> Vec<Frame> {
+    text.split_whitespace().map(|frame| frame.parse().unwrap()).collect()
+}
+
+/// The image of the golden vectors: 1000 bytes.
+pub fn image() -> Vec<u8> {
+    (0..1000).map(|i| (37 * i + 11) as u8).collect()
+}
+
+/// The header of an image for any board.
+pub fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
+    Header {
+        cycle,
+        memory: 0,
+        address: 0,
+        length: (image.len() / 2) as u32,
+        program_id: checksum(profile.prog_checksum, profile.prog_endian, image),
+        date: 0x3AC1,
+        target: Header::ANY_BOARD,
+    }
+}
+
+/// All blocks of both cycles, headers included.
+pub fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
+    let mut all = Vec::new();
+    for cycle in 1..=2 {
+        all.push(header(image, cycle, profile).build(profile.prog_endian));
+        all.extend((0..).map_while(|i| data_block(image, i)));
+    }
+    all
+}

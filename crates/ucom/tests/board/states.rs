@@ -1,0 +1,314 @@
+//! The state table, row by row: each event in each state.
+
+use ucom::node::Phase;
+use ucom::{Frame, Profile, Status};
+
+use crate::bus::{Bus, blocks, frames, image};
+
+/// The columns of the table; S3x and S4 are told apart from their neighbours.
+const STATES: [Phase; 7] = [
+    Phase::Uninitialised,
+    Phase::Idle,
+    Phase::Programming,
+    Phase::Aborted,
+    Phase::Starting,
+    Phase::Ready,
+    Phase::Running,
+];
+
+/// Board 1 (flash number 0x21) in a state, with nothing waiting on the bus.
+fn in_state(phase: Phase) -> Bus {
+    let mut bus = match phase {
+        Phase::Uninitialised => Bus::one(),
+        Phase::Ready => Bus::started(),
+        Phase::Running => Bus::running(),
+        _ => Bus::initialised(),
+    };
+    match phase {
+        Phase::Programming => bus.send("041#"),
+        Phase::Aborted => {
+            bus.send("041#");
+            bus.send("2C1#00");
+            bus.run(1);
+        }
+        Phase::Starting => {
+            bus.boards[0].application.start_us = 1_000_000;
+            bus.send("301#");
+        }
+        _ => {}
+    }
+    assert_eq!(bus.boards[0].phase(), phase);
+    bus.take();
+    bus
+}
+
+/// What came of an event.
+struct Seen {
+    phase: Phase,
+    /// What was said within 9 ms, before the first transfer of the outputs.
+    said: Vec<Frame>,
+}
+
+fn event(phase: Phase, text: &str) -> Seen {
+    let mut bus = in_state(phase);
+    // In S6 the outputs go out every 10 ms; they are no answers.
+    let said = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
+    Seen { phase: bus.boards[0].phase(), said }
+}
+
+/// `expected` gives for each state the state after the event and what is said.
+fn row(text: &str, expected: impl Fn(Phase) -> (Phase, &'static str)) {
+    for phase in STATES {
+        let seen = event(phase, text);
+        let (after, said) = expected(phase);
+        assert_eq!(seen.phase, after, "{text} in {phase:?}");
+        assert_eq!(seen.said, frames(said), "{text} in {phase:?}");
+    }
+}
+
+use Phase::*;
+
+#[test]
+fn d23_pc_reset_in_every_state() {
+    for phase in STATES {
+        for text in ["000#", "001#"] {
+            let mut bus = in_state(phase);
+            bus.boards[0].application.active = phase == Running;
+            let heard = bus.ask(text, 500);
+            if text == "001#" && phase == Uninitialised {
+                assert_eq!(heard, [], "nobody has this number");
+                continue;
+            }
+            let expected = frames("441#21");
+            let reports: Vec<_> = heard.into_iter().filter(|frame| frame.id() != 0x381).collect();
+            assert_eq!(reports, expected, "{text} in {phase:?}");
+            assert_eq!(bus.boards[0].status(), Status(0x11));
+            assert_eq!(bus.boards[0].phase(), Uninitialised);
+            let application = &bus.boards[0].application;
+            assert!(!application.active && !application.running && application.started_us.is_none());
+        }
+    }
+}
+
+#[test]
+fn d07_pc_report_in_every_state() {
+    for phase in STATES {
+        let mut bus = in_state(phase);
+        let status = bus.boards[0].status();
+        let heard = bus.ask("240#", 40);
+        assert_eq!(heard.iter().filter(|frame| **frame == frames("441#21")[0]).count(), 1, "{phase:?}");
+        assert_eq!(bus.boards[0].status(), status, "{phase:?}");
+    }
+}
+
+#[test]
+fn d24_pc_init_in_every_state() {
+    row("281#", |phase| (if phase == Uninitialised { Idle } else { phase }, "0C1#01"));
+    row("282#", |phase| if phase == Uninitialised { (Idle, "0C2#02") } else { (phase, "") });
+    // 0 is everybody, not a board.
+    row("280#", |phase| (phase, ""));
+    let mut bus = Bus::one();
+    bus.boards[0].pins.input.store(false, std::sync::atomic::Ordering::SeqCst);
+    assert_eq!(bus.ask("281#", 100), [], "the incoming pin is off");
+    assert_eq!(bus.boards[0].status(), Status(0x10));
+}
+
+#[test]
+fn d04_pc_info_in_every_state() {
+    for phase in STATES {
+        for text in ["201#", "200#"] {
+            let mut bus = in_state(phase);
+            let heard: Vec<_> = bus.ask(text, 9).into_iter().filter(|frame| frame.id() == 0x141).collect();
+            assert_eq!(heard.len(), if phase == Uninitialised { 0 } else { 4 }, "{text} in {phase:?}");
+        }
+    }
+}
+
+#[test]
+fn d23_xreset_in_every_state() {
+    let after = |phase| if phase == Uninitialised { phase } else { Programming };
+    row("041#", |phase| (after(phase), ""));
+    row("040#", |phase| (after(phase), ""));
+    for phase in STATES {
+        let mut bus = in_state(phase);
+        bus.send("041#");
+        let expected = if phase == Uninitialised { 0x11 } else { 0x1F };
+        assert_eq!(bus.boards[0].status(), Status(expected), "number and pin survive, {phase:?}");
+        assert!(!bus.boards[0].application.active);
+    }
+}
+
+#[test]
+fn d22_set_status_prog_in_every_state() {
+    row("1C1#0404", |phase| (if phase == Idle { Programming } else { phase }, ""));
+    row("1C1#0400", |phase| match phase {
+        Programming | Aborted => (Idle, ""),
+        other => (other, ""),
+    });
+    // PROG 0→1 is what an aborted transfer needs.
+    let mut bus = in_state(Aborted);
+    bus.send("1C1#0400");
+    bus.send("1C1#0404");
+    assert_eq!(bus.boards[0].phase(), Programming);
+}
+
+#[test]
+fn d22_set_status_mstart_in_every_state() {
+    row("1C1#8080", |phase| match phase {
+        Idle | Programming | Aborted => (Starting, ""),
+        other => (other, ""),
+    });
+    row("1C1#8000", |phase| match phase {
+        Starting | Ready | Running => (Idle, ""),
+        other => (other, ""),
+    });
+}
+
+#[test]
+fn d22_set_status_init_in_every_state() {
+    row("1C1#0800", |_| (Uninitialised, ""));
+    for phase in STATES {
+        let mut bus = in_state(phase);
+        bus.send("1C1#0800");
+        assert_eq!(bus.boards[0].status(), Status(0x11), "{phase:?}");
+        assert!(!bus.boards[0].application.active);
+    }
+    // 0→1 gives no number.
+    row("1C1#0808", |phase| (phase, ""));
+}
+
+#[test]
+fn d43_pc_prog_in_every_state() {
+    row("2C1#4355010001000000", |phase| match phase {
+        Idle | Starting | Ready | Running => (phase, "081#02"),
+        other => (other, ""),
+    });
+    row("2C0#4355010001000000", |phase| (phase, ""));
+    row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
+}
+
+#[test]
+fn d30_pc_start_in_every_state() {
+    row("301#", |phase| match phase {
+        Idle | Programming | Aborted => (Starting, ""),
+        Ready | Running => (phase, "501#"),
+        other => (other, ""),
+    });
+    row("300#", |phase| match phase {
+        Idle | Programming | Aborted => (Starting, ""),
+        Ready | Running => (phase, "501#"),
+        other => (other, ""),
+    });
+}
+
+#[test]
+fn d30_mca_pc_start_in_every_state() {
+    row("541#", |phase| match phase {
+        Ready | Running => (Running, "601#01000000"),
+        other => (other, ""),
+    });
+    row("540#", |phase| match phase {
+        Ready | Running => (Running, "601#01000000"),
+        other => (other, ""),
+    });
+}
+
+#[test]
+fn d37_admin_in_every_state() {
+    row("601#00000000", |phase| match phase {
+        Ready | Running => (Ready, "601#00000000"),
+        other => (other, ""),
+    });
+    row("601#01010000", |phase| match phase {
+        Ready | Running => (Running, "601#01010000"),
+        other => (other, ""),
+    });
+    // active needs run; the other flags do not.
+    row("600#00010101", |phase| match phase {
+        Ready | Running => (Ready, "601#00000101"),
+        other => (other, ""),
+    });
+}
+
+#[test]
+fn d34_d35_inputs_and_parameters_in_every_state() {
+    for phase in STATES {
+        for text in ["341#010007000000", "3C1#010007000000"] {
+            let mut bus = in_state(phase);
+            let heard: Vec<_> = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
+            assert_eq!(heard, [], "{text} in {phase:?}");
+            let application = &bus.boards[0].application;
+            let taken = application.latched_ci[1] == 7 || application.par[1] == 7;
+            assert_eq!(taken, matches!(phase, Ready | Running), "{text} in {phase:?}");
+        }
+        // Not to everybody.
+        let mut bus = in_state(phase);
+        bus.send("340#010007000000");
+        bus.send("3C0#010007000000");
+        assert_eq!(bus.boards[0].application.latched_ci[1] + bus.boards[0].application.par[1], 0);
+    }
+}
+
+/// D-36: dumps exist only while the application is up, and never to everybody.
+#[test]
+fn d36_dumps_in_every_state() {
+    for phase in STATES {
+        for (text, id) in [("581#", 0x581), ("5C1#", 0x6C1)] {
+            let mut bus = in_state(phase);
+            let some = bus.ask(text, 9).iter().any(|frame| frame.id() == id);
+            assert_eq!(some, matches!(phase, Ready | Running), "{text} in {phase:?}");
+        }
+        let mut bus = in_state(phase);
+        bus.send("580#");
+        let heard = bus.ask("5C0#", 9);
+        assert!(heard.iter().all(|frame| frame.id() == 0x381), "{phase:?}");
+    }
+}
+
+/// D-26: a board that reboots by itself says so, once.
+#[test]
+fn d26_spontaneous_report() {
+    for phase in STATES {
+        let mut bus = in_state(phase);
+        let now = bus.now;
+        bus.boards[0].restart(now);
+        bus.run(1000);
+        assert_eq!(bus.take(), frames("441#21"), "{phase:?}");
+        assert_eq!(bus.boards[0].status(), Status(0x11));
+    }
+}
+
+/// D-21: the pin changes only by PC_SETSTATUS, and falls with the number.
+#[test]
+fn d21_pin_of_the_next_board() {
+    let mut bus = Bus::new(&[0x21, 0x42], Profile::default());
+    bus.ask("281#", 10);
+    let out = |bus: &Bus| bus.boards[1].status().has(Status::IPINIT);
+    assert!(!out(&bus));
+    bus.send("1C1#0202");
+    assert!(out(&bus));
+    bus.send("041#");
+    assert!(out(&bus), "PC_XRESET keeps it");
+    bus.send("001#");
+    assert!(!out(&bus));
+}
+
+/// D-42, D-43: between the cycles and after a cancelled transfer the board is in a state that the table has.
+#[test]
+fn d43_cancel_and_again() {
+    let mut bus = in_state(Programming);
+    let all = blocks(&image(), &Profile::default());
+    for block in &all[..9] {
+        assert_eq!(bus.block(block, 5), frames("181#"));
+    }
+    bus.send("2C1#0011223344556677");
+    bus.send("1C1#0400");
+    assert_eq!(bus.boards[0].phase(), Idle);
+    bus.run(300);
+    assert_eq!(bus.take(), [], "the frame of the cancelled block is forgotten");
+    bus.send("041#");
+    for (i, block) in all.iter().enumerate() {
+        assert_eq!(bus.block(block, 200).len(), 1, "block {i}");
+    }
+    assert_eq!(bus.boards[0].record().unwrap().program_id, 0x4B3F);
+}

@@ -1,0 +1,315 @@
+//! Updates with trouble: power loss at each flash operation, each frame lost once, failing flash; other plans.
+
+use ucom::node::Phase;
+use ucom::profile::{Endian, HeaderForm, Plan};
+use ucom::{Checksum, Memory, Profile, Status};
+
+use crate::bus::{Bus, GOLDEN, blocks, frames, header, image};
+
+/// 200 bytes: four data blocks, the last one short.
+fn small() -> Vec<u8> {
+    (0..200u32).map(|i| (i * i % 251) as u8).collect()
+}
+
+/// Sends everything as a PC without eyes would, waiting for an answer to each block; `true` when FINISHED came.
+fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
+    bus.send("041#");
+    bus.run(1);
+    let mut finished = false;
+    for block in all {
+        let heard = bus.block(block, 100);
+        finished |= heard.contains(&frames("101#")[0]);
+        if heard.is_empty() && bus.boards[0].flash.is_dark() {
+            return false;
+        }
+    }
+    finished
+}
+
+/// Whether what the board calls valid is a whole image: the old one or the new one.
+fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
+    let board = &bus.boards[0];
+    let stored = board.flash.bytes(Memory::Program);
+    match board.record() {
+        None => {}
+        Some(record) if record == GOLDEN => assert_eq!(stored[..8], [0x11; 8], "{context}"),
+        Some(_) => assert_eq!(stored[..new.len()], *new, "{context}"),
+    }
+}
+
+/// D-45, D-46: the power goes in the middle of each flash operation in turn.
+#[test]
+fn d45_power_loss_at_every_flash_operation() {
+    let image = small();
+    let all = blocks(&image, &Profile::default());
+    let mut whole = Bus::initialised();
+    assert!(update(&mut whole, &all));
+    let operations = whole.boards[0].flash.operations;
+    // Record cleared, area erased, four blocks, record written.
+    assert_eq!(operations, 7);
+    for cut in 0..operations {
+        let mut bus = Bus::initialised();
+        bus.boards[0].flash.cut_after = Some(cut);
+        assert!(!update(&mut bus, &all), "cut {cut}");
+        assert!(bus.boards[0].flash.is_dark());
+        bus.boards[0].flash.power_up();
+        let now = bus.now;
+        bus.boards[0].power_up(now);
+        bus.run(100);
+        assert_eq!(bus.boards[0].status(), Status(0x11), "cut {cut}: S1");
+        assert_no_half_image(&bus, &image, &format!("cut {cut}"));
+        assert!(!bus.boards[0].has_application(), "cut {cut}");
+        // And it can be programmed again.
+        bus.take();
+        bus.number(1);
+        assert!(update(&mut bus, &all), "again after cut {cut}");
+        assert_no_half_image(&bus, &image, "again");
+        assert_ne!(bus.boards[0].record(), Some(GOLDEN));
+    }
+}
+
+/// D-46: power loss in cycle 1 changes nothing.
+#[test]
+fn d46_power_loss_in_the_first_cycle() {
+    let all = blocks(&small(), &Profile::default());
+    for count in 0..=5 {
+        let mut bus = Bus::initialised();
+        bus.send("041#");
+        for block in &all[..count] {
+            bus.block(block, 5);
+        }
+        let now = bus.now;
+        bus.boards[0].power_up(now);
+        bus.run(100);
+        assert_eq!(bus.boards[0].record(), Some(GOLDEN));
+        assert_eq!(bus.boards[0].flash.operations, 0);
+    }
+}
+
+/// D-43, D-44: each single frame of an update lost, in both directions.
+#[test]
+fn d43_every_frame_lost_once() {
+    let image = small();
+    let all = blocks(&image, &Profile::default());
+    let mut whole = Bus::initialised();
+    let first = whole.frames_to_boards;
+    let first_answer = whole.frames_from_boards;
+    assert!(update(&mut whole, &all));
+    assert_eq!(whole.frames_to_boards - first, 1 + 8 * 10);
+    for lost in first..whole.frames_to_boards {
+        let mut bus = Bus::initialised();
+        bus.lose_to_boards = Some(lost);
+        // Without PC_XRESET nothing is taken at all; without a data frame the checks fail.
+        assert!(!update(&mut bus, &all), "lost {}", lost - first);
+        bus.run(1000);
+        assert_no_half_image(&bus, &image, &format!("lost {}", lost - first));
+        let errors: Vec<_> = bus.errors.iter().map(|frame| frame.data()[0]).collect();
+        assert_eq!(errors.len(), 1, "lost {}: {errors:?}", lost - first);
+        // The next attempt succeeds.
+        assert!(update(&mut bus, &all), "again after {}", lost - first);
+    }
+    // A lost answer does not change what the board did.
+    for lost in first_answer..whole.frames_from_boards {
+        let mut bus = Bus::initialised();
+        bus.lose_from_boards = Some(lost);
+        update(&mut bus, &all);
+        assert_no_half_image(&bus, &image, "lost answer");
+        assert_ne!(bus.boards[0].record(), Some(GOLDEN));
+    }
+}
+
+/// Error 3, and whose application is then valid.
+#[test]
+fn d45_failing_flash() {
+    let all = blocks(&small(), &Profile::default());
+    for failing in 0..7 {
+        let mut bus = Bus::initialised();
+        bus.boards[0].flash.fail_after = Some(failing);
+        assert!(!update(&mut bus, &all));
+        assert_eq!(bus.errors, frames("081#03"), "operation {failing}");
+        assert!(!bus.boards[0].has_application());
+        assert_eq!(bus.boards[0].phase(), Phase::Aborted);
+        bus.boards[0].flash.fail_after = None;
+        assert!(update(&mut bus, &all));
+    }
+}
+
+/// D-42: READY after the header of cycle 2 waits for the erase; the board answers meanwhile.
+#[test]
+fn d42_long_erase_blocks_nothing() {
+    let all = blocks(&small(), &Profile::default());
+    let mut bus = Bus::initialised();
+    bus.boards[0].flash.erase_us = 8_000_000;
+    bus.send("041#");
+    for block in &all[..5] {
+        assert_eq!(bus.block(block, 5), frames("181#"));
+    }
+    assert_eq!(bus.block(&all[5], 100), []);
+    for _ in 0..7 {
+        assert_eq!(bus.status(1), 0x1F);
+        bus.run(1000);
+        assert_eq!(bus.take(), []);
+    }
+    bus.run(1000);
+    assert_eq!(bus.take(), frames("181#"));
+    // A reset in the middle of an erase: the board listens when the flash is done.
+    let mut bus = Bus::initialised();
+    bus.boards[0].flash.erase_us = 8_000_000;
+    bus.send("041#");
+    for block in &all[..6] {
+        bus.block(block, 5);
+    }
+    assert_eq!(bus.ask("000#", 1000), []);
+    bus.run(8000);
+    assert_eq!(bus.take(), frames("441#21"));
+    assert!(!bus.boards[0].has_application());
+}
+
+/// D-40: the plan exloader-app: RAM first, and the flash stays as it is until cycle 2.
+#[test]
+fn d40_exloader_then_application() {
+    let profile = Profile { prog_plan: Plan::ExloaderApp, ..Profile::default() };
+    let (exloader, image) = (vec![0x5A; 120], small());
+    let mut bus = Bus::new(&[0x21], profile);
+    bus.number(1);
+    let mut first = header(&exloader, 1, &profile);
+    first.memory = Memory::Ram.number();
+    let second = header(&image, 2, &profile);
+    bus.send("041#");
+    let one = [vec![first.build(Endian::Little)], data(&exloader)].concat();
+    for block in &one {
+        assert_eq!(bus.block(block, 5), frames("181#"));
+        assert_eq!(bus.boards[0].record(), Some(GOLDEN));
+    }
+    let two = [vec![second.build(Endian::Little)], data(&image)].concat();
+    let heard: Vec<_> = two.iter().flat_map(|block| bus.block(block, 100)).collect();
+    assert_eq!(heard, frames("181# 181# 181# 181# 101#"));
+    assert_eq!(bus.boards[0].flash.bytes(Memory::Ram)[..120], exloader);
+    assert_no_half_image(&bus, &image, "");
+    assert_eq!(bus.boards[0].record().unwrap().program_id, second.program_id);
+    // An exloader does not go to flash.
+    bus.send("041#");
+    assert_eq!(bus.block(&header(&image, 1, &profile).build(Endian::Little), 5), frames("081#02"));
+}
+
+fn data(image: &[u8]) -> Vec<[u8; 64]> {
+    (0..).map_while(|i| ucom::data_block(image, i)).collect()
+}
+
+/// D-40: the plan pmem-xmem: two memories, one application, valid when both are there.
+#[test]
+fn d40_program_then_data_memory() {
+    let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };
+    let (program, constants) = (small(), vec![0xA5; 60]);
+    let mut bus = Bus::new(&[0x21], profile);
+    bus.number(1);
+    let first = header(&program, 1, &profile);
+    let mut second = header(&constants, 2, &profile);
+    second.memory = Memory::Data.number();
+    let all = [
+        vec![first.build(Endian::Little)],
+        data(&program),
+        vec![second.build(Endian::Little)],
+        data(&constants),
+    ]
+    .concat();
+    bus.send("041#");
+    for (i, block) in all.iter().enumerate() {
+        let last = i + 1 == all.len();
+        assert_eq!(bus.block(block, 100), frames(if last { "101#" } else { "181#" }), "block {i}");
+        assert_eq!(bus.boards[0].has_application(), last, "block {i}");
+    }
+    assert_eq!(bus.boards[0].flash.bytes(Memory::Data)[..60], constants);
+    assert_no_half_image(&bus, &program, "");
+    assert_eq!(bus.boards[0].record().unwrap().program_id, first.program_id);
+}
+
+/// D-41: without header blocks the board knows the length by itself, and finds the Program ID by itself.
+#[test]
+fn d41_no_header() {
+    let profile = Profile { prog_header: HeaderForm::None, ..Profile::default() };
+    let image = small();
+    let mut bus = Bus::new(&[0x21], profile);
+    let config = ucom::node::NodeConfig { headerless_words: 100, ..*bus.boards[0].config() };
+    let board = bus.boards.pop().unwrap();
+    bus.boards.push(ucom::node::Node::new(
+        config,
+        board.flash,
+        board.pins,
+        board.store,
+        board.application,
+        bus.now,
+    ));
+    bus.run(50);
+    bus.number(1);
+    bus.send("041#");
+    let mut heard = Vec::new();
+    for block in [data(&image), data(&image)].concat() {
+        heard.extend(bus.block(&block, 200));
+    }
+    assert_eq!(heard, frames("181# 181# 181# 181# 181# 181# 181# 101#"));
+    assert_no_half_image(&bus, &image, "");
+    let id = ucom::checksum(Checksum::Crc16, Endian::Little, &image);
+    assert_eq!(bus.boards[0].record().unwrap().program_id, id);
+    // Two cycles that differ are noticed.
+    bus.send("041#");
+    let mut other = image.clone();
+    other[3] ^= 1;
+    for block in [data(&image), data(&other)].concat() {
+        bus.block(&block, 200);
+    }
+    assert_eq!(bus.errors, frames("081#01"));
+}
+
+/// D-44, D-10: the other checksums and the other byte order, through a whole update.
+#[test]
+fn d44_update_in_other_profiles() {
+    for (checksum, endian) in [
+        (Checksum::Sum16, Endian::Little),
+        (Checksum::Xor16, Endian::Big),
+        (Checksum::None, Endian::Big),
+        (Checksum::Crc16, Endian::Big),
+    ] {
+        let profile = Profile { prog_checksum: checksum, prog_endian: endian, endian, ..Profile::default() };
+        let mut bus = Bus::new(&[0x21], profile);
+        bus.number(1);
+        let image = image();
+        assert!(update(&mut bus, &blocks(&image, &profile)), "{checksum} {endian}");
+        assert_no_half_image(&bus, &image, "");
+        let info = bus.info(1).unwrap();
+        let expected = ucom::checksum(checksum, endian, &image);
+        assert_eq!((info.program_id, info.date, info.flash_number), (expected, 0x3AC1, 0x21));
+    }
+}
+
+/// D-40: raw, two different files as their headers say; the first is only checked.
+#[test]
+fn d40_raw_takes_two_files() {
+    let profile = Profile { prog_plan: Plan::Raw, ..Profile::default() };
+    let (one, two) = (vec![1; 64], small());
+    let mut bus = Bus::new(&[0x21], profile);
+    bus.number(1);
+    let all = [
+        vec![header(&one, 1, &profile).build(Endian::Little)],
+        data(&one),
+        vec![header(&two, 2, &profile).build(Endian::Little)],
+        data(&two),
+    ]
+    .concat();
+    assert!(update(&mut bus, &all));
+    assert_no_half_image(&bus, &two, "");
+}
+
+/// D-43: reordered frames of a block (adapters with several mailboxes do that) are found by the checksum.
+#[test]
+fn d43_reordered_frames_are_refused() {
+    let image = small();
+    let mut all = blocks(&image, &Profile::default());
+    let (a, b): ([u8; 8], [u8; 8]) = (all[2][..8].try_into().unwrap(), all[2][8..16].try_into().unwrap());
+    all[2][..8].copy_from_slice(&b);
+    all[2][8..16].copy_from_slice(&a);
+    let mut bus = Bus::initialised();
+    assert!(!update(&mut bus, &all));
+    assert_eq!(bus.errors, frames("081#01"));
+    assert_eq!(bus.boards[0].record(), Some(GOLDEN));
+}

@@ -56,12 +56,13 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 7] = [
+const CHECKS: [Check; 8] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
     Check { script: "can/check_multicast.py", program: None, demo_files: &[] },
     Check { script: "can/check_socketcand.py", program: None, demo_files: &[] },
+    Check { script: "can/check_slcan.py", program: None, demo_files: &[] },
     Check {
         script: "recording/check_mcap.py",
         program: None,
@@ -84,6 +85,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
             ("jtc-sim", "free_fall"),
             ("can-link", "echo"),
             ("can-link", "socketcand_server"),
+            ("can-link", "slcan_adapter"),
         ] {
             run(&mut cargo(&["build", "--release", "--package", package, "--example", example]))?;
         }

@@ -99,4 +99,27 @@ pub enum CanError {
         /// What the system said.
         source: io::Error,
     },
+    /// A serial port could not be opened.
+    #[error(
+        "{url}: cannot open the port: {source}; is the adapter plugged in, is the name right, may this user open it, and is no \
+             other program using it?"
+    )]
+    Port {
+        /// The bus.
+        url: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A rate that the adapter's protocol does not have.
+    #[error("{url}: no {what} of {rate} bit/s; possible are {possible}")]
+    Rate {
+        /// The bus.
+        url: String,
+        /// Which rate.
+        what: &'static str,
+        /// What was asked for, bit/s.
+        rate: u32,
+        /// All that there are, bit/s.
+        possible: String,
+    },
 }

@@ -5,8 +5,9 @@
 //! | `virtual:NAME` | a bus inside this process | yes |
 //! | `multicast:ADDR:PORT` | python-can's `udp_multicast`; stays on this host | yes |
 //! | `socketcand:HOST:PORT/can0` | a server of the socketcand protocol, such as [`SocketcandServer`] | no |
+//! | `slcan:/dev/ttyACM0@1000000` | an adapter at a serial port | CANable 2 |
 //!
-//! `socketcan:` and `slcan:` are understood as [URLs](CanUrl) and refused by [`open`] with an
+//! `socketcan:` is understood as [URLs](CanUrl) and refused by [`open`] with an
 //! error that says what can be opened.
 //!
 //! ```
@@ -34,6 +35,7 @@ mod error;
 mod faulty;
 mod frame;
 mod multicast;
+mod slcan;
 mod socketcand;
 mod state;
 mod timed;
@@ -45,6 +47,7 @@ pub use error::CanError;
 pub use faulty::{Counts, Faults, Faulty, Plan};
 pub use frame::{CanFrame, Id, InvalidFrame};
 pub use multicast::MulticastBus;
+pub use slcan::{AdapterError, SlcanAdapter, SlcanBus, SlcanOptions};
 pub use socketcand::{
     ClientEvent, ClientId, FromClient, SOCKETCAND_PORT, ServerStats, SocketcandBus, SocketcandGateway,
     SocketcandServer,

@@ -4,10 +4,11 @@ use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 use std::str::FromStr;
 
-use crate::SOCKETCAND_PORT;
+use crate::{SOCKETCAND_PORT, SlcanOptions};
 
 /// What this version opens, for error messages.
-pub(crate) const OPENABLE: &str = "socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME";
+pub(crate) const OPENABLE: &str =
+    "slcan:DEVICE@RATE, socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME";
 
 /// Default port of python-can's `udp_multicast`.
 const MULTICAST_PORT: u16 = 43113;
@@ -20,12 +21,16 @@ pub enum CanUrl {
         /// Network interface.
         interface: String,
     },
-    /// `slcan:/dev/ttyACM0@1000000`.
+    /// `slcan:/dev/ttyACM0@1000000`; `?data=N` sets the bit rate of CAN FD's data phase, `?baud=N` that of the line.
     Slcan {
-        /// Serial port.
+        /// Serial port, or `tcp:HOST:PORT`.
         device: String,
-        /// The number behind the `@`, bit/s.
+        /// Bit rate of the bus behind the `@`, bit/s; none leaves the adapter's own.
         rate: Option<u32>,
+        /// Bit rate of the data phase, bit/s; none leaves the adapter's own.
+        data_rate: Option<u32>,
+        /// Rate of the serial line, bit/s.
+        baud: u32,
     },
     /// `socketcand:HOST:PORT/can0`; the port may be left out.
     Socketcand {
@@ -119,6 +124,7 @@ impl FromStr for CanUrl {
 }
 
 fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
+    let (rest, query) = rest.split_once('?').unwrap_or((rest, ""));
     let (device, rate) = match rest.rsplit_once('@') {
         Some((device, rate)) => (device, Some(rate.parse().map_err(|_| "the rate is no number")?)),
         None => (rest, None),
@@ -126,10 +132,18 @@ fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
     if device.is_empty() {
         return Err("no serial port");
     }
-    if rate == Some(0) {
+    let (mut data_rate, mut baud) = (None, SlcanOptions::BAUD);
+    for setting in query.split('&').filter(|setting| !setting.is_empty()) {
+        match setting.split_once('=') {
+            Some(("data", text)) => data_rate = Some(text.parse().map_err(|_| "the data rate is no number")?),
+            Some(("baud", text)) => baud = text.parse().map_err(|_| "the baud rate is no number")?,
+            _ => return Err("the settings are data and baud"),
+        }
+    }
+    if rate == Some(0) || data_rate == Some(0) || baud == 0 {
         return Err("the rate is 0");
     }
-    Ok(CanUrl::Slcan { device: device.to_owned(), rate })
+    Ok(CanUrl::Slcan { device: device.to_owned(), rate, data_rate, baud })
 }
 
 /// Host or bracketed IPv6 address, and its port if there is one.
@@ -186,8 +200,16 @@ impl fmt::Display for CanUrl {
         write!(f, "{}:", self.scheme())?;
         match self {
             Self::SocketCan { interface } => f.write_str(interface),
-            Self::Slcan { device, rate: Some(rate) } => write!(f, "{device}@{rate}"),
-            Self::Slcan { device, rate: None } => f.write_str(device),
+            Self::Slcan { device, rate, data_rate, baud } => {
+                f.write_str(device)?;
+                rate.map_or(Ok(()), |rate| write!(f, "@{rate}"))?;
+                let mut mark = '?';
+                if let Some(rate) = data_rate {
+                    write!(f, "{mark}data={rate}")?;
+                    mark = '&';
+                }
+                if *baud == SlcanOptions::BAUD { Ok(()) } else { write!(f, "{mark}baud={baud}") }
+            }
             Self::Socketcand { host, port, channel } if host.contains(':') => {
                 write!(f, "[{host}]:{port}/{channel}")
             }
@@ -212,6 +234,10 @@ mod tests {
             "socketcan:can0",
             "slcan:/dev/ttyACM0@1000000",
             "slcan:COM7",
+            "slcan:tcp:localhost:3000@500000",
+            "slcan:/dev/ttyACM0@1000000?data=5000000",
+            "slcan:/dev/ttyACM0@1000000?data=5000000&baud=1000000",
+            "slcan:COM7?baud=57600",
             "socketcand:localhost:29536/can0",
             "socketcand:[::1]:5/vcan1",
             "multicast:239.74.163.2:43113",
@@ -223,7 +249,8 @@ mod tests {
         }
         assert_eq!(parsed("socketcand:h/can0"), parsed("socketcand:h:29536/can0"));
         assert_eq!(parsed("multicast:[ff15::1]"), parsed("multicast:[ff15::1]:43113?ttl=0"));
-        let slcan = CanUrl::Slcan { device: "/dev/ttyACM0".into(), rate: Some(1_000_000) };
+        let (rate, data_rate, baud) = (Some(1_000_000), None, 115_200);
+        let slcan = CanUrl::Slcan { device: "/dev/ttyACM0".into(), rate, data_rate, baud };
         assert_eq!(parsed("slcan:/dev/ttyACM0@1000000"), slcan);
     }
 
@@ -236,6 +263,9 @@ mod tests {
             ("slcan:@5", "no serial port"),
             ("slcan:/dev/x@fast", "the rate is no number"),
             ("slcan:/dev/x@0", "the rate is 0"),
+            ("slcan:/dev/x@5?data=0", "the rate is 0"),
+            ("slcan:/dev/x@5?data=x", "the data rate is no number"),
+            ("slcan:/dev/x@5?baud", "the settings are data and baud"),
             ("socketcand:host:1", "no bus"),
             ("socketcand:host:1/", "no bus"),
             ("socketcand::1/can0", "no host"),

@@ -1,0 +1,45 @@
+//! A simulated SLCAN adapter at a pseudo-terminal, for hosts of any make: `cargo run --example slcan_adapter`. On its bus every
+//! frame is answered with its own payload under the next identifier.
+
+#[cfg(unix)]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    use std::time::Duration;
+
+    use can_link::{CanBus, CanFrame, Id, SlcanAdapter, VirtualHub};
+    use serialport::{SerialPort, TTYPort};
+
+    let (mut port, line) = TTYPort::pair()?;
+    port.set_timeout(Duration::from_millis(1))?;
+    let hub = VirtualHub::new();
+    let (mut bus, mut node) = (hub.join(), hub.join());
+    std::thread::spawn(move || {
+        while let Ok(frame) = node.receive(Duration::MAX) {
+            let Some(frame) = frame else { continue };
+            let next = frame.id().value() + 1;
+            let answer = || {
+                let id = if frame.is_extended() { Id::extended(next) } else { Id::standard(next) }?;
+                match (frame.is_remote(), frame.is_fd()) {
+                    (true, _) => CanFrame::remote(id, frame.len()),
+                    (_, true) => Ok(CanFrame::fd(id, frame.data())?.with_brs(frame.is_brs())),
+                    _ => CanFrame::classic(id, frame.data()),
+                }
+            };
+            if answer().is_ok_and(|answer| node.send(&answer).is_err()) {
+                return;
+            }
+        }
+    });
+    // `line` is held so that the terminal stays when a host goes.
+    println!("ready: {}", line.name().unwrap_or_default());
+    let mut adapter = SlcanAdapter::new();
+    loop {
+        adapter.turn(&mut port, &mut bus)?;
+    }
+}
+
+/// Pseudo-terminals are a thing of Unix.
+#[cfg(not(unix))]
+fn main() {
+    eprintln!("slcan_adapter needs pseudo-terminals, which this system does not have");
+    std::process::exit(2);
+}

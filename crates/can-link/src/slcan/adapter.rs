@@ -1,0 +1,206 @@
+//! The adapter's side, for tests and simulators.
+
+use std::io::{self, Read, Write};
+
+use super::BIT_RATES;
+use super::DATA_RATES;
+use super::line::{BELL, Lines, Piece, flags, parse_frame, push_frame};
+use crate::{CanBus, CanError, CanFrame, ControllerState};
+
+/// Bytes that wait for a host that does not read; beyond that frames are lost, as in a small adapter.
+const OUTPUT: usize = 256 * 1024;
+/// Frames of the bus taken in one turn.
+const MOST: usize = 64;
+
+/// A simulated SLCAN adapter: no port, no thread, bytes in and bytes out.
+///
+/// ```
+/// use can_link::SlcanAdapter;
+/// let mut adapter = SlcanAdapter::new();
+/// let mut sent = Vec::new();
+/// adapter.input(b"S8\rO\rt28121122\r", |frame| { sent.push(*frame); true });
+/// assert_eq!(sent[0].to_string(), "281 # 11 22");
+/// adapter.heard(&sent[0]);
+/// assert_eq!(adapter.take_output(), b"\r\rz\rt28121122\r");
+/// ```
+#[derive(Default)]
+pub struct SlcanAdapter {
+    lines: Option<Lines>,
+    output: Vec<u8>,
+    rate: Option<u32>,
+    data_rate: Option<u32>,
+    open: bool,
+    listen_only: bool,
+    time_stamps: bool,
+    state: ControllerState,
+    lost: u64,
+}
+
+impl SlcanAdapter {
+    /// A closed adapter without a rate.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Bytes from the host. `send` gets its frames and tells whether the bus has room; without room the host is refused with
+    /// a bell, as by an adapter whose queue is full.
+    pub fn input(&mut self, mut bytes: &[u8], mut send: impl FnMut(&CanFrame) -> bool) {
+        let mut lines = self.lines.take().unwrap_or_else(Lines::new);
+        while let Some(piece) = lines.next(&mut bytes) {
+            // The bell is the adapter's own.
+            if let Piece::Line(line) = piece {
+                self.obey(line, &mut send);
+            }
+        }
+        self.lines = Some(lines);
+    }
+
+    /// A frame was on the bus.
+    pub fn heard(&mut self, frame: &CanFrame) {
+        if !self.open {
+            return;
+        }
+        if self.output.len() >= OUTPUT {
+            self.lost += 1;
+            return;
+        }
+        let mut line = String::new();
+        push_frame(&mut line, frame);
+        if self.time_stamps {
+            line.insert_str(line.len() - 1, "0000");
+        }
+        self.output.extend_from_slice(line.as_bytes());
+    }
+
+    /// What it answers when it is asked for its flags.
+    pub fn set_state(&mut self, state: ControllerState) {
+        self.state = state;
+    }
+
+    /// Bytes for the host; they are gone from here.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.output)
+    }
+
+    /// The host has opened its channel.
+    pub fn is_open(&self) -> bool {
+        self.open
+    }
+
+    /// Bit rate and data bit rate that the host has set, bit/s.
+    pub fn rates(&self) -> (Option<u32>, Option<u32>) {
+        (self.rate, self.data_rate)
+    }
+
+    /// Frames of the bus that were lost because the host did not read.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// One turn between a host and a bus: what the host has written is obeyed, what is on the bus is told. The port's reads and
+    /// writes must not wait for long.
+    pub fn turn(
+        &mut self,
+        port: &mut (impl Read + Write),
+        bus: &mut impl CanBus,
+    ) -> Result<(), AdapterError> {
+        let mut buffer = [0; 1024];
+        let count = waited(port.read(&mut buffer))?;
+        let mut failed = None;
+        self.input(&buffer[..count], |frame| match bus.send(frame) {
+            Ok(()) => true,
+            Err(error) => {
+                failed = Some(error);
+                false
+            }
+        });
+        if let Some(error) = failed {
+            return Err(AdapterError::Bus(error));
+        }
+        for _ in 0..MOST {
+            match bus.receive(std::time::Duration::ZERO).map_err(AdapterError::Bus)? {
+                Some(frame) => self.heard(&frame),
+                None => break,
+            }
+        }
+        if !self.output.is_empty() {
+            let count = waited(port.write(&self.output))?;
+            self.output.drain(..count);
+        }
+        Ok(())
+    }
+
+    fn obey(&mut self, line: &str, send: &mut impl FnMut(&CanFrame) -> bool) {
+        let Some((command, rest)) = line.split_at_checked(1) else {
+            // An empty line, as hosts send them to clear what was typed before.
+            return self.say("\r");
+        };
+        let digit = rest.parse::<usize>().ok().filter(|_| rest.len() == 1);
+        match command {
+            "S" if !self.open => {
+                let rate = digit.and_then(|code| BIT_RATES.get(code)).copied();
+                self.yes_if(rate.is_some());
+                self.rate = rate.or(self.rate);
+            }
+            "Y" if !self.open => {
+                let rate =
+                    digit.and_then(|digit| DATA_RATES.iter().find(|(_, code)| usize::from(*code) == digit));
+                self.yes_if(rate.is_some());
+                self.data_rate = rate.map(|(rate, _)| *rate).or(self.data_rate);
+            }
+            "O" | "L" if !self.open && rest.is_empty() && self.rate.is_some() => {
+                self.open = true;
+                self.listen_only = command == "L";
+                self.say("\r");
+            }
+            "C" if rest.is_empty() => {
+                self.yes_if(self.open);
+                self.open = false;
+            }
+            "Z" if !self.open => {
+                self.yes_if(matches!(rest, "0" | "1"));
+                self.time_stamps = rest == "1";
+            }
+            "V" => self.say("V1013\r"),
+            "N" => self.say("NSIM0\r"),
+            "F" if self.open => {
+                let flags = flags(self.state);
+                self.say(&format!("F{flags:02X}\r"));
+            }
+            _ => match parse_frame(line) {
+                Some(frame) if self.open && !self.listen_only && send(&frame) => {
+                    self.say(if frame.is_extended() { "Z\r" } else { "z\r" });
+                }
+                _ => self.output.push(BELL),
+            },
+        }
+    }
+
+    fn yes_if(&mut self, yes: bool) {
+        self.output.push(if yes { b'\r' } else { BELL });
+    }
+
+    fn say(&mut self, text: &str) {
+        self.output.extend_from_slice(text.as_bytes());
+    }
+}
+
+/// Why a turn of an adapter failed.
+#[derive(Debug, thiserror::Error)]
+pub enum AdapterError {
+    /// The host's side.
+    #[error("the serial line failed: {0}")]
+    Port(#[from] io::Error),
+    /// The bus.
+    #[error(transparent)]
+    Bus(CanError),
+}
+
+/// Nothing is no error.
+fn waited(result: io::Result<usize>) -> io::Result<usize> {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    result.or_else(|error| match error.kind() {
+        WouldBlock | TimedOut | Interrupted => Ok(0),
+        _ => Err(error),
+    })
+}

@@ -1,0 +1,395 @@
+//! The host's side: an adapter at a serial port as a bus.
+
+use std::collections::VecDeque;
+use std::io;
+use std::time::{Duration, Instant};
+
+use super::line::{Lines, Piece, parse_flags, parse_frame, parse_state, push_frame};
+use super::port::Port;
+use super::{BIT_RATES, DATA_RATES};
+use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState};
+
+/// How long an adapter may take to answer its first question; it may still be starting.
+const HELLO: Duration = Duration::from_secs(1);
+/// How often it is asked.
+const HELLOS: u32 = 3;
+/// How long an adapter may take for other answers.
+const ANSWER: Duration = Duration::from_millis(500);
+/// What an earlier user left on the line has come by then.
+const QUIET: Duration = Duration::from_millis(30);
+/// How long an adapter may refuse a frame because its queue is full, or keep its answer.
+const SEND_PATIENCE: Duration = Duration::from_secs(2);
+/// Pause before a refused frame is tried again.
+const RETRY: Duration = Duration::from_millis(1);
+/// Slices of waiting in which both directions get their turn.
+const SLICE: Duration = Duration::from_millis(20);
+/// Received frames that are kept while something else is waited for.
+const INBOX: usize = 100_000;
+
+/// How to talk to an adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlcanOptions {
+    /// `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`.
+    pub device: String,
+    /// Bit rate of the bus, bit/s; none leaves the adapter's own.
+    pub rate: Option<u32>,
+    /// Bit rate of the data phase of CAN FD, bit/s; none leaves the adapter's own.
+    pub data_rate: Option<u32>,
+    /// Rate of the serial line, bit/s; USB adapters do not care.
+    pub baud: u32,
+}
+
+impl SlcanOptions {
+    /// Rate of the serial line if nothing else is asked for, bit/s.
+    pub const BAUD: u32 = 115_200;
+
+    fn url(&self) -> String {
+        let Self { device, rate, data_rate, baud } = self.clone();
+        CanUrl::Slcan { device, rate, data_rate, baud }.to_string()
+    }
+}
+
+/// What an adapter says to what it is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    Yes,
+    No,
+}
+
+/// A frame that the adapter has not confirmed yet.
+struct Outstanding {
+    line: String,
+    since: Instant,
+    /// When it was last written.
+    written: Instant,
+    /// It was refused since.
+    refused: bool,
+}
+
+/// A bus behind an SLCAN adapter.
+///
+/// Adapters that confirm frames get the next one after the confirmation, and a refused one again: their queue is full. Some
+/// adapters never answer; to those frames are written as fast as the line takes them.
+pub struct SlcanBus {
+    url: String,
+    port: Port,
+    lines: Lines,
+    inbox: VecDeque<CanFrame>,
+    /// The adapter answers what it is told.
+    answers: bool,
+    /// Confirmations of frames have come.
+    confirms: bool,
+    last_answer: Option<Answer>,
+    outstanding: Option<Outstanding>,
+    state: ControllerState,
+    /// The adapter answers `F`; unknown until it was asked.
+    has_flags: Option<bool>,
+    got_flags: bool,
+    /// A line came that is none of the others.
+    got_text: bool,
+    closed: bool,
+}
+
+impl SlcanBus {
+    /// Opens the port, sets the rates and opens the adapter's channel.
+    pub fn open(options: &SlcanOptions) -> Result<Self, CanError> {
+        let url = options.url();
+        let wrong_rate = |what: &'static str, rate: u32, possible: String| CanError::Rate {
+            url: url.clone(),
+            what,
+            rate,
+            possible,
+        };
+        let rate_code = match options.rate {
+            None => None,
+            Some(rate) => {
+                let list = BIT_RATES.map(|rate| rate.to_string()).join(", ");
+                let code = BIT_RATES.iter().position(|known| *known == rate);
+                Some(code.ok_or_else(|| wrong_rate("bit rate", rate, list))?)
+            }
+        };
+        let data_code = match options.data_rate {
+            None => None,
+            Some(rate) => {
+                let list = DATA_RATES.map(|(rate, _)| rate.to_string()).join(", ");
+                let code = DATA_RATES.iter().find(|(known, _)| *known == rate).map(|(_, code)| *code);
+                Some(code.ok_or_else(|| wrong_rate("data bit rate", rate, list))?)
+            }
+        };
+        let port = match Port::open(&options.device, options.baud) {
+            Ok(port) => port,
+            Err(source) => return Err(CanError::Port { url, source }),
+        };
+        let mut bus = Self {
+            url,
+            port,
+            lines: Lines::new(),
+            inbox: VecDeque::new(),
+            answers: true,
+            confirms: false,
+            last_answer: None,
+            outstanding: None,
+            state: ControllerState::default(),
+            has_flags: None,
+            got_flags: false,
+            got_text: false,
+            closed: false,
+        };
+        bus.say_hello()?;
+        if let Some(code) = rate_code {
+            bus.set("setting the bit rate", &format!("S{code}\r"))?;
+        }
+        if let Some(code) = data_code {
+            bus.set("setting the data bit rate", &format!("Y{code}\r"))?;
+        }
+        bus.set("opening the channel", "O\r")?;
+        bus.inbox.clear();
+        Ok(bus)
+    }
+
+    /// Closes what an earlier user left open, and sees whether anybody is there.
+    fn say_hello(&mut self) -> Result<(), CanError> {
+        // The first end of line is for what was typed before.
+        self.write(b"\rC\r")?;
+        let end = Instant::now() + ANSWER;
+        while self.take_in(QUIET)? && Instant::now() < end {}
+        let mut somebody = false;
+        for _ in 0..HELLOS {
+            self.got_text = false;
+            self.write(b"V\r")?;
+            let end = Instant::now() + HELLO;
+            while Instant::now() < end {
+                somebody |= self.take_in(SLICE)?;
+                // The version is a text: what was answered before belongs to earlier lines.
+                if self.got_text {
+                    return Ok(());
+                }
+            }
+            // It does not know the question, but it is there.
+            if somebody {
+                return Ok(());
+            }
+        }
+        let hint = "is it an SLCAN adapter, is its firmware the right one, and does the line have this rate (?baud=N)?";
+        let seconds = HELLO.as_secs() * u64::from(HELLOS);
+        Err(CanError::NoAnswer { url: self.url.clone(), step: "asking for the version", seconds, hint })
+    }
+
+    /// Tells the adapter something; adapters that never answer are believed.
+    fn set(&mut self, step: &'static str, line: &str) -> Result<(), CanError> {
+        self.last_answer = None;
+        self.write(line.as_bytes())?;
+        let end = Instant::now() + ANSWER;
+        while self.answers && self.last_answer.is_none() {
+            if Instant::now() >= end {
+                self.answers = false;
+            }
+            self.take_in(SLICE)?;
+        }
+        if self.last_answer == Some(Answer::No) {
+            let answer =
+                "the adapter answers with a bell: it does not know that, or does not do it now".to_owned();
+            return Err(CanError::Refused { url: self.url.clone(), step, answer });
+        }
+        Ok(())
+    }
+
+    fn broken(&mut self, step: &'static str, source: io::Error) -> CanError {
+        use io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset, UnexpectedEof};
+        self.closed = true;
+        match source.kind() {
+            BrokenPipe | ConnectionAborted | ConnectionReset | UnexpectedEof => {
+                CanError::Closed { url: self.url.clone() }
+            }
+            _ => CanError::Io { url: self.url.clone(), step, source },
+        }
+    }
+
+    /// Takes in what comes within `timeout`; true if something came.
+    fn take_in(&mut self, timeout: Duration) -> Result<bool, CanError> {
+        if self.closed {
+            return Err(CanError::Closed { url: self.url.clone() });
+        }
+        let mut buffer = [0; 4096];
+        let count = match self.port.read(&mut buffer, timeout) {
+            Ok(Some(count)) => count,
+            Ok(None) => return Ok(false),
+            Err(error) => return Err(self.broken("receiving", error)),
+        };
+        let mut bytes = &buffer[..count];
+        let mut answers = Vec::new();
+        while let Some(piece) = self.lines.next(&mut bytes) {
+            match piece {
+                Piece::Bell => answers.push(Answer::No),
+                Piece::Line("" | "z" | "Z") => answers.push(Answer::Yes),
+                Piece::Line(line) => {
+                    if let Some(frame) = parse_frame(line) {
+                        self.inbox.push_back(frame);
+                    } else if let Some(state) = parse_state(line) {
+                        self.state = state;
+                    } else if let Some(state) = parse_flags(line) {
+                        self.got_flags = true;
+                        // Counters of a state that the adapter told by itself stay as long as they fit.
+                        if self.state.errors != state.errors {
+                            self.state = state;
+                        }
+                    } else {
+                        self.got_text = true;
+                    }
+                }
+            }
+        }
+        for answer in answers {
+            self.answered(answer);
+        }
+        Ok(true)
+    }
+
+    fn answered(&mut self, answer: Answer) {
+        self.last_answer = Some(answer);
+        match (&mut self.outstanding, answer) {
+            (Some(_), Answer::Yes) => {
+                self.outstanding = None;
+                self.confirms = true;
+            }
+            (Some(frame), Answer::No) => frame.refused = true,
+            (None, _) => {}
+        }
+    }
+
+    fn write(&mut self, mut bytes: &[u8]) -> Result<(), CanError> {
+        let mut give_up = Instant::now() + SEND_PATIENCE;
+        while !bytes.is_empty() {
+            match self.port.write(bytes, SLICE) {
+                Ok(0) if Instant::now() >= give_up => {
+                    return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
+                }
+                // It may be waiting for us.
+                Ok(0) if self.inbox.len() < INBOX => {
+                    self.take_in(SLICE)?;
+                }
+                Ok(0) => {}
+                Ok(count) => {
+                    bytes = &bytes[count..];
+                    give_up = Instant::now() + SEND_PATIENCE;
+                }
+                Err(error) => return Err(self.broken("sending", error)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Sees to the frame that is not confirmed yet: a refused one is written again. True when there is none.
+    fn settle(&mut self, now: Instant) -> Result<bool, CanError> {
+        let Some(frame) = &mut self.outstanding else { return Ok(true) };
+        let late = now.saturating_duration_since(frame.since) >= SEND_PATIENCE;
+        if frame.refused {
+            if late {
+                self.outstanding = None;
+                let answer = "the adapter refused the frame for 2 s: its transmit queue is full; does anybody acknowledge \
+                              on the bus, and has the bus this bit rate?";
+                return Err(CanError::Refused {
+                    url: self.url.clone(),
+                    step: "sending",
+                    answer: answer.to_owned(),
+                });
+            }
+            if now.saturating_duration_since(frame.written) >= RETRY {
+                frame.refused = false;
+                frame.written = now;
+                let line = frame.line.clone();
+                self.write(line.as_bytes())?;
+            }
+        } else if !self.confirms && now.saturating_duration_since(frame.since) >= ANSWER {
+            // It answers when it is set up, but not frames.
+            self.answers = false;
+            self.outstanding = None;
+            return Ok(true);
+        } else if late {
+            self.outstanding = None;
+            let hint = "does anybody acknowledge on the bus? Unplug the adapter and try again";
+            let seconds = SEND_PATIENCE.as_secs();
+            return Err(CanError::NoAnswer { url: self.url.clone(), step: "sending a frame", seconds, hint });
+        }
+        Ok(self.outstanding.is_none())
+    }
+
+    /// Until the last frame is confirmed.
+    fn wait_for_confirmation(&mut self) -> Result<(), CanError> {
+        while !self.settle(Instant::now())? {
+            if self.inbox.len() < INBOX {
+                let refused = self.outstanding.as_ref().is_some_and(|frame| frame.refused);
+                self.take_in(if refused { RETRY } else { SLICE })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl CanBus for SlcanBus {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        if self.closed {
+            return Err(CanError::Closed { url: self.url.clone() });
+        }
+        self.wait_for_confirmation()?;
+        let mut line = String::with_capacity(160);
+        push_frame(&mut line, frame);
+        self.write(line.as_bytes())?;
+        if self.answers {
+            let now = Instant::now();
+            self.outstanding = Some(Outstanding { line, since: now, written: now, refused: false });
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        let deadline = Instant::now().checked_add(timeout);
+        // What is there already is taken in even if nothing is waited for.
+        let mut wait = Duration::ZERO;
+        loop {
+            if let Some(frame) = self.inbox.pop_front() {
+                return Ok(Some(frame));
+            }
+            let waiting = !self.settle(Instant::now())?;
+            let came = self.take_in(if waiting { wait.min(SLICE) } else { wait })?;
+            if came && !self.inbox.is_empty() {
+                continue;
+            }
+            let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));
+            if left.is_zero() {
+                return Ok(None);
+            }
+            wait = left;
+        }
+    }
+
+    /// Asks the adapter, if it answers such questions.
+    fn state(&mut self) -> ControllerState {
+        if self.has_flags == Some(false) || !self.answers || self.wait_for_confirmation().is_err() {
+            return self.state;
+        }
+        self.got_flags = false;
+        if self.write(b"F\r").is_ok() {
+            let end = Instant::now() + ANSWER;
+            self.last_answer = None;
+            // A bell is a no.
+            while !self.got_flags && self.last_answer.is_none() && Instant::now() < end {
+                if self.take_in(SLICE).is_err() {
+                    break;
+                }
+            }
+            self.has_flags = Some(self.got_flags);
+        }
+        self.state
+    }
+}
+
+impl Drop for SlcanBus {
+    fn drop(&mut self) {
+        if !self.closed {
+            // The last frame is to leave the adapter before its channel is closed.
+            let _ = self.wait_for_confirmation();
+            let _ = self.write(b"C\r");
+        }
+    }
+}

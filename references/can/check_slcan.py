@@ -1,0 +1,104 @@
+"""python-can's slcan interface against can-link's side of an adapter, at a pseudo-terminal.
+
+Needs python-can and pyserial. The example `slcan_adapter` is taken from $JTC_EXAMPLES, else built with cargo. Exit code 0: all
+agreed.
+"""
+
+import os
+import pathlib
+import random
+import subprocess
+import sys
+import time
+
+import can
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
+PATIENCE_S = 120.0
+BURST = 2000
+
+
+def adapter_program() -> list[str]:
+    built = os.environ.get("JTC_EXAMPLES")
+    if built and (pathlib.Path(built) / "slcan_adapter").exists():
+        return [str(pathlib.Path(built) / "slcan_adapter")]
+    cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", "slcan_adapter"]
+    return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml")]
+
+
+def heard(bus: can.BusABC) -> can.Message:
+    """The next message; python-can returns without one for every confirmation."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        message = bus.recv(1.0)
+        if message is not None:
+            return message
+    raise AssertionError("nothing came")
+
+
+def same(sent: can.Message, got: can.Message) -> None:
+    for field in ("is_extended_id", "is_remote_frame", "is_fd", "bitrate_switch", "dlc"):
+        assert getattr(sent, field) == getattr(got, field), f"{field}: {sent} became {got}"
+    assert sent.arbitration_id + 1 == got.arbitration_id, f"{sent} became {got}"
+    assert bytes(sent.data) == bytes(got.data), f"{sent} became {got}"
+
+
+def messages(rng: random.Random) -> list[can.Message]:
+    """One of each kind and length. Ids are even, those of the answers odd."""
+    found = []
+    for extended in (False, True):
+        top = 0x1FFFFFFF if extended else 0x7FF
+
+        def message(**fields) -> can.Message:
+            number = rng.randrange(0, top) & ~1
+            return can.Message(arbitration_id=number, is_extended_id=extended, check=True, **fields)
+
+        for length in range(9):
+            found.append(message(data=rng.randbytes(length)))
+            found.append(message(is_remote_frame=True, dlc=length))
+        for length in FD_LENGTHS:
+            for switch in (False, True):
+                found.append(message(is_fd=True, bitrate_switch=switch, data=rng.randbytes(length)))
+    return found
+
+
+def check(path: str, seed: int) -> None:
+    timing = can.BitTimingFd.from_sample_point(
+        f_clock=80_000_000, nom_bitrate=1_000_000, nom_sample_point=80.0, data_bitrate=5_000_000, data_sample_point=75.0)
+    with can.Bus(interface="slcan", channel=path, timing=timing, sleep_after_open=0) as bus:
+        count = 0
+        for message in messages(random.Random(seed)):
+            bus.send(message)
+            same(message, heard(bus))
+            count += 1
+        assert bus.get_version(PATIENCE_S) == (10, 13)
+        for number in range(BURST):
+            bus.send(can.Message(arbitration_id=0x100, is_extended_id=False, data=number.to_bytes(2, "big")))
+            # The line between the two is short: half-way through a burst its answers are taken.
+            if number % 100 == 99:
+                for before in range(number - 99, number + 1):
+                    message = heard(bus)
+                    assert bytes(message.data) == before.to_bytes(2, "big"), message
+    print(f"{path}: {count} kinds of frames and a burst of {BURST} answered alike")
+
+
+def main() -> int:
+    seed = int(os.environ.get("SEED", random.randrange(2**32)))
+    print(f"seed {seed}")
+    adapter = subprocess.Popen(adapter_program(), stdout=subprocess.PIPE, text=True)
+    try:
+        line = adapter.stdout.readline()
+        assert line.startswith("ready: /"), line
+        path = line.removeprefix("ready: ").strip()
+        # A second host finds the adapter as the first one did.
+        for _ in range(2):
+            check(path, seed)
+    finally:
+        adapter.terminate()
+        adapter.wait()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

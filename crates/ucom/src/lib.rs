@@ -44,6 +44,8 @@ mod status;
 mod string;
 
 #[cfg(feature = "std")]
+pub mod chain;
+#[cfg(feature = "std")]
 pub mod files;
 #[cfg(feature = "std")]
 pub mod master;

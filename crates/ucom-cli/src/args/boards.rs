@@ -1,0 +1,147 @@
+//! Boards and values as words of the command line.
+
+use std::str::FromStr;
+
+/// Which boards are meant: numbers, a list, ranges, or all.
+#[derive(Clone, Debug, Eq, PartialEq)]
+pub enum Boards {
+    /// Every board that answers.
+    All,
+    /// None at all.
+    None,
+    /// These, ascending, each once.
+    Some(Vec<u8>),
+}
+
+impl FromStr for Boards {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => return Ok(Self::All),
+            "none" => return Ok(Self::None),
+            _ => {}
+        }
+        let number = |word: &str| {
+            let number = word.trim().parse().ok().filter(|n| *n <= 31);
+            number.ok_or_else(|| {
+                format!("\"{word}\" is no board: a number 0..31, a list 1,3, a range 1-4, or all")
+            })
+        };
+        let mut boards: Vec<u8> = Vec::new();
+        for word in text.split(',') {
+            match word.split_once('-') {
+                Some((first, last)) => boards.extend(number(first)?..=number(last)?),
+                None => boards.push(number(word)?),
+            }
+        }
+        boards.sort_unstable();
+        boards.dedup();
+        if boards.is_empty() { Err(format!("\"{text}\" names no board")) } else { Ok(Self::Some(boards)) }
+    }
+}
+
+/// `NAME=VALUE` or `BOARD.NAME=VALUE`.
+#[derive(Clone, Debug, Eq, PartialEq)]
+pub struct Assignment {
+    /// The board, when it is named.
+    pub board: Option<u8>,
+    /// Name or index.
+    pub name: String,
+    /// The word that is sent.
+    pub value: i32,
+}
+
+impl FromStr for Assignment {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let form = "the form is NAME=VALUE or BOARD.NAME=VALUE";
+        let (left, right) = text.split_once('=').ok_or_else(|| format!("\"{text}\" has no value; {form}"))?;
+        let right = right.trim();
+        let value = match right.strip_prefix("0x").or(right.strip_prefix("0X")) {
+            Some(hex) => i32::from_str_radix(hex, 16).ok(),
+            None => right.parse().ok(),
+        };
+        let value = value.filter(|v| (-32768..=65535).contains(v));
+        let value =
+            value.ok_or_else(|| format!("\"{right}\" is no word: -32768..65535 or 0x0000..0xFFFF"))?;
+        let (board, name) = match left.split_once('.') {
+            Some((board, name)) if board.trim().parse::<u8>().is_ok() => (board.trim().parse().ok(), name),
+            _ => (None, left),
+        };
+        if name.trim().is_empty() {
+            return Err(format!("\"{text}\" names nothing; {form}"));
+        }
+        Ok(Self { board, name: name.trim().to_owned(), value })
+    }
+}
+
+/// A flash number, decimal or with 0x.
+pub fn flash_id(text: &str) -> Result<u16, String> {
+    let text = text.trim();
+    let number = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
+        Some(hex) => u16::from_str_radix(hex, 16),
+        None => text.parse(),
+    };
+    number.map_err(|_| format!("\"{text}\" is no flash id, as 0x21 or 33"))
+}
+
+/// `ASTART,OPINIT` as a mask.
+pub fn bits(text: &str) -> Result<ucom::Status, String> {
+    let mut all = ucom::Status(0);
+    for name in text.split(',').map(str::trim) {
+        let bit = ucom::Status::bit(name).ok_or_else(|| {
+            let names: Vec<&str> = ucom::Status::NAMES.iter().map(|(name, _)| *name).collect();
+            format!("there is no bit \"{name}\"; there are {}", names.join(" "))
+        })?;
+        all = all | bit;
+    }
+    Ok(all)
+}
+
+/// A span in seconds.
+pub fn seconds(text: &str) -> Result<std::time::Duration, String> {
+    let value = text.parse::<f64>().ok().and_then(|s| std::time::Duration::try_from_secs_f64(s).ok());
+    value.ok_or_else(|| format!("\"{text}\" is no number of seconds"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boards_are_numbers_lists_ranges_or_all() {
+        assert_eq!("3".parse(), Ok(Boards::Some(vec![3])));
+        assert_eq!("4-6,1,5".parse(), Ok(Boards::Some(vec![1, 4, 5, 6])));
+        assert_eq!("all".parse(), Ok(Boards::All));
+        for wrong in ["32", "", "1,,2", "3-1", "-1", "x", "0x1"] {
+            assert!(wrong.parse::<Boards>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn assignments_are_words_of_16_bits() {
+        let parsed = |text: &str| text.parse::<Assignment>().unwrap();
+        assert_eq!(parsed("kp=120"), Assignment { board: None, name: "kp".into(), value: 120 });
+        assert_eq!(
+            parsed("2.set_position=-20"),
+            Assignment { board: Some(2), name: "set_position".into(), value: -20 }
+        );
+        assert_eq!(parsed("0=0xFFFF").value, 65535);
+        for wrong in ["kp", "kp=", "kp=70000", "kp=-40000", "=3", "1.=3", "kp=1.5"] {
+            assert!(wrong.parse::<Assignment>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn flash_ids_bits_and_seconds() {
+        assert_eq!(flash_id("0x21"), Ok(0x21));
+        assert_eq!(flash_id("33"), Ok(33));
+        assert!(flash_id("0x10000").is_err() && flash_id("x").is_err());
+        assert_eq!(bits("astart,OPINIT"), Ok(ucom::Status(0x42)));
+        assert!(bits("OPINT").unwrap_err().contains("OPINIT"));
+        assert_eq!(seconds("0.5"), Ok(std::time::Duration::from_millis(500)));
+        assert!(seconds("-1").is_err() && seconds("nan").is_err() && seconds("").is_err());
+    }
+}

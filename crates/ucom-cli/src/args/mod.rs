@@ -1,0 +1,223 @@
+//! The command line: commands, options, their environment variables and examples.
+
+mod boards;
+mod options;
+
+use std::path::PathBuf;
+
+use clap::builder::FalseyValueParser;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+pub use boards::{Assignment, Boards};
+pub use options::*;
+
+/// Motor boards on a CAN bus from your terminal.
+#[derive(Debug, Parser)]
+#[command(
+    name = "ucom",
+    version,
+    about = "UCoM motor boards on a CAN bus: number, look at, update, move and simulate a chain of them",
+    after_help = "Examples:\n  ucom sim                                     a simulated head of ten boards; prints its bus\n  \
+                  export UCOM_BUS=socketcand:127.0.0.1:29536/can0\n  \
+                  ucom scan                                    who is there; changes nothing\n  \
+                  ucom init                                    reset, number the chain, write an inventory\n  \
+                  ucom update 3 firmware.hex                   check, program, verify\n  \
+                  ucom --json info | jq .boards[0].program_id  for programs\n\n\
+                  A bus: socketcan:can0, slcan:/dev/ttyACM0@1000000, socketcand:HOST:PORT/can0, multicast:ADDR:PORT.\n\
+                  Every option can be set by an environment variable, see `ucom COMMAND --help`.\n\
+                  Exit codes: 0 done, 1 a board reported an error, 2 wrong usage or unreadable input, 3 no answer,\n\
+                  4 refused by a check (nothing was sent or moved), 5 failed while running.",
+    max_term_width = 100,
+    propagate_version = true,
+    disable_help_subcommand = true
+)]
+pub struct Cli {
+    /// Print one JSON object (streams: one a line) instead of text
+    #[arg(long, global = true, env = "UCOM_JSON", value_parser = FalseyValueParser::new(), help_heading = "Common")]
+    pub json: bool,
+    #[command(flatten)]
+    pub link: LinkArgs,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Which bus, and how its boards read the protocol.
+#[derive(Args, Clone, Debug)]
+pub struct LinkArgs {
+    /// The bus, as socketcan:can0 or socketcand:127.0.0.1:29536/can0
+    #[arg(long, global = true, env = "UCOM_BUS", value_name = "URL", help_heading = "Common")]
+    pub bus: Option<String>,
+    /// How the boards read the protocol, TOML; `ucom help profile` shows the form, `ucom probe` makes one
+    #[arg(long, global = true, env = "UCOM_PROFILE", value_name = "FILE", help_heading = "Common")]
+    pub profile: Option<PathBuf>,
+}
+
+/// Go on where a check would refuse.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct ForceArgs {
+    /// Go on where a check would refuse: another PC on the bus, a running board, bus load
+    #[arg(long, env = "UCOM_FORCE", value_parser = FalseyValueParser::new())]
+    pub force: bool,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// A simulated chain of boards on a bus that others can join
+    #[command(
+        after_help = "Examples:\n  ucom sim\n  ucom sim --boards 5 --flash-ids 0x21,0x42,0x63,0x04,0x7F --listen 127.0.0.1:0\n  \
+                            ucom sim --chain head.toml --faults faults.toml --seed 7\n\n\
+                            `ucom help sim` shows the form of chain files, `ucom help faults` that of fault files."
+    )]
+    Sim(SimArgs),
+    /// Boards on the bus; asks only, changes nothing
+    #[command(after_help = "Examples:\n  ucom scan\n  ucom --json scan | jq '.boards | length'")]
+    Scan,
+    /// Reset all boards, number them along the chain, write an inventory
+    #[command(after_help = "Examples:\n  ucom init\n  ucom init --inventory head.toml\n\n\
+                            An inventory that is there already is compared: a board in another place is an error.")]
+    Init(InitArgs),
+    /// What boards say about themselves
+    #[command(after_help = "Examples:\n  ucom info\n  ucom info 3\n  ucom --json info 1-4")]
+    Info(BoardsArgs),
+    /// Status bits: show, set, clear
+    #[command(
+        after_help = "Examples:\n  ucom status\n  ucom status 2 --set ASTART\n  ucom status all --clear OPINIT,ASTART\n\n\
+                            Bits: MSTART ASTART MCARUN EXLRUN INIT PROG OPINIT IPINIT; MCARUN, EXLRUN and IPINIT cannot be set."
+    )]
+    Status(StatusArgs),
+    /// Reset boards: outputs safe, numbers forgotten
+    #[command(
+        after_help = "Examples:\n  ucom reset          all boards; `ucom init` numbers them again\n  ucom reset 2"
+    )]
+    Reset(ResetArgs),
+    /// Stop the application and enter the exloader with programming enabled
+    #[command(after_help = "Examples:\n  ucom xreset 2\n  ucom xreset all")]
+    Xreset(ActArgs),
+    /// Start the application of boards; nothing moves before `ucom run`
+    #[command(after_help = "Examples:\n  ucom start all\n  ucom start 1,3")]
+    Start(ActArgs),
+    /// Stop control and application of boards
+    #[command(after_help = "Examples:\n  ucom stop all\n  ucom stop 2 --control-only")]
+    Stop(StopArgs),
+    /// Program boards: check, transfer twice, verify by reading back
+    #[command(
+        after_help = "Examples:\n  ucom update 3 firmware.hex --flash-id 0x63\n  ucom update all firmware.bin --start\n  \
+                            ucom update 1-4 firmware.s19 --dry-run\n\n\
+                            Image formats: raw binary, Intel HEX, Motorola S-record, told apart by their content.\n\
+                            Exit codes: 0 verified, or already up to date; 1 the board reported an error before anything was\n\
+                            erased; 3 no answer; 4 refused; 5 failed or cancelled after something was erased."
+    )]
+    Update(UpdateArgs),
+    /// Names of inputs, outputs and parameters, and initial inputs
+    #[command(after_help = "Examples:\n  ucom io 1\n  ucom --json io all\n  ucom io 1 --fresh")]
+    Io(IoArgs),
+    /// Controller inputs by name: show the initial ones, or set some
+    #[command(
+        after_help = "Examples:\n  ucom ci 1\n  ucom ci 1 set_position=1500\n  ucom ci 1 set_position=1500 --for 3\n\n\
+                            With --for the board runs under supervision for so long and moves; `ucom run` is for more."
+    )]
+    Ci(CiArgs),
+    /// Parameters by name: show the names, or set some
+    #[command(after_help = "Examples:\n  ucom par 1\n  ucom par 1 kp=120 current_max=1500\n\n\
+                            The protocol cannot read parameters back: what was written is marked as assumed.")]
+    Par(ParArgs),
+    /// Sensor outputs of running boards, live; only listens
+    #[command(
+        after_help = "Examples:\n  ucom so 1\n  ucom so 1 --count 100 --csv > so.csv\n  ucom --json so all --count 10"
+    )]
+    So(SoArgs),
+    /// Start boards and keep them running under supervision until Ctrl-C
+    #[command(after_help = "Examples:\n  ucom run all\n  ucom run 1,2 --active --ci 1.set_position=1500\n\n\
+                            On stdin: `ci 1 set_position=-500`, `par 1 kp=80`, `active on`, `active off`, `stop`.\n\
+                            Ctrl-C stops control, then applications, in reverse order.")]
+    Run(RunArgs),
+    /// Live view of boards, bus load and foreign frames; only listens
+    #[command(after_help = "Examples:\n  ucom monitor\n  ucom --json monitor --count 5")]
+    Monitor(MonitorArgs),
+    /// Write the frames of the bus to a file: candump log, FZI-CAN or MCAP
+    #[command(
+        after_help = "Examples:\n  ucom record bus.log\n  ucom record bus.mcap --for 10\n  ucom record - | ucom decode -\n\n\
+                            By the ending: .log candump -L, .fzi FZI-CAN 1.2, .mcap MCAP; `-` is a candump log on stdout."
+    )]
+    Record(RecordArgs),
+    /// Send the frames of a recording with their original timing
+    #[command(after_help = "Examples:\n  ucom replay bus.log\n  ucom replay bus.log --intrusive\n\n\
+                            Frames that reset, number, program, start or move boards are left out without --intrusive.")]
+    Replay(ReplayArgs),
+    /// Frames in words: a file, stdin or the live bus
+    #[command(
+        after_help = "Examples:\n  ucom decode bus.log\n  echo '141#2100011934126E38' | ucom decode -\n  ucom decode --live"
+    )]
+    Decode(DecodeArgs),
+    /// Measure how the boards read the protocol, and write a profile
+    #[command(
+        after_help = "Examples:\n  ucom probe\n  ucom probe --init --out boards.toml\n  ucom probe --image firmware.hex"
+    )]
+    Probe(ProbeArgs),
+    /// What is wrong with bus, chain and boards, with the next command
+    #[command(after_help = "Examples:\n  ucom doctor\n  ucom --json doctor")]
+    Doctor,
+    /// A DBC file for other CAN tools, with the names of the boards' inputs, outputs and parameters
+    #[command(
+        after_help = "Examples:\n  ucom dbc --out chain.dbc\n  ucom dbc 1-4 > chain.dbc\n  ucom dbc none > messages.dbc"
+    )]
+    Dbc(DbcArgs),
+    /// A page about profiles, simulated chains or faults
+    #[command(after_help = "Examples:\n  ucom help profile\n  ucom help sim\n  ucom help faults")]
+    Help {
+        /// The page; without it this program's own help
+        topic: Option<Topic>,
+    },
+    /// Completions for a shell, on stdout
+    #[command(
+        after_help = "Examples:\n  ucom completions bash > ~/.local/share/bash-completion/completions/ucom"
+    )]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Manual pages, one file a command
+    #[command(after_help = "Examples:\n  ucom man --out ~/.local/share/man/man1")]
+    Man {
+        /// Directory for the pages; without it the main page goes to stdout
+        #[arg(long, env = "UCOM_OUT", value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+}
+
+/// Pages of `ucom help`.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub enum Topic {
+    /// Profile files.
+    Profile,
+    /// Simulated chains.
+    Sim,
+    /// Fault files.
+    Faults,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound_and_has_an_example_and_variables_for_each_command() {
+        Cli::command().debug_assert();
+        for sub in Cli::command().get_subcommands() {
+            let help = sub.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains("Examples:"), "{} has no example", sub.get_name());
+            for arg in sub.get_arguments().filter(|a| a.get_long().is_some()) {
+                let env = arg.get_env().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
+                assert!(
+                    env.starts_with("UCOM_"),
+                    "{} --{}: no variable",
+                    sub.get_name(),
+                    arg.get_long().unwrap()
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! The options of each command.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use clap::builder::FalseyValueParser;
+
+use super::boards::{Assignment, Boards, bits, flash_id, seconds};
+use super::{ForceArgs, ValueEnum};
+
+/// Options of `ucom sim`.
+#[derive(Args, Debug)]
+pub struct SimArgs {
+    /// Number of boards, 0..31; default: those of the chain file
+    #[arg(long, env = "UCOM_BOARDS", value_name = "N", value_parser = clap::value_parser!(u8).range(0..=31))]
+    pub boards: Option<u8>,
+    /// Flash numbers along the chain, as 0x21,0x42
+    #[arg(long, env = "UCOM_FLASH_IDS", value_name = "LIST", value_delimiter = ',', value_parser = flash_id)]
+    pub flash_ids: Vec<u16>,
+    /// Where clients of the socketcand protocol connect; port 0 takes a free one
+    #[arg(long, env = "UCOM_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:29536")]
+    pub listen: String,
+    /// Boards of the chain, TOML; default: a built-in head
+    #[arg(long, env = "UCOM_CHAIN", value_name = "FILE")]
+    pub chain: Option<PathBuf>,
+    /// Faults to inject, TOML; `ucom help faults` shows the form
+    #[arg(long, env = "UCOM_FAULTS", value_name = "FILE")]
+    pub faults: Option<PathBuf>,
+    /// Seed of all that is drawn by chance
+    #[arg(long, env = "UCOM_SEED", value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// Options of `ucom init`.
+#[derive(Args, Debug)]
+pub struct InitArgs {
+    /// Inventory to write, and to compare with when it is there
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
+    /// Write the inventory anew, whatever it said before
+    #[arg(long, env = "UCOM_RENEW", value_parser = FalseyValueParser::new())]
+    pub renew: bool,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Which boards.
+#[derive(Args, Debug)]
+pub struct BoardsArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+}
+
+/// Options of `ucom status`.
+#[derive(Args, Debug)]
+pub struct StatusArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+    /// Bits to set, as ASTART,OPINIT
+    #[arg(long, env = "UCOM_SET", value_name = "BITS", value_parser = bits)]
+    pub set: Option<ucom::Status>,
+    /// Bits to clear
+    #[arg(long, env = "UCOM_CLEAR", value_name = "BITS", value_parser = bits)]
+    pub clear: Option<ucom::Status>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom reset`.
+#[derive(Args, Debug)]
+pub struct ResetArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of commands that act on boards.
+#[derive(Args, Debug)]
+pub struct ActArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS")]
+    pub boards: Boards,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom stop`.
+#[derive(Args, Debug)]
+pub struct StopArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS")]
+    pub boards: Boards,
+    /// Only end control; the application stays started
+    #[arg(long, env = "UCOM_CONTROL_ONLY", value_parser = FalseyValueParser::new())]
+    pub control_only: bool,
+}
+
+/// Options of `ucom update`.
+#[derive(Args, Debug)]
+pub struct UpdateArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS")]
+    pub boards: Boards,
+    /// Image: raw binary, Intel HEX or S-record
+    #[arg(value_name = "IMAGE")]
+    pub image: PathBuf,
+    /// The flash number that the board must have
+    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
+    pub flash_id: Option<u16>,
+    /// Flash date to write; default: today
+    #[arg(long, env = "UCOM_DATE", value_name = "YYYY-MM-DD")]
+    pub date: Option<String>,
+    /// Check everything, send nothing that changes a board
+    #[arg(long, env = "UCOM_DRY_RUN", value_parser = FalseyValueParser::new())]
+    pub dry_run: bool,
+    /// Start the application afterwards and see that it runs
+    #[arg(long, env = "UCOM_START", value_parser = FalseyValueParser::new())]
+    pub start: bool,
+    /// Flash numbers of the boards, as `ucom init` wrote them
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom io`.
+#[derive(Args, Debug)]
+pub struct IoArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+    #[command(flatten)]
+    pub cache: CacheArgs,
+}
+
+/// Where descriptions are kept.
+#[derive(Args, Clone, Debug)]
+pub struct CacheArgs {
+    /// Ask the board even when its descriptions are known
+    #[arg(long, env = "UCOM_FRESH", value_parser = FalseyValueParser::new())]
+    pub fresh: bool,
+    /// Directory of known descriptions; default: ucom in the user's cache directory
+    #[arg(long, env = "UCOM_CACHE", value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+/// Options of `ucom ci`.
+#[derive(Args, Debug)]
+pub struct CiArgs {
+    /// Board number
+    #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
+    pub board: u8,
+    /// NAME=VALUE; a name is the start of a description, or an index
+    #[arg(value_name = "NAME=VALUE")]
+    pub values: Vec<Assignment>,
+    /// Run the board under supervision for so many seconds, outputs active
+    #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
+    pub duration: Option<Duration>,
+    #[command(flatten)]
+    pub cache: CacheArgs,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom par`.
+#[derive(Args, Debug)]
+pub struct ParArgs {
+    /// Board number
+    #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
+    pub board: u8,
+    /// NAME=VALUE; a name is the start of a description, or an index
+    #[arg(value_name = "NAME=VALUE")]
+    pub values: Vec<Assignment>,
+    #[command(flatten)]
+    pub cache: CacheArgs,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom so`.
+#[derive(Args, Debug)]
+pub struct SoArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+    /// End after so many snapshots
+    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    pub count: Option<u64>,
+    /// A CSV table: time_s, board, then a column for each output
+    #[arg(long, env = "UCOM_CSV", value_parser = FalseyValueParser::new())]
+    pub csv: bool,
+    #[command(flatten)]
+    pub cache: CacheArgs,
+}
+
+/// What happens when a board's life signs stop.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub enum OnLost {
+    /// Only say it.
+    Report,
+    /// Stop that board's control.
+    StopBoard,
+    /// Stop control of all boards.
+    StopAll,
+}
+
+/// Options of `ucom run`.
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+    /// Enable the outputs: things move
+    #[arg(long, env = "UCOM_ACTIVE", value_parser = FalseyValueParser::new())]
+    pub active: bool,
+    /// Inputs to begin with, BOARD.NAME=VALUE
+    #[arg(long, env = "UCOM_CI", value_name = "B.NAME=V", value_delimiter = ',')]
+    pub ci: Vec<Assignment>,
+    /// Parameters to begin with, BOARD.NAME=VALUE
+    #[arg(long, env = "UCOM_PAR", value_name = "B.NAME=V", value_delimiter = ',')]
+    pub par: Vec<Assignment>,
+    /// What to do when a board is lost; default: the profile's on_lost
+    #[arg(long, env = "UCOM_ON_LOST", value_enum, value_name = "POLICY")]
+    pub on_lost: Option<OnLost>,
+    /// Have the boards send their texts
+    #[arg(long, env = "UCOM_DEBUG", value_parser = FalseyValueParser::new())]
+    pub debug: bool,
+    /// End after so many seconds
+    #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
+    pub duration: Option<Duration>,
+    #[command(flatten)]
+    pub cache: CacheArgs,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom monitor`.
+#[derive(Args, Debug)]
+pub struct MonitorArgs {
+    /// End after so many views, one a second
+    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    pub count: Option<u64>,
+    /// Send nothing at all, not even PC_INFO
+    #[arg(long, env = "UCOM_LISTEN_ONLY", value_parser = FalseyValueParser::new())]
+    pub listen_only: bool,
+}
+
+/// Options of `ucom record`.
+#[derive(Args, Debug)]
+pub struct RecordArgs {
+    /// File to write, .log .fzi .mcap, or - for stdout
+    pub file: PathBuf,
+    /// End after so many seconds
+    #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
+    pub duration: Option<Duration>,
+    /// End after so many frames
+    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    pub count: Option<u64>,
+}
+
+/// Options of `ucom replay`.
+#[derive(Args, Debug)]
+pub struct ReplayArgs {
+    /// Recording, .log .fzi .mcap
+    pub file: PathBuf,
+    /// Send frames too that reset, number, program, start or move boards
+    #[arg(long, env = "UCOM_INTRUSIVE", value_parser = FalseyValueParser::new())]
+    pub intrusive: bool,
+    /// Times the original speed
+    #[arg(long, env = "UCOM_SPEED", value_name = "X", default_value_t = 1.0)]
+    pub speed: f64,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom decode`.
+#[derive(Args, Debug)]
+pub struct DecodeArgs {
+    /// Recording, or - for a candump log or bare frames on stdin
+    #[arg(default_value = "-")]
+    pub file: PathBuf,
+    /// Decode the bus instead
+    #[arg(long, env = "UCOM_LIVE", value_parser = FalseyValueParser::new())]
+    pub live: bool,
+    /// End after so many frames
+    #[arg(long, env = "UCOM_COUNT", value_name = "N")]
+    pub count: Option<u64>,
+}
+
+/// Options of `ucom probe`.
+#[derive(Args, Debug)]
+pub struct ProbeArgs {
+    /// Profile to write; default: stdout
+    #[arg(long, env = "UCOM_OUT", value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Measure also what shows only while numbers are given: resets and numbers the chain
+    #[arg(long, env = "UCOM_INIT", value_parser = FalseyValueParser::new())]
+    pub init: bool,
+    /// Image that is on a board, to find the checksum of Program IDs
+    #[arg(long, env = "UCOM_IMAGE", value_name = "FILE")]
+    pub image: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom dbc`.
+#[derive(Args, Debug)]
+pub struct DbcArgs {
+    /// Board number, list, range, all, or none
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+    /// File to write; default: stdout
+    #[arg(long, env = "UCOM_OUT", value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub cache: CacheArgs,
+}

@@ -1,0 +1,105 @@
+//! `ucom decode`: frames in words, from a recording, stdin or the live bus.
+
+use std::io::BufRead;
+use std::time::Duration;
+
+use serde_json::json;
+use ucom::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
+
+use crate::args::{DecodeArgs, LinkArgs};
+use crate::failure::Failure;
+use crate::link::{protocol_frame, recorded};
+use crate::output::Output;
+use crate::signal::Stop;
+use crate::words::Decoder;
+
+/// Decodes to the end, or until Ctrl-C. Exit code 2 when nothing in a file is a frame.
+pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let left = args.count.unwrap_or(u64::MAX);
+    if args.live {
+        return live(left, link, out);
+    }
+    let stdin = args.file.as_os_str() == "-";
+    let mut profile = link.profile()?;
+    let records: Box<dyn Iterator<Item = Result<Record, Failure>>> = if stdin {
+        Box::new(lines(std::io::stdin().lock()))
+    } else {
+        let recording = Recording::read(&args.file)
+            .map_err(|e| Failure::usage(e).hint("forms are candump -L, FZI-CAN 1.2 and MCAP"))?;
+        // The recorder's profile is the right one, unless another is asked for.
+        if let (None, Some(text)) = (&link.profile, &recording.profile) {
+            profile = ucom::Profile::from_toml(text).map_err(Failure::usage)?;
+        }
+        Box::new(recording.records.into_iter().map(Ok))
+    };
+    let mut decoder = Decoder::new(profile);
+    let mut frames = 0;
+    let mut start = None;
+    for record in records {
+        let record = record?;
+        if frames == left {
+            return Ok(());
+        }
+        frames += 1;
+        let start_ns = *start.get_or_insert(record.time_ns);
+        print(&mut decoder, record.time_ns.saturating_sub(start_ns), &record.frame, out);
+    }
+    if frames == 0 {
+        return Err(Failure::usage("no frame in the input")
+            .hint("a candump log, or bare frames, one a line: 141#2100011934126E38"));
+    }
+    Ok(())
+}
+
+fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let stop = Stop::listen()?;
+    let mut decoder = Decoder::new(link.profile()?);
+    let mut bus = link.open()?;
+    while left > 0 && !stop.asked() {
+        if let Some(frame) = bus.receive(Duration::from_millis(100))? {
+            print(&mut decoder, bus.now_us() * 1000, &recorded(&frame), out);
+            left -= 1;
+        }
+    }
+    Ok(())
+}
+
+fn print(decoder: &mut Decoder, time_ns: u64, frame: &RecordedFrame, out: &Output) {
+    let described = decoder.describe(time_ns / 1000, &protocol_frame(frame));
+    let time_s = time_ns as f64 * 1e-9;
+    let mut value = json!({
+        "time_s": time_s,
+        "frame": frame.to_string(),
+        "function": described.name,
+        "who": described.who,
+        "text": described.text,
+    });
+    if let (Some(value), Some(more)) = (value.as_object_mut(), described.value.as_object()) {
+        value.extend(more.clone());
+    }
+    out.result(&value, || {
+        let frame = frame.to_string();
+        format!("{time_s:11.6}  {frame:20}  {:14} {:24} {}", described.who, described.name, described.text)
+    });
+}
+
+/// candump lines, or bare frames; empty lines are none.
+fn lines(input: impl BufRead) -> impl Iterator<Item = Result<Record, Failure>> {
+    let texts = input.lines().enumerate();
+    texts.filter_map(|(i, line)| match line {
+        Err(e) => Some(Err(e.into())),
+        Ok(line) if line.trim().is_empty() => None,
+        Ok(line) => parsed(line.trim(), i + 1),
+    })
+}
+
+fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
+    let bare = !line.starts_with('(');
+    // A bare frame has no time and no bus; with both it is a line of a log.
+    let full = if bare { format!("(0.0) can0 {line}\n") } else { format!("{line}\n") };
+    match CandumpReader::new(full.as_bytes()).next()? {
+        Ok(record) => Some(Ok(record)),
+        Err(e) => Some(Err(Failure::usage(format!("line {number}: \"{line}\": {e}"))
+            .hint("a candump log, or bare frames, one a line: 141#2100011934126E38"))),
+    }
+}

@@ -1,0 +1,20 @@
+//! `ucom help`: pages about the files that ucom reads.
+
+use clap::CommandFactory;
+use serde_json::json;
+
+use crate::args::{Cli, Topic};
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Prints a page, or the program's own help.
+pub fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {
+    let text = match topic {
+        Some(Topic::Profile) => ucom::profile::help(),
+        Some(Topic::Sim) => ucom::chain::help(),
+        Some(Topic::Faults) => ucom::chain::FAULT_HELP.to_owned(),
+        None => Cli::command().render_long_help().to_string(),
+    };
+    out.result(&json!({ "text": text }), || text.clone());
+    Ok(())
+}

@@ -1,0 +1,25 @@
+//! The commands, one file each or one file a family.
+
+mod decode;
+mod help;
+mod pages;
+mod record;
+mod sim;
+
+use crate::args::{Command, LinkArgs};
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Does what the command line asks for.
+pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    match command {
+        Command::Sim(args) => sim::sim(&args, link, out),
+        Command::Record(args) => record::record(&args, link, out),
+        Command::Replay(args) => record::replay(&args, link, out),
+        Command::Decode(args) => decode::decode(&args, link, out),
+        Command::Help { topic } => help::help(topic, out),
+        Command::Completions { shell } => pages::completions(shell),
+        Command::Man { out: dir } => pages::man(dir.as_deref(), out),
+        _ => Err(Failure::usage("not yet")),
+    }
+}

@@ -1,0 +1,145 @@
+//! `ucom record` and `ucom replay`: frames of a bus to a file and back.
+
+use std::io::Write;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use serde_json::json;
+use ucom::files::recording::{CandumpWriter, Record, Recording, RecordingFormat, RecordingWriter};
+
+use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
+use crate::failure::{FAULT, Failure};
+use crate::link::{Link, protocol_frame, recorded, replayed};
+use crate::output::Output;
+use crate::signal::Stop;
+use crate::words::Decoder;
+
+/// Where frames go.
+enum Sink {
+    File(RecordingWriter),
+    Stdout(CandumpWriter<std::io::Stdout>),
+}
+
+impl Sink {
+    fn write(&mut self, record: &Record, name: &str) -> Result<(), ucom::files::RecordingError> {
+        match self {
+            Self::File(writer) => writer.write(record, Some(name)),
+            Self::Stdout(writer) => writer.write(record),
+        }
+    }
+}
+
+/// Records until Ctrl-C, so long, or so many frames.
+pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let stop = Stop::listen()?;
+    let profile = link.profile()?;
+    let mut bus = link.open()?;
+    let stdout = args.file.as_os_str() == "-";
+    let format = RecordingFormat::of_path(&args.file);
+    let mut sink = if stdout {
+        Sink::Stdout(CandumpWriter::new(std::io::stdout()))
+    } else {
+        Sink::File(RecordingWriter::create(&args.file, format, &profile.to_toml()).map_err(Failure::usage)?)
+    };
+    let channel = bus.url().rsplit(['/', ':']).next().unwrap_or("can0").to_owned();
+    let mut decoder = Decoder::new(profile);
+    let start = Instant::now();
+    let (mut frames, mut left_out) = (0_u64, 0_u64);
+    while !stop.asked() && frames < args.count.unwrap_or(u64::MAX) {
+        let rest = args.duration.map_or(Duration::MAX, |d| d.saturating_sub(start.elapsed()));
+        if rest.is_zero() {
+            break;
+        }
+        let Some(frame) = bus.receive(rest.min(Duration::from_millis(100)))? else { continue };
+        let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let frame = recorded(&frame);
+        let name = decoder.describe(bus.now_us(), &protocol_frame(&frame)).name;
+        let record =
+            Record { time_ns: time.as_nanos() as u64, channel: channel.clone(), direction: None, frame };
+        match sink.write(&record, &name) {
+            Ok(()) => frames += 1,
+            // FZI-CAN has no form for frames of other protocols.
+            Err(_) if format == RecordingFormat::FziCan && protocol_frame(&record.frame).is_err() => {
+                left_out += 1
+            }
+            Err(e) => return Err(Failure::new(FAULT, "recording", e).hint("is the disk full?")),
+        }
+    }
+    match sink {
+        Sink::File(writer) => writer.finish().map_err(Failure::usage)?,
+        Sink::Stdout(_) => return Ok(std::io::stdout().flush()?),
+    }
+    let (file, time_s) = (args.file.display().to_string(), start.elapsed().as_secs_f64());
+    let value = json!({ "file": file, "frames": frames, "left_out": left_out, "time_s": time_s });
+    out.result(&value, || {
+        let missing =
+            if left_out > 0 { format!(", {left_out} foreign ones left out") } else { String::new() };
+        format!("{file}: {frames} frames in {time_s:.1} s{missing}")
+    });
+    Ok(())
+}
+
+/// Sends a recording's frames when they are due.
+pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    if !(args.speed.is_finite() && args.speed > 0.0) {
+        return Err(Failure::usage(format!("--speed {}: it must be above 0", args.speed)));
+    }
+    let recording = Recording::read(&args.file).map_err(Failure::usage)?;
+    let intrusive = |record: &Record| {
+        protocol_frame(&record.frame)
+            .ok()
+            .and_then(|f| f.address().ok())
+            .is_some_and(|(f, _)| intrusive_function(f))
+    };
+    let (guarded, due): (Vec<&Record>, Vec<&Record>) =
+        recording.records.iter().partition(|record| !args.intrusive && intrusive(record));
+    let stop = Stop::listen()?;
+    let mut bus = link.open()?;
+    let sent = play(&due, args.speed, &mut bus, &stop, out)?;
+    let value = json!({ "sent": sent, "left_out": guarded.len(), "frames": recording.records.len() });
+    out.result(&value, || {
+        let hint = match guarded.len() {
+            0 => String::new(),
+            n => format!(
+                ", {n} left out that reset, number, program, start or move boards (--intrusive sends them)"
+            ),
+        };
+        format!("{sent} frames sent{hint}")
+    });
+    Ok(())
+}
+
+fn play(records: &[&Record], speed: f64, bus: &mut Link, stop: &Stop, out: &Output) -> Result<u64, Failure> {
+    let bar = out.bar(records.len() as u64, "replay");
+    let first = records.first().map_or(0, |r| r.time_ns);
+    let start = Instant::now();
+    let mut sent = 0;
+    for record in records {
+        let due_s = record.time_ns.saturating_sub(first) as f64 * 1e-9 / speed;
+        let due = Duration::try_from_secs_f64(due_s).unwrap_or(Duration::MAX);
+        while !stop.asked() {
+            let rest = due.saturating_sub(start.elapsed());
+            if rest.is_zero() {
+                break;
+            }
+            // What others say is of no interest here, and must not pile up.
+            bus.receive(rest.min(Duration::from_millis(100)))?;
+        }
+        if stop.asked() {
+            break;
+        }
+        if let Some(frame) = replayed(&record.frame) {
+            bus.send_wire(&frame)?;
+            sent += 1;
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(sent)
+}
+
+/// What changes boards or keeps them running; questions and frames of boards do not.
+fn intrusive_function(function: ucom::Function) -> bool {
+    use ucom::Function;
+    let asks = matches!(function, Function::Info | Function::AskReport | Function::DumpIo | Function::DumpCi);
+    function.from_pc() && !asks
+}

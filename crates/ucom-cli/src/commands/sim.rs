@@ -1,0 +1,279 @@
+//! `ucom sim`: a simulated chain behind a server of the socketcand protocol.
+
+use std::collections::BTreeMap;
+use std::io::BufRead;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use can_link::{
+    BusError, BusStats, CanFrame, ClientEvent, ClientId, Happening, MemberId, SocketcandGateway, TimedBus,
+    TimedEvent,
+};
+use serde_json::json;
+use ucom::chain::{ChainConfig, ChainSim, Fault};
+use ucom::{Format, Frame, Profile};
+
+use crate::args::{LinkArgs, SimArgs};
+use crate::failure::Failure;
+use crate::link::to_wire;
+use crate::output::Output;
+use crate::signal::Stop;
+
+/// The name of the bus.
+const CHANNEL: &str = "can0";
+/// How long nothing that happens outside is waited for: signals and stdin are looked at so often.
+const LOOK: Duration = Duration::from_millis(50);
+/// A computer that was busy for longer than this makes virtual time stand still, or boards would lose their PC.
+const CATCH_UP_US: u64 = 200_000;
+
+/// Serves a simulated chain until SIGINT or SIGTERM.
+pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let stop = Stop::listen()?;
+    let profile = link.profile()?;
+    let config = config(args, &profile)?;
+    let faults = match &args.faults {
+        None => Vec::new(),
+        Some(path) => {
+            let wrong = |e: &dyn std::fmt::Display| {
+                Failure::usage(format!("{}: {e}", path.display())).hint("ucom help faults shows the form")
+            };
+            Fault::from_toml(&std::fs::read_to_string(path).map_err(|e| wrong(&e))?).map_err(|e| wrong(&e))?
+        }
+    };
+    let boards = config.boards.len();
+    let gateway = SocketcandGateway::bind(args.listen.as_str(), &[CHANNEL])
+        .map_err(|e| Failure::usage(e).hint("--listen 127.0.0.1:0 takes a free port"))?;
+    let url = gateway.url(CHANNEL);
+    let chain = ChainSim::new(&config, faults, args.seed, &profile);
+    out.result(&json!({ "ready": url, "boards": boards }), || format!("ready: {url}"));
+    let mut server = Server::new(gateway, chain, profile.bitrate, args.seed, out);
+    server.run(&stop);
+    let stats = server.bus.stats();
+    let load = stats.load_since(&BusStats::default()) * 100.0;
+    out.note(format!(
+        "ended after {:.1} s; {} frames on the bus, {load:.1} % load, {} collisions",
+        stats.now_ns as f64 * 1e-9,
+        stats.frames,
+        stats.collisions
+    ));
+    Ok(())
+}
+
+fn config(args: &SimArgs, profile: &Profile) -> Result<ChainConfig, Failure> {
+    let config = match &args.chain {
+        Some(path) => ChainConfig::read(path, profile)
+            .map_err(|e| Failure::usage(e).hint("ucom help sim shows the form of chain files"))?,
+        None => ChainConfig::head(profile),
+    };
+    let count = match args.boards {
+        Some(count) => usize::from(count),
+        None => config.boards.len().max(args.flash_ids.len()),
+    };
+    if args.flash_ids.len() > count {
+        let (given, wanted) = (args.flash_ids.len(), count);
+        return Err(Failure::usage(format!("--flash-ids names {given} boards, --boards {wanted}")));
+    }
+    Ok(config.with_boards(count, profile).with_flash_ids(&args.flash_ids))
+}
+
+/// Lines on stdin, read beside the bus.
+fn words() -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+/// Clients outside, boards inside, a bus between them.
+struct Server<'a> {
+    gateway: SocketcandGateway,
+    bus: TimedBus,
+    chain: ChainSim,
+    /// The chain's members on the bus, in its order.
+    inside: Vec<MemberId>,
+    clients: BTreeMap<ClientId, MemberId>,
+    /// Clients that have gone while frames of them still wait for the bus.
+    leaving: Vec<MemberId>,
+    started: Instant,
+    start_us: u64,
+    words: Receiver<String>,
+    out: &'a Output,
+}
+
+impl<'a> Server<'a> {
+    fn new(gateway: SocketcandGateway, chain: ChainSim, bitrate: u32, seed: u64, out: &'a Output) -> Self {
+        let mut bus = TimedBus::new(bitrate, seed);
+        let inside = (0..chain.members()).map(|_| bus.join()).collect();
+        Self {
+            gateway,
+            bus,
+            chain,
+            inside,
+            clients: BTreeMap::new(),
+            leaving: Vec::new(),
+            started: Instant::now(),
+            start_us: 0,
+            words: words(),
+            out,
+        }
+    }
+
+    fn run(&mut self, stop: &Stop) {
+        while !stop.asked() {
+            let now_us = self.now_us();
+            self.advance(now_us);
+            let bus = &mut self.bus;
+            self.leaving.retain(|member| {
+                let stays = bus.pending(*member) > 0;
+                if !stays {
+                    bus.leave(*member);
+                }
+                stays
+            });
+            while let Ok(line) = self.words.try_recv() {
+                self.fault(line.trim());
+            }
+            let due_us = self.due_us().saturating_sub(self.now_us());
+            let mut patience = Duration::from_micros(due_us).min(LOOK);
+            while let Some(event) = self.gateway.next(patience) {
+                self.heard(event.client, event.event);
+                patience = Duration::ZERO;
+            }
+        }
+    }
+
+    /// Virtual time by the clock, µs.
+    fn now_us(&mut self) -> u64 {
+        let now = self.start_us + self.started.elapsed().as_micros() as u64;
+        let reached = self.bus.now_ns() / 1000;
+        if now.saturating_sub(reached) > CATCH_UP_US {
+            (self.started, self.start_us) = (Instant::now(), reached + LOOK.as_micros() as u64);
+            return self.start_us;
+        }
+        now
+    }
+
+    /// When something happens next without the clients, µs.
+    fn due_us(&self) -> u64 {
+        let bus = self.bus.next_ns().map_or(u64::MAX, |ns| ns.div_ceil(1000));
+        bus.min(self.chain.next_due_us())
+    }
+
+    /// Lets virtual time pass.
+    fn advance(&mut self, to_us: u64) {
+        loop {
+            let at_us = self.due_us().clamp(self.bus.now_ns() / 1000, to_us);
+            for member in self.chain.advance(at_us) {
+                self.bus.clear(self.inside[member]);
+            }
+            for (i, member) in self.inside.iter().enumerate() {
+                self.bus.set_acknowledges(*member, self.chain.is_powered(i));
+                while let Some(frame) = self.chain.poll(i) {
+                    let wire = to_wire(&frame).ok();
+                    if wire.is_none_or(|wire| self.bus.queue(*member, wire).is_err()) {
+                        self.chain.not_sent(i, &frame);
+                        break;
+                    }
+                }
+            }
+            match self.bus.advance_to(at_us * 1000) {
+                Some(event) => self.happened(&event),
+                None if at_us >= to_us && self.chain.next_due_us() > to_us => return,
+                None => {}
+            }
+        }
+    }
+
+    fn happened(&mut self, event: &TimedEvent) {
+        self.chain.advance(event.at_ns / 1000);
+        let place = |member: &MemberId| self.inside.iter().position(|m| m == member);
+        match &event.what {
+            Happening::Received { member, frame } => {
+                if let Some(i) = place(member) {
+                    let format = Format {
+                        extended: frame.is_extended(),
+                        remote: frame.is_remote(),
+                        fd: frame.is_fd(),
+                    };
+                    self.chain.hear(i, frame.id().value(), format, frame.data());
+                }
+            }
+            Happening::Sent { member, frame } => match place(member) {
+                Some(i) => {
+                    if let Ok(protocol) = plain(frame) {
+                        self.chain.sent(i, &protocol);
+                    }
+                    for frame in through(&mut self.chain, frame) {
+                        self.gateway.deliver(0, &frame, None);
+                    }
+                }
+                None => {
+                    let client = self.clients.iter().find(|(_, m)| *m == member).map(|(client, _)| *client);
+                    self.gateway.deliver(0, frame, client);
+                }
+            },
+            Happening::Failed { member, frame } => {
+                if let (Some(i), Ok(frame)) = (place(member), plain(frame)) {
+                    self.chain.not_sent(i, &frame);
+                }
+            }
+            Happening::Error { error: BusError::Collision, frame, .. } => {
+                let time_s = event.at_ns as f64 * 1e-9;
+                let id = frame.id();
+                self.out.note(format!(
+                    "{time_s:.3} s: two members send {id} at once with different data; both are destroyed (D-05)"
+                ));
+            }
+            Happening::Error { .. } | Happening::State { .. } => {}
+        }
+    }
+
+    fn heard(&mut self, client: ClientId, event: ClientEvent) {
+        let member = *self.clients.entry(client).or_insert_with(|| self.bus.join());
+        match event {
+            ClientEvent::Joined => {}
+            ClientEvent::Frame(frame) => {
+                for frame in through(&mut self.chain, &frame) {
+                    if let Err(e) = self.bus.queue(member, frame) {
+                        self.out.note(format!("{client}: {frame} is lost: {e}"));
+                    }
+                }
+            }
+            ClientEvent::Left => {
+                self.leaving.push(member);
+                self.clients.remove(&client);
+            }
+        }
+    }
+
+    /// A fault asked for on stdin.
+    fn fault(&mut self, line: &str) {
+        if line.is_empty() {
+            return;
+        }
+        match Fault::from_line(line) {
+            Ok(fault) => {
+                self.chain.inject(fault);
+                self.out.note(format!("fault: {line}"));
+            }
+            Err(e) => self.out.note(format!("{e}; ucom help faults lists them")),
+        }
+    }
+}
+
+/// What the faults between chain and clients make of a frame.
+fn through(chain: &mut ChainSim, frame: &CanFrame) -> Vec<CanFrame> {
+    let id = frame.id();
+    chain.through(frame.data()).iter().filter_map(|data| CanFrame::classic(id, data).ok()).collect()
+}
+
+/// A frame of a board.
+fn plain(frame: &CanFrame) -> Result<Frame, ()> {
+    let id = u16::try_from(frame.id().value()).map_err(|_| ())?;
+    Frame::new(id, frame.data()).ok_or(())
+}

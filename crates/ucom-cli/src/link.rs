@@ -1,0 +1,130 @@
+//! The way to the boards: bus and profile of the command line, and frames of the bus as the protocol's.
+
+use std::time::{Duration, Instant};
+
+use can_link::{CanBus, CanFrame, ControllerState, Id};
+use ucom::files::recording::{FrameKind, RecordedFrame};
+use ucom::{Foreign, Format, Frame, Profile};
+
+use crate::args::LinkArgs;
+use crate::failure::{FAULT, Failure, NO_LINK};
+
+impl LinkArgs {
+    /// The profile; without a file the defaults.
+    pub fn profile(&self) -> Result<Profile, Failure> {
+        let Some(path) = &self.profile else { return Ok(Profile::default()) };
+        let text =
+            std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+        Profile::from_toml(&text).map_err(|e| {
+            Failure::usage(format!("{}: {e}", path.display())).hint("ucom help profile lists every key")
+        })
+    }
+
+    /// The URL of the bus.
+    pub fn url(&self) -> Result<&str, Failure> {
+        self.bus.as_deref().ok_or_else(|| {
+            Failure::usage("which bus? there is neither --bus URL nor UCOM_BUS")
+                .hint("as --bus socketcan:can0; ucom sim makes a simulated one and says its URL")
+        })
+    }
+
+    /// Opens the bus.
+    pub fn open(&self) -> Result<Link, Failure> {
+        let url = self.url()?.to_owned();
+        Ok(Link { bus: can_link::open(&url)?, url, start: Instant::now() })
+    }
+}
+
+/// An open bus with its clock.
+pub struct Link {
+    bus: Box<dyn CanBus + Send>,
+    url: String,
+    start: Instant,
+}
+
+impl Link {
+    /// The URL it was opened with.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// µs since it was opened.
+    pub fn now_us(&self) -> u64 {
+        self.start.elapsed().as_micros() as u64
+    }
+
+    /// Puts a frame on the bus.
+    pub fn send(&mut self, frame: &Frame) -> Result<(), Failure> {
+        self.send_wire(&to_wire(frame)?)
+    }
+
+    /// Puts a frame of any protocol on the bus.
+    pub fn send_wire(&mut self, frame: &CanFrame) -> Result<(), Failure> {
+        self.bus.send(frame).map_err(lost)
+    }
+
+    /// The next frame, of any protocol; waits at most so long.
+    pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, Failure> {
+        self.bus.receive(timeout).map_err(lost)
+    }
+
+    /// How the adapter gets on with the bus.
+    pub fn state(&mut self) -> ControllerState {
+        self.bus.state()
+    }
+}
+
+/// A bus that was open and fails is a fault of the run, not of the command line.
+fn lost(e: can_link::CanError) -> Failure {
+    Failure::new(NO_LINK, "bus", e).hint("is the bus still there? ucom doctor looks at it")
+}
+
+/// A frame of the protocol as one of the bus.
+pub fn to_wire(frame: &Frame) -> Result<CanFrame, Failure> {
+    let id = Id::standard(frame.id().into());
+    let made = id.and_then(|id| CanFrame::classic(id, frame.data()));
+    made.map_err(|e| Failure::new(FAULT, "frame", e))
+}
+
+/// A frame of the bus as one of the protocol, or why it is foreign (D-02).
+pub fn from_wire(frame: &CanFrame) -> Result<Frame, Foreign> {
+    let format = Format { extended: frame.is_extended(), remote: frame.is_remote(), fd: frame.is_fd() };
+    Frame::received(frame.id().value(), format, frame.data())
+}
+
+/// A frame of the bus for a recording.
+pub fn recorded(frame: &CanFrame) -> RecordedFrame {
+    let kind = if frame.is_remote() {
+        FrameKind::Remote { length: frame.len() as u8 }
+    } else if frame.is_fd() {
+        FrameKind::Fd { flags: frame.is_brs().into() }
+    } else {
+        FrameKind::Data
+    };
+    let (id, extended) = (frame.id().value(), frame.is_extended());
+    RecordedFrame { id, extended, kind, data: frame.data().to_vec(), dlc: None }
+}
+
+/// A frame of a recording for the bus; `None` for what is no frame.
+pub fn replayed(frame: &RecordedFrame) -> Option<CanFrame> {
+    let id = if frame.extended { Id::extended(frame.id) } else { Id::standard(frame.id) }.ok()?;
+    match frame.kind {
+        FrameKind::Data => CanFrame::classic(id, &frame.data).ok(),
+        FrameKind::Remote { length } => CanFrame::remote(id, length.into()).ok(),
+        FrameKind::Fd { flags } => CanFrame::fd(id, &frame.data).ok().map(|f| f.with_brs(flags & 1 != 0)),
+        FrameKind::Error => None,
+    }
+}
+
+/// A frame of a recording as one of the protocol, or why it is foreign.
+pub fn protocol_frame(frame: &RecordedFrame) -> Result<Frame, Foreign> {
+    let format = Format {
+        extended: frame.extended,
+        remote: matches!(frame.kind, FrameKind::Remote { .. }),
+        fd: matches!(frame.kind, FrameKind::Fd { .. }),
+    };
+    if frame.kind == FrameKind::Error {
+        return Err(Foreign::Malformed);
+    }
+    Frame::received(frame.id, format, &frame.data)
+}

@@ -1,0 +1,110 @@
+//! Where words go: results to stdout as text or JSON, progress and logs to stderr.
+
+use std::io::{IsTerminal, Write};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::failure::Failure;
+
+/// How a command speaks.
+#[derive(Clone, Copy, Debug)]
+pub struct Output {
+    json: bool,
+}
+
+impl Output {
+    /// Text, or JSON objects.
+    pub fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// JSON was asked for.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// Prints a result: `value` as one line of JSON, or the text.
+    pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
+        let line = if self.json {
+            serde_json::to_string(value)
+                .unwrap_or_else(|e| json!({ "error": { "message": e.to_string() } }).to_string())
+        } else {
+            text()
+        };
+        let mut stdout = std::io::stdout().lock();
+        // A reader that has gone (`ucom status | head`) is no error.
+        let _ = writeln!(stdout, "{}", line.trim_end());
+        let _ = stdout.flush();
+    }
+
+    /// One line of a log.
+    pub fn note(&self, text: impl std::fmt::Display) {
+        eprintln!("{text}");
+    }
+
+    /// A bar on stderr; invisible where stderr is no terminal.
+    pub fn bar(&self, total: u64, what: &str) -> ProgressBar {
+        let bar = ProgressBar::with_draw_target(Some(total), target());
+        let style = ProgressStyle::with_template("{msg:12} {bar:40.cyan/dim} {pos:>5}/{len} {elapsed:>5}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─"));
+        bar.set_message(what.to_owned());
+        bar
+    }
+
+    /// Prints why a command failed.
+    pub fn failure(&self, failure: &Failure) {
+        if failure.printed {
+            return;
+        }
+        if self.json {
+            let error = json!({
+                "error": {
+                    "code": failure.code,
+                    "message": failure.message,
+                    "hint": failure.hint,
+                    "exit": failure.exit,
+                }
+            });
+            println!("{error}");
+        }
+        eprintln!("ucom: {}", failure.message);
+        if !failure.hint.is_empty() {
+            eprintln!("      {}", failure.hint);
+        }
+    }
+}
+
+fn target() -> ProgressDrawTarget {
+    if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
+}
+
+/// Rows as a text table: the first column to the left, the others to the right.
+pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    let width = |i: usize| {
+        let cells = rows.iter().filter_map(|r| r.get(i)).map(|c| c.chars().count());
+        cells.chain([head[i].chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..head.len()).map(width).collect();
+    let line = |cells: &[String]| {
+        let mut text = String::new();
+        for (i, (cell, w)) in cells.iter().zip(&widths).enumerate() {
+            let room = w - cell.chars().count().min(*w);
+            let space = " ".repeat(room);
+            text += &if i == 0 { format!("{cell}{space}") } else { format!("   {space}{cell}") };
+        }
+        text.trim_end().to_owned()
+    };
+    let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
+    let mut text = line(&head) + "\n";
+    for row in rows {
+        text += &(line(row) + "\n");
+    }
+    text
+}
+
+/// A figure with so many decimals, or a dash where it is not known.
+pub fn figure(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".into(), |v| format!("{v:.digits$}"))
+}

@@ -1,0 +1,238 @@
+//! A board of the simulated chain: the node that real boards run, with simulated parts and faults around it.
+
+use std::prelude::v1::*;
+use std::sync::atomic::Ordering;
+
+use super::application::{SimApplication, latin1};
+use super::file::BoardConfig;
+use crate::node::memory::{MemoryFlash, MemoryStore, WirePins};
+use crate::node::{Node, NodeConfig, Phase, Pins, Record};
+use crate::profile::{Endian, HeaderForm};
+use crate::{Checksum, Format, Frame, Function, Status, checksum};
+
+/// While a frame waits for the bus, time passes inside the board in steps of this, µs.
+const WAIT_US: u64 = 500;
+
+pub(super) struct Board {
+    node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
+    /// First of the chain: the incoming pin is strapped.
+    strapped: bool,
+    /// Faults that hold at present.
+    pub unpowered: bool,
+    pub silent: bool,
+    pub deaf: bool,
+    pub ack_held: bool,
+    /// The frame that waits for the bus.
+    waiting: Option<Frame>,
+    /// An acknowledgement that does not leave.
+    held: Option<Frame>,
+    next_us: u64,
+    /// A state that cannot be, if there ever was one.
+    pub violation: Option<&'static str>,
+}
+
+impl Board {
+    pub fn new(config: &BoardConfig, strapped: bool, seed: u64) -> Self {
+        let mut flash = MemoryFlash::default();
+        if config.application {
+            let image = image(config);
+            let program_id = program_id(config, &image);
+            let record = Record { program_id, date: config.date, address: 0, words: image.len() as u32 / 2 };
+            flash.install(record, &image);
+        }
+        let headerless_words = if config.profile.prog_header == HeaderForm::None { 500 } else { 0 };
+        let node_config = NodeConfig {
+            profile: config.profile,
+            seed: (seed as u32) | 1,
+            headerless_words,
+            ..NodeConfig::new(config.flash_id)
+        };
+        let pins = WirePins::default();
+        pins.input.store(strapped, Ordering::SeqCst);
+        let store = MemoryStore { autostart: config.autostart, description: latin1(&config.description) };
+        let node = Node::new(node_config, flash, pins, store, SimApplication::new(config), 0);
+        Self {
+            node,
+            strapped,
+            unpowered: false,
+            silent: false,
+            deaf: false,
+            ack_held: false,
+            waiting: None,
+            held: None,
+            next_us: 0,
+            violation: None,
+        }
+    }
+
+    /// When it wants to be looked at next, µs.
+    pub fn next_us(&self) -> u64 {
+        if self.unpowered { u64::MAX } else { self.next_us }
+    }
+
+    /// Time has come to `now_us`; a frame is what it puts into its controller.
+    pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
+        if self.unpowered {
+            return None;
+        }
+        if !self.ack_held
+            && let Some(frame) = self.held.take()
+        {
+            self.waiting = Some(frame);
+            return Some(frame);
+        }
+        let polled = self.node.poll(now_us);
+        self.schedule(now_us);
+        let frame = polled?;
+        if self.silent {
+            // Its controller believes that somebody acknowledged.
+            self.node.sent(now_us, &frame);
+            self.schedule(now_us);
+            return None;
+        }
+        let acknowledges = frame.address().is_ok_and(|(function, _)| function == Function::InitAck);
+        if self.ack_held && acknowledges {
+            self.held = Some(frame);
+            return None;
+        }
+        self.waiting = Some(frame);
+        Some(frame)
+    }
+
+    fn schedule(&mut self, now_us: u64) {
+        let busy = self.waiting.is_some() || self.held.is_some();
+        let soonest = now_us + if busy { WAIT_US } else { 1 };
+        self.next_us = self.node.next_deadline().max(soonest);
+        self.violation = self.violation.or(self.node.status().contradiction());
+    }
+
+    /// Its frame was on the bus.
+    pub fn sent(&mut self, now_us: u64, frame: &Frame) {
+        if self.waiting == Some(*frame) {
+            self.waiting = None;
+        }
+        if !self.unpowered {
+            self.node.sent(now_us, frame);
+            self.next_us = now_us;
+        }
+    }
+
+    /// Its controller gave the frame up.
+    pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
+        if self.waiting == Some(*frame) {
+            self.waiting = None;
+        }
+        if !self.unpowered {
+            self.node.not_sent(now_us, frame);
+            self.next_us = now_us;
+        }
+    }
+
+    /// A frame of another member was on the bus.
+    pub fn hear(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
+        if !self.unpowered && !self.deaf {
+            // Frames that are not of this protocol are counted and ignored (D-02).
+            let _ = self.node.receive_any(now_us, id, format, data);
+            self.next_us = now_us;
+        }
+    }
+
+    /// Level of the outgoing pin.
+    pub fn outgoing(&self) -> bool {
+        !self.unpowered && self.node.pins.output.load(Ordering::SeqCst)
+    }
+
+    /// The wire from the board before has this level; broken or unpowered, it is inactive.
+    pub fn set_incoming(&mut self, now_us: u64, level: bool) {
+        let level = self.strapped || level;
+        if self.node.pins.input.swap(level, Ordering::SeqCst) != level {
+            self.next_us = self.next_us.min(now_us);
+        }
+    }
+
+    pub fn power(&mut self, now_us: u64, on: bool) {
+        if on == self.unpowered {
+            self.unpowered = !on;
+            self.waiting = None;
+            self.held = None;
+            if on {
+                self.node.power_up(now_us);
+                self.next_us = now_us;
+            } else {
+                self.node.application.power_lost(now_us);
+                self.node.flash.power_up();
+                self.node.pins.set_init_out(false);
+            }
+        }
+    }
+
+    /// Its application crashes, the watchdog reboots it (D-26).
+    pub fn crash(&mut self, now_us: u64) {
+        if !self.unpowered {
+            self.waiting = None;
+            self.held = None;
+            self.node.restart(now_us);
+            self.next_us = now_us;
+        }
+    }
+
+    pub fn break_flash(&mut self, broken: bool) {
+        self.node.flash.fail_after = broken.then_some(0);
+    }
+
+    pub fn state(&self) -> BoardState {
+        BoardState {
+            powered: !self.unpowered,
+            phase: self.node.phase(),
+            status: self.node.status(),
+            number: self.node.number().map(|n| n.number()),
+            program: self.node.record().map(|r| (r.program_id, r.date)),
+            driven: self.node.application.is_driven(),
+        }
+    }
+}
+
+/// What a board of the chain is doing; for tests and displays, nothing of it goes over the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BoardState {
+    /// It has power.
+    pub powered: bool,
+    /// S1 to S6.
+    pub phase: Phase,
+    /// Status byte.
+    pub status: Status,
+    /// Sequence number.
+    pub number: Option<u8>,
+    /// Program ID and date of the valid application.
+    pub program: Option<(u16, u16)>,
+    /// Something drives its axes.
+    pub driven: bool,
+}
+
+/// An application as the factory programs it: made from the description, so that boards have different ones.
+fn image(config: &BoardConfig) -> Vec<u8> {
+    let seed = config.description.bytes().fold(7_u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into()));
+    let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();
+    image.extend([0, 0]);
+    let Some(wanted) = config.program_id else { return image };
+    // The last word makes the checksum what the file asks for.
+    for word in 0..=u16::MAX {
+        image.truncate(254);
+        image.extend(word.to_le_bytes());
+        if program_id(config, &image) == wanted {
+            break;
+        }
+    }
+    image
+}
+
+fn program_id(config: &BoardConfig, image: &[u8]) -> u16 {
+    match (config.profile.prog_checksum, config.program_id) {
+        (Checksum::None, given) => given.unwrap_or(0),
+        (kind, _) => checksum(kind, words_order(config), image),
+    }
+}
+
+fn words_order(config: &BoardConfig) -> Endian {
+    config.profile.prog_endian
+}

@@ -31,11 +31,42 @@ const RAM: [(u64, u64); 5] = [
 /// SRAM1..3 of domain D2, each with a clock of its own.
 const D2: [(u64, u64); 3] = [(0x3000_0000, 0x2_0000), (0x3002_0000, 0x2_0000), (0x3004_0000, 0x8000)];
 
+/// Where nothing is, or where only reading is allowed, as first and last address.
+pub const FORBIDDEN: [(u64, u64); 11] = [
+    (0x0001_0000, 0x07FF_FFFF),
+    (0x0800_0000, 0x081F_FFFF),
+    (0x0820_0000, 0x1FFF_FFFF),
+    (0x2002_0000, 0x23FF_FFFF),
+    (0x2408_0000, 0x2FFF_FFFF),
+    (0x3004_8000, 0x37FF_FFFF),
+    (0x3801_0000, 0x387F_FFFF),
+    (0x3880_1000, 0x3FFF_FFFF),
+    (0x6000_0000, 0xDFFF_FFFF),
+    (0xE010_0000, 0xFFFF_FFDF),
+    (0xFFFF_FFE0, 0xFFFF_FFFF),
+];
+
+/// Code is expected in ITCM and flash only: Unicorn looks for translated code behind every store to memory that may hold some,
+/// which makes stores slow. Elsewhere [`allow_code`] is called by the first jump there.
+fn data() -> Prot {
+    Prot::READ | Prot::WRITE
+}
+
+/// Let the RAM around an address hold code; false when there is none or it may already.
+pub fn allow_code(uc: &mut Unicorn<'static, Chip>, address: u32) -> bool {
+    let regions = uc.mem_regions().unwrap_or_default();
+    let holds = |begin: u64, end: u64| (begin..=end).contains(&u64::from(address));
+    let Some(region) = regions.iter().find(|r| holds(r.begin, r.end) && r.perms == data().0) else {
+        return false;
+    };
+    uc.mem_protect(region.begin, region.end - region.begin + 1, Prot::ALL).is_ok()
+}
+
 /// Map everything; RAM is filled with chance from `seed`.
 pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
     let mut rng = fastrand::Rng::with_seed(seed ^ 0x7261_6D00);
     for (address, size) in RAM.into_iter().chain(D2) {
-        uc.mem_map(address, size, Prot::ALL).expect("RAM");
+        uc.mem_map(address, size, if address == 0 { Prot::ALL } else { data() }).expect("RAM");
         let bytes: Vec<u8> = core::iter::repeat_with(|| rng.u8(..)).take(size as usize).collect();
         uc.mem_write(address, &bytes).expect("RAM");
     }
@@ -63,6 +94,6 @@ pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
 pub fn protect(uc: &mut Unicorn<'static, Chip>) {
     for (n, (address, size)) in D2.into_iter().enumerate() {
         let on = uc.get_data().rcc.enabled(Gate::Sram(n as u32 + 1));
-        let _ = uc.mem_protect(address, size, if on { Prot::ALL } else { Prot::NONE });
+        let _ = uc.mem_protect(address, size, if on { data() } else { Prot::NONE });
     }
 }

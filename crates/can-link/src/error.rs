@@ -12,8 +12,8 @@ pub enum CanError {
     /// The URL is none.
     #[error(transparent)]
     Url(#[from] UrlError),
-    /// A URL of a kind that this version cannot open.
-    #[error("`{url}`: this version cannot open {kind} buses; it opens {}", crate::url::OPENABLE)]
+    /// A URL of a kind that this system cannot open.
+    #[error("`{url}`: {kind} buses are those of the Linux kernel; this system has {}", crate::url::OPENABLE)]
     Unsupported {
         /// The URL.
         url: String,
@@ -121,5 +121,15 @@ pub enum CanError {
         rate: u32,
         /// All that there are, bit/s.
         possible: String,
+    },
+    /// A network interface cannot be used.
+    #[error("{url}: {source}: {hint}")]
+    Interface {
+        /// The bus.
+        url: String,
+        /// The likely cause and the next command.
+        hint: String,
+        /// What the system said.
+        source: io::Error,
     },
 }

@@ -6,9 +6,7 @@
 //! | `multicast:ADDR:PORT` | python-can's `udp_multicast`; stays on this host | yes |
 //! | `socketcand:HOST:PORT/can0` | a server of the socketcand protocol, such as [`SocketcandServer`] | no |
 //! | `slcan:/dev/ttyACM0@1000000` | an adapter at a serial port | CANable 2 |
-//!
-//! `socketcan:` is understood as [URLs](CanUrl) and refused by [`open`] with an
-//! error that says what can be opened.
+//! | `socketcan:can0` | an interface of the Linux kernel | yes |
 //!
 //! ```
 //! use std::time::Duration;
@@ -36,6 +34,8 @@ mod faulty;
 mod frame;
 mod multicast;
 mod slcan;
+#[cfg(target_os = "linux")]
+mod socket_can;
 mod socketcand;
 mod state;
 mod timed;
@@ -48,6 +48,8 @@ pub use faulty::{Counts, Faults, Faulty, Plan};
 pub use frame::{CanFrame, Id, InvalidFrame};
 pub use multicast::MulticastBus;
 pub use slcan::{AdapterError, SlcanAdapter, SlcanBus, SlcanOptions};
+#[cfg(target_os = "linux")]
+pub use socket_can::SocketCanBus;
 pub use socketcand::{
     ClientEvent, ClientId, FromClient, SOCKETCAND_PORT, ServerStats, SocketcandBus, SocketcandGateway,
     SocketcandServer,

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use crate::{SOCKETCAND_PORT, SlcanOptions};
 
-/// What this version opens, for error messages.
+/// What every system opens, for error messages.
 pub(crate) const OPENABLE: &str =
     "slcan:DEVICE@RATE, socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME";
 

@@ -1,0 +1,80 @@
+//! Waiting for room in the kernel's transmit queue.
+
+use std::io;
+use std::time::Duration;
+
+/// The queue is full: the kernel gives this number and does not wait.
+const ENOBUFS: i32 = 105;
+/// Pause between two tries: a frame on a fast bus.
+const PAUSE: Duration = Duration::from_micros(200);
+/// A queue that has had no room for so long is that of a dead bus.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Writes until it works. A full queue is waited for; after 10 s without room it is an error that says what may be wrong.
+pub(super) fn insist(
+    mut write: impl FnMut() -> io::Result<()>,
+    mut pause: impl FnMut(Duration),
+) -> io::Result<()> {
+    let mut waited = Duration::ZERO;
+    loop {
+        match write() {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) if is_full(&error) => {
+                if waited >= PATIENCE {
+                    let cause = "the transmit queue has been full for 10 s: does anybody acknowledge on the bus, \
+                                 has it this bit rate, is it terminated?";
+                    return Err(io::Error::new(io::ErrorKind::TimedOut, cause));
+                }
+                pause(PAUSE);
+                waited += PAUSE;
+            }
+            other => return other,
+        }
+    }
+}
+
+fn is_full(error: &io::Error) -> bool {
+    error.raw_os_error() == Some(ENOBUFS) || error.kind() == io::ErrorKind::WouldBlock
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// EAGAIN, what a socket says that does not wait.
+    const EAGAIN: i32 = 11;
+
+    fn run(mut answers: Vec<Option<i32>>) -> (io::Result<()>, Duration, usize) {
+        let mut waited = Duration::ZERO;
+        answers.reverse();
+        let mut tries = 0;
+        let write = || {
+            tries += 1;
+            // The last answer stays.
+            let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
+            answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
+        };
+        let result = insist(write, |pause| waited += pause);
+        (result, waited, tries)
+    }
+
+    #[test]
+    fn a_full_queue_is_waited_for() {
+        let full = [vec![Some(ENOBUFS); 900], vec![Some(EAGAIN); 99], vec![None]].concat();
+        let (result, waited, tries) = run(full);
+        assert!(result.is_ok());
+        assert_eq!((waited, tries), (PAUSE * 999, 1000));
+        // A signal is no reason to wait.
+        let (result, waited, _) = run(vec![Some(4), None]);
+        assert!(result.is_ok() && waited.is_zero());
+    }
+
+    #[test]
+    fn a_dead_bus_is_an_error_after_a_while_and_other_errors_at_once() {
+        let (result, waited, _) = run(vec![Some(ENOBUFS)]);
+        assert!(result.unwrap_err().to_string().contains("acknowledge"));
+        assert_eq!(waited, PATIENCE);
+        let (result, waited, tries) = run(vec![Some(100), None]);
+        assert_eq!((result.unwrap_err().raw_os_error(), waited, tries), (Some(100), Duration::ZERO, 1));
+    }
+}

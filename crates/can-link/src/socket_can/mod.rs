@@ -1,0 +1,158 @@
+//! The CAN of the Linux kernel.
+
+mod convert;
+mod insist;
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use socketcan::{CanFdSocket, Socket, SocketOptions};
+
+use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState};
+use convert::{Heard, from_kernel, to_kernel};
+use insist::insist;
+
+/// Error numbers of Linux.
+const EINVAL: i32 = 22;
+const ENODEV: i32 = 19;
+const ENXIO: i32 = 6;
+const EPERM: i32 = 1;
+const EACCES: i32 = 13;
+const EAFNOSUPPORT: i32 = 97;
+const EPROTONOSUPPORT: i32 = 93;
+const ENETDOWN: i32 = 100;
+
+/// A network interface of the kernel's CAN, such as `can0` or `vcan0`, classic and CAN FD.
+pub struct SocketCanBus {
+    url: String,
+    interface: String,
+    socket: CanFdSocket,
+    state: ControllerState,
+}
+
+impl SocketCanBus {
+    /// Opens an interface that is up.
+    pub fn open(interface: &str) -> Result<Self, CanError> {
+        let failed = |source: io::Error| CanError::Interface {
+            url: CanUrl::SocketCan { interface: interface.to_owned() }.to_string(),
+            hint: hint(&source, interface),
+            source,
+        };
+        // Any interface first: a kernel without CAN is told apart from a wrong name.
+        drop(CanFdSocket::open_iface(0).map_err(failed)?);
+        let socket = CanFdSocket::open(interface).map_err(failed)?;
+        // The kernel remembers here that the interface is down.
+        if let Some(error) = socket.as_raw_socket().take_error().map_err(failed)? {
+            return Err(failed(error));
+        }
+        socket.set_error_filter_accept_all().map_err(failed)?;
+        socket.set_nonblocking(true).map_err(failed)?;
+        let url = CanUrl::SocketCan { interface: interface.to_owned() }.to_string();
+        Ok(Self { url, interface: interface.to_owned(), socket, state: ControllerState::default() })
+    }
+
+    fn failed(&self, step: &'static str, source: io::Error) -> CanError {
+        let url = self.url.clone();
+        match source.raw_os_error() {
+            Some(ENETDOWN | ENODEV | ENXIO) => {
+                CanError::Interface { url, hint: hint(&source, &self.interface), source }
+            }
+            _ => CanError::Io { url, step, source },
+        }
+    }
+}
+
+/// The likely cause and the next command.
+fn hint(error: &io::Error, interface: &str) -> String {
+    let up = format!("sudo ip link set {interface} up type can bitrate 1000000");
+    match error.raw_os_error() {
+        Some(EAFNOSUPPORT | EPROTONOSUPPORT) => {
+            "this kernel has no CAN: try `sudo modprobe -a can can_raw`; where that fails, use an slcan adapter, or \
+             multicast:ADDR:PORT between programs of one computer"
+                .to_owned()
+        }
+        Some(ENODEV | ENXIO) => format!(
+            "there is no such CAN interface; `ip -brief link show type can` lists them; plug in the adapter, then `{up}`"
+        ),
+        Some(ENETDOWN) => format!("the interface is down: `{up}`"),
+        Some(EPERM | EACCES) => "this user may not; see `id` and the rights of the container".to_owned(),
+        _ => format!("see `ip -details link show {interface}`"),
+    }
+}
+
+impl CanBus for SocketCanBus {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        let raw = to_kernel(frame);
+        let result = insist(|| self.socket.write_frame(&raw), std::thread::sleep);
+        result.map_err(|source| match source.raw_os_error() {
+            Some(EINVAL) if frame.is_fd() => CanError::NotCarried {
+                url: self.url.clone(),
+                frame: *frame,
+                why: "the interface is a classic one; if its adapter has CAN FD, set it up with `dbitrate 5000000 fd on`",
+            },
+            _ => self.failed("sending", source),
+        })
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+        let deadline = Instant::now().checked_add(timeout);
+        let mut read = self.socket.read_frame();
+        loop {
+            match read {
+                Ok(raw) => match from_kernel(&raw, self.state) {
+                    Heard::Frame(frame) => return Ok(Some(frame)),
+                    Heard::State(state) => self.state = state,
+                    Heard::Nothing => {}
+                },
+                Err(error) if is_no_data(&error) => {}
+                Err(error) => return Err(self.failed("receiving", error)),
+            }
+            read = self.socket.read_frame();
+            if !read.as_ref().is_err_and(is_no_data) {
+                continue;
+            }
+            let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));
+            if left.is_zero() {
+                return Ok(None);
+            }
+            read = self.socket.read_frame_timeout(left);
+        }
+    }
+
+    /// From the error frames that [`receive`](CanBus::receive) has seen; none come when all is well from the start.
+    fn state(&mut self) -> ControllerState {
+        self.state
+    }
+}
+
+fn is_no_data(error: &io::Error) -> bool {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    matches!(error.kind(), WouldBlock | TimedOut | Interrupted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On any machine: a kernel without CAN and one without this interface both end in words with the next command.
+    #[test]
+    fn what_cannot_be_opened_says_why_and_what_to_do() {
+        let error = SocketCanBus::open("nocan17").err().expect("no such interface").to_string();
+        assert!(error.contains("socketcan:nocan17"), "{error}");
+        assert!(error.contains("modprobe") || error.contains("ip -brief link"), "{error}");
+    }
+
+    #[test]
+    fn each_cause_has_its_next_command() {
+        for (number, part) in [
+            (EAFNOSUPPORT, "modprobe -a can can_raw"),
+            (ENODEV, "ip link set can0 up type can bitrate 1000000"),
+            (ENETDOWN, "is down: `sudo ip link set can0 up type can bitrate 1000000`"),
+            (EPERM, "may not"),
+            (EINVAL, "ip -details link show can0"),
+        ] {
+            let hint = hint(&io::Error::from_raw_os_error(number), "can0");
+            assert!(hint.contains(part), "{hint}");
+        }
+    }
+}

@@ -49,8 +49,7 @@ mod scan;
 mod shared;
 mod statistics;
 mod supervise;
-#[cfg(test)]
-mod tests;
+
 mod times;
 pub mod update;
 

@@ -75,7 +75,8 @@ struct Tick {
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 static SUMMARY: Mutex<Cell<Summary>> = Mutex::new(Cell::new(Summary::new()));
 
-/// Starts the ticks.
+/// Starts the ticks. Not inlined: the controller is large, and its way through the stack should not last.
+#[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
     let Parts { points, can, pins, slot, lines, watchdog, boot } = parts;

@@ -26,3 +26,37 @@ pub fn profile(data: &[u8]) {
         assert_eq!(Profile::from_toml(&profile.to_toml()), Ok(profile));
     }
 }
+
+/// A board with a history: each step is a byte that says how much time passes and what kind of frame comes, two
+/// bytes of identifier, and up to eight of data. It never contradicts itself and says only what it may.
+pub fn node(data: &[u8]) {
+    use crate::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+    use crate::node::{Node, NodeConfig, Phase};
+
+    let application = MemoryApplication::new("fuzz", &["a", "b", "c", "d"], &["e", "f", "g", "h"], &["i"]);
+    let pins = WirePins::chain(1).remove(0);
+    let config = NodeConfig::new(0x21);
+    let mut board = Node::new(config, MemoryFlash::default(), pins, MemoryStore::default(), application, 0);
+    board.flash.install(crate::node::Record { program_id: 1, date: 2, address: 0, words: 4 }, &[0; 8]);
+    let mut now = 100_000;
+    board.poll(now);
+    let mut rest = data;
+    while let Some((&[step, high, low], tail)) = rest.split_first_chunk::<3>() {
+        let len = usize::from(step & 15).min(8).min(tail.len());
+        let (payload, tail) = tail.split_at(len);
+        rest = tail;
+        now += [0, 100, 1000, 10_000, 100_000, 500_000, 1_500_000, 10][usize::from(step >> 5)];
+        // The low five bits choose a number that the board may have.
+        let id = u16::from_be_bytes([high, low]) & 0x7E1;
+        let Some(frame) = Frame::new(id, payload) else { continue };
+        board.receive(now, &frame);
+        for _ in 0..100 {
+            let Some(frame) = board.poll(now) else { break };
+            assert!(FromBoard::decode(&frame, &Profile::default()).is_ok(), "{frame}");
+            now += 100;
+            board.sent(now, &frame);
+        }
+        assert_eq!(board.status().contradiction(), None);
+        assert!(!board.application.active || board.phase() == Phase::Running);
+    }
+}

@@ -30,6 +30,8 @@ pub struct MemoryFlash {
     pub fail_after: Option<u64>,
     /// The operation, counted from 0, in which the power goes.
     pub cut_after: Option<u64>,
+    /// A byte of the program flash that stays erased whatever is written: only reading back finds it.
+    pub stuck_byte: Option<usize>,
     /// Operations started so far.
     pub operations: u64,
     cells: [Vec<u8>; 3],
@@ -59,6 +61,7 @@ impl MemoryFlash {
             write_us: 500,
             fail_after: None,
             cut_after: None,
+            stuck_byte: None,
             operations: 0,
             cells,
             record: [0xFF; RECORD_LEN],
@@ -158,6 +161,9 @@ impl Flash for MemoryFlash {
         let len = data.len() * halves / 2;
         for (cell, byte) in cells.iter_mut().zip(data).take(len) {
             *cell = if memory == Memory::Ram { *byte } else { *cell & *byte };
+        }
+        if let Some(cell) = self.stuck_byte.and_then(|at| self.cells[slot(Memory::Program)].get_mut(at)) {
+            *cell = 0xFF;
         }
         Ok(())
     }

@@ -282,6 +282,8 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(chain(&[("680#", 290), ("041#", 1)]), (0x5D, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#4000", 1)]), (0x19, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#0404", 1)]), (0x5D, frames("0C1#01")));
+    // Once for each number: the same number again starts nothing.
+    assert_eq!(chain(&[("680#", 600), ("1C1#8000", 10), ("281#", 10)]).0, 0x59);
     // Not before its time, and with error 11 when there is nothing to start.
     let mut bus = Bus::one();
     bus.boards[0].store.autostart = true;

@@ -76,6 +76,21 @@ fn d33_outputs_on_a_blocked_bus() {
     assert!(bus.take().len() <= 6);
 }
 
+/// D-34, D-50: a start begins with the initial inputs, whatever was set before.
+#[test]
+fn d34_initial_inputs_at_the_start() {
+    let mut bus = Bus::initialised();
+    bus.boards[0].application.initial_ci = vec![11, 22];
+    for _ in 0..2 {
+        bus.send("301#");
+        bus.run(50);
+        assert_eq!(bus.boards[0].application.latched_ci, [11, 22]);
+        bus.send("341#0000050006000000");
+        assert_eq!(bus.boards[0].application.latched_ci, [5, 6]);
+        bus.send("1C1#8000");
+    }
+}
+
 /// D-34: with the latch `last` inputs take effect together.
 #[test]
 fn d34_latch_last() {

@@ -52,6 +52,11 @@ fn d23_xreset_forgets_the_number() {
     assert_eq!(bus.info(1), None);
     assert_eq!(bus.ask("281#", 20), frames("0C1#01"));
     assert_eq!(bus.status(1), 0x1D);
+    // D-25: the new number does not start the application in the middle of an update.
+    bus.boards[0].store.autostart = true;
+    bus.send("041#");
+    bus.ask("281#", 2000);
+    assert_eq!(bus.status(1), 0x5D);
 }
 
 /// D-10, D-13: the other byte order and the other way to count.

@@ -134,6 +134,19 @@ fn d45_failing_flash() {
     }
 }
 
+/// D-44: what is in the flash must have the Program ID, not only what came.
+#[test]
+fn d44_flash_is_read_back() {
+    let image = small();
+    for byte in [0, 63, 64, 127, 150, 199] {
+        let mut bus = Bus::initialised();
+        bus.boards[0].flash.stuck_byte = Some(byte);
+        assert!(image[byte] != 0xFF && !update(&mut bus, &blocks(&image, &Profile::default())));
+        assert_eq!(bus.errors, frames("081#01"), "byte {byte}");
+        assert!(!bus.boards[0].has_application());
+    }
+}
+
 /// D-42: READY after the header of cycle 2 waits for the erase; the board answers meanwhile.
 #[test]
 fn d42_long_erase_blocks_nothing() {

@@ -1,0 +1,66 @@
+//! One board on an in-memory bus: reset, number, start, run, and what happens when the PC falls silent.
+//!
+//! `cargo run -p ucom --example one_board` prints the frames with their times; `<` is the PC, `>` the board.
+
+use ucom::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+use ucom::node::{Node, NodeConfig, Record};
+use ucom::{Admin, Frame, Profile, Sequence, ToBoard};
+
+fn main() {
+    let profile = Profile::default();
+    let number = Sequence::new(1).expect("1 is at most 31");
+
+    // A board is the state machine and four parts; here they live in memory.
+    let mut flash = MemoryFlash::default();
+    flash.install(Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 }, &[0; 8]);
+    let pins = WirePins::chain(1).remove(0);
+    let store = MemoryStore { autostart: false, description: b"UCoM2 head pan".to_vec() };
+    let application = MemoryApplication::new("head pan", &["position"], &["position", "current"], &["kp"]);
+    let mut board = Node::new(NodeConfig::new(0x0021), flash, pins, store, application, 0);
+
+    let script = [
+        (300, ToBoard::Reset, Sequence::ZERO),
+        (50, ToBoard::Init, number),
+        (50, ToBoard::Info, number),
+        (50, ToBoard::Start, number),
+        (50, ToBoard::DumpIo, number),
+        (15, ToBoard::Admin(Admin { run: true, active: true, ..Admin::default() }), number),
+    ];
+    let mut now_us = 100_000;
+    for (wait_ms, message, to) in script {
+        let frame = message.encode(to, &profile);
+        print('<', now_us, &frame);
+        board.receive(now_us, &frame);
+        now_us = pass(&mut board, now_us, wait_ms);
+    }
+    println!("the PC falls silent; outputs every 10 ms are not shown");
+    pass(&mut board, now_us, 2000);
+    println!("status: {}", board.status());
+}
+
+/// Lets time pass, from one thing that the board does to the next.
+fn pass(
+    board: &mut Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>,
+    mut now_us: u64,
+    ms: u64,
+) -> u64 {
+    let end = now_us + 1000 * ms;
+    while now_us < end {
+        if let Some(frame) = board.poll(now_us) {
+            if frame.id() != 0x381 {
+                print('>', now_us, &frame);
+            }
+            // About as long as the frame takes at 1 Mbit/s.
+            now_us += 55 + 10 * u64::from(frame.dlc());
+            board.sent(now_us, &frame);
+        } else {
+            now_us = board.next_deadline().clamp(now_us + 1, end);
+        }
+    }
+    end
+}
+
+fn print(who: char, now_us: u64, frame: &Frame) {
+    let name = frame.address().map_or("", |(function, _)| function.name());
+    println!("{:9.3} ms {who} {:<22} {name}", now_us as f64 / 1000.0, frame.to_string());
+}

@@ -32,6 +32,9 @@ mod datagram;
 mod error;
 mod faulty;
 mod frame;
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub mod fuzzing;
 mod multicast;
 mod slcan;
 #[cfg(target_os = "linux")]

@@ -3,7 +3,7 @@
 
 mod adapter;
 mod host;
-mod line;
+pub(crate) mod line;
 mod port;
 
 pub use adapter::{AdapterError, SlcanAdapter};

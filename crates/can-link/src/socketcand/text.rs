@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::{CanFrame, Id};
 
 /// Longest message that is kept; the longest of the protocol, a CAN FD frame with blanks between its bytes, has 240.
-const LONGEST: usize = 512;
+pub(crate) const LONGEST: usize = 512;
 
 /// Finds messages in a stream that may be cut anywhere, in bounded memory.
 pub(crate) struct Splitter {
@@ -26,6 +26,12 @@ impl Splitter {
     /// Messages that were too long, not ASCII or never ended, so far.
     pub(crate) fn rubbish(&self) -> u64 {
         self.rubbish
+    }
+
+    /// Bytes that it holds at most.
+    #[cfg(any(test, feature = "fuzzing"))]
+    pub(crate) fn capacity(&self) -> usize {
+        self.message.capacity()
     }
 
     /// The text between `<` and `>` of the next message; what it takes of `bytes` is gone from there.
@@ -265,7 +271,7 @@ mod tests {
         for _ in 0..1000 {
             assert!(messages(&mut splitter, &[b'a'; 4096]).is_empty());
         }
-        assert_eq!(splitter.message.capacity(), LONGEST);
+        assert_eq!(splitter.capacity(), LONGEST);
         assert_eq!(messages(&mut splitter, b"> < hi >"), [" hi "]);
         assert_eq!(splitter.rubbish(), 1);
     }

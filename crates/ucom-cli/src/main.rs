@@ -3,9 +3,11 @@
 
 mod args;
 mod commands;
+mod driver;
 mod failure;
 mod link;
 mod output;
+mod shape;
 mod signal;
 mod words;
 

@@ -53,6 +53,16 @@ impl Output {
         bar
     }
 
+    /// A bar of bytes on stderr, with the words of its owner behind it.
+    pub fn bytes_bar(&self, total: u64, what: &str) -> ProgressBar {
+        let bar = ProgressBar::with_draw_target(Some(total), target());
+        let style =
+            ProgressStyle::with_template("{prefix:9} {bar:32.cyan/dim} {bytes:>9} of {total_bytes}  {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─"));
+        bar.set_prefix(what.to_owned());
+        bar
+    }
+
     /// Prints why a command failed.
     pub fn failure(&self, failure: &Failure) {
         if failure.printed {

@@ -1,10 +1,12 @@
 //! The commands, one file each or one file a family.
 
+mod boards;
 mod decode;
 mod help;
 mod pages;
 mod record;
 mod sim;
+mod update;
 
 use crate::args::{Command, LinkArgs};
 use crate::failure::Failure;
@@ -14,6 +16,15 @@ use crate::output::Output;
 pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Sim(args) => sim::sim(&args, link, out),
+        Command::Scan => boards::scan(link, out),
+        Command::Init(args) => boards::init(&args, link, out),
+        Command::Info(args) => boards::info(&args, link, out),
+        Command::Status(args) => boards::status(&args, link, out),
+        Command::Reset(args) => boards::reset(&args, link, out),
+        Command::Xreset(args) => boards::xreset(&args, link, out),
+        Command::Start(args) => boards::start(&args, link, out),
+        Command::Stop(args) => boards::stop(&args, link, out),
+        Command::Update(args) => update::update(&args, link, out),
         Command::Record(args) => record::record(&args, link, out),
         Command::Replay(args) => record::replay(&args, link, out),
         Command::Decode(args) => decode::decode(&args, link, out),

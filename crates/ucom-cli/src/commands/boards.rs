@@ -1,0 +1,261 @@
+//! `ucom scan`, `init`, `info`, `status`, `reset`, `xreset`, `start`, `stop`: the chain and single acts on boards.
+
+use serde_json::{Value, json};
+use ucom::files::{Inventory, InventoryBoard};
+use ucom::master::{BoardSeen, InitOptions, InitReport, Outcome, Reports, Request, StopLevel};
+use ucom::{BoardInfo, Profile, Status};
+
+use crate::args::{ActArgs, BoardsArgs, Boards, InitArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
+use crate::driver::{Driver, unexpected};
+use crate::failure::{Failure, NO_LINK};
+use crate::output::Output;
+use crate::shape::{bits, board_table, board_value, info_value, state};
+
+/// Who is there; changes nothing.
+pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let profile = driver.master.profile();
+    let report = match driver.run(Request::Scan)? {
+        Outcome::Scan(report) => report,
+        other => return Err(unexpected(&other)),
+    };
+    let value = json!({
+        "reports": report.reports.ids,
+        "boards": report.boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>(),
+        "findings": texts(&report.findings),
+    });
+    if report.boards.is_empty() && report.reports.ids.is_empty() {
+        let failure = Failure::new(NO_LINK, "no-boards", "no board answers").hint("ucom doctor looks for the reason");
+        return Err(failure);
+    }
+    out.result(&value, || {
+        let mut text = String::new();
+        if !report.boards.is_empty() {
+            text += &board_table(&report.boards, &profile);
+        }
+        let (numbered, there) = (report.boards.len(), report.reports.ids.len());
+        text += &format!("{there} boards are there, {numbered} have a number\n");
+        let unnumbered = report.findings.iter().filter(|f| is_unnumbered(f)).count();
+        if unnumbered > 0 {
+            text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
+        }
+        text + &lines(&report.findings.iter().filter(|f| !is_unnumbered(f)).collect::<Vec<_>>())
+    });
+    Ok(())
+}
+
+fn is_unnumbered(finding: &ucom::master::ScanFinding) -> bool {
+    matches!(finding, ucom::master::ScanFinding::Unnumbered { .. })
+}
+
+fn unnumbered_ids(findings: &[ucom::master::ScanFinding]) -> String {
+    let id = |finding: &ucom::master::ScanFinding| match finding {
+        ucom::master::ScanFinding::Unnumbered { ucom_id } => Some(format!("0x{ucom_id:02X}")),
+        _ => None,
+    };
+    findings.iter().filter_map(id).collect::<Vec<_>>().join(" ")
+}
+
+fn texts(findings: &[impl ToString]) -> Vec<String> {
+    findings.iter().map(ToString::to_string).collect()
+}
+
+fn lines(findings: &[impl ToString]) -> String {
+    texts(findings).iter().map(|text| format!("! {text}\n")).collect()
+}
+
+/// Resets and numbers the whole chain; writes an inventory.
+pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let known = match args.inventory.exists() {
+        true => Some(Inventory::read(&args.inventory).map_err(Failure::usage)?),
+        false => None,
+    };
+    let compared = known.as_ref().filter(|_| !args.renew);
+    let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
+    let mut driver = Driver::open(link, out)?;
+    let profile = driver.master.profile();
+    let options = InitOptions { expected, force: args.force.force };
+    let report = match driver.run(Request::Init(options))? {
+        Outcome::Init(report) => report,
+        other => return Err(unexpected(&other)),
+    };
+    let written = report.is_ok();
+    if written {
+        inventory(&report, known.as_ref())?.write(&args.inventory).map_err(Failure::usage)?;
+    }
+    let file = args.inventory.display().to_string();
+    let value = json!({
+        "ok": report.is_ok(),
+        "boards": report.boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>(),
+        "reports": report.reports.ids,
+        "findings": texts(&report.findings),
+        "inventory": written.then_some(&file),
+    });
+    out.result(&value, || {
+        let end = match (written, report.boards.len()) {
+            (true, n) => format!("{n} boards numbered; inventory: {file}\n"),
+            (false, n) => format!("{n} boards numbered; the inventory {file} is not touched\n"),
+        };
+        let renew = match compared {
+            Some(_) if !written => "if the chain was changed on purpose: ucom init --renew\n",
+            _ => "",
+        };
+        board_table(&report.boards, &profile) + &lines(&report.findings) + &end + renew
+    });
+    match report.exit_code() {
+        0 => Ok(()),
+        code => Err(Failure::printed(code)),
+    }
+}
+
+/// The boards of a report, with the names that people have given them.
+fn inventory(report: &InitReport, known: Option<&Inventory>) -> Result<Inventory, Failure> {
+    let mut inventory = Inventory::default();
+    for board in &report.boards {
+        let entry = InventoryBoard {
+            number: board.number,
+            flash_number: board.info.flash_number,
+            description: board.description.clone().unwrap_or_default(),
+            name: String::new(),
+        };
+        inventory.insert(entry).map_err(Failure::usage)?;
+    }
+    if let Some(known) = known {
+        inventory.keep_names(known);
+    }
+    Ok(inventory)
+}
+
+/// What boards say about themselves.
+pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let profile = driver.master.profile();
+    let mut boards = Vec::new();
+    for board in driver.numbers(&args.boards)? {
+        match driver.run(Request::Info { board })? {
+            Outcome::Info(seen) => boards.push(seen),
+            other => return Err(unexpected(&other)),
+        }
+    }
+    let value = json!({ "boards": boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>() });
+    out.result(&value, || board_table(&boards, &profile));
+    Ok(())
+}
+
+/// Shows status bits, after setting and clearing some.
+pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let (set, clear) = (args.set.unwrap_or_default(), args.clear.unwrap_or_default());
+    let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
+    if both != Status(0) {
+        return Err(Failure::usage(format!("{both}: cannot be set and cleared at once")));
+    }
+    if mirrors != Status(0) {
+        return Err(Failure::usage(format!("{mirrors}: mirrors reality and cannot be written"))
+            .hint("ucom start, ucom stop and ucom init change what these bits show"));
+    }
+    let mut driver = Driver::open(link, out)?;
+    let profile = driver.master.profile();
+    let mut all = Vec::new();
+    for board in driver.numbers(&args.boards)? {
+        let request = match set | clear {
+            Status(0) => Request::Info { board },
+            mask => Request::SetStatus { board, mask, value: set, force: args.force.force },
+        };
+        all.push(numbers(driver.run(request)?)?);
+    }
+    print(&all, &profile, out);
+    Ok(())
+}
+
+fn numbers(outcome: Outcome) -> Result<(u8, BoardInfo), Failure> {
+    match outcome {
+        Outcome::Status { board, info } => Ok((board, info)),
+        Outcome::Info(seen) | Outcome::Started(seen) => Ok((seen.number, seen.info)),
+        other => Err(unexpected(&other)),
+    }
+}
+
+fn print(all: &[(u8, BoardInfo)], profile: &Profile, out: &Output) {
+    let value = json!({ "boards": all.iter().map(|(n, info)| info_value(*n, info, profile)).collect::<Vec<_>>() });
+    out.result(&value, || {
+        let line = |(n, info): &(u8, BoardInfo)| {
+            let (status, words) = (info.status, bits(info.status).join(" "));
+            format!("board {n:<3} 0x{:02X}  {:12} {words}\n", status.0, state(status))
+        };
+        all.iter().map(line).collect()
+    });
+}
+
+/// PC_RESET, to all at once or one by one.
+pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let force = args.force.force;
+    let boards: Vec<Option<u8>> = match &args.boards {
+        Boards::All => vec![None],
+        Boards::None => Vec::new(),
+        Boards::Some(numbers) => numbers.iter().copied().map(Some).collect(),
+    };
+    let mut reports = Reports::default();
+    for board in boards {
+        match driver.run(Request::Reset { board, force })? {
+            Outcome::Reset(some) => reports.ids.extend(some.ids),
+            other => return Err(unexpected(&other)),
+        }
+    }
+    if reports.ids.is_empty() {
+        return Err(Failure::new(NO_LINK, "no-boards", "no board reported after the reset")
+            .hint("ucom doctor looks for the reason"));
+    }
+    out.result(&json!({ "reports": reports.ids }), || {
+        let ids: Vec<String> = reports.ids.iter().map(|id| format!("0x{id:02X}")).collect();
+        format!("{} boards reported: {}\ntheir numbers are gone; next: ucom init\n", ids.len(), ids.join(" "))
+    });
+    Ok(())
+}
+
+/// PC_XRESET: exloader with programming enabled.
+pub fn xreset(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    act(args, link, out, |board, force| Request::XReset { board, force })
+}
+
+/// PC_START: the application.
+pub fn start(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    act(args, link, out, |board, force| Request::Start { board, force })
+}
+
+fn act(args: &ActArgs, link: &LinkArgs, out: &Output, request: fn(u8, bool) -> Request) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let profile = driver.master.profile();
+    let mut all = Vec::new();
+    for board in driver.numbers(&args.boards)? {
+        all.push(numbers(driver.run(request(board, args.force.force))?)?);
+    }
+    print(&all, &profile, out);
+    Ok(())
+}
+
+/// Outputs, control and application, as far as asked. Stopping is always allowed: no other PC can forbid it.
+pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let profile = driver.master.profile();
+    let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
+    let mut all = Vec::new();
+    for board in driver.numbers(&args.boards)? {
+        all.push(numbers(driver.run(Request::Stop { board, level, force: true })?)?);
+    }
+    print(&all, &profile, out);
+    Ok(())
+}
+
+/// The boards of `info` for other commands.
+pub fn seen(driver: &mut Driver, board: u8) -> Result<BoardSeen, Failure> {
+    match driver.run(Request::Info { board })? {
+        Outcome::Info(seen) => Ok(seen),
+        other => Err(unexpected(&other)),
+    }
+}
+
+/// Values of a finding list for JSON.
+pub fn finding_values(findings: &[impl ToString]) -> Value {
+    json!(texts(findings))
+}

@@ -1,0 +1,76 @@
+//! Boards as text and as JSON, alike for all commands.
+
+use serde_json::{Value, json};
+use ucom::master::BoardSeen;
+use ucom::{BoardInfo, Profile, Status};
+
+use crate::output::table;
+
+/// A flash date as text, `2026-05-04`; the bare number where the profile's form does not fit.
+pub fn date(profile: &Profile, date: u16) -> String {
+    match profile.prog_date.decode(date) {
+        Some((year, month, day)) => format!("{year:04}-{month:02}-{day:02}"),
+        None => format!("0x{date:04X}"),
+    }
+}
+
+/// The names of the bits that are set.
+pub fn bits(status: Status) -> Vec<&'static str> {
+    Status::NAMES.iter().filter(|(_, bit)| status.has(*bit)).map(|(name, _)| *name).collect()
+}
+
+/// What a board does, in one word.
+pub fn state(status: Status) -> &'static str {
+    if status.has(Status::MCARUN) {
+        "running"
+    } else if status.has(Status::MSTART) {
+        "started"
+    } else if status.has(Status::PROG) {
+        "programming"
+    } else {
+        "exloader"
+    }
+}
+
+/// The numbers of DSP_INFO.
+pub fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
+    let application = info.has_application();
+    json!({
+        "number": number,
+        "flash_number": info.flash_number,
+        "status": bits(info.status),
+        "status_byte": info.status.0,
+        "state": state(info.status),
+        "application": application,
+        "program_id": application.then_some(info.program_id),
+        "flash_date": application.then(|| date(profile, info.date)),
+    })
+}
+
+/// A board with its description.
+pub fn board_value(board: &BoardSeen, profile: &Profile) -> Value {
+    let mut value = info_value(board.number, &board.info, profile);
+    value["description"] = json!(board.description);
+    value
+}
+
+/// Boards as a table.
+pub fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
+    let row = |b: &BoardSeen| {
+        let (program, day) = match b.info.has_application() {
+            true => (format!("0x{:04X}", b.info.program_id), date(profile, b.info.date)),
+            false => ("none".into(), "-".into()),
+        };
+        vec![
+            b.number.to_string(),
+            format!("0x{:04X}", b.info.flash_number),
+            state(b.info.status).into(),
+            program,
+            day,
+            bits(b.info.status).join(" "),
+            b.description.clone().unwrap_or_else(|| "?".into()),
+        ]
+    };
+    let rows: Vec<Vec<String>> = boards.iter().map(row).collect();
+    table(&["board", "flash id", "state", "program", "flashed", "status", "description"], &rows)
+}

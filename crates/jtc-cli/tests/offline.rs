@@ -15,6 +15,16 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
 }
 
+/// The joint bus is CAN FD: a transport that cannot carry it is refused with one that can.
+#[cfg(unix)]
+#[test]
+fn a_bus_that_cannot_carry_the_joints_is_refused() {
+    let said = jtc(&["sim", "--bus", "socketcand:localhost/can0"]).ends(2);
+    assert!(said.err.contains("CAN FD") && said.err.contains("multicast:239.74.163.2:43113"), "{}", said.err);
+    let said = jtc(&["sim", "--bus", "can0"]).ends(2);
+    assert!(said.err.contains("is no CAN URL"), "{}", said.err);
+}
+
 #[test]
 fn a_port_that_is_not_there_ends_with_3() {
     let said = jtc(&["--json", "status", "--port", "/nowhere/tty"]).ends(3);

@@ -46,7 +46,15 @@ fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
 /// The joint bus on a bus that others can join.
 #[cfg(unix)]
 fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
-    let bus = can_link::open(url).map_err(|e| Failure::usage(format!("{url}: {e}")))?;
+    let parsed: can_link::CanUrl = url.parse().map_err(Failure::usage)?;
+    if matches!(parsed, can_link::CanUrl::Socketcand { .. }) {
+        let what =
+            format!("{url}: the joint bus is CAN FD, and the socketcand protocol has classic frames only");
+        return Err(Failure::usage(what)
+            .hint("use --bus multicast:239.74.163.2:43113, which python-can joins as udp_multicast"));
+    }
+    // The error names the bus.
+    let bus = can_link::open_url(&parsed).map_err(Failure::usage)?;
     Ok(jtc_sim::BusTap::new(bus))
 }
 

@@ -198,8 +198,8 @@ impl Board {
     }
 
     /// Bytes of the host that are not through yet.
-    pub fn write_pending(&mut self, port: Port) -> usize {
-        self.machine.chip().usarts[Self::index(port)].host_pending()
+    pub fn pending(&self, port: Port) -> usize {
+        self.machine.uc.get_data().usarts[Self::index(port)].host_pending()
     }
 
     /// Bytes that have reached the host since the last call, with their times.

@@ -1,0 +1,199 @@
+//! Board, terminal and clock in one loop.
+use std::error::Error;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use openjtc_emulator::observe::ResetCause;
+use openjtc_emulator::{Board, Port};
+
+use crate::frames::{Frames, Incoming};
+use crate::log::DefmtLog;
+use crate::pty::{Pty, PtyError};
+
+/// Bytes of the host that wait for the line.
+const WAITING_MAX: usize = 4096;
+/// Longest time for which virtual time stands still within a frame while no bytes come.
+const STANDSTILL: Duration = Duration::from_millis(5);
+/// Longest wait for a host to read, when virtual time runs free.
+const READER_WAIT: Duration = Duration::from_millis(100);
+/// Largest delay that is made up for.
+const CATCH_UP: Duration = Duration::from_secs(2);
+const TICK: Duration = Duration::from_millis(1);
+
+/// How virtual time goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speed {
+    /// With the clock.
+    Realtime,
+    /// As fast as it can.
+    Max,
+}
+
+/// The loop's state.
+pub struct Live {
+    board: Board,
+    port: Port,
+    pty: Pty,
+    speed: Speed,
+    log: Option<DefmtLog>,
+    frames: Frames,
+    incoming: Incoming,
+    /// Bytes that the terminal did not take at once.
+    rest: Vec<u8>,
+    connected: bool,
+    stood: Duration,
+    ready: bool,
+    resets: usize,
+    faults: usize,
+}
+
+impl Live {
+    /// A board that has just been switched on, behind a terminal.
+    pub fn new(board: Board, port: Port, pty: Pty, speed: Speed, log: Option<DefmtLog>) -> Self {
+        Self {
+            board,
+            port,
+            pty,
+            speed,
+            log,
+            frames: Frames::default(),
+            incoming: Incoming::default(),
+            rest: Vec::new(),
+            connected: false,
+            stood: Duration::ZERO,
+            ready: false,
+            resets: 1,
+            faults: 0,
+        }
+    }
+
+    /// Runs until `stop` is set.
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), Box<dyn Error>> {
+        let (mut start, mut start_ms) = (Instant::now(), self.board.now_ms());
+        while !stop.load(Ordering::Relaxed) {
+            self.take_input()?;
+            if self.speed == Speed::Realtime {
+                let passed = TICK * (self.board.now_ms() - start_ms) as u32;
+                let due = start.elapsed().saturating_sub(passed);
+                if due < TICK {
+                    self.wait(TICK - due)?;
+                    continue;
+                }
+                if due > CATCH_UP {
+                    // Longer than that is not made up for: time goes on from here.
+                    (start, start_ms) = (Instant::now(), self.board.now_ms());
+                }
+            }
+            if self.stands_still()? {
+                continue;
+            }
+            self.board.step();
+            self.report()?;
+            self.give_output()?;
+        }
+        Ok(())
+    }
+
+    fn wait(&self, time: Duration) -> Result<(), PtyError> {
+        if self.incoming_room() == 0 {
+            std::thread::sleep(time);
+            return Ok(());
+        }
+        self.pty.wait_input(time)
+    }
+
+    fn incoming_room(&self) -> usize {
+        WAITING_MAX.saturating_sub(self.board.pending(self.port))
+    }
+
+    fn take_input(&mut self) -> Result<(), PtyError> {
+        let mut buffer = [0; WAITING_MAX];
+        loop {
+            let room = self.incoming_room();
+            let n = if room == 0 { 0 } else { self.pty.read(&mut buffer[..room])? };
+            if n == 0 {
+                return Ok(());
+            }
+            self.stood = Duration::ZERO;
+            self.incoming.push(&buffer[..n]);
+            self.board.write(self.port, &buffer[..n]);
+        }
+    }
+
+    /// Within a frame whose next bytes are still on their way through the operating system, virtual time waits a little.
+    fn stands_still(&mut self) -> Result<bool, PtyError> {
+        let waiting = self.board.pending(self.port) > 0;
+        if !self.incoming.mid_frame() || waiting || self.stood >= STANDSTILL {
+            return Ok(false);
+        }
+        let before = Instant::now();
+        self.pty.wait_input(STANDSTILL - self.stood)?;
+        self.stood += before.elapsed();
+        if self.stood >= STANDSTILL {
+            self.incoming.give_up();
+        }
+        Ok(true)
+    }
+
+    /// The firmware's log, and what nobody wants to see: resets and faults.
+    fn report(&mut self) -> Result<(), Box<dyn Error>> {
+        let ms = self.board.now_ms();
+        if let Some(log) = &mut self.log {
+            log.print(ms, &self.board.machine.defmt())?;
+        }
+        let observers = &self.board.machine.chip().observers;
+        for fault in &observers.faults[self.faults..] {
+            eprintln!("{ms} ms: {:?} at 0x{:08X}, address 0x{:08X}", fault.kind, fault.pc, fault.address);
+        }
+        for reset in observers.resets.iter().skip(self.resets).filter(|r| r.cause != ResetCause::PowerOn) {
+            eprintln!("{ms} ms: reset, {:?}, at 0x{:08X}", reset.cause, reset.pc);
+        }
+        (self.faults, self.resets) = (observers.faults.len(), observers.resets.len());
+        Ok(())
+    }
+
+    fn give_output(&mut self) -> Result<(), PtyError> {
+        let bytes = self.board.read(self.port);
+        self.frames.push(&bytes);
+        if self.frames.is_empty() {
+            return Ok(());
+        }
+        if !self.ready {
+            println!("ready: {}", self.pty.name().display());
+            self.ready = true;
+        }
+        let connected = self.pty.host_is_there()?;
+        if self.connected && !connected {
+            self.rest.clear();
+            self.pty.renew()?;
+        }
+        self.connected = connected;
+        while let Some(frame) = self.frames.pop() {
+            if connected {
+                self.write_rest()?;
+                if self.rest.is_empty() {
+                    self.rest = frame;
+                    self.write_rest()?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A host that does not read must not hold up the arm: in real time nothing waits.
+    fn write_rest(&mut self) -> Result<(), PtyError> {
+        let end = Instant::now() + READER_WAIT;
+        while !self.rest.is_empty() {
+            let n = self.pty.write(&self.rest)?;
+            self.rest.drain(..n);
+            let now = Instant::now();
+            if n == 0 && (self.speed == Speed::Realtime || now >= end) {
+                break;
+            }
+            if n == 0 {
+                self.pty.wait_room(end - now)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -58,7 +58,8 @@ impl IoDescription {
         }
     }
 
-    /// Place of an edge: by its text, in any case when only one fits, or by its number (`#3` or `3`).
+    /// Place of an edge: by its text, in any case when only one fits, with or without the unit in brackets behind it, or by
+    /// its number (`#3` or `3`).
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {
@@ -67,6 +68,7 @@ impl IoDescription {
         };
         let index = only(&|n| n == name)
             .or_else(|| only(&|n| n.trim().eq_ignore_ascii_case(name.trim())))
+            .or_else(|| only(&|n| short(n).eq_ignore_ascii_case(name.trim())))
             .or_else(|| name.trim_start_matches('#').parse().ok().filter(|i| *i < names.len()));
         if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
             return Ok(index);
@@ -77,6 +79,11 @@ impl IoDescription {
         let near = near.into_iter().take(3).map(|(_, n)| n.clone()).collect();
         Err(Error::NoEdge { board, kind: kind.name(), name: name.into(), near })
     }
+}
+
+/// A text without the unit in brackets behind it.
+pub fn short(text: &str) -> &str {
+    text.split_once(" [").map_or(text, |(name, _)| name).trim()
 }
 
 #[cfg(test)]
@@ -90,6 +97,8 @@ mod tests {
         assert_eq!(io.find(1, Kind::Ci, "Target"), Ok(0));
         assert_eq!(io.find(1, Kind::Ci, "TARGET SPEED"), Ok(1));
         assert_eq!(io.find(1, Kind::Ci, "#3"), Ok(3));
+        let units = IoDescription { par: texts(&["kp [mA/deg]", "kp_2 [mA]", "KD"]), ..Default::default() };
+        assert_eq!((units.find(1, Kind::Par, "KP"), units.find(1, Kind::Par, "kd")), (Ok(0), Ok(2)));
         assert!(io.find(1, Kind::Ci, "x").is_err(), "two edges have this name");
         let text = io.find(1, Kind::Ci, "traget").unwrap_err().to_string();
         assert!(text.contains("board 1 has no CI `traget`; there is `Target`"), "{text}");

@@ -5,7 +5,7 @@ mod dump;
 mod shadow;
 mod snapshot;
 
-pub use description::{IoDescription, Kind};
+pub use description::{IoDescription, Kind, short};
 pub(crate) use dump::{describe, describe_procedure, initial_inputs_procedure, read_initial_inputs};
 pub use shadow::{ParValue, Shadow};
 pub use snapshot::{Snapshot, SnapshotAssembler};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ucom::Profile;
-use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request};
+use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request, StopLevel};
 
 use crate::args::{Boards, LinkArgs};
 use crate::failure::{Failure, NO_LINK};
@@ -99,6 +99,21 @@ impl Driver {
         }
     }
 
+    /// Stops a board, also after Ctrl-C: what was started is not left alone.
+    pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), Failure> {
+        let id = self.master.start(self.link.now_us(), Request::Stop { board, level, force: true })?;
+        loop {
+            self.turn(LOOK)?;
+            while let Some(event) = self.master.take_event() {
+                if let Event::Done { id: done, result } = event
+                    && done == id
+                {
+                    return result.map(|_| ()).map_err(Failure::from);
+                }
+            }
+        }
+    }
+
     /// Words for what happens beside a procedure.
     pub fn tell(&self, event: &Event, during: Option<ProcedureId>) {
         if let Some(text) = words(event, during) {
@@ -119,9 +134,14 @@ impl Driver {
                 }
                 let found = report.reports.ids.len();
                 Err(match found {
-                    0 => Failure::new(NO_LINK, "no-boards", "no board answers").hint("ucom doctor looks for the reason"),
-                    n => Failure::new(NO_LINK, "no-numbers", format!("{n} boards are there, none has a number"))
-                        .hint("ucom init numbers them"),
+                    0 => Failure::new(NO_LINK, "no-boards", "no board answers")
+                        .hint("ucom doctor looks for the reason"),
+                    n => Failure::new(
+                        NO_LINK,
+                        "no-numbers",
+                        format!("{n} boards are there, none has a number"),
+                    )
+                    .hint("ucom init numbers them"),
                 })
             }
         }
@@ -141,7 +161,9 @@ pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
             Supervision::Lost => format!("board {board}: lost, no life sign any more"),
             Supervision::Back => format!("board {board}: back"),
             Supervision::Rebooted { ucom_id } => {
-                format!("board {board} (UCoM id 0x{ucom_id:02X}) has rebooted and lost its number: `ucom init`")
+                format!(
+                    "board {board} (UCoM id 0x{ucom_id:02X}) has rebooted and lost its number: `ucom init`"
+                )
             }
             Supervision::UnknownRebooted { ucom_id } => {
                 format!("a board with UCoM id 0x{ucom_id:02X} has rebooted")

@@ -9,6 +9,11 @@ use ucom::{Foreign, Format, Frame, Profile};
 use crate::args::LinkArgs;
 use crate::failure::{FAULT, Failure, NO_LINK};
 
+/// Waits that are no longer than this are kept exactly.
+const COARSE: Duration = Duration::from_millis(12);
+/// How often the bus is looked at in such a wait.
+const LOOK: Duration = Duration::from_micros(100);
+
 impl LinkArgs {
     /// The profile; without a file the defaults.
     pub fn profile(&self) -> Result<Profile, Failure> {
@@ -65,7 +70,21 @@ impl Link {
 
     /// The next frame, of any protocol; waits at most so long.
     pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, Failure> {
-        self.bus.receive(timeout).map_err(lost)
+        if timeout > COARSE {
+            return self.bus.receive(timeout - COARSE).map_err(lost);
+        }
+        // Sockets round their timeouts up to the system's tick, up to 10 ms; gaps between frames are shorter.
+        let end = Instant::now() + timeout;
+        loop {
+            if let Some(frame) = self.bus.receive(Duration::ZERO).map_err(lost)? {
+                return Ok(Some(frame));
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            std::thread::sleep(left.min(LOOK));
+        }
     }
 
     /// How the adapter gets on with the bus.

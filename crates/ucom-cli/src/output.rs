@@ -90,8 +90,10 @@ fn target() -> ProgressDrawTarget {
     if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
 }
 
-/// Rows as a text table: the first column to the left, the others to the right.
+/// Rows as a text table; words to the left, columns whose head begins with `>` (figures) to the right.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    let right: Vec<bool> = head.iter().map(|h| h.starts_with('>')).collect();
+    let head: Vec<&str> = head.iter().map(|h| h.trim_start_matches('>')).collect();
     let width = |i: usize| {
         let cells = rows.iter().filter_map(|r| r.get(i)).map(|c| c.chars().count());
         cells.chain([head[i].chars().count()]).max().unwrap_or(0)
@@ -102,7 +104,8 @@ pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
         for (i, (cell, w)) in cells.iter().zip(&widths).enumerate() {
             let room = w - cell.chars().count().min(*w);
             let space = " ".repeat(room);
-            text += &if i == 0 { format!("{cell}{space}") } else { format!("   {space}{cell}") };
+            let gap = if i == 0 { "" } else { "   " };
+            text += &if right[i] { format!("{gap}{space}{cell}") } else { format!("{gap}{cell}{space}") };
         }
         text.trim_end().to_owned()
     };

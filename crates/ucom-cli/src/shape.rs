@@ -72,5 +72,5 @@ pub fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = boards.iter().map(row).collect();
-    table(&["board", "flash id", "state", "program", "flashed", "status", "description"], &rows)
+    table(&[">board", "flash id", "state", "program", "flashed", "status", "description"], &rows)
 }

@@ -1,11 +1,11 @@
 //! `ucom scan`, `init`, `info`, `status`, `reset`, `xreset`, `start`, `stop`: the chain and single acts on boards.
 
-use serde_json::{Value, json};
+use serde_json::json;
 use ucom::files::{Inventory, InventoryBoard};
 use ucom::master::{BoardSeen, InitOptions, InitReport, Outcome, Reports, Request, StopLevel};
 use ucom::{BoardInfo, Profile, Status};
 
-use crate::args::{ActArgs, BoardsArgs, Boards, InitArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
+use crate::args::{ActArgs, Boards, BoardsArgs, InitArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{Failure, NO_LINK};
 use crate::output::Output;
@@ -25,7 +25,8 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         "findings": texts(&report.findings),
     });
     if report.boards.is_empty() && report.reports.ids.is_empty() {
-        let failure = Failure::new(NO_LINK, "no-boards", "no board answers").hint("ucom doctor looks for the reason");
+        let failure =
+            Failure::new(NO_LINK, "no-boards", "no board answers").hint("ucom doctor looks for the reason");
         return Err(failure);
     }
     out.result(&value, || {
@@ -71,7 +72,8 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         false => None,
     };
     let compared = known.as_ref().filter(|_| !args.renew);
-    let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
+    let expected =
+        compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
     let mut driver = Driver::open(link, out)?;
     let profile = driver.master.profile();
     let options = InitOptions { expected, force: args.force.force };
@@ -176,7 +178,8 @@ fn numbers(outcome: Outcome) -> Result<(u8, BoardInfo), Failure> {
 }
 
 fn print(all: &[(u8, BoardInfo)], profile: &Profile, out: &Output) {
-    let value = json!({ "boards": all.iter().map(|(n, info)| info_value(*n, info, profile)).collect::<Vec<_>>() });
+    let value =
+        json!({ "boards": all.iter().map(|(n, info)| info_value(*n, info, profile)).collect::<Vec<_>>() });
     out.result(&value, || {
         let line = |(n, info): &(u8, BoardInfo)| {
             let (status, words) = (info.status, bits(info.status).join(" "));
@@ -223,7 +226,12 @@ pub fn start(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     act(args, link, out, |board, force| Request::Start { board, force })
 }
 
-fn act(args: &ActArgs, link: &LinkArgs, out: &Output, request: fn(u8, bool) -> Request) -> Result<(), Failure> {
+fn act(
+    args: &ActArgs,
+    link: &LinkArgs,
+    out: &Output,
+    request: fn(u8, bool) -> Request,
+) -> Result<(), Failure> {
     let mut driver = Driver::open(link, out)?;
     let profile = driver.master.profile();
     let mut all = Vec::new();
@@ -253,9 +261,4 @@ pub fn seen(driver: &mut Driver, board: u8) -> Result<BoardSeen, Failure> {
         Outcome::Info(seen) => Ok(seen),
         other => Err(unexpected(&other)),
     }
-}
-
-/// Values of a finding list for JSON.
-pub fn finding_values(findings: &[impl ToString]) -> Value {
-    json!(texts(findings))
 }

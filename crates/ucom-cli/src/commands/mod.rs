@@ -3,10 +3,14 @@
 mod boards;
 mod decode;
 mod help;
+mod io;
 mod pages;
 mod record;
+mod run;
 mod sim;
 mod update;
+
+pub use boards::seen;
 
 use crate::args::{Command, LinkArgs};
 use crate::failure::Failure;
@@ -25,6 +29,12 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Start(args) => boards::start(&args, link, out),
         Command::Stop(args) => boards::stop(&args, link, out),
         Command::Update(args) => update::update(&args, link, out),
+        Command::Io(args) => io::io(&args, link, out),
+        Command::Ci(args) => io::ci(&args, link, out),
+        Command::Par(args) => io::par(&args, link, out),
+        Command::So(args) => run::so(&args, link, out),
+        Command::Run(args) => run::run(&args, link, out),
+        Command::Dbc(args) => io::dbc(&args, link, out),
         Command::Record(args) => record::record(&args, link, out),
         Command::Replay(args) => record::replay(&args, link, out),
         Command::Decode(args) => decode::decode(&args, link, out),

@@ -4,9 +4,7 @@ use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use ucom::Profile;
 use ucom::files::{Image, ImageOptions, Inventory};
-use ucom::master::update::{
-    Progress, UpdateImage, UpdateOptions, UpdateReport, UpdateResult, UpdateTarget,
-};
+use ucom::master::update::{Progress, UpdateImage, UpdateOptions, UpdateReport, UpdateResult, UpdateTarget};
 use ucom::master::{Event, Outcome, Request};
 
 use crate::args::{Boards, LinkArgs, UpdateArgs};
@@ -88,9 +86,9 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
 /// The flash date: as asked, else today (UTC).
 fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let (year, month, day) = match asked {
-        Some(text) => parsed(text).ok_or_else(|| {
-            Failure::usage(format!("--date {text}: the form is YYYY-MM-DD"))
-        })?,
+        Some(text) => {
+            parsed(text).ok_or_else(|| Failure::usage(format!("--date {text}: the form is YYYY-MM-DD")))?
+        }
         None => {
             let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
             civil(now.as_secs() / 86_400)
@@ -183,9 +181,10 @@ fn print(report: &UpdateReport, profile: &Profile, out: &Output) {
             (false, Some(id)) => format!("program 0x{id:04X}, {}\n", date(profile, report.date)),
             (false, None) => String::new(),
         };
-        let hint = |b: &UpdateResult| b.failure.as_ref().map(|f| format!("board {}: {}\n", b.board, f.hint()));
+        let hint =
+            |b: &UpdateResult| b.failure.as_ref().map(|f| format!("board {}: {}\n", b.board, f.hint()));
         let hints: String = report.boards.iter().filter_map(hint).collect();
-        head + &table(&["board", "flash id", "outcome", "attempts", "time", ""], &rows) + &hints
+        head + &table(&[">board", "flash id", "outcome", ">attempts", ">time", ""], &rows) + &hints
     });
 }
 

@@ -174,6 +174,16 @@ mod tests {
         assert_eq!(Header::parse(&block, Endian::Big), Err(HeaderError::Magic(0x4355)));
     }
 
+    #[test]
+    fn d41_another_version_is_refused() {
+        let header = Header { cycle: 1, memory: 0, address: 0, length: 1, program_id: 0, date: 0, target: 0 };
+        let mut block = header.build(Endian::Little);
+        // Version 2 with a sum that is right.
+        (block[2], block[62]) = (2, block[62].wrapping_sub(1));
+        assert_ne!(block[62], 0xFF, "no borrow");
+        assert_eq!(Header::parse(&block, Endian::Little), Err(HeaderError::Version(2)));
+    }
+
     proptest! {
         #[test]
         fn d41_round_trip(words: [u16; 5], address: u32, length: u32, big: bool, at in 0..64usize, flip in 1..=255u8) {

@@ -180,9 +180,8 @@ impl DateForm {
             }
             Self::Bcd => {
                 let number = |byte: u16| {
-                    (byte >> 4 < 10 && byte & 15 < 10)
-                        .then(|| byte >> 4 & 15)
-                        .map(|t| (t * 10 + (byte & 15)) as u8)
+                    let (tens, ones) = (byte >> 4, byte & 15);
+                    (tens < 10 && ones < 10).then_some((10 * tens + ones) as u8)
                 };
                 (2000 + u16::from(number(date >> 8)?), number(date & 0xFF)?, 1)
             }

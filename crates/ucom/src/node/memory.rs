@@ -350,6 +350,8 @@ impl Application for MemoryApplication {
         self.sampled_so.clone_from(&self.so);
     }
 
+    // The snapshot is what the trait calls so.
+    #[allow(clippy::misnamed_getters)]
     fn so(&self) -> &[u16] {
         &self.sampled_so
     }

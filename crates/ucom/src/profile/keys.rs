@@ -79,7 +79,7 @@ macro_rules! keys {
             doc: $doc,
             kind: Kind::$kind,
             set: |profile, text| match <$type as Value>::read(text) {
-                Some(value @ $allowed) => {
+                Some(value) if matches!(value, $allowed) => {
                     profile.$field = value;
                     true
                 }

@@ -94,6 +94,11 @@ impl Profile {
         Sequence::all().filter(move |number| profile.is_board(*number))
     }
 
+    /// The number that a process word without a type of its own stands for (D-11).
+    pub const fn process_value(&self, word: u16) -> i32 {
+        if self.pd_signed { word as i16 as i32 } else { word as i32 }
+    }
+
     /// `string.max`, never above the 512 that the table allows.
     pub const fn string_limit(&self) -> usize {
         if self.string_max > 512 { 512 } else { self.string_max as usize }
@@ -160,6 +165,23 @@ mod tests {
         assert_eq!(numbers(1, Broadcast::None), (1, 31, 0));
         let both = Profile { addr_first: 0, ..Profile::default() };
         assert!(matches!(both.check(), Err(ProfileError::Contradiction(_))));
+    }
+
+    #[test]
+    fn d11_process_words_are_signed() {
+        let profile = Profile::default();
+        assert_eq!([0x05DC, 0xFFEC, 0x8000].map(|word| profile.process_value(word)), [1500, -20, -32768]);
+        let unsigned = Profile { pd_signed: false, ..profile };
+        assert_eq!(unsigned.process_value(0xFFEC), 65516);
+    }
+
+    /// Every key has its place on the protocol page.
+    #[test]
+    fn d00_the_protocol_page_names_every_key() {
+        let page = include_str!("../../../../docs/protocol-ucom.md");
+        let missing: Vec<_> =
+            KEYS.iter().filter(|key| !page.contains(&std::format!("`{}`", key.name))).collect();
+        assert!(missing.is_empty(), "{missing:?}");
     }
 
     #[test]

@@ -134,6 +134,19 @@ fn d45_failing_flash() {
     }
 }
 
+/// D-43: the block is in use until READY has left the controller.
+#[test]
+fn d43_frame_before_ready_has_left() {
+    let mut bus = Bus::initialised();
+    bus.send("041#");
+    bus.hold = |frame| frame.id() == 0x181;
+    bus.block(&blocks(&small(), &Profile::default())[0], 10);
+    bus.send("2C1#0011223344556677");
+    bus.release();
+    bus.run(5);
+    assert_eq!(bus.take(), frames("181# 081#04"));
+}
+
 /// D-44: what is in the flash must have the Program ID, not only what came.
 #[test]
 fn d44_flash_is_read_back() {

@@ -288,6 +288,9 @@ pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result
     }
     let seen = confirmed(link, number).await?;
     if seen.info.flash_number != flash_number {
+        // Another board took the number just now: it must not keep it, or the next command means the wrong one.
+        link.send(to, ToBoard::SetStatus { mask: Status::INIT.0, value: 0 }).await;
+        link.with(|core| *core.boards.of(number) = Default::default());
         let (wanted, found) = (flash_number, seen.info.flash_number);
         return Err(Error::WrongBoard { board: number, wanted, found });
     }

@@ -72,9 +72,9 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// As [`Link::ask`] with a frame of any form.
-    pub(crate) async fn ask_frame(&self, frame: Frame) {
-        let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::All));
+    /// As [`Link::send`] with a frame of any form.
+    pub(crate) async fn send_frame(&self, frame: Frame) {
+        let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::Nothing));
         self.left(serial).await;
     }
 

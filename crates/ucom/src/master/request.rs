@@ -49,10 +49,6 @@ impl InfoCollector {
         Ok(())
     }
 
-    pub(crate) fn started(&self) -> bool {
-        self.info.is_some()
-    }
-
     pub(crate) fn finished(&self) -> bool {
         self.broken || self.text.is_some()
     }

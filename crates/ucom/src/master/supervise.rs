@@ -219,11 +219,11 @@ impl Core {
             if let FromBoard::Error(code) = message {
                 let during = self.inboxes.keys().next().copied();
                 self.event(Event::BoardError { board: from, code, during });
-                self.deliver(from, message);
             } else {
                 self.statistics.undecodable += 1;
             }
-            return;
+            // A probe wants to know who answers under the number that should be nobody's.
+            return self.deliver(from, message);
         }
         self.boards.of(from).last = Some((now, message.function()));
         match message {

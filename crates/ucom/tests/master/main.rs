@@ -3,5 +3,8 @@
 
 mod bench;
 mod chain;
+mod faults;
+mod probing;
+mod running;
 mod scripted;
 mod update;

@@ -1,6 +1,6 @@
 //! The controller: state machine and tick (section 4).
 use jtc_dynamics::Dynamics;
-use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, STATUS_LEN, Status};
+use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, Status};
 
 use crate::config::{Config, PidGains, TableOf};
 use crate::defaults;
@@ -125,15 +125,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.select_state();
 
         // What to do in it.
-        match self.state {
-            State::Start | State::Init | State::Error => self.motion.release(&self.nodes),
+        let mut torque = match self.state {
+            State::Start | State::Init | State::Error => {
+                self.motion.release(&self.nodes);
+                [0.0; JOINTS]
+            }
             State::Teaching => self.teach(),
             State::HoldPos => self.hold(),
             State::Operate => self.operate(),
-        }
+        };
 
         // An error found now zeroes the torque of this same tick.
-        let mut torque = self.check_limits();
         if self.errors.any() {
             self.enter(State::Error);
             torque = [0.0; JOINTS];
@@ -145,13 +147,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let must_move = new_error || (powered(before) && !self.powered());
         let bus = self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move);
         self.observe(&torque);
-        Outputs {
-            bus: Some(bus),
-            // J-22: 0 in Start and while an internal error is latched.
-            safety_output: self.state != State::Start && !self.errors.internal(),
-            status: self.status(inputs.status_free),
-            host_done,
+        // J-22: 0 in Start and while an internal error is latched.
+        let safety_output = self.state != State::Start && !self.errors.internal();
+        let mut outputs = Outputs { bus: Some(bus), safety_output, status: None, host_done };
+        if self.status_due(inputs.status_free) {
+            outputs.status = Some(self.status().emit());
         }
+        outputs
     }
 
     /// What the last tick computed.
@@ -247,8 +249,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Execute from Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
-        let first = self.store.at(0.0).ok_or(DataStatus::NotAllowed)?;
-        if !self.near(&first.position) {
+        let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
+        if !self.near(&first) {
             return Err(DataStatus::StartPositionMismatch);
         }
         self.clock = PathClock::default();
@@ -291,21 +293,24 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    fn hold(&mut self) {
+    fn hold(&mut self) -> [f64; JOINTS] {
         self.motion.latch(&self.nodes);
         self.motion.hold(&self.config);
-        self.compute(Law::Hold);
+        self.control(Law::Hold)
     }
 
-    fn teach(&mut self) {
+    fn teach(&mut self) -> [f64; JOINTS] {
         self.motion.set = crate::SetPoint::still(*self.nodes.positions());
-        self.compute(Law::Teach);
+        self.control(Law::Teach)
     }
 
-    fn operate(&mut self) {
+    /// The control step in Operate: a function of its own, so that its instructions can be counted. On the path they are the
+    /// same number in every tick.
+    #[inline(never)]
+    fn operate(&mut self) -> [f64; JOINTS] {
         self.motion.latch(&self.nodes);
         self.walk();
-        self.compute(Law::Follow);
+        self.control(Law::Follow)
     }
 
     /// Set values of Operate.
@@ -366,7 +371,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Positions of the first point; without a trajectory (which Execute refuses) where the arm is held.
     fn first_point(&self) -> [f64; JOINTS] {
-        self.store.at(0.0).map_or(self.motion.set.position, |first| first.position)
+        self.store.first().unwrap_or(self.motion.set.position)
     }
 
     /// The last point was commanded in this tick (J-31).
@@ -376,42 +381,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    fn compute(&mut self, law: Law) {
+    /// The control law; returns the torque to command, and raises the errors of the joints.
+    fn control(&mut self, law: Law) -> [f64; JOINTS] {
         let gains = Gains {
             dynamics: &self.dynamics,
             pid: &self.pid,
             polynomial: &self.polynomial,
             table: self.friction_is_table.then_some(&self.tables),
         };
-        let errors = self.motion.compute(law, &self.nodes, &self.config, &gains);
-        for (j, &bits) in errors.iter().enumerate() {
-            if bits != 0 && self.nodes.node(j).enabled() {
-                self.errors.raise_joint(j, bits);
-            }
-        }
-    }
-
-    /// J-43; returns the torque to command.
-    fn check_limits(&mut self) -> [f64; JOINTS] {
-        let mut torque = [0.0; JOINTS];
-        let law = match self.state {
-            State::HoldPos => Law::Hold,
-            State::Operate => Law::Follow,
-            State::Teaching => Law::Teach,
-            State::Start | State::Init | State::Error => return torque,
-        };
-        for (j, torque) in torque.iter_mut().enumerate() {
-            let measured = self.nodes.positions()[j];
-            let mut errors =
-                if law == Law::Teach { 0 } else { self.motion.check_set(law, j, measured, &self.config) };
-            match self.motion.limit_torque(j, &self.config) {
-                Ok(limited) => *torque = limited,
-                Err(bit) => errors |= bit,
-            }
-            if errors != 0 {
-                self.errors.raise_joint(j, errors);
-            }
-        }
+        let (torque, errors) = self.motion.control(law, &self.nodes, &self.config, &gains);
+        self.errors.raise_joints(&errors);
         torque
     }
 
@@ -444,13 +423,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A JtcStatus when one is due: at once for a response, else every period (J-04).
-    fn status(&mut self, free: bool) -> Option<[u8; STATUS_LEN]> {
+    /// A JtcStatus is due: at once for a response, else every period (J-04).
+    fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
-        if !free || (self.records.is_empty() && self.since_status_ms < self.config.status_period_ms) {
-            return None;
+        let due = free && (!self.records.is_empty() || self.since_status_ms >= self.config.status_period_ms);
+        if due {
+            self.since_status_ms = 0;
         }
-        self.since_status_ms = 0;
+        due
+    }
+
+    fn status(&mut self) -> Status {
         let (can_current, can_occurred) = self.errors.can();
         let (q, v) = (self.nodes.positions(), self.nodes.velocities());
         let joints = core::array::from_fn(|j| {
@@ -471,7 +454,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
         });
         let gripper = &self.nodes.node(GRIPPER).report;
-        let status = Status {
+        Status {
             response: self.records.pop().unwrap_or_default(),
             fsm: self.state as u8,
             errors: self.errors.word(),
@@ -493,8 +476,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 errors: gripper.errors,
                 warnings: gripper.warnings,
             }),
-        };
-        Some(status.emit())
+        }
     }
 }
 

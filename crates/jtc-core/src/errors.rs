@@ -35,13 +35,15 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    pub fn raise_joint(&mut self, joint: usize, bits: u16) {
-        if let (Some(now), Some(occurred)) = (self.joints.get_mut(joint), self.joints_occurred.get_mut(joint))
-        {
-            *now |= bits;
-            *occurred |= bits;
+    /// Internal errors per joint; 0 where there is none.
+    pub fn raise_joints(&mut self, bits: &[u16; JOINTS]) {
+        for j in 0..JOINTS {
+            self.joints[j] |= bits[j];
+            self.joints_occurred[j] |= bits[j];
         }
-        self.occurred |= self.word();
+        if any(bits) {
+            self.occurred |= self.word();
+        }
     }
 
     pub fn raise_can(&mut self, flags: u32) {
@@ -66,7 +68,7 @@ impl Errors {
 
     /// An internal error is latched: it holds the safety output at 0 (J-22).
     pub fn internal(&self) -> bool {
-        self.device || self.can != 0 || self.joints.iter().any(|&bits| bits != 0)
+        self.device || self.can != 0 || any(&self.joints)
     }
 
     pub fn any(&self) -> bool {
@@ -79,7 +81,7 @@ impl Errors {
         bit(self.emergency_input, error::EMERGENCY_INPUT)
             | bit(self.internal(), error::EMERGENCY_OUTPUT | error::INTERNAL)
             | bit(self.emergency_input || self.external_joints, error::EXTERNAL)
-            | bit(self.joints.iter().any(|&bits| bits != 0), error::INTERNAL_JOINTS)
+            | bit(any(&self.joints), error::INTERNAL_JOINTS)
             | bit(self.can != 0, error::INTERNAL_CAN)
             | bit(self.external_joints, error::EXTERNAL_JOINTS)
     }
@@ -97,4 +99,9 @@ impl Errors {
     pub fn can(&self) -> (u32, u32) {
         (self.can, self.can_occurred)
     }
+}
+
+/// A joint has an error.
+fn any(joints: &[u16; JOINTS]) -> bool {
+    joints.iter().fold(0, |all, bits| all | bits) != 0
 }

@@ -18,28 +18,26 @@ pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
 
 /// Bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m; both axes with their ends, `None` outside.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
-    let (row, x) = locate(&table.velocity, v)?;
-    let (column, y) = locate(&table.temperature, t)?;
-    let at = |r: usize, c: usize| f64::from(table.torque[r][c]);
-    let low = at(row, column) + x * (at(row + 1, column) - at(row, column));
-    let high = at(row, column + 1) + x * (at(row + 1, column + 1) - at(row, column + 1));
+    let (x, [row, next]) = locate(&table.velocity, table.torque.array_windows(), v)?;
+    let columns = row.array_windows().zip(next.array_windows());
+    let (y, ([a, b], [c, d])) = locate(&table.temperature, columns, t)?;
+    let [a, b, c, d] = [a, b, c, d].map(|&torque| f64::from(torque));
+    // Along the velocity at both temperatures of the cell, then between them.
+    let (low, high) = (a + x * (c - a), b + x * (d - b));
     Some(low + y * (high - low))
 }
 
-/// The cell of an axis that holds `value`, and where in it (0..1).
-fn locate(axis: &[f32; 20], value: f64) -> Option<(usize, f64)> {
-    if !(value >= f64::from(axis[0]) && value <= f64::from(axis[19])) {
-        return None;
-    }
-    let mut cell = 0;
+/// Where in its cell of an axis `value` is (0..1), and which of `cells` that is; `None` outside the axis.
+fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Option<(f64, T)> {
+    let mut found = None;
     // No early exit: the same number of instructions for every value.
-    for (i, &start) in axis.iter().enumerate().take(19).skip(1) {
+    for (&[start, end], cell) in axis.array_windows().zip(cells) {
         if value >= f64::from(start) {
-            cell = i;
+            found = Some((start, end, cell));
         }
     }
-    let (a, b) = (f64::from(axis[cell]), f64::from(axis[cell + 1]));
-    Some((cell, (value - a) / (b - a)))
+    let (start, end, cell) = found.filter(|_| value <= f64::from(axis[19]))?;
+    Some(((value - f64::from(start)) / (f64::from(end) - f64::from(start)), cell))
 }
 
 #[cfg(test)]

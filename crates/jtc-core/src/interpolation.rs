@@ -3,6 +3,8 @@
 //! Each channel comes from its own samples: the position from the quintic through both points' position, velocity and
 //! acceleration, the velocity from the cubic through their velocity and acceleration, the acceleration from the line. No
 //! channel is the derivative of another, because the int16 grid of the positions (96 µrad) would turn into tens of rad/s².
+use core::array::from_fn;
+
 use jtc_wire::RawPoint;
 
 use crate::JOINTS;
@@ -38,10 +40,9 @@ impl From<&RawPoint> for SetPoint {
 /// Set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
 #[inline]
 pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
-    let mut out = SetPoint::default();
     let u2 = u * u;
     let u3 = u2 * u;
-    for j in 0..JOINTS {
+    let position = |j: usize| {
         // Velocities and accelerations per step instead of per second: all in rad.
         let (v0, v1) = (a.velocity[j] * h, b.velocity[j] * h);
         let (a0, a1) = (a.acceleration[j] * h * h, b.acceleration[j] * h * h);
@@ -49,15 +50,15 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
         let c3 = 10.0 * d - (4.0 * v1 + 6.0 * v0) - 0.5 * (3.0 * a0 - a1);
         let c4 = -15.0 * d + (7.0 * v1 + 8.0 * v0) + 0.5 * (3.0 * a0 - 2.0 * a1);
         let c5 = 6.0 * d - 3.0 * (v1 + v0) + 0.5 * (a1 - a0);
-        out.position[j] = a.position[j] + u * v0 + u2 * (0.5 * a0) + u3 * (c3 + u * c4 + u2 * c5);
-
+        a.position[j] + u * v0 + u2 * (0.5 * a0) + u3 * (c3 + u * c4 + u2 * c5)
+    };
+    let velocity = |j: usize| {
         let (va, vb) = (a.velocity[j], b.velocity[j]);
         let (ah, bh) = (a.acceleration[j] * h, b.acceleration[j] * h);
-        out.velocity[j] =
-            va + u * ah + u2 * (3.0 * (vb - va) - 2.0 * ah - bh) + u3 * (2.0 * (va - vb) + ah + bh);
-        out.acceleration[j] = a.acceleration[j] + u * (b.acceleration[j] - a.acceleration[j]);
-    }
-    out
+        va + u * ah + u2 * (3.0 * (vb - va) - 2.0 * ah - bh) + u3 * (2.0 * (va - vb) + ah + bh)
+    };
+    let acceleration = |j: usize| a.acceleration[j] + u * (b.acceleration[j] - a.acceleration[j]);
+    SetPoint { position: from_fn(position), velocity: from_fn(velocity), acceleration: from_fn(acceleration) }
 }
 
 #[cfg(test)]

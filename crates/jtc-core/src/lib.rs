@@ -10,6 +10,7 @@ pub mod friction;
 mod host;
 mod interpolation;
 mod io;
+mod limits;
 mod motion;
 mod nodes;
 mod path;

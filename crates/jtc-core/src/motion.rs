@@ -4,6 +4,7 @@ use jtc_dynamics::Dynamics;
 use crate::config::{Config, PidGains, TableOf};
 use crate::friction;
 use crate::interpolation::SetPoint;
+use crate::limits::{self, Saturation};
 use crate::nodes::Nodes;
 use crate::pid::{Pid, PidTorque};
 use crate::{JOINTS, joint_error};
@@ -79,9 +80,7 @@ pub(crate) struct Motion {
     pid: [Pid; JOINTS],
     /// Torque of the last tick.
     pub torque: [JointTorque; JOINTS],
-    saturated: [bool; JOINTS],
-    /// Ticks for which the computed torque has been beyond its limit.
-    over_limit: [u16; JOINTS],
+    saturation: [Saturation; JOINTS],
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
@@ -234,8 +233,26 @@ impl Motion {
         (low, high)
     }
 
+    /// The control law and its limits: torques to command, and joint errors found on the way.
+    pub fn control(
+        &mut self,
+        law: Law,
+        nodes: &Nodes,
+        config: &Config,
+        gains: &Gains<'_>,
+    ) -> ([f64; JOINTS], [u16; JOINTS]) {
+        let missing = self.compute(law, nodes, config, gains);
+        let (torque, mut errors) = self.limit(law, nodes, config);
+        for (j, error) in errors.iter_mut().enumerate() {
+            if nodes.node(j).enabled() {
+                *error |= missing[j];
+            }
+        }
+        (torque, errors)
+    }
+
     /// Computes the torque of this tick into `self.torque`; returns joint errors found on the way (friction table).
-    pub fn compute(&mut self, law: Law, nodes: &Nodes, config: &Config, gains: &Gains<'_>) -> [u16; JOINTS] {
+    fn compute(&mut self, law: Law, nodes: &Nodes, config: &Config, gains: &Gains<'_>) -> [u16; JOINTS] {
         let mut errors = [0; JOINTS];
         // What the last torque has to be continued from, where it has to be.
         let rebase = self.rebase.take();
@@ -256,7 +273,7 @@ impl Motion {
                 JointTorque { model: model[j] + limit.rotor_inertia * qdd[j], ..JointTorque::default() };
             if law != Law::Teach {
                 let error = self.set.position[j] - q[j];
-                torque.pid = self.pid[j].step(&gains.pid[j], error, self.saturated[j]);
+                torque.pid = self.pid[j].step(&gains.pid[j], error, self.saturation[j].saturated);
             }
             if law == Law::Follow {
                 let t = celsius(nodes.node(j).report.temperature);
@@ -308,40 +325,19 @@ impl Motion {
         }
     }
 
-    /// Set values outside the limits, as joint errors (J-43). The position limit holds for positions that somebody commanded: an
-    /// arm that is found beyond it is held where it is, or it could never be brought back.
-    pub fn check_set(&self, law: Law, j: usize, measured: f64, config: &Config) -> u16 {
-        let limit = &config.joints[j];
-        if !self.holding[j] {
-            return 0;
+    /// The torques to command and the joint errors found, both per joint (J-43).
+    fn limit(&mut self, law: Law, nodes: &Nodes, config: &Config) -> ([f64; JOINTS], [u16; JOINTS]) {
+        let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
+        for j in 0..JOINTS {
+            let limits = &config.joints[j];
+            let (limited, torque_error) =
+                self.saturation[j].limit(self.torque[j].sum(), limits, config.torque_over_ms);
+            let joint = (self.set.position[j], self.set.velocity[j], self.set.acceleration[j]);
+            let set_error = limits::check_set(joint, nodes.positions()[j], limits, law == Law::Follow);
+            torque[j] = limited;
+            errors[j] = torque_error | if law != Law::Teach && self.holding[j] { set_error } else { 0 };
         }
-        // Written so that NaN is outside.
-        let within = |x: f64, low: f64, high: f64| x >= low && x <= high;
-        let bit = |ok: bool, bit: u16| if ok { 0 } else { bit };
-        let (v, a, e) = (limit.velocity_max, limit.acceleration_max, limit.position_error_max);
-        let position =
-            law != Law::Follow || within(self.set.position[j], limit.position_min, limit.position_max);
-        bit(position, joint_error::POSITION)
-            | bit(within(self.set.velocity[j], -v, v), joint_error::VELOCITY)
-            | bit(within(self.set.acceleration[j], -a, a), joint_error::ACCELERATION)
-            | bit(within(self.set.position[j] - measured, -e, e), joint_error::POSITION_ERROR)
-    }
-
-    /// The torque to command, within its limit; a computed torque beyond it is a joint error (J-43), at once or, if the
-    /// configuration allows it some time, after that. While it saturates the integral is held (J-41).
-    pub fn limit_torque(&mut self, j: usize, config: &Config) -> Result<f64, u16> {
-        let limit = config.joints[j].torque_max;
-        let torque = self.torque[j].sum();
-        if torque.abs() <= limit {
-            (self.saturated[j], self.over_limit[j]) = (false, 0);
-            return Ok(torque);
-        }
-        self.saturated[j] = true;
-        self.over_limit[j] = self.over_limit[j].saturating_add(1);
-        if torque.is_nan() || self.over_limit[j] > config.torque_over_ms {
-            return Err(joint_error::TORQUE);
-        }
-        Ok(torque.max(-limit).min(limit))
+        (torque, errors)
     }
 }
 

@@ -13,9 +13,8 @@ const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 pub struct Pid {
     /// Integral of the error, rad·s.
     integral: f64,
-    /// The last errors, rad, a ring.
+    /// The last errors, rad, oldest first.
     errors: [f64; WINDOW],
-    oldest: usize,
 }
 
 /// The three parts, N·m.
@@ -39,19 +38,18 @@ impl PidTorque {
 impl Pid {
     /// Forget everything; `error` is taken as having stood for long, so that the derivative starts at 0.
     pub fn reset(&mut self, error: f64) {
-        *self = Self { integral: 0.0, errors: [error; WINDOW], oldest: 0 };
+        *self = Self { integral: 0.0, errors: [error; WINDOW] };
     }
 
     /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held.
     pub fn step(&mut self, gains: &PidGains, error: f64, saturated: bool) -> PidTorque {
-        if !saturated {
-            self.integral += error * DT;
-        }
+        let grown = self.integral + error * DT;
+        let integral = if saturated { self.integral } else { grown };
         // Also while held: new gains may have brought narrower bounds.
-        self.integral = self.integral.max(gains.int_min).min(gains.int_max);
-        let rate = (error - self.errors[self.oldest]) * RATE;
-        self.errors[self.oldest] = error;
-        self.oldest = if self.oldest + 1 < WINDOW { self.oldest + 1 } else { 0 };
+        self.integral = integral.max(gains.int_min).min(gains.int_max);
+        let [oldest, a, b, c, d] = self.errors;
+        self.errors = [a, b, c, d, error];
+        let rate = (error - oldest) * RATE;
         PidTorque { p: gains.kp * error, i: gains.ki * self.integral, d: gains.kd * rate }
     }
 }

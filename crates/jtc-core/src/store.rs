@@ -2,7 +2,7 @@
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::interpolation::{SetPoint, interpolate};
-use crate::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
+use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 /// What was received of the current trajectory. `M` is the memory of its points.
 #[derive(Clone, Debug)]
@@ -99,6 +99,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.next_segment = segment.segment + 1;
     }
 
+    /// Positions of point 0, rad.
+    pub fn first(&self) -> Option<[f64; JOINTS]> {
+        self.points.as_ref().get(..self.received)?.first().map(RawPoint::position_rad)
+    }
+
     /// Set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
     #[inline]
     pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
@@ -106,13 +111,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         let step = f64::from(self.step_ms);
         // `as` saturates: a negative or NaN time is point 0.
         let index = (time_ms / step) as usize;
-        let start = SetPoint::from(points.get(index).or(points.last())?);
-        let offset = time_ms - index as f64 * step;
-        match points.get(index + 1) {
-            Some(end) if offset > 0.0 => {
-                Some(interpolate(&start, &SetPoint::from(end), step / 1000.0, offset / step))
-            }
-            _ => Some(start),
-        }
+        let start = points.get(index).or(points.last())?;
+        // Also at a point itself and at the last one, where it changes nothing: the same work in every tick.
+        let (end, offset) = match points.get(index + 1) {
+            Some(end) => (end, (time_ms - index as f64 * step).max(0.0)),
+            None => (start, 0.0),
+        };
+        Some(interpolate(&SetPoint::from(start), &SetPoint::from(end), step / 1000.0, offset / step))
     }
 }

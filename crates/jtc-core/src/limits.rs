@@ -1,0 +1,115 @@
+//! Limits of a joint (J-43).
+use crate::config::JointConfig;
+use crate::joint_error;
+
+/// Whether a joint's torque is at its limit, and for how long it has been.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Saturation {
+    /// The last torque was beyond the limit: the integral is held (J-41).
+    pub saturated: bool,
+    /// Consecutive ticks of that.
+    over_ms: u16,
+}
+
+impl Saturation {
+    /// The torque to command, within its limit, and the joint error of a computed `torque` beyond it: at once or, if the
+    /// configuration allows it some time, after `over_ms_max`. With the error, and for NaN, no torque is commanded.
+    pub fn limit(&mut self, torque: f64, limits: &JointConfig, over_ms_max: u16) -> (f64, u16) {
+        let limit = limits.torque_max;
+        // Written so that NaN is beyond. Choices without branches: the same work in every tick.
+        self.saturated = !(torque.abs() <= limit);
+        self.over_ms = if self.saturated { self.over_ms.saturating_add(1) } else { 0 };
+        let error = torque.is_nan() | (self.over_ms > over_ms_max);
+        let limited = torque.max(-limit).min(limit);
+        (if error { 0.0 } else { limited }, bit(!error, joint_error::TORQUE))
+    }
+}
+
+/// Set values (position, velocity, acceleration) outside the limits, as joint errors. The position limit holds for positions that
+/// somebody `commanded`: an arm that is found beyond it is held where it is, or it could never be brought back.
+pub(crate) fn check_set(set: (f64, f64, f64), measured: f64, limits: &JointConfig, commanded: bool) -> u16 {
+    let (position, velocity, acceleration) = set;
+    // Written so that NaN is outside.
+    let inside = (position >= limits.position_min) & (position <= limits.position_max);
+    bit(inside | !commanded, joint_error::POSITION)
+        | bit(velocity.abs() <= limits.velocity_max, joint_error::VELOCITY)
+        | bit(acceleration.abs() <= limits.acceleration_max, joint_error::ACCELERATION)
+        | bit((position - measured).abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
+}
+
+fn bit(good: bool, bit: u16) -> u16 {
+    if good { 0 } else { bit }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use proptest::prelude::*;
+
+    const INF: f64 = f64::INFINITY;
+
+    fn limits() -> JointConfig {
+        Config::avena().joints[0]
+    }
+
+    #[test]
+    fn j43_nan_is_outside_every_limit() {
+        let nan = f64::NAN;
+        let all = joint_error::POSITION
+            | joint_error::VELOCITY
+            | joint_error::ACCELERATION
+            | joint_error::POSITION_ERROR;
+        assert_eq!(check_set((nan, nan, nan), 0.0, &limits(), true), all);
+        assert_eq!(check_set((0.0, 0.0, 0.0), nan, &limits(), true), joint_error::POSITION_ERROR);
+        assert_eq!(Saturation::default().limit(nan, &limits(), 10), (0.0, joint_error::TORQUE));
+    }
+
+    #[test]
+    fn j43_limits_themselves_are_allowed() {
+        let l = limits();
+        for s in [-1.0, 1.0] {
+            let position = if s < 0.0 { l.position_min } else { l.position_max };
+            let set = (position, s * l.velocity_max, s * l.acceleration_max);
+            // The error is measured around 0, where it is exact.
+            assert_eq!(check_set(set, position, &l, true), 0);
+            assert_eq!(check_set((0.0, 0.0, 0.0), s * l.position_error_max, &l, true), 0);
+            let beyond = |x: f64| x * (1.0 + 1e-12);
+            let set = (beyond(position), beyond(set.1), beyond(set.2));
+            let three = joint_error::POSITION | joint_error::VELOCITY | joint_error::ACCELERATION;
+            assert_eq!(check_set(set, position, &l, true), three);
+            assert_eq!(check_set(set, position, &l, false), three & !joint_error::POSITION);
+            assert_eq!(Saturation::default().limit(s * l.torque_max, &l, 0), (s * l.torque_max, 0));
+        }
+    }
+
+    #[test]
+    fn j43_too_much_torque_is_an_error_after_its_time() {
+        let (l, mut saturation) = (limits(), Saturation::default());
+        for _ in 0..3 {
+            assert_eq!(saturation.limit(-INF, &l, 3), (-l.torque_max, 0));
+            assert!(saturation.saturated);
+        }
+        assert_eq!(saturation.limit(-INF, &l, 3), (0.0, joint_error::TORQUE));
+        // One tick within the limit starts the time anew.
+        assert_eq!(saturation.limit(1.0, &l, 3), (1.0, 0));
+        assert!(!saturation.saturated);
+        assert_eq!(saturation.limit(INF, &l, 3), (l.torque_max, 0));
+        assert_eq!(Saturation::default().limit(INF, &l, 0), (0.0, joint_error::TORQUE));
+    }
+
+    proptest! {
+        #[test]
+        fn j43_no_torque_beyond_the_limit_is_commanded(torques in prop::collection::vec(prop::num::f64::ANY, 1..50)) {
+            let (l, mut saturation) = (limits(), Saturation::default());
+            for torque in torques {
+                let (commanded, error) = saturation.limit(torque, &l, 10);
+                prop_assert!(commanded.abs() <= l.torque_max);
+                prop_assert!(commanded == torque || commanded == 0.0 || commanded.abs() == l.torque_max);
+                prop_assert!(error == 0 || commanded == 0.0);
+                // Never against what was computed.
+                prop_assert!(torque.is_nan() || commanded * torque >= 0.0);
+            }
+        }
+    }
+}

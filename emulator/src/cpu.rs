@@ -187,6 +187,21 @@ impl Machine {
         self.uc.mem_write(u64::from(address), bytes).is_ok()
     }
 
+    /// Read a register of a peripheral from outside, as a debugger does.
+    pub fn read_register(&mut self, address: u32) -> u32 {
+        let mut ram = Ram(self.uc.clone());
+        self.uc.get_data_mut().load(address, 4, &mut ram)
+    }
+
+    /// Write a register of a peripheral from outside, as a debugger does.
+    pub fn write_register(&mut self, address: u32, value: u32) {
+        let mut ram = Ram(self.uc.clone());
+        self.uc.get_data_mut().store(address, 4, value, &mut ram);
+        if self.uc.get_data().remap {
+            self.remap();
+        }
+    }
+
     pub(crate) fn masks(&self) -> Masks {
         Masks {
             primask: self.register(RegisterARM::PRIMASK) & 1 == 1,

@@ -95,6 +95,17 @@ impl Elf {
         Ok(elf)
     }
 
+    /// A firmware that is nothing but these bytes at an address.
+    pub fn from_image(address: u32, bytes: Vec<u8>) -> Self {
+        Self { segments: vec![(address, bytes)], symbols: BTreeMap::new() }
+    }
+
+    /// The same with one more symbol.
+    pub fn with_symbol(mut self, name: &str, symbol: Symbol) -> Self {
+        self.symbols.insert(name.to_owned(), symbol);
+        self
+    }
+
     /// A symbol by its full name, or by a part of it that no other symbol has. Rust names are written as in the source,
     /// without the hash.
     pub fn symbol(&self, name: &str) -> Result<Symbol, ElfError> {

@@ -1,0 +1,230 @@
+//! Both serial lines: gaps, long frames, whose record is whose, floods.
+mod rig;
+
+use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response, fixed, trajectory};
+use openjtc_emulator::clock::{MILLISECOND, to_us};
+use openjtc_emulator::{BoardConfig, Port};
+use rig::{BOARDS, PORTS, Rig, fast_elf, index};
+
+const A: Port = Port::Usart2;
+const B: Port = Port::Usart3;
+
+/// Segment 0 of 1 with that many points, which stand still at 0.
+fn segment(points: usize) -> Vec<u8> {
+    let mut frame = vec![0; 60_000];
+    let still = std::iter::repeat_n(RawPoint::default(), points);
+    let n = trajectory(&mut frame, (1, 0, 1), 10, still).expect("it fits into a frame");
+    frame.truncate(n);
+    frame
+}
+
+/// Runs until the line of a port has been silent for that long.
+fn silence(rig: &mut Rig, port: Port, ms: u64) {
+    rig.wait("the line falls silent", 10_000, |rig| rig.board.pending(port) == 0);
+    rig.run(ms);
+}
+
+fn no_losses(rig: &mut Rig) {
+    for usart in &rig.board.machine.chip().usarts {
+        assert_eq!((usart.overruns, usart.garbled, usart.unheard), (0, 0, 0));
+    }
+}
+
+/// J-03, J-05. The first half of a frame, a silence of whole ms, the other half.
+#[test]
+fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
+    for port in PORTS {
+        let mut rig = Rig::new(BOARDS[0]);
+        rig.run(50);
+        let frame = fixed::PID_PARAM_USE_DEFAULT;
+        // With the bytes' own time the silence is 0.2 ms shorter than the time between the halves.
+        for ms in [1, 2, 3, 4, 6, 7, 8, 12] {
+            let records = |rig: &Rig| rig.hosts[index(port)].records.clone();
+            rig.hosts[index(port)].records.clear();
+            rig.write(port, &frame[..3]);
+            rig.run(ms);
+            rig.write(port, &frame[3..]);
+            rig.run(60);
+            let good = Response::good(FrameType::PidParamUseDefault, DataStatus::NoError, 6);
+            if ms < 5 {
+                assert_eq!(records(&rig), [good], "{ms} ms");
+                continue;
+            }
+            let cut = Response::bad(0x08, FrameStatus::DiscontinuousFrame, 3);
+            let rest = Response::bad(0, FrameStatus::IncorrectHeader, 0);
+            let found = records(&rig);
+            assert_eq!(found.len(), 2, "{ms} ms: {found:?}");
+            assert_eq!(found[0], cut, "{ms} ms");
+            assert_eq!(found[1].status, rest.status, "{ms} ms: the rest of the frame is none");
+        }
+        assert_eq!(rig.status(port).jtc_init & 2, 0, "the gains were given");
+    }
+}
+
+/// J-01, J-07: the longest frames that there are, on both lines at once, without the loss of a byte or a tick.
+fn longest_frames(mut rig: Rig) {
+    rig.bring_up(A);
+    let (accepted, refused) = (segment(1500), segment(1666));
+    assert_eq!((accepted.len(), refused.len()), (54_014, 59_990));
+    assert_eq!(
+        rig.response(A, &accepted),
+        Response::good(FrameType::Trajectory, DataStatus::NoError, 54_014)
+    );
+    for (a, b) in [(&refused, &refused), (&accepted, &refused)] {
+        for host in &mut rig.hosts {
+            host.records.clear();
+        }
+        rig.write(A, a);
+        rig.write(B, b);
+        rig.wait("both records", 6_000, |rig| rig.hosts.iter().all(|host| !host.records.is_empty()));
+        rig.run(100);
+        for (frame, host) in [a, b].into_iter().zip(&rig.hosts) {
+            let code = if frame.len() > 55_000 { DataStatus::TooManyPoints } else { DataStatus::NoError };
+            assert_eq!(host.records, [Response::good(FrameType::Trajectory, code, frame.len() as u16)]);
+        }
+    }
+    assert_eq!(rig.status(A).tes, 1, "the trajectory is there, at its start");
+    no_losses(&mut rig);
+}
+
+#[test]
+fn j01_frames_of_60_000_bytes_at_115_200_bd() {
+    longest_frames(Rig::new(BOARDS[0]));
+}
+
+#[test]
+fn j01_frames_of_60_000_bytes_at_15_mbd() {
+    let rig = Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() });
+    longest_frames(rig);
+}
+
+/// J-04: an answer goes to who asked, in order, whatever the other line says at the same time.
+#[test]
+fn j04_every_port_gets_its_own_records() {
+    let mut rig = Rig::new(BOARDS[0]);
+    rig.run(50);
+    let asked: [&[(FrameType, &[u8])]; 2] = [
+        &[
+            (FrameType::PidParamUseDefault, &fixed::PID_PARAM_USE_DEFAULT),
+            (FrameType::GripperControl, &fixed::PUMP_OFF),
+            (FrameType::ArmModelUseDefault, &fixed::ARM_MODEL_USE_DEFAULT),
+            (FrameType::ClearOccurredErrors, &fixed::CLEAR_OCCURRED_ERRORS),
+        ],
+        &[
+            (FrameType::TeachingModeEnable, &fixed::TEACHING_MODE_ENABLE),
+            (FrameType::FrictionTableUseDefault, &fixed::FRICTION_TABLE_USE_DEFAULT),
+            (FrameType::TrajSetExecStatus, &fixed::PAUSE),
+        ],
+    ];
+    for round in 0..6 {
+        for host in &mut rig.hosts {
+            host.records.clear();
+        }
+        for (port, frames) in PORTS.into_iter().zip(asked) {
+            // The halves of a round begin at other moments of the tick.
+            for (_, frame) in frames.iter().cycle().skip(round).take(frames.len()) {
+                rig.write(port, frame);
+            }
+        }
+        rig.run(300);
+        for (host, frames) in rig.hosts.iter().zip(asked) {
+            let expected = frames.iter().cycle().skip(round).take(frames.len());
+            let expected: Vec<_> = expected.map(|(kind, bytes)| (*kind as u8, bytes.len() as u16)).collect();
+            let records: Vec<_> = host.records.iter().map(|r| (r.frame_type, r.length)).collect();
+            assert_eq!(records, expected, "round {round}");
+            assert!(host.records.iter().all(|r| r.status == FrameStatus::NoError));
+        }
+    }
+}
+
+/// J-04: "at once" is the tick after the frame's last byte.
+#[test]
+fn j04_a_record_waits_for_nothing_but_the_tick() {
+    let mut rig = Rig::new(BOARDS[0]);
+    rig.run(65);
+    for shift in 0..40 {
+        // Right after a status, when the line is free again.
+        let port = PORTS[shift % 2];
+        rig.run(1 + shift as u64);
+        rig.wait("the line is free", 50, |rig| rig.flight.status_free && rig.ticks % 40 > 25);
+        let begin = rig.board.machine.now();
+        rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
+        let end = *rig.hosts[index(port)].times.last().expect("a status");
+        // Six bytes in, one tick at most, 175 bytes out, at 86.8 µs each; unless a periodic status was just in front.
+        let took = to_us(end - begin);
+        let without_waiting = 181 * 87 + 1_200;
+        assert!(took < without_waiting + 15_300, "{took} µs");
+    }
+}
+
+/// J-03, J-07: rubbish of any kind costs one record and no frame that follows it, with or without a gap.
+#[test]
+fn j03_rubbish_costs_no_frame_that_follows() {
+    let mut rig = Rig::new(BOARDS[0]);
+    rig.run(50);
+    let every: Vec<u8> = (0..=255).collect();
+    let header = [0x9B, 0x04, 0xEA, 0x46];
+    let headers = [0x9B; 300];
+    let zeros = [0; 1000];
+    for (n, rubbish) in [&every[..], &header, &headers, &zeros, &[0x9B]].into_iter().enumerate() {
+        for (gap, port) in [(8, A), (8, B), (0, A), (0, B)] {
+            if gap == 0 && rubbish == header {
+                // A header that promises 59 974 bytes is waited for until a gap: what follows is looked at then.
+                rig.write(port, rubbish);
+            }
+            rig.hosts[index(port)].records.clear();
+            rig.write(port, rubbish);
+            if gap > 0 {
+                silence(&mut rig, port, gap);
+            }
+            rig.write(port, &fixed::CLEAR_OCCURRED_ERRORS);
+            silence(&mut rig, port, 120);
+            let records = &rig.hosts[index(port)].records;
+            let (bad, good): (Vec<&Response>, Vec<&Response>) =
+                records.iter().partition(|r| r.status != FrameStatus::NoError);
+            assert_eq!(good.len(), 1, "rubbish {n}, gap {gap}: {records:?}");
+            assert!((1..=2).contains(&bad.len()), "rubbish {n}, gap {gap}: {records:?}");
+        }
+    }
+    no_losses(&mut rig);
+}
+
+/// J-07: a port that floods neither delays the tick (which is checked in every millisecond) nor keeps the other waiting
+/// for more than the records that are ahead of it.
+#[test]
+fn j07_a_flooding_port_does_not_starve_the_other() {
+    for (flood, other) in [(A, B), (B, A)] {
+        let mut rig = Rig::new(BOARDS[0]);
+        rig.run(50);
+        rig.write(flood, &fixed::CLEAR_OCCURRED_ERRORS.repeat(4_000));
+        rig.run(500);
+        for _ in 0..3 {
+            let begin = rig.board.machine.now();
+            rig.hosts[index(other)].records.clear();
+            rig.write(other, &fixed::PID_PARAM_USE_DEFAULT);
+            rig.wait("a record in spite of the flood", 400, |rig| {
+                !rig.hosts[index(other)].records.is_empty()
+            });
+            let ms = (rig.board.machine.now() - begin) / MILLISECOND;
+            println!("{flood:?} floods: answered after {ms} ms");
+        }
+        no_losses(&mut rig);
+    }
+}
+
+/// The same at 15 MBd, to the end: every frame of the flood has its record.
+#[test]
+fn j04_a_host_that_pipelines_loses_no_record() {
+    let mut rig = Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() });
+    rig.run(50);
+    for port in PORTS {
+        rig.write(port, &fixed::CLEAR_OCCURRED_ERRORS.repeat(1_000));
+    }
+    rig.wait("2000 records", 3_000, |rig| rig.hosts.iter().all(|host| host.records.len() >= 1_000));
+    rig.run(100);
+    for host in &rig.hosts {
+        assert_eq!(host.records.len(), 1_000);
+        assert!(host.records.iter().all(Response::accepted));
+    }
+    no_losses(&mut rig);
+}

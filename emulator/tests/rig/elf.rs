@@ -1,0 +1,64 @@
+//! The boards' programs, and the record in them that says what they are.
+use openjtc_emulator::Elf;
+use std::path::PathBuf;
+
+/// The boards, as their files are called.
+pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
+
+/// Rate of the program that [`fast_elf`] gives, Bd.
+pub const FAST: u32 = 15_000_000;
+
+fn directory() -> PathBuf {
+    let Some(directory) = std::env::var_os("OPENJTC_FIRMWARE") else {
+        panic!(
+            "OPENJTC_FIRMWARE must name the directory with {}.elf and the others; `cargo xtask emulate` builds them \
+             and runs these tests",
+            BOARDS[0]
+        )
+    };
+    directory.into()
+}
+
+fn load(file: &str) -> Elf {
+    let path = directory().join(file);
+    let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    Elf::parse(&bytes).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Program of a board.
+pub fn elf(board: &str) -> Elf {
+    load(&format!("{board}.elf"))
+}
+
+/// Program of the first board for lines of 15 MBd.
+pub fn fast_elf() -> Elf {
+    load(&format!("{}-{FAST}.elf", BOARDS[0]))
+}
+
+/// The record at the fixed address, as `docs/board.md` has it.
+#[derive(Debug)]
+pub struct Version {
+    pub board: String,
+    pub points: u32,
+    pub segments: u32,
+    pub segment_points: u32,
+    pub tick_hz: u32,
+    pub baud: u32,
+    pub core_hz: u32,
+}
+
+/// Reads it from the file; `None` when it is not there.
+pub fn version(elf: &Elf) -> Option<Version> {
+    const ADDRESS: u32 = 0x0800_0400;
+    let bytes = elf.segments.iter().find_map(|(start, data)| {
+        let at = ADDRESS.checked_sub(*start)? as usize;
+        data.get(at..at + 96)
+    })?;
+    if &bytes[..8] != b"OPENJTC\0" || bytes[8..12] != [1, 0, 96, 0] {
+        return None;
+    }
+    let number = |n: usize| u32::from_le_bytes(bytes[72 + 4 * n..][..4].try_into().expect("four"));
+    let board = String::from_utf8_lossy(&bytes[24..48]).trim_end_matches('\0').to_owned();
+    let [points, segments, segment_points, tick_hz, baud, core_hz] = core::array::from_fn(number);
+    Some(Version { board, points, segments, segment_points, tick_hz, baud, core_hz })
+}

@@ -1,0 +1,122 @@
+//! The flight record, read from its bytes as any tool reads it.
+use jtc_bus::Frame;
+use jtc_core::BusState;
+
+/// Bytes of the record.
+pub const FLIGHT_SIZE: usize = 720;
+
+/// A tick as the board recorded it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Flight {
+    pub phase: u32,
+    pub cause: u32,
+    pub tick: u64,
+    pub bus_state: u8,
+    pub safety_input: bool,
+    pub status_free: bool,
+    pub wrong_format: u32,
+    pub event: Event,
+    pub heard: Vec<Frame>,
+    pub state: u8,
+    pub tes: u8,
+    pub safety_output: bool,
+    /// The event was worked off.
+    pub host_done: bool,
+    /// A status was sent.
+    pub status: bool,
+    pub sent: Option<Frame>,
+    pub point: u32,
+    pub errors: u16,
+    pub torque: [f64; 6],
+}
+
+/// What came from a host.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Event {
+    /// 0 nothing, 1 a frame, 2 something bad.
+    pub kind: u8,
+    pub line: u8,
+    pub frame_type: u8,
+    pub status: u8,
+    pub len: u16,
+    pub crc: u16,
+}
+
+struct Bytes<'a>(&'a [u8]);
+
+impl Bytes<'_> {
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let (first, rest) = self.0.split_first_chunk().expect("the record is long enough");
+        self.0 = rest;
+        *first
+    }
+    fn u8(&mut self) -> u8 {
+        self.take::<1>()[0]
+    }
+    fn u16(&mut self) -> u16 {
+        u16::from_le_bytes(self.take())
+    }
+    fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.take())
+    }
+    fn u64(&mut self) -> u64 {
+        u64::from_le_bytes(self.take())
+    }
+    fn frame(&mut self) -> Option<Frame> {
+        let (id, len, data) = (self.u16(), self.u16(), self.take::<24>());
+        Frame::new(id, data.get(..len.into())?)
+    }
+}
+
+impl Flight {
+    /// The outputs belong to the tick, too.
+    pub const PHASE_COMPLETE: u32 = 2;
+
+    /// `None` when these bytes are no record, as after power-on.
+    pub fn parse(bytes: &[u8]) -> Option<Self> {
+        assert_eq!(bytes.len(), FLIGHT_SIZE);
+        let mut b = Bytes(bytes);
+        let head = (b.take::<4>(), b.u16(), b.u16());
+        if head != (*b"JTCF", 1, FLIGHT_SIZE as u16) {
+            return None;
+        }
+        let (phase, cause, tick) = (b.u32(), b.u32(), b.u64());
+        let [bus_state, safety_input, status_free, heard_count] = b.take();
+        let wrong_format = b.u32();
+        let [kind, line, frame_type, status] = b.take();
+        let event = Event { kind, line, frame_type, status, len: b.u16(), crc: b.u16() };
+        let mut heard: Vec<_> = (0..21).map(|_| b.frame()).collect();
+        heard.truncate(heard_count.into());
+        let [state, tes, safety_output, done] = b.take();
+        let sent = b.frame();
+        let (point, errors) = (b.u32(), b.u16());
+        b.take::<6>();
+        let torque = [(); 6].map(|()| f64::from_bits(b.u64()));
+        assert!(b.0.is_empty());
+        Some(Self {
+            phase,
+            cause,
+            tick,
+            bus_state,
+            safety_input: safety_input != 0,
+            status_free: status_free != 0,
+            wrong_format,
+            event,
+            heard: heard.into_iter().map(|f| f.expect("what was heard is a frame")).collect(),
+            state,
+            tes,
+            safety_output: safety_output != 0,
+            host_done: done & 1 != 0,
+            status: done & 2 != 0,
+            sent,
+            point,
+            errors,
+            torque,
+        })
+    }
+
+    /// The state of the bus that went in.
+    pub fn bus(&self) -> BusState {
+        BusState { acknowledged: self.bus_state & 1 != 0, bus_off: self.bus_state & 2 != 0 }
+    }
+}

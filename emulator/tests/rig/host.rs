@@ -1,0 +1,94 @@
+//! A host on a line: what it sent, and what it heard.
+use std::collections::VecDeque;
+
+use jtc_wire::{FrameRef, Response, Status, StatusReceiver};
+use openjtc_emulator::WireByte;
+use openjtc_emulator::clock::Time;
+
+use super::flight::Event;
+
+/// A host.
+#[derive(Default)]
+pub struct Host {
+    /// Every byte it sent.
+    pub sent: Vec<u8>,
+    /// What of them the device has named in its records.
+    found: usize,
+    /// Bytes that must come next: the statuses of the controller beside the board.
+    pub expected: VecDeque<u8>,
+    receiver: StatusReceiver,
+    /// The newest status.
+    pub last: Option<Status>,
+    /// When statuses were complete.
+    pub times: Vec<Time>,
+    /// Records heard, oldest first.
+    pub records: Vec<Response>,
+    /// Bytes heard.
+    pub heard: u64,
+    /// A start of the device that the bytes heard so far are older than.
+    reset: Option<Time>,
+}
+
+impl Host {
+    /// Bytes from the device: those of the controller beside it, each of them.
+    pub fn hear(&mut self, bytes: &[WireByte]) {
+        for byte in bytes {
+            self.heard += 1;
+            // What was on the line while the device was reset is cut off.
+            if self.reset.is_some_and(|reset| byte.end < reset) {
+                continue;
+            }
+            if let Some(expected) = self.expected.pop_front() {
+                assert_eq!(byte.byte, expected, "byte {} from the device", self.heard);
+            } else {
+                panic!("byte {} from the device, {:#04x}, belongs to no status", self.heard, byte.byte);
+            }
+            let mut one = &[byte.byte][..];
+            if let Some(status) = self.receiver.next(&mut one) {
+                self.records.extend(status.response());
+                self.last = Some(status);
+                self.times.push(byte.end);
+            }
+        }
+    }
+
+    /// Statuses, bad frames and bytes that are none.
+    pub fn counters(&self) -> jtc_wire::StatusCounters {
+        self.receiver.counters()
+    }
+
+    /// Nothing that was on its way comes any more.
+    pub fn device_was_reset(&mut self, time: Time) {
+        self.reset = Some(time);
+        self.expected.clear();
+        self.receiver.clear();
+    }
+
+    /// The bytes of a frame that the device says it has: they were sent, and not before the last one.
+    pub fn frame(&self, event: &Event) -> Vec<u8> {
+        let length = usize::from(event.len);
+        let (_, bytes) = self.place(event);
+        assert_eq!(bytes.len(), length);
+        bytes.to_vec()
+    }
+
+    fn place(&self, event: &Event) -> (usize, &[u8]) {
+        let length = usize::from(event.len);
+        let [high, low] = event.crc.to_be_bytes();
+        let rest = &self.sent[self.found..];
+        rest.windows(length)
+            .enumerate()
+            .find(|(_, bytes)| {
+                bytes[..2] == [0x9B, event.frame_type]
+                    && bytes[length - 2..] == [high, low]
+                    && FrameRef::new_checked(bytes).is_some()
+            })
+            .unwrap_or_else(|| panic!("the host sent no frame like {event:?}"))
+    }
+
+    /// The device has worked that frame off.
+    pub fn done(&mut self, event: &Event) {
+        let (at, bytes) = self.place(event);
+        self.found += at + bytes.len();
+    }
+}

@@ -1,0 +1,261 @@
+//! A board under test: the very ELF, the simulated arm on its joint bus, a host on each serial line, and beside it the
+//! same controller on this machine, which is given what the board's flight record says went in, and must give out the same.
+//!
+//! Every millisecond of every test is checked: no tick is missing, all torques have the same bits as those computed
+//! here, the same frame and the same statuses go out on the wires, and the invariants of the simulator hold.
+#![allow(dead_code, reason = "each test uses its part")]
+
+mod elf;
+mod flight;
+mod host;
+mod shadow;
+
+use openjtc_emulator::fdcan::{BusEntry, Outcome};
+use openjtc_emulator::{Board, BoardConfig, Port};
+
+use jtc_core::{State, Telemetry};
+use jtc_sim::invariants::{Invariants, Moment};
+use jtc_sim::{FaultKind, host as frames};
+use jtc_wire::{DataStatus, FrameStatus, Response, Status};
+
+#[allow(unused_imports, reason = "each test uses its part")]
+pub use elf::{BOARDS, elf, fast_elf, version};
+pub use flight::{FLIGHT_SIZE, Flight};
+pub use host::Host;
+pub use shadow::Shadow;
+
+/// Both lines, in the order of the flight record.
+pub const PORTS: [Port; 2] = [Port::Usart2, Port::Usart3];
+
+/// Index of a port in arrays.
+pub fn index(port: Port) -> usize {
+    match port {
+        Port::Usart2 => 0,
+        Port::Usart3 => 1,
+    }
+}
+
+/// Board, hosts, and the controller that runs beside it.
+pub struct Rig {
+    /// The board.
+    pub board: Board,
+    /// What each host sent and heard.
+    pub hosts: [Host; 2],
+    /// The controller on this machine; `None` until the board's first tick after a start.
+    pub shadow: Option<Shadow>,
+    /// The last complete flight record.
+    pub flight: Flight,
+    /// What was on the joint bus in the last millisecond.
+    pub bus: Vec<BusEntry>,
+    /// Ticks may be missing: the test hangs the board.
+    pub may_hang: bool,
+    /// Ticks seen since the board started.
+    pub ticks: u64,
+    invariants: Invariants,
+    flight_at: u32,
+    resets: usize,
+    /// Frames that the last ticks gave out and that were not on the bus yet.
+    to_pass: Vec<jtc_bus::Frame>,
+}
+
+impl Rig {
+    /// A board with power just switched on.
+    pub fn new(board: &str) -> Self {
+        Self::with(board, BoardConfig::default())
+    }
+
+    /// In another world.
+    pub fn with(board: &str, config: BoardConfig) -> Self {
+        Self::of(elf(board), &config)
+    }
+
+    /// With this very program.
+    pub fn of(elf: openjtc_emulator::Elf, config: &BoardConfig) -> Self {
+        let flight_at = elf.symbol("FLIGHT").expect("the flight record").address;
+        let board = Board::new(elf, config);
+        Self {
+            board,
+            hosts: [Host::default(), Host::default()],
+            shadow: None,
+            flight: Flight::default(),
+            bus: Vec::new(),
+            may_hang: false,
+            ticks: 0,
+            invariants: Invariants::default(),
+            flight_at,
+            resets: 1,
+            to_pass: Vec::new(),
+        }
+    }
+
+    /// One millisecond of everything, with all checks.
+    pub fn step(&mut self) {
+        self.board.step();
+        let ms = self.board.now_ms();
+        let resets = self.board.machine.chip().observers.resets.clone();
+        for reset in &resets[self.resets..] {
+            // A new program begins, and so does everything beside it.
+            self.shadow = None;
+            self.ticks = 0;
+            self.to_pass.clear();
+            for host in &mut self.hosts {
+                host.device_was_reset(reset.time);
+            }
+        }
+        self.resets = resets.len();
+        self.take_bus();
+        if let Some(flight) = self.read_flight() {
+            let due = self.ticks > 0 && !self.may_hang;
+            if flight.tick == self.ticks + 1 {
+                assert_eq!(
+                    flight.phase,
+                    Flight::PHASE_COMPLETE,
+                    "{ms} ms: the tick ended within its millisecond"
+                );
+                self.ticked(flight);
+            } else {
+                assert!(!due, "{ms} ms: tick {} of the board follows {}", flight.tick, self.ticks);
+            }
+        } else {
+            assert_eq!(self.ticks, 0, "{ms} ms: the flight record is gone");
+        }
+        for port in PORTS {
+            let bytes = self.board.read_timed(port);
+            self.hosts[index(port)].hear(&bytes);
+        }
+    }
+
+    fn ticked(&mut self, flight: Flight) {
+        let ms = self.board.now_ms();
+        self.ticks = flight.tick;
+        let shadow = self.shadow.get_or_insert_with(|| Shadow::new(flight.cause));
+        shadow.tick(&flight, &mut self.hosts);
+        self.to_pass.extend(flight.sent);
+        let level = flight.safety_output;
+        assert_eq!(self.board.safety_output(), Some(level), "{ms} ms: safety output");
+        let truth = *self.board.plant().truth();
+        let checked = self.invariants.check_moment(&Moment {
+            time_us: ms * 1000,
+            ticked: true,
+            telemetry: shadow.telemetry(),
+            truth: &truth,
+            sent: flight.sent.as_ref(),
+            worked: shadow.worked,
+            safety_output: level,
+            torque_max: shadow.config().joints.map(|joint| joint.torque_max),
+        });
+        if let Err(violation) = checked {
+            panic!("{violation}");
+        }
+        self.flight = flight;
+    }
+
+    /// What the controller sent passes unchanged and in order, or not at all.
+    fn take_bus(&mut self) {
+        let wire = &mut self.board.machine.chip().fdcan.wire;
+        self.bus = wire.log().iter().cloned().collect();
+        wire.clear_log();
+        for entry in self.bus.iter().filter(|e| e.from_controller && e.outcome == Outcome::Good) {
+            let frame = &entry.frame;
+            assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
+            let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
+            let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
+                // The frame of the tick that runs now: its record is read after this.
+                continue;
+            };
+            self.to_pass.drain(..=at);
+        }
+    }
+
+    /// The flight record as it is now; `None` when there is none.
+    pub fn read_flight(&mut self) -> Option<Flight> {
+        let bytes = self.board.machine.memory(self.flight_at, FLIGHT_SIZE)?;
+        Flight::parse(&bytes)
+    }
+
+    /// Lets `ms` pass.
+    pub fn run(&mut self, ms: u64) {
+        (0..ms).for_each(|_| self.step());
+    }
+
+    /// Lets time pass until `done`, at most `ms`.
+    #[track_caller]
+    pub fn wait(&mut self, what: &str, ms: u64, mut done: impl FnMut(&mut Self) -> bool) {
+        for _ in 0..=ms {
+            if done(self) {
+                return;
+            }
+            self.step();
+        }
+        let t = self.shadow.as_ref().map(|s| *s.telemetry());
+        panic!("{what}: not within {ms} ms; {t:?}");
+    }
+
+    /// What the controller beside the board computed, with the same bits as the board.
+    pub fn telemetry(&self) -> Telemetry {
+        self.shadow.as_ref().map(|s| *s.telemetry()).unwrap_or_default()
+    }
+
+    /// State of the controller.
+    pub fn state(&self) -> State {
+        self.telemetry().state
+    }
+
+    /// The host at a port sends bytes.
+    pub fn write(&mut self, port: Port, bytes: &[u8]) {
+        self.hosts[index(port)].sent.extend_from_slice(bytes);
+        self.board.write(port, bytes);
+    }
+
+    /// Sends a frame and waits for its record, which no other port may get.
+    #[track_caller]
+    pub fn response(&mut self, port: Port, frame: &[u8]) -> Response {
+        for host in &mut self.hosts {
+            host.records.clear();
+        }
+        self.write(port, frame);
+        self.wait("a record", 8_000, |rig| !rig.hosts[index(port)].records.is_empty());
+        let other = &self.hosts[1 - index(port)];
+        assert!(other.records.is_empty(), "J-04: the other port heard {:?}", other.records);
+        self.hosts[index(port)].records.remove(0)
+    }
+
+    /// Sends a frame that must be accepted.
+    #[track_caller]
+    pub fn ask(&mut self, port: Port, frame: &[u8]) {
+        let response = self.response(port, frame);
+        let good = response.status == FrameStatus::NoError && response.data == DataStatus::NoError;
+        assert!(good, "refused: {response}");
+    }
+
+    /// The newest status at a port.
+    pub fn status(&self, port: Port) -> Status {
+        self.hosts[index(port)].last.expect("a status was heard")
+    }
+
+    /// Default parameters by the host at `port`, then every joint enabled and held.
+    #[track_caller]
+    pub fn bring_up(&mut self, port: Port) {
+        self.write(port, &frames::use_defaults());
+        self.wait_for_hold(12_000);
+    }
+
+    /// Every joint enabled and held.
+    #[track_caller]
+    pub fn wait_for_hold(&mut self, ms: u64) {
+        self.wait("HoldPos with all joints enabled", ms, |rig| {
+            rig.state() == State::HoldPos
+                && rig.board.plant().node_states()[..6] == [jtc_bus::fsm::ENABLED; 6]
+        });
+    }
+
+    /// A fault begins.
+    pub fn inject(&mut self, kind: FaultKind) {
+        self.board.inject(kind);
+    }
+
+    /// A register, as a debugger reads it.
+    pub fn register(&mut self, address: u32) -> u32 {
+        self.board.machine.word(address).unwrap_or_else(|| panic!("no register at {address:#010x}"))
+    }
+}

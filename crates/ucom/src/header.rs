@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Golden vector 13.4, byte for byte.
+    /// The golden header block of the protocol page, byte for byte.
     #[test]
     fn d41_header_golden() {
         let mut header = Header {

@@ -201,7 +201,7 @@ mod tests {
         (0..1000).map(|i| (37 * i + 11) as u8).collect()
     }
 
-    /// Golden vectors 13.3, from other implementations of the same checksum.
+    /// The golden checks of the protocol page.
     #[test]
     fn d44_program_id_golden() {
         assert_eq!(checksum(Checksum::Crc16, Endian::Little, b"123456789"), 0x29B1);

@@ -276,3 +276,9 @@ pub fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
     }
     all
 }
+
+/// By identifier.
+pub fn sorted(mut heard: Vec<Frame>) -> Vec<Frame> {
+    heard.sort_by_key(Frame::id);
+    heard
+}

@@ -1,9 +1,11 @@
 //! Boards as seen from the bus: raw frames in, raw frames out.
 
 mod acceptance;
+mod acceptance_update;
 mod application;
 mod bus;
 mod compatibility;
+mod golden;
 mod random;
 mod states;
 mod update;

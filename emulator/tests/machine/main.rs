@@ -26,7 +26,7 @@ fn image(main: &[u16], handlers: &[(usize, &[u16])]) -> Elf {
     for (i, (exception, code)) in handlers.iter().enumerate() {
         let at = 0x800 + 0x100 * i;
         put(at, code);
-        put(4 * exception, &pair(0x0800_0000 + at as u32 | 1));
+        put(4 * exception, &pair((0x0800_0000 + at as u32) | 1));
     }
     Elf::from_image(0x0800_0000, bytes)
 }

@@ -139,7 +139,7 @@ impl Live {
     fn report(&mut self) -> Result<(), Box<dyn Error>> {
         let ms = self.board.now_ms();
         if let Some(log) = &mut self.log {
-            log.print(ms, &self.board.machine.defmt())?;
+            log.print(&self.board.machine.defmt())?;
         }
         let observers = &self.board.machine.chip().observers;
         for fault in &observers.faults[self.faults..] {

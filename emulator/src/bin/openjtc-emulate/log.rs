@@ -1,34 +1,37 @@
-//! The firmware's defmt log in plain words.
-use std::error::Error;
+//! The firmware's defmt log in plain words, by the program `defmt-print`.
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 
-use defmt_decoder::{DecodeError, StreamDecoder, Table};
-
-/// Decodes and prints.
-pub struct DefmtLog {
-    decoder: Box<dyn StreamDecoder>,
-}
+/// The program that decodes, which gets the bytes and prints lines.
+pub struct DefmtLog(Child);
 
 impl DefmtLog {
     /// For the firmware with this ELF file.
-    pub fn new(elf: &[u8]) -> Result<Self, Box<dyn Error>> {
-        let table = Table::parse(elf)?.ok_or("the firmware has no defmt log")?;
-        // It is needed to the end of the process.
-        let table: &'static Table = Box::leak(Box::new(table));
-        Ok(Self { decoder: table.new_stream_decoder() })
+    pub fn new(elf: &Path) -> Result<Self, String> {
+        let child = Command::new("defmt-print")
+            .arg("-e")
+            .arg(elf)
+            .stdin(Stdio::piped())
+            // The standard output is for `ready:`.
+            .stdout(io::stderr())
+            .spawn();
+        child.map(Self).map_err(|e| format!("defmt-print: {e}; install it with `cargo install defmt-print`"))
     }
 
-    /// Print the lines that are complete.
-    pub fn print(&mut self, ms: u64, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
-        if bytes.is_empty() {
-            return Ok(());
+    /// Pass bytes on.
+    pub fn print(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match &mut self.0.stdin {
+            Some(input) if !bytes.is_empty() => input.write_all(bytes),
+            _ => Ok(()),
         }
-        self.decoder.received(bytes);
-        loop {
-            match self.decoder.decode() {
-                Ok(frame) => eprintln!("{ms} ms: {}", frame.display(false)),
-                Err(DecodeError::UnexpectedEof) => return Ok(()),
-                Err(DecodeError::Malformed) => eprintln!("{ms} ms: (a piece of the log was lost)"),
-            }
-        }
+    }
+}
+
+impl Drop for DefmtLog {
+    fn drop(&mut self) {
+        // The end of its input ends the program.
+        drop(self.0.stdin.take());
+        let _ = self.0.wait();
     }
 }

@@ -44,7 +44,7 @@ struct Args {
     /// Seed of the arm's deviations and of what RAM holds at first.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print the firmware's defmt log on stderr.
+    /// Print the firmware's defmt log on stderr; needs the program defmt-print.
     #[arg(long)]
     defmt: bool,
 }
@@ -70,7 +70,7 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
         format!("{}: {e}; build it with `cargo build --release` in firmware/", args.elf.display())
     })?;
     let elf = Elf::parse(&bytes).map_err(|e| format!("{}: {e}", args.elf.display()))?;
-    let log = if args.defmt { Some(DefmtLog::new(&bytes)?) } else { None };
+    let log = if args.defmt { Some(DefmtLog::new(&args.elf)?) } else { None };
     let mut config = BoardConfig { baud: args.baud, seed: args.seed, ..BoardConfig::default() };
     config.sim.seed = args.seed;
     let board = Board::new(elf, &config);

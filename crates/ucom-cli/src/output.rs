@@ -116,8 +116,3 @@ pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     }
     text
 }
-
-/// A figure with so many decimals, or a dash where it is not known.
-pub fn figure(value: Option<f64>, digits: usize) -> String {
-    value.map_or("-".into(), |v| format!("{v:.digits$}"))
-}

@@ -301,6 +301,9 @@ pub struct ProbeArgs {
     /// Measure also what shows only while numbers are given: resets and numbers the chain
     #[arg(long, env = "UCOM_INIT", value_parser = FalseyValueParser::new())]
     pub init: bool,
+    /// Start a control loop, outputs safe, to see which life signs count
+    #[arg(long, env = "UCOM_ALIVE", value_parser = FalseyValueParser::new())]
+    pub alive: bool,
     /// Image that is on a board, to find the checksum of Program IDs
     #[arg(long, env = "UCOM_IMAGE", value_name = "FILE")]
     pub image: Option<PathBuf>,

@@ -2,8 +2,11 @@
 
 mod boards;
 mod decode;
+mod doctor;
 mod help;
 mod io;
+mod monitor;
+mod monitor_view;
 mod pages;
 mod record;
 mod run;
@@ -34,6 +37,9 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Par(args) => io::par(&args, link, out),
         Command::So(args) => run::so(&args, link, out),
         Command::Run(args) => run::run(&args, link, out),
+        Command::Monitor(args) => monitor::monitor(&args, link, out),
+        Command::Doctor => doctor::doctor(link, out),
+        Command::Probe(args) => doctor::probe(&args, link, out),
         Command::Dbc(args) => io::dbc(&args, link, out),
         Command::Record(args) => record::record(&args, link, out),
         Command::Replay(args) => record::replay(&args, link, out),
@@ -41,6 +47,5 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Help { topic } => help::help(topic, out),
         Command::Completions { shell } => pages::completions(shell),
         Command::Man { out: dir } => pages::man(dir.as_deref(), out),
-        _ => Err(Failure::usage("not yet")),
     }
 }

@@ -81,13 +81,17 @@ impl Board {
             self.waiting = Some(frame);
             return Some(frame);
         }
-        let polled = self.node.poll(now_us);
+        let frame = self.node.poll(now_us);
+        let out = frame.and_then(|frame| self.through(now_us, frame));
         self.schedule(now_us);
-        let frame = polled?;
+        out
+    }
+
+    /// What faults leave of a frame that the board sends.
+    fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
         if self.silent {
             // Its controller believes that somebody acknowledged.
             self.node.sent(now_us, &frame);
-            self.schedule(now_us);
             return None;
         }
         let acknowledges = frame.address().is_ok_and(|(function, _)| function == Function::InitAck);
@@ -100,10 +104,13 @@ impl Board {
     }
 
     fn schedule(&mut self, now_us: u64) {
-        let busy = self.waiting.is_some() || self.held.is_some();
-        let soonest = now_us + if busy { WAIT_US } else { 1 };
-        self.next_us = self.node.next_deadline().max(soonest);
         self.violation = self.violation.or(self.node.status().contradiction());
+        self.next_us = match (&self.held, &self.waiting) {
+            // The fault may end at any time.
+            (Some(_), _) => now_us + WAIT_US,
+            (None, Some(_)) => self.node.next_deadline().max(now_us + WAIT_US),
+            (None, None) => self.node.next_deadline().max(now_us + 1),
+        };
     }
 
     /// Its frame was on the bus.

@@ -1,0 +1,118 @@
+//! `ucom doctor` and `ucom probe`: what is wrong, and how boards read the protocol.
+
+use std::time::{Duration, Instant};
+
+use can_link::ErrorState;
+use serde_json::json;
+use ucom::files::{Image, ImageOptions};
+use ucom::master::doctor::{Controller, Finding, Observation, Severity, findings};
+use ucom::master::probe::ProbeOptions;
+use ucom::master::{Event, Outcome, Request};
+
+use crate::args::{LinkArgs, ProbeArgs};
+use crate::driver::{Driver, unexpected};
+use crate::failure::{DEVICE, Failure, NO_LINK};
+use crate::output::Output;
+use crate::shape::board_value;
+
+/// How long the bus is listened to before anything is asked.
+const LISTEN: Duration = Duration::from_millis(1500);
+
+/// Looks at everything; ends with 0 when nothing is a problem, 3 without any frame, else 1.
+pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    out.note(format!("listening on {}", link.url()?));
+    let start = Instant::now();
+    let mut foreign_master = None;
+    while start.elapsed() < LISTEN && !driver.stop_asked() {
+        driver.turn(Duration::from_millis(50))?;
+        while let Some(event) = driver.master.take_event() {
+            if let Event::ForeignMaster { function, to } = event {
+                foreign_master = Some((function, to));
+            }
+        }
+    }
+    // With another master on the bus even questions could mix with its own.
+    let scan = match foreign_master {
+        Some(_) => None,
+        None => match driver.run(Request::Scan)? {
+            Outcome::Scan(report) => Some(report),
+            other => return Err(unexpected(&other)),
+        },
+    };
+    let state = driver.link().state();
+    let controller = (state.errors != ErrorState::Unknown).then_some(Controller {
+        bus_off: state.errors == ErrorState::BusOff,
+        passive: state.errors == ErrorState::Passive,
+        tec: state.tec,
+        rec: state.rec,
+        ..Default::default()
+    });
+    let profile = driver.master.profile();
+    let seen = Observation {
+        listened_us: LISTEN.as_micros() as u64,
+        now_us: driver.now_us(),
+        statistics: driver.master.statistics(),
+        boards: driver.master.boards(),
+        controller,
+        scan,
+        foreign_master,
+        profile,
+        ..Default::default()
+    };
+    let all = findings(&seen);
+    let bad = all.iter().any(|f| f.severity == Severity::Problem);
+    let boards = seen.scan.iter().flat_map(|s| &s.boards).map(|b| board_value(b, &profile)).collect::<Vec<_>>();
+    let value = json!({ "bus": link.url()?, "healthy": !bad, "findings": all, "boards": boards });
+    out.result(&value, || all.iter().map(line).collect());
+    match (bad, seen.statistics.received) {
+        (false, _) => Ok(()),
+        (true, 0) => Err(Failure::printed(NO_LINK)),
+        (true, _) => Err(Failure::printed(DEVICE)),
+    }
+}
+
+fn line(f: &Finding) -> String {
+    let mark = match f.severity {
+        Severity::Problem => "✗",
+        Severity::Warning => "!",
+        Severity::Good => "✓",
+    };
+    let mut text = format!("{mark} {}\n", f.what);
+    for (word, more) in [("why", &f.why), ("next", &f.next)] {
+        if !more.is_empty() {
+            text += &format!("    {word}: {}\n", more.replace('`', ""));
+        }
+    }
+    text
+}
+
+/// Measures and writes a profile.
+pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let image = match &args.image {
+        Some(path) => {
+            Some(Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?.bytes().to_vec())
+        }
+        None => None,
+    };
+    let mut driver = Driver::open(link, out)?;
+    let options = ProbeOptions { init: args.init, alive: args.alive, image, force: args.force.force };
+    let report = match driver.run(Request::Probe(options))? {
+        Outcome::Probe(report) => report,
+        other => return Err(unexpected(&other)),
+    };
+    let toml = report.profile.to_toml();
+    let file = args.out.as_ref().map(|path| path.display().to_string());
+    if let Some(path) = &args.out {
+        std::fs::write(path, &toml).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+    }
+    let value = json!({ "rows": report.rows, "boards": report.boards, "profile": toml, "file": file });
+    out.result(&value, || match &file {
+        Some(file) => format!("{}\nprofile: {file}; use it with --profile {file}\n", report.table()),
+        None => {
+            out.note(report.table());
+            toml.clone()
+        }
+    });
+    Ok(())
+}

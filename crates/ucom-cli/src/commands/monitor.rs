@@ -1,0 +1,224 @@
+//! `ucom monitor`: boards, bus load and foreign frames live. A full view on a terminal, one object a second elsewhere.
+
+use std::collections::VecDeque;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use crossterm::event::{self, Event as Key, KeyCode, KeyModifiers};
+use serde_json::{Value, json};
+use ucom::master::{Board, Event, Life, Request};
+
+use super::monitor_view as view;
+use crate::args::{LinkArgs, MonitorArgs};
+use crate::driver::{Driver, words};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::shape::{bits, info_value};
+
+/// Between two questions to boards.
+const ASK: Duration = Duration::from_millis(400);
+/// Seconds of bus load that the curve shows.
+pub const HISTORY: usize = 120;
+/// Lines of the log that are kept.
+pub const LOG: usize = 200;
+
+/// What the view shows beside the boards.
+pub struct Watch {
+    /// The bus.
+    pub url: String,
+    /// Percent, one value a second.
+    pub load: VecDeque<f64>,
+    /// What happened, oldest first: time in s and words.
+    pub log: VecDeque<(f64, String)>,
+    /// Another PC is master: nothing is asked.
+    pub foreign_master: bool,
+    /// Nothing may be sent.
+    pub listen_only: bool,
+    asked: Instant,
+    next: u8,
+    loaded: Instant,
+}
+
+impl Watch {
+    fn new(url: String, listen_only: bool) -> Self {
+        let now = Instant::now();
+        let (load, log) = (VecDeque::new(), VecDeque::new());
+        Self { url, load, log, foreign_master: false, listen_only, asked: now, next: 0, loaded: now }
+    }
+
+    /// Lets the bus go on for a moment.
+    fn turn(&mut self, driver: &mut Driver) -> Result<(), Failure> {
+        driver.turn(Duration::from_millis(25))?;
+        let time_s = driver.now_us() as f64 * 1e-6;
+        while let Some(event) = driver.master.take_event() {
+            match &event {
+                Event::ForeignMaster { .. } => {
+                    if !self.foreign_master {
+                        self.note(time_s, "another PC is master of the bus: this view only listens".into());
+                    }
+                    self.foreign_master = true;
+                }
+                Event::Note { .. } | Event::Done { .. } => {}
+                other => {
+                    if let Some(text) = words(other, None) {
+                        self.note(time_s, text);
+                    }
+                }
+            }
+        }
+        if self.loaded.elapsed() >= Duration::from_secs(1) {
+            self.loaded = Instant::now();
+            self.load.push_back(driver.master.statistics().load_percent(driver.now_us()));
+            if self.load.len() > HISTORY {
+                self.load.pop_front();
+            }
+        }
+        self.ask(driver);
+        Ok(())
+    }
+
+    fn note(&mut self, time_s: f64, text: String) {
+        self.log.push_back((time_s, text));
+        if self.log.len() > LOG {
+            self.log.pop_front();
+        }
+    }
+
+    /// One board after the other is asked for its status, unless another PC is master: its questions go first.
+    fn ask(&mut self, driver: &mut Driver) {
+        if self.listen_only || self.foreign_master || driver.master.is_busy() || self.asked.elapsed() < ASK {
+            return;
+        }
+        self.asked = Instant::now();
+        let known = driver.master.boards();
+        let numbers: Vec<u8> = known.iter().filter(|(_, b)| b.info.is_some()).map(|(n, _)| n).collect();
+        let request = match numbers.iter().find(|n| **n > self.next).or(numbers.first()) {
+            Some(board) => {
+                self.next = *board;
+                Request::Info { board: *board }
+            }
+            None => Request::Scan,
+        };
+        // A board at work for nobody else: it cannot be busy.
+        let _ = driver.master.start(driver.now_us(), request);
+    }
+}
+
+/// Shows the bus until `q`, Ctrl-C, or so many views.
+pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only);
+    let full = !out.is_json() && std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
+    let left = args.count.unwrap_or(u64::MAX);
+    if full { live(&mut driver, &mut watch, left) } else { lines(&mut driver, &mut watch, left, out) }
+}
+
+fn lines(driver: &mut Driver, watch: &mut Watch, mut left: u64, out: &Output) -> Result<(), Failure> {
+    let mut shown = Instant::now();
+    // The first view waits for the scan.
+    let first = Instant::now();
+    while left > 0 && !driver.stop_asked() {
+        watch.turn(driver)?;
+        if shown.elapsed() < Duration::from_secs(1) || first.elapsed() < Duration::from_millis(2000) {
+            continue;
+        }
+        shown = Instant::now();
+        left -= 1;
+        out.result(&value(driver, watch), || text(driver));
+        watch.log.clear();
+    }
+    Ok(())
+}
+
+fn value(driver: &Driver, watch: &Watch) -> Value {
+    let (now, profile) = (driver.now_us(), driver.master.profile());
+    let (boards, statistics) = (driver.master.boards(), driver.master.statistics());
+    let board = |(number, b): (u8, &Board)| {
+        let mut value = b.info.map_or_else(|| json!({ "number": number }), |i| info_value(number, &i, &profile));
+        value["description"] = json!(b.description);
+        value["life"] = json!(life(b));
+        value["alive_age_s"] = json!(age_s(b, now));
+        value["frames_per_s"] = json!(statistics.frames_per_s(number, now));
+        value["errors"] = json!(b.error_count);
+        value["last_error"] = json!(b.errors.last().map(|(_, code)| code.name()));
+        value
+    };
+    json!({
+        "time_s": now as f64 * 1e-6,
+        "load_percent": statistics.load_percent(now),
+        "received": statistics.received,
+        "foreign_frames": statistics.foreign_count(),
+        "foreign_master": watch.foreign_master,
+        "boards": boards.iter().map(board).collect::<Vec<_>>(),
+        "events": watch.log.iter().map(|(time_s, text)| json!({ "time_s": time_s, "text": text })).collect::<Vec<_>>(),
+    })
+}
+
+fn text(driver: &Driver) -> String {
+    let now = driver.now_us();
+    let (boards, statistics) = (driver.master.boards(), driver.master.statistics());
+    let mut text = format!(
+        "{:8.1} s  load {:.1} %, {} foreign frames\n",
+        now as f64 * 1e-6,
+        statistics.load_percent(now),
+        statistics.foreign_count()
+    );
+    for (number, b) in boards.iter() {
+        let status = b.status().map(|s| bits(s).join(" ")).unwrap_or_default();
+        text += &format!(
+            "  board {number:<2} {:20} {:34} {:8} {:5} frames/s\n",
+            b.description.as_deref().unwrap_or("?"),
+            status,
+            life(b),
+            statistics.frames_per_s(number, now)
+        );
+    }
+    text
+}
+
+/// Life signs in a word.
+pub fn life(board: &Board) -> &'static str {
+    match board.life {
+        Life::Unarmed => "-",
+        Life::Alive => "alive",
+        Life::Late => "late",
+        Life::Lost => "lost",
+    }
+}
+
+/// Since the last life sign, s.
+pub fn age_s(board: &Board, now_us: u64) -> Option<f64> {
+    board.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
+}
+
+fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64) -> Result<(), Failure> {
+    let mut terminal = ratatui::try_init()?;
+    let mut run = || -> Result<(), Failure> {
+        let mut drawn: Option<Instant> = None;
+        let mut counted = Instant::now();
+        while left > 0 && !driver.stop_asked() {
+            while event::poll(Duration::ZERO)? {
+                if let Key::Key(key) = event::read()? {
+                    let ctrl_c =
+                        key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+                    if ctrl_c || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) {
+                        return Ok(());
+                    }
+                }
+            }
+            watch.turn(driver)?;
+            if counted.elapsed() >= Duration::from_secs(1) {
+                counted = Instant::now();
+                left -= 1;
+            }
+            if drawn.is_none_or(|at| at.elapsed() >= Duration::from_millis(100)) {
+                drawn = Some(Instant::now());
+                terminal.draw(|frame| view::draw(frame, driver, watch))?;
+            }
+        }
+        Ok(())
+    };
+    let done = run();
+    ratatui::restore();
+    done
+}

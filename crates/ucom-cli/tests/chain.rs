@@ -1,0 +1,230 @@
+//! Commands against `ucom sim`: the chain, process data, recordings.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Sim, ended, signal};
+use serde_json::json;
+
+#[test]
+fn the_simulator_ends_with_0_on_a_signal() {
+    for name in ["-INT", "-TERM"] {
+        assert_eq!(Sim::start(&["--boards", "1"]).end(name), 0, "{name}");
+    }
+}
+
+/// P-1, D-T1: a scan only asks, and sees boards with and without numbers.
+#[test]
+fn p1_scan_only_asks() {
+    let sim = Sim::start(&["--boards", "5", "--flash-ids", "0x21,0x42,0x63,0x04,0x7F"]);
+    let mut peer = sim.peer();
+    let scan = sim.ucom(&["--json", "scan"]).ends(0).json();
+    assert_eq!(scan["reports"], json!([0x04, 0x21, 0x42, 0x63, 0x7F]));
+    assert_eq!(scan["boards"], json!([]));
+    let asks = |f: &String| f == "240#" || f.starts_with("20") || f.starts_with("21");
+    let heard = peer.all(200);
+    let of_pc = heard.iter().filter(|f| !f.starts_with('4')).collect::<Vec<_>>();
+    assert!(of_pc.iter().all(|f| asks(f)) && !of_pc.is_empty(), "{of_pc:?}");
+    sim.ucom(&["init"]).ends(0);
+    peer.all(100);
+    let scan = sim.ucom(&["--json", "scan"]).ends(0).json();
+    assert_eq!(scan["boards"].as_array().unwrap().len(), 5);
+    assert_eq!(scan["boards"][4]["flash_number"], 0x7F);
+    assert_eq!(scan["findings"], json!([]));
+    let of_pc: Vec<String> = peer.all(200).into_iter().filter(|f| f.starts_with('0')).collect();
+    assert!(of_pc.is_empty(), "{of_pc:?}");
+}
+
+/// P-2: chains of 0, 1 and 31 boards; the inventory is written, compared, and kept when it differs.
+#[test]
+fn p2_init_of_chains_and_their_inventory() {
+    let sim = Sim::start(&["--boards", "0"]);
+    let said = sim.ucom(&["--json", "init"]).ends(3);
+    assert_eq!(said.json()["ok"], false);
+    drop(sim);
+
+    let sim = Sim::start(&["--boards", "31"]);
+    let mut peer = sim.peer();
+    let init = sim.ucom(&["--json", "init"]).ends(0).json();
+    assert_eq!(init["boards"].as_array().unwrap().len(), 31);
+    assert_eq!(init["boards"][30]["number"], 31);
+    let frames = peer.all(100);
+    assert!(frames.iter().any(|f| f == "29F#") && frames.iter().all(|f| f != "2A0#"), "no PC_INIT(32)");
+    drop(sim);
+
+    let sim = Sim::start(&["--boards", "3"]);
+    let init = sim.ucom(&["--json", "init"]).ends(0).json();
+    let first = &init["boards"][0];
+    assert_eq!(first["status"], json!(["EXLRUN", "INIT", "OPINIT", "IPINIT"]));
+    assert_eq!(first["flash_date"], "2008-03-14");
+    let inventory = std::fs::read_to_string(sim.path("inventory.toml")).unwrap();
+    assert!(inventory.contains("flash_number = 0x0023"), "{inventory}");
+    // Somebody swapped two boards.
+    std::fs::write(sim.path("inventory.toml"), inventory.replace("0x0023", "0x0055")).unwrap();
+    let said = sim.ucom(&["--json", "init"]).ends(1);
+    let text = said.json()["findings"][0].as_str().unwrap().to_owned();
+    assert!(text.contains("0x0023") && text.contains("0x0055"), "{text}");
+    sim.ucom(&["init", "--renew"]).ends(0);
+}
+
+/// D-24, 5.4: a broken wire is named with its place.
+#[test]
+fn a_broken_init_wire_is_told_with_its_place() {
+    let mut sim = Sim::start(&["--boards", "4"]);
+    sim.fault("wire-broken board=2");
+    let init = sim.ucom(&["--json", "init"]).ends(1).json();
+    assert_eq!(init["boards"].as_array().unwrap().len(), 2);
+    let text = init["findings"][0].as_str().unwrap();
+    assert!(text.contains("after position 2") && text.contains("0x23") && text.contains("0x31"), "{text}");
+}
+
+/// D-T21: two boards with one flash id are one report and two boards.
+#[test]
+fn d07_equal_flash_ids_are_found_out() {
+    let sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x22,0x22"]);
+    let init = sim.ucom(&["--json", "init"]).ends(1).json();
+    let all = init["findings"].to_string();
+    assert!(all.contains("more boards than reports"), "{all}");
+}
+
+#[test]
+fn status_bits_are_set_and_cleared_by_name() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let status = sim.ucom(&["--json", "status", "2", "--set", "ASTART"]).ends(0).json();
+    assert_eq!(status["boards"][0]["status_byte"], 0x5B);
+    let status = sim.ucom(&["--json", "status", "2", "--clear", "astart"]).ends(0).json();
+    assert_eq!(status["boards"][0]["status_byte"], 0x1B);
+    // D-T8: the walk of the status byte.
+    let byte = |words: &[&str]| sim.ucom(words).ends(0).json()["boards"][0]["status_byte"].clone();
+    assert_eq!(byte(&["--json", "xreset", "1"]), 0x1F);
+    assert_eq!(byte(&["--json", "start", "1"]), 0x8B);
+    assert_eq!(byte(&["--json", "stop", "1"]), 0x1B);
+    let reset = sim.ucom(&["--json", "reset"]).ends(0).json();
+    assert_eq!(reset["reports"], json!([0x21, 0x22]));
+    sim.ucom(&["info", "1"]).ends(3);
+}
+
+#[test]
+fn names_inputs_and_motion() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let said = sim.ucom(&["--json", "io", "1"]).ends(4);
+    assert!(said.json()["error"]["hint"].as_str().unwrap().contains("ucom start 1"), "{}", said.out);
+    sim.ucom(&["start", "1"]).ends(0);
+    let io = sim.ucom(&["--json", "io", "1"]).ends(0).json();
+    assert_eq!(io["boards"][0]["ci"][0], "set_position [0.01 deg]");
+    assert_eq!(io["boards"][0]["initial_ci"], json!([0, 1000, 900]));
+    // Inputs move outputs, under supervision.
+    let so = sim.ucom(&["--json", "ci", "1", "set_position=1500", "--for", "1.5"]).ends(0).json();
+    let position = so["so"]["position"].as_i64().unwrap();
+    assert!((1450..1550).contains(&position), "{so}");
+    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+    assert_eq!(status["boards"][0]["state"], "started", "the loop was stopped");
+    // D-35: what was written is only assumed.
+    let par = sim.ucom(&["--json", "par", "1", "kp=150"]).ends(0).json();
+    assert_eq!((par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()), (json!(150), json!(null)));
+    let said = sim.ucom(&["--json", "ci", "1", "set_positon=3"]).ends(2);
+    assert!(said.json()["error"]["message"].as_str().unwrap().contains("set_position"), "{}", said.out);
+    let said = sim.ucom(&["--json", "ci", "1", "2.set_position=3"]).ends(2);
+    assert!(said.json()["error"]["message"].as_str().unwrap().contains("another board"), "{}", said.out);
+}
+
+/// P-17, D-08, D-50: while one PC runs the boards a second one is refused; when it dies the boards become safe.
+#[test]
+fn p17_one_master_at_a_time_and_none_is_safe() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let run = sim.spawn(&["--json", "run", "1", "--active", "--ci", "1.set_position=1000"]);
+    let mut peer = sim.peer();
+    peer.wait("601#01010000");
+    // Listening is welcome: the names are asked for before the loop runs, or known.
+    let so = sim.ucom(&["--json", "so", "1", "--count", "1"]).ends(0).json();
+    assert!(so["so"]["position"].is_i64(), "{so}");
+    let said = sim.ucom(&["--json", "reset"]).ends(4);
+    assert_eq!(said.json()["error"]["code"], "foreign-master", "{}", said.out);
+    sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
+    // kill -9: nobody says stop, the board itself must.
+    signal(&run, "-KILL");
+    ended(run);
+    peer.wait("601#00000000");
+    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+    assert_eq!(status["boards"][0]["state"], "started");
+}
+
+/// Ctrl-C stops control, then applications.
+#[test]
+fn run_stops_in_order() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let run = sim.spawn(&["--json", "run", "all"]);
+    let mut peer = sim.peer();
+    peer.wait("602#01000000");
+    std::thread::sleep(std::time::Duration::from_millis(1200));
+    signal(&run, "-INT");
+    let said = ended(run).ends(0);
+    assert!(said.out.contains("\"running\"") && said.out.contains("\"stopped\""), "{}", said.out);
+    let status = sim.ucom(&["--json", "status"]).ends(0).json();
+    assert_eq!(status["boards"][0]["status_byte"], 0x1B);
+    assert_eq!(status["boards"][1]["status_byte"], 0x1B);
+}
+
+/// P-19: too much load is refused before the loops start.
+#[test]
+fn p19_load_is_refused() {
+    let sim = Sim::start(&["--boards", "3"]);
+    sim.ucom(&["init"]).ends(0);
+    let profile = sim.file("slow.toml", b"load.limit = 1\n");
+    let said = sim.ucom(&["--json", "run", "all", "--profile", &profile, "--for", "1"]).ends(4);
+    assert_eq!(said.json()["error"]["code"], "load", "{}", said.out);
+}
+
+#[test]
+fn monitor_and_doctor_see_what_is_there() {
+    let mut sim = Sim::start(&["--boards", "3"]);
+    sim.ucom(&["init"]).ends(0);
+    let view = sim.ucom(&["--json", "monitor", "--count", "1"]).ends(0).json();
+    assert_eq!(view["boards"].as_array().unwrap().len(), 3, "{view}");
+    assert_eq!(view["boards"][2]["description"], "UCoM2 neck roll");
+    let doctor = sim.ucom(&["--json", "doctor"]).ends(0).json();
+    assert_eq!(doctor["healthy"], true, "{doctor}");
+    sim.fault("foreign-frames for_s=10");
+    let view = sim.ucom(&["--json", "monitor", "--count", "1", "--listen-only"]).ends(0).json();
+    assert!(view["foreign_frames"].as_u64().unwrap() > 10, "{view}");
+}
+
+#[test]
+fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
+    let sim = Sim::start(&["--boards", "2"]);
+    for name in ["bus.log", "bus.mcap", "bus.fzi"] {
+        let record = sim.spawn(&["--json", "record", &sim.path(name), "--for", "4"]);
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        sim.ucom(&["init", "--renew"]).ends(0);
+        let recorded = ended(record).ends(0).json();
+        let frames = recorded["frames"].as_u64().unwrap();
+        assert!(frames > 20, "{recorded}");
+        let decoded = sim.ucom(&["decode", &sim.path(name)]).ends(0);
+        assert_eq!(decoded.out.lines().count() as u64, frames, "{name}");
+        assert!(decoded.out.contains("PC_RESET") && decoded.out.contains("UCoM2 neck pitch"), "{name}");
+        let mut peer = sim.peer();
+        let replay = sim.ucom(&["--json", "replay", &sim.path(name), "--speed", "4"]).ends(0).json();
+        assert!(replay["left_out"].as_u64().unwrap() > 5, "{replay}");
+        let heard = peer.all(300);
+        assert!(heard.iter().any(|f| f == "0C2#02") && heard.iter().all(|f| f != "000#" && f != "282#"), "{name}");
+    }
+}
+
+/// P-20: a board that reads the protocol otherwise is measured.
+#[test]
+fn p20_probe_finds_big_endian_boards() {
+    let chain = tempfile::tempdir().unwrap();
+    let file = chain.path().join("big.toml");
+    let text = "[[board]]\nflash_id = 0x21\ndescription = 'big'\n[board.profile]\nendian = 'big'\nchain.auto_opinit = true\n";
+    std::fs::write(&file, text).unwrap();
+    let sim = Sim::start(&["--chain", file.to_str().unwrap()]);
+    let probe = sim.ucom(&["--json", "probe", "--init", "--out", &sim.path("found.toml")]).ends(0).json();
+    assert!(probe["profile"].as_str().unwrap().contains("endian = \"big\""), "{probe}");
+    assert!(probe["profile"].as_str().unwrap().contains("chain.auto_opinit = true"), "{probe}");
+    let init = sim.ucom(&["--json", "init", "--profile", &sim.path("found.toml")]).ends(0).json();
+    assert_eq!(init["boards"][0]["flash_number"], 0x21);
+}

@@ -1,0 +1,211 @@
+//! Runs the `ucom` command as a user does, and a simulated chain for it to talk to.
+#![allow(dead_code)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use can_link::{CanBus, CanFrame, Id};
+use serde_json::Value;
+
+/// What a command said and how it ended.
+pub struct Said {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+impl Said {
+    /// Its stdout as one JSON object.
+    pub fn json(&self) -> Value {
+        let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
+        serde_json::from_str(self.out.trim()).unwrap_or_else(error)
+    }
+
+    /// The same, once it ended with this code.
+    pub fn ends(self, code: i32) -> Self {
+        assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
+        self
+    }
+}
+
+fn command() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ucom"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("UCOM_")) {
+        command.env_remove(name);
+    }
+    command
+}
+
+/// Runs `ucom` with these words.
+pub fn ucom(words: &[&str]) -> Said {
+    ucom_with(words, "")
+}
+
+/// Runs `ucom` with this text on its stdin.
+pub fn ucom_with(words: &[&str], stdin: &str) -> Said {
+    run(command(), words, stdin)
+}
+
+fn run(mut command: Command, words: &[&str], stdin: &str) -> Said {
+    let mut child = command
+        .args(words)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("ucom starts");
+    child.stdin.take().expect("stdin").write_all(stdin.as_bytes()).ok();
+    said(child)
+}
+
+fn said(child: Child) -> Said {
+    let output = child.wait_with_output().expect("ucom ends");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+}
+
+/// A simulated chain; it ends with the test.
+pub struct Sim {
+    child: Child,
+    pub url: String,
+    pub dir: tempfile::TempDir,
+}
+
+impl Sim {
+    /// Starts one on a free port and waits until it is ready.
+    pub fn start(options: &[&str]) -> Self {
+        let mut child = command()
+            .args(["sim", "--listen", "127.0.0.1:0"])
+            .args(options)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("ucom sim starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
+        let Some(url) = line.trim().strip_prefix("ready: ") else {
+            let mut err = String::new();
+            child.stderr.take().expect("stderr").read_to_string(&mut err).ok();
+            panic!("ucom sim says {line:?}, {err}");
+        };
+        Self { child, url: url.to_owned(), dir: tempfile::tempdir().expect("a directory") }
+    }
+
+    fn command(&self) -> Command {
+        let mut command = command();
+        command.env("UCOM_BUS", &self.url).env("UCOM_INVENTORY", self.path("inventory.toml"));
+        command.env("UCOM_CACHE", self.path("cache"));
+        command
+    }
+
+    /// Runs `ucom` on its bus, with an inventory and a cache of its own.
+    pub fn ucom(&self, words: &[&str]) -> Said {
+        run(self.command(), words, "")
+    }
+
+    /// Starts `ucom` on its bus; it goes on while the test does.
+    pub fn spawn(&self, words: &[&str]) -> Child {
+        let mut command = self.command();
+        command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().expect("ucom starts")
+    }
+
+    /// A path in its directory.
+    pub fn path(&self, name: &str) -> String {
+        self.dir.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    /// A file in its directory.
+    pub fn file(&self, name: &str, bytes: &[u8]) -> String {
+        std::fs::write(self.path(name), bytes).expect("a file");
+        self.path(name)
+    }
+
+    /// Begins a fault.
+    pub fn fault(&mut self, line: &str) {
+        let stdin = self.child.stdin.as_mut().expect("stdin");
+        writeln!(stdin, "{line}").expect("the simulator reads");
+        // It looks at its stdin every 50 ms.
+        std::thread::sleep(Duration::from_millis(150));
+    }
+
+    /// Joins its bus as a device that knows nothing but frames.
+    pub fn peer(&self) -> Peer {
+        Peer { bus: can_link::open(&self.url).expect("the bus opens") }
+    }
+
+    /// Sends a signal and waits for the end: its exit code.
+    pub fn end(mut self, name: &str) -> i32 {
+        signal(&self.child, name);
+        self.child.wait().expect("it ends").code().unwrap_or(-1)
+    }
+}
+
+impl Drop for Sim {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+/// Sends a signal to a process of the test.
+pub fn signal(child: &Child, name: &str) {
+    Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
+}
+
+/// What a started command said, once it has ended.
+pub fn ended(child: Child) -> Said {
+    said(child)
+}
+
+/// A device on the bus that sends and hears raw frames.
+pub struct Peer {
+    bus: Box<dyn CanBus + Send>,
+}
+
+impl Peer {
+    /// Sends a frame written as candump does, `1C1#0202`.
+    pub fn send(&mut self, text: &str) {
+        let (id, data) = text.split_once('#').expect("ID#DATA");
+        let id = Id::standard(u32::from_str_radix(id, 16).expect("hex")).expect("11 bits");
+        let data: Vec<u8> = (0..data.len() / 2)
+            .map(|i| u8::from_str_radix(&data[2 * i..2 * i + 2], 16).expect("hex"))
+            .collect();
+        self.bus.send(&CanFrame::classic(id, &data).expect("8 bytes")).expect("sent");
+    }
+
+    /// The next frame within a time.
+    pub fn hear(&mut self, within_ms: u64) -> Option<String> {
+        let frame = self.bus.receive(Duration::from_millis(within_ms)).expect("the bus works")?;
+        let data: String = frame.data().iter().map(|b| format!("{b:02X}")).collect();
+        Some(format!("{}#{data}", frame.id()))
+    }
+
+    /// Everything within a time.
+    pub fn all(&mut self, within_ms: u64) -> Vec<String> {
+        let end = Instant::now() + Duration::from_millis(within_ms);
+        let mut heard = Vec::new();
+        while let Some(left) = end.checked_duration_since(Instant::now()) {
+            heard.extend(self.hear(left.as_millis() as u64));
+        }
+        heard
+    }
+
+    /// Waits for a frame that begins so; what comes before it is passed over.
+    pub fn wait(&mut self, start: &str) -> String {
+        let end = Instant::now() + Duration::from_secs(20);
+        while Instant::now() < end {
+            if let Some(frame) = self.hear(100).filter(|f| f.starts_with(start)) {
+                return frame;
+            }
+        }
+        panic!("no frame {start} within 20 s");
+    }
+}
+
+/// An image of so many bytes, different for each seed.
+pub fn image(bytes: usize, seed: u8) -> Vec<u8> {
+    (0..bytes).map(|i| (i * 37 + 11) as u8 ^ seed).collect()
+}

@@ -1,0 +1,79 @@
+//! Commands that need no bus: exit codes, JSON, pages.
+
+mod common;
+
+use common::{ucom, ucom_with};
+
+#[test]
+fn wrong_usage_and_unreadable_input_end_with_2() {
+    ucom(&["scann"]).ends(2);
+    ucom(&["info", "32", "--bus", "virtual:x"]).ends(2);
+    let said = ucom(&["--json", "scan"]).ends(2);
+    assert!(said.json()["error"]["message"].as_str().unwrap().contains("UCOM_BUS"), "{}", said.out);
+    ucom(&["scan", "--bus", "can0"]).ends(2);
+    ucom(&["sim", "--profile", "/nowhere.toml"]).ends(2);
+    ucom(&["sim", "--chain", "/nowhere.toml"]).ends(2);
+    let said = ucom(&["sim", "--boards", "1", "--flash-ids", "1,2"]).ends(2);
+    assert!(said.err.contains("2 boards"), "{}", said.err);
+    ucom(&["update", "1", "/nowhere.hex", "--bus", "virtual:x"]).ends(2);
+    ucom(&["status", "1", "--set", "MCARUN", "--bus", "virtual:x"]).ends(2);
+    ucom(&["status", "1", "--set", "PROG", "--clear", "PROG", "--bus", "virtual:x"]).ends(2);
+    ucom(&["decode", "/nowhere.log"]).ends(2);
+}
+
+#[test]
+fn a_bus_that_is_not_there_ends_with_3() {
+    let said = ucom(&["--json", "scan", "--bus", "socketcand:127.0.0.1:1/can0"]).ends(3);
+    let error = &said.json()["error"];
+    assert_eq!((error["code"].as_str(), error["exit"].as_u64()), (Some("bus"), Some(3)));
+}
+
+#[test]
+fn nobody_on_the_bus_ends_with_3_and_says_what_to_do() {
+    let said = ucom(&["--json", "scan", "--bus", "virtual:empty"]).ends(3);
+    assert!(said.json()["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{}", said.out);
+    let said = ucom(&["--json", "info", "all", "--bus", "virtual:empty"]).ends(3);
+    assert_eq!(said.json()["error"]["code"], "no-boards");
+    let said = ucom(&["--json", "doctor", "--bus", "virtual:empty"]).ends(3);
+    assert_eq!(said.json()["healthy"], false);
+}
+
+/// C-3: the frame `000#` is a frame.
+#[test]
+fn decode_tells_names_of_frames() {
+    let said = ucom_with(&["decode"], "000#\n141#2100011934126E38\n2A1#\n").ends(0);
+    let lines: Vec<&str> = said.out.lines().collect();
+    assert!(lines[0].contains("PC_RESET") && lines[0].contains("all"), "{}", said.out);
+    assert!(lines[1].contains("DSP_INFO") && lines[1].contains("0x1234") && lines[1].contains("EXLRUN INIT IPINIT"));
+    assert!(lines[2].contains("foreign") && lines[2].contains("bit 5"), "{}", said.out);
+    let said = ucom_with(&["--json", "decode", "-"], "(1.5) can0 1C1#0202\n").ends(0);
+    let value = said.json();
+    assert_eq!((value["function"].as_str(), value["mask"].as_u64()), (Some("PC_SETSTATUS"), Some(2)));
+    // A string is followed over its packages.
+    let text = "141#2100011934126E38\n141#0200\n141#55436F4D32206865\n141#61642070616E\n";
+    let said = ucom_with(&["decode"], text).ends(0);
+    assert!(said.out.lines().last().unwrap().contains("\"UCoM2 head pan\""), "{}", said.out);
+    let said = ucom_with(&["decode"], "hello\n").ends(2);
+    assert!(said.err.contains("line 1"), "{}", said.err);
+    ucom_with(&["decode"], "").ends(2);
+}
+
+#[test]
+fn pages_completions_and_manual_are_made() {
+    assert!(ucom(&["help", "profile"]).ends(0).out.contains("chain.auto_opinit"));
+    assert!(ucom(&["help", "sim"]).ends(0).out.contains("neck yaw"));
+    assert!(ucom(&["help", "faults"]).ends(0).out.contains("power-loss"));
+    assert!(ucom(&["help"]).ends(0).out.contains("Exit codes"));
+    for shell in ["bash", "zsh", "fish", "powershell"] {
+        assert!(ucom(&["completions", shell]).ends(0).out.contains("ucom"));
+    }
+    let dir = tempfile::tempdir().unwrap();
+    ucom(&["man", "--out", dir.path().to_str().unwrap()]).ends(0);
+    assert!(std::fs::read_dir(dir.path()).unwrap().count() > 20);
+}
+
+#[test]
+fn a_dbc_without_boards_needs_no_bus() {
+    let said = ucom(&["dbc", "none"]).ends(0);
+    assert!(said.out.starts_with("VERSION") && said.out.contains("BO_ "), "{}", said.out);
+}

@@ -1,0 +1,151 @@
+//! `ucom update` against `ucom sim`: outcomes, exit codes, and what is left behind.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Sim, ended, image, signal};
+
+fn chain(boards: &str) -> Sim {
+    let sim = Sim::start(&["--boards", boards]);
+    sim.ucom(&["init"]).ends(0);
+    sim
+}
+
+fn program_id(sim: &Sim, board: &str) -> serde_json::Value {
+    sim.ucom(&["--json", "info", board]).ends(0).json()["boards"][0]["program_id"].clone()
+}
+
+/// U-1 to U-10 on 60 KiB: verified, then up to date; the golden Program ID of 13.3.
+#[test]
+fn d46_update_is_verified_and_then_up_to_date() {
+    let sim = chain("2");
+    let file = sim.file("app.bin", &image(60 * 1024, 1));
+    let update = sim.ucom(&["--json", "update", "2", &file, "--date", "2009-06-01"]).ends(0).json();
+    assert_eq!(update["outcome"], "verified", "{update}");
+    assert_eq!(update["flash_date"], "2009-06-01");
+    assert_eq!(program_id(&sim, "2"), update["program_id"]);
+    let update = sim.ucom(&["--json", "update", "2", &file, "--date", "2009-06-01"]).ends(0).json();
+    assert_eq!((update["outcome"].as_str(), update["boards"][0]["attempts"].as_u64()), (Some("up-to-date"), Some(0)));
+
+    let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
+    let file = sim.file("golden.bin", &golden);
+    let update = sim.ucom(&["--json", "update", "1", &file, "--start", "--flash-id", "0x21"]).ends(0).json();
+    assert_eq!((update["outcome"].as_str(), update["program_id"].as_u64()), (Some("running"), Some(0x4B3F)));
+}
+
+/// The exit codes 2 and 4: nothing is sent that changes a board.
+#[test]
+fn d46_refusals_change_nothing() {
+    let sim = chain("3");
+    let file = sim.file("app.bin", &image(2000, 2));
+    let before = program_id(&sim, "1");
+    // Another board than the one that is meant.
+    let update = sim.ucom(&["--json", "update", "1", &file, "--flash-id", "0x77"]).ends(4).json();
+    assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
+    assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
+    sim.ucom(&["update", "1-2", &file, "--flash-id", "0x21"]).ends(2);
+    sim.ucom(&["update", "1", &sim.file("half.hex", b":10000000"), "--flash-id", "0x21"]).ends(2);
+    sim.ucom(&["update", "1", &file, "--date", "yesterday"]).ends(2);
+    // A list needs to know who is who.
+    let said = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
+    assert_eq!(said.json()["error"]["code"], "no-inventory");
+    let dry = sim.ucom(&["--json", "update", "all", &file, "--dry-run"]).ends(0).json();
+    assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
+    // While a board runs.
+    let run = sim.spawn(&["--json", "run", "3"]);
+    sim.peer().wait("603#01000000");
+    sim.ucom(&["update", "1", &file]).ends(4);
+    signal(&run, "-INT");
+    ended(run).ends(0);
+    assert_eq!(program_id(&sim, "1"), before);
+    // Nobody there.
+    sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
+}
+
+/// Exit code 1: the board reported an error before anything was erased; 5: after.
+#[test]
+fn d46_errors_before_and_after_the_erase() {
+    let mut sim = chain("2");
+    // An image beyond the application area.
+    let file = sim.file("large.bin", &image(100 * 1024, 3));
+    let before = program_id(&sim, "1");
+    let update = sim.ucom(&["--json", "update", "1", &file]).ends(1).json();
+    assert_eq!(update["boards"][0]["attempts"], 1, "P-11: exactly one attempt: {update}");
+    assert_eq!(program_id(&sim, "1"), before);
+    sim.fault("flash-broken board=1");
+    let file = sim.file("app.bin", &image(2000, 4));
+    let update = sim.ucom(&["--json", "update", "1", &file]).ends(5).json();
+    assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
+}
+
+/// A campaign: all boards of the inventory, one fails, the others are done; the next run only does the rest.
+#[test]
+fn a_campaign_goes_on_and_is_resumed() {
+    let mut sim = chain("3");
+    let file = sim.file("app.bin", &image(4000, 5));
+    sim.fault("silent board=2");
+    sim.ucom(&["update", "1-3", &file]).ends(3);
+    let infos = sim.ucom(&["--json", "scan"]).ends(0).json();
+    assert_eq!(infos["boards"].as_array().unwrap().len(), 2);
+    // Board 2 comes back with power off and on: without a number, and repaired by the update itself or by an init.
+    drop(sim);
+    let sim = chain("3");
+    let first = sim.ucom(&["--json", "update", "1,3", &file_in(&sim)]).ends(0).json();
+    assert_eq!(first["boards"][1]["outcome"], "verified");
+    let all = sim.ucom(&["--json", "update", "all", &file_in(&sim)]).ends(0).json();
+    let outcomes: Vec<&str> = all["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
+    assert_eq!(outcomes, ["up-to-date", "verified", "up-to-date"]);
+}
+
+fn file_in(sim: &Sim) -> String {
+    sim.file("campaign.bin", &image(4000, 6))
+}
+
+/// P-12: Ctrl-C in mid-block: SETSTATUS(04,00) leaves, exit code 5 after the erase, the board is usable.
+#[test]
+fn p12_cancel_leaves_the_board_usable() {
+    let sim = chain("1");
+    let file = sim.file("app.bin", &image(60 * 1024, 7));
+    let mut peer = sim.peer();
+    let update = sim.spawn(&["--json", "update", "1", &file]);
+    // Well into the second cycle: 961 blocks with their READY each are the first.
+    for _ in 0..1200 {
+        peer.wait("181#");
+    }
+    signal(&update, "-INT");
+    peer.wait("1C1#0400");
+    let said = ended(update).ends(5);
+    assert_eq!(said.json()["boards"][0]["outcome"], "erased", "{}", said.out);
+    let info = sim.ucom(&["--json", "info", "1"]).ends(0).json();
+    assert_eq!(info["boards"][0]["application"], false);
+    sim.ucom(&["update", "1", &sim.file("small.bin", &image(2000, 8))]).ends(0);
+}
+
+/// P-13: kill -9 in mid-update, the next run recovers.
+#[test]
+fn p13_a_killed_update_is_recovered_by_the_next() {
+    let sim = chain("1");
+    let file = sim.file("app.bin", &image(60 * 1024, 9));
+    let mut peer = sim.peer();
+    let update = sim.spawn(&["update", "1", &file]);
+    for _ in 0..1100 {
+        peer.wait("181#");
+    }
+    signal(&update, "-KILL");
+    ended(update);
+    let update = sim.ucom(&["--json", "update", "1", &file]).ends(0).json();
+    assert_eq!(update["outcome"], "verified", "{update}");
+}
+
+/// Power loss of the board in the second cycle: it comes up without an application, an init and an update repair it.
+#[test]
+fn d46_power_loss_in_mid_update() {
+    let mut sim = chain("2");
+    let file = sim.file("app.bin", &image(20 * 1024, 10));
+    sim.fault("power-loss board=1 for_s=0.3 on_id=0x2C1 on_count=4000");
+    let first = sim.ucom(&["--json", "update", "1", &file]);
+    assert!([0, 5].contains(&first.code), "{}", first.out);
+    sim.ucom(&["init"]).ends(0);
+    let update = sim.ucom(&["--json", "update", "1", &file]).ends(0).json();
+    assert!(["verified", "up-to-date"].contains(&update["outcome"].as_str().unwrap()), "{update}");
+}

@@ -173,7 +173,11 @@ pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome
 /// XRESET, wait, poll PC_INFO until the exloader runs; PROG by SETSTATUS when it is off (U-4).
 ///
 /// A board that does not answer any more is repaired when its flash number is known.
-pub(crate) async fn enter_exloader(link: &Link, board: u8, flash_number: Option<u16>) -> Result<BoardInfo, Error> {
+pub(crate) async fn enter_exloader(
+    link: &Link,
+    board: u8,
+    flash_number: Option<u16>,
+) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     link.send(to, ToBoard::XReset).await;
     link.with(|core| {
@@ -249,7 +253,11 @@ async fn flags(link: &Link, board: u8) -> Result<Admin, Error> {
     let told = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
     // A frame of it may have been lost: the status byte knows whether the loop runs.
-    Ok(told.map_or(Admin { run, ..Admin::default() }, |told| Admin { run, active: told.active && run, ..told }))
+    Ok(told.map_or(Admin { run, ..Admin::default() }, |told| Admin {
+        run,
+        active: told.active && run,
+        ..told
+    }))
 }
 
 /// Read-modify-write of the flags.

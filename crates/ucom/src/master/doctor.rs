@@ -77,7 +77,13 @@ pub struct Finding {
 struct Findings(Vec<Finding>);
 
 impl Findings {
-    fn add(&mut self, severity: Severity, what: impl Into<String>, why: impl Into<String>, next: impl Into<String>) {
+    fn add(
+        &mut self,
+        severity: Severity,
+        what: impl Into<String>,
+        why: impl Into<String>,
+        next: impl Into<String>,
+    ) {
         self.0.push(Finding { severity, what: what.into(), why: why.into(), next: next.into() });
     }
     fn problem(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<String>) {
@@ -113,7 +119,11 @@ fn bus(o: &Observation, f: &mut Findings) {
         let counters = format!("TEC {}, REC {}", count(c.tec), count(c.rec));
         if c.bus_off {
             let why = "too many of its frames failed: wrong bit rate, or CAN_H and CAN_L swapped or shorted";
-            f.problem(format!("the adapter is bus-off ({counters})"), why, "check rate and cable, then restart the interface");
+            f.problem(
+                format!("the adapter is bus-off ({counters})"),
+                why,
+                "check rate and cable, then restart the interface",
+            );
         } else if c.no_acknowledge > 0 && heard == 0 {
             let why = "no powered board is connected, or all of them listen at another bit rate";
             f.problem(
@@ -123,7 +133,11 @@ fn bus(o: &Observation, f: &mut Findings) {
             );
         } else if c.protocol_errors > 0 && heard == 0 {
             let why = "frames are there but none can be read: usually another bit rate";
-            f.problem(format!("{} bus errors and no frame", c.protocol_errors), why, "try `bitrate` 500000, 250000, 125000");
+            f.problem(
+                format!("{} bus errors and no frame", c.protocol_errors),
+                why,
+                "try `bitrate` 500000, 250000, 125000",
+            );
         } else if c.protocol_errors > 0 || c.passive || c.tec.max(c.rec).is_some_and(|n| n >= 96) {
             let why = "reflections: termination missing or doubled (120 Ω at both ends, 60 Ω measured across the bus), a stub too long, a ground missing";
             let what = format!("bus errors beside good frames: {} ({counters})", c.protocol_errors);
@@ -132,7 +146,9 @@ fn bus(o: &Observation, f: &mut Findings) {
             f.good(format!("the adapter is error active ({counters})"));
         }
     }
-    if heard == 0 && o.controller.is_none_or(|c| c.no_acknowledge == 0 && c.protocol_errors == 0 && !c.bus_off) {
+    if heard == 0
+        && o.controller.is_none_or(|c| c.no_acknowledge == 0 && c.protocol_errors == 0 && !c.bus_off)
+    {
         let s = o.listened_us as f64 * 1e-6;
         let why = if o.scan.is_some() {
             "no board is powered or connected to this bus, or none reads the protocol as the profile says"
@@ -151,19 +167,33 @@ fn traffic(o: &Observation, f: &mut Findings) {
     let load = o.statistics.load_percent(o.now_us);
     if load > f64::from(o.profile.load_limit) {
         let why = "life signs rank behind all process data and starve first";
-        f.warn(format!("bus load {load:.0} %, limit {} %", o.profile.load_limit), why, "longer `so.period` or `ci.period`, fewer boards on this bus");
+        f.warn(
+            format!("bus load {load:.0} %, limit {} %", o.profile.load_limit),
+            why,
+            "longer `so.period` or `ci.period`, fewer boards on this bus",
+        );
     }
     if o.statistics.foreign_count() > 0 {
-        let kinds: Vec<String> = o.statistics.foreign.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
+        let kinds: Vec<String> =
+            o.statistics.foreign.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
         let why = "another protocol shares the bus, or the identifiers are read otherwise";
-        f.warn(format!("frames that are not of this protocol: {}", kinds.join(", ")), why, "`ucom monitor` shows them");
+        f.warn(
+            format!("frames that are not of this protocol: {}", kinds.join(", ")),
+            why,
+            "`ucom monitor` shows them",
+        );
     }
     if let Some((function, to)) = o.foreign_master {
         let why = "exactly one PC may be master";
-        f.warn(format!("another PC talks on this bus ({} to {to})", function.name()), why, "end the other program before anything that changes boards");
+        f.warn(
+            format!("another PC talks on this bus ({} to {to})", function.name()),
+            why,
+            "end the other program before anything that changes boards",
+        );
     }
     if o.statistics.undecodable > 0 {
-        let why = "too short or impossible values: another reading of the protocol, or two boards with one number";
+        let why =
+            "too short or impossible values: another reading of the protocol, or two boards with one number";
         f.warn(format!("{} frames of boards cannot be read", o.statistics.undecodable), why, "`ucom probe`");
     }
 }
@@ -172,7 +202,9 @@ fn chain(o: &Observation, f: &mut Findings) {
     if let Some(init) = &o.init {
         for finding in &init.findings {
             let next = match finding {
-                InitFinding::NoBoards => "check power, cable and bit rate, then `ucom doctor` again".to_owned(),
+                InitFinding::NoBoards => {
+                    "check power, cable and bit rate, then `ucom doctor` again".to_owned()
+                }
                 InitFinding::NotReached { after: 0, .. } => {
                     "the first board does not take number 1: is its incoming init pin strapped active?".into()
                 }
@@ -197,17 +229,27 @@ fn chain(o: &Observation, f: &mut Findings) {
     let Some(scan) = &o.scan else { return };
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {
-        f.warn(format!("{unnumbered} boards, none has a number"), "they were powered up or reset", "`ucom init`");
+        f.warn(
+            format!("{unnumbered} boards, none has a number"),
+            "they were powered up or reset",
+            "`ucom init`",
+        );
     } else if unnumbered > 0 {
         let after = scan.boards.last().map_or(0, |b| b.number);
         let why = format!("they rebooted, or the init wire behind board {after} is broken");
-        f.problem(format!("{unnumbered} boards have no number beside {} that have one", scan.boards.len()), why, "`ucom init` names the place");
+        f.problem(
+            format!("{unnumbered} boards have no number beside {} that have one", scan.boards.len()),
+            why,
+            "`ucom init` names the place",
+        );
     } else if !scan.boards.is_empty() {
         f.good(format!("{} boards already have numbers", scan.boards.len()));
     }
     for finding in scan.findings.iter().filter(|x| !matches!(x, ScanFinding::Unnumbered { .. })) {
         let next = match finding {
-            ScanFinding::SameFlash { .. } | ScanFinding::Ambiguous { .. } => "give one of them another flash number",
+            ScanFinding::SameFlash { .. } | ScanFinding::Ambiguous { .. } => {
+                "give one of them another flash number"
+            }
             ScanFinding::Disagrees { .. } => "`ucom probe`",
             ScanFinding::Status { .. } => "`ucom probe`; then `ucom reset` and `ucom init`",
             ScanFinding::Contradicts { .. } => "`ucom init` numbers them anew",
@@ -218,7 +260,11 @@ fn chain(o: &Observation, f: &mut Findings) {
     for board in &scan.boards {
         let n = board.number;
         if !board.info.has_application() {
-            f.warn(format!("board {n} has no valid application"), "never programmed, or an update was cut off", format!("`ucom update {n} IMAGE`"));
+            f.warn(
+                format!("board {n} has no valid application"),
+                "never programmed, or an update was cut off",
+                format!("`ucom update {n} IMAGE`"),
+            );
         }
     }
 }
@@ -226,11 +272,23 @@ fn chain(o: &Observation, f: &mut Findings) {
 fn boards(o: &Observation, f: &mut Findings) {
     for (n, board) in o.boards.iter() {
         if board.rebooted {
-            f.problem(format!("board {n} rebooted and lost its number"), "power, watchdog or a crash of its application", "`ucom init`");
+            f.problem(
+                format!("board {n} rebooted and lost its number"),
+                "power, watchdog or a crash of its application",
+                "`ucom init`",
+            );
         }
         match board.life {
-            Life::Lost => f.problem(format!("board {n} gives no life sign"), "it lost power or the bus", "`ucom info N`, cable and power of this board"),
-            Life::Late => f.warn(format!("board {n} is late with its life signs"), "the bus is overloaded or frames get lost", "`ucom monitor`"),
+            Life::Lost => f.problem(
+                format!("board {n} gives no life sign"),
+                "it lost power or the bus",
+                "`ucom info N`, cable and power of this board",
+            ),
+            Life::Late => f.warn(
+                format!("board {n} is late with its life signs"),
+                "the bus is overloaded or frames get lost",
+                "`ucom monitor`",
+            ),
             Life::Unarmed | Life::Alive => {}
         }
         if let Some((_, code)) = board.errors.last() {

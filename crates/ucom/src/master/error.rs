@@ -23,7 +23,9 @@ pub struct Heard(pub Option<LastHeard>);
 impl fmt::Display for Heard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Some(LastHeard { function, ago_ms }) => write!(f, "last heard: {} {ago_ms} ms ago", function.name()),
+            Some(LastHeard { function, ago_ms }) => {
+                write!(f, "last heard: {} {ago_ms} ms ago", function.name())
+            }
             None => f.write_str("nothing heard from it at all"),
         }
     }
@@ -60,7 +62,9 @@ pub enum Error {
         problem: Incomplete,
     },
     /// Answers of a board contradict each other.
-    #[error("board {board}: its answers to PC_INFO contradict each other in {tries} tries (two boards with one number?)")]
+    #[error(
+        "board {board}: its answers to PC_INFO contradict each other in {tries} tries (two boards with one number?)"
+    )]
     Contradiction {
         /// Its number.
         board: u8,
@@ -104,7 +108,12 @@ pub enum Error {
         found: u16,
     },
     /// A status was set and is not what was set.
-    #[error("board {board}: status is {} after {tries} tries, wanted {} of the bits {}", status, wanted, mask)]
+    #[error(
+        "board {board}: status is {} after {tries} tries, wanted {} of the bits {}",
+        status,
+        wanted,
+        mask
+    )]
     StatusNotTaken {
         /// Its number.
         board: u8,

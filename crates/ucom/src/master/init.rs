@@ -55,7 +55,9 @@ impl InitReport {
 #[non_exhaustive]
 pub enum InitFinding {
     /// Nobody reported and nobody took number 1.
-    #[error("no board reported and none took a number: is the bus connected, powered, and at this bit rate? `ucom doctor`")]
+    #[error(
+        "no board reported and none took a number: is the bus connected, powered, and at this bit rate? `ucom doctor`"
+    )]
     NoBoards,
     /// Boards reported but got no number.
     #[error(
@@ -69,7 +71,9 @@ pub enum InitFinding {
         ids: Vec<u8>,
     },
     /// More boards than reports: boards share the low byte of their flash number.
-    #[error("more boards than reports: {boards} boards, {reports} reports; flash ids must be unique in their low byte")]
+    #[error(
+        "more boards than reports: {boards} boards, {reports} reports; flash ids must be unique in their low byte"
+    )]
     MoreBoardsThanReports {
         /// Boards with a number.
         boards: u32,
@@ -93,7 +97,9 @@ pub enum InitFinding {
         second: u8,
     },
     /// Another board than the inventory has at a position.
-    #[error("unexpected board order: position {board} has flash number 0x{found:04X}, the inventory says 0x{expected:04X}")]
+    #[error(
+        "unexpected board order: position {board} has flash number 0x{found:04X}, the inventory says 0x{expected:04X}"
+    )]
     UnexpectedOrder {
         /// The position.
         board: u8,
@@ -208,7 +214,9 @@ async fn take_number(link: &Link, number: u8) -> Result<bool, Error> {
                     break;
                 }
                 // The acknowledge of before has not left the board yet (D-24): give it time.
-                FromBoard::Error(crate::ErrorCode::Reinit) if heard.from == nobody || heard.from == number => {
+                FromBoard::Error(crate::ErrorCode::Reinit)
+                    if heard.from == nobody || heard.from == number =>
+                {
                     until = until.max(link.now() + 100 * MS);
                 }
                 _ => {}
@@ -255,7 +263,11 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
     for (i, first) in report.boards.iter().enumerate() {
         let flash_number = first.info.flash_number;
         for second in report.boards.iter().skip(i + 1).filter(|b| b.info.flash_number == flash_number) {
-            findings.push(InitFinding::DuplicateFlash { flash_number, first: first.number, second: second.number });
+            findings.push(InitFinding::DuplicateFlash {
+                flash_number,
+                first: first.number,
+                second: second.number,
+            });
         }
     }
     for &(board, expected) in &options.expected {
@@ -268,7 +280,9 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
             None => findings.push(InitFinding::Missing { board, expected }),
         }
     }
-    findings.extend(report.reports.ambiguous().into_iter().map(|(low, high)| InitFinding::Ambiguous { low, high }));
+    findings.extend(
+        report.reports.ambiguous().into_iter().map(|(low, high)| InitFinding::Ambiguous { low, high }),
+    );
     report.findings.extend(findings);
 }
 

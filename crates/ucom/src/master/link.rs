@@ -148,11 +148,15 @@ impl Link {
     }
 
     /// Ends `work` with [`Error::Cancelled`] when the caller asks to; its queued frames do not leave then.
-    pub(crate) async fn or_cancel<T>(&self, work: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
+    pub(crate) async fn or_cancel<T>(
+        &self,
+        work: impl Future<Output = Result<T, Error>>,
+    ) -> Result<T, Error> {
         let mut work = pin!(work);
         poll_fn(|context| {
             let cancelled = self.with(|core| {
-                let cancelled = core.inboxes.get_mut(&self.id).is_some_and(|inbox| core::mem::take(&mut inbox.cancel));
+                let cancelled =
+                    core.inboxes.get_mut(&self.id).is_some_and(|inbox| core::mem::take(&mut inbox.cancel));
                 if cancelled {
                     core.forget_queued(self.id);
                 }
@@ -171,7 +175,8 @@ impl Link {
             return Ok(());
         }
         if !force {
-            let (since, listen, now) = self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
+            let (since, listen, now) =
+                self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
             // The time before the command counts when the bus was listened to.
             if now < since + listen {
                 self.sleep(since + listen - now).await;

@@ -79,9 +79,12 @@ mod tests {
             let profile = Profile { so_period: period, ci_period: period, ..Profile::default() };
             LoadForecast::new(&all, &profile)
         };
-        for (boards, so, ci, period, percent) in
-            [(7, 6, 3, 10, 85.0 / 3.0), (7, 12, 3, 10, 142.0 / 3.0), (16, 12, 3, 10, 108.0), (7, 12, 3, 1, 472.5)]
-        {
+        for (boards, so, ci, period, percent) in [
+            (7, 6, 3, 10, 85.0 / 3.0),
+            (7, 12, 3, 10, 142.0 / 3.0),
+            (16, 12, 3, 10, 108.0),
+            (7, 12, 3, 1, 472.5),
+        ] {
             let f = forecast(boards, so, ci, period);
             // Life signs add less than 0.2 %.
             assert!((f.percent() - percent).abs() < 0.3, "{f}");

@@ -38,6 +38,9 @@ mod control;
 pub mod doctor;
 mod error;
 mod event;
+#[cfg(feature = "fuzzing")]
+#[doc(hidden)]
+pub mod fuzzing;
 mod init;
 pub mod io;
 mod link;

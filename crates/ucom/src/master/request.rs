@@ -183,7 +183,12 @@ pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
 
 /// PC_SETSTATUS read back with PC_INFO, repeated when it was not taken (D-22). Value bits outside the mask are never
 /// sent.
-pub(crate) async fn set_status(link: &Link, board: u8, mask: Status, value: Status) -> Result<BoardInfo, Error> {
+pub(crate) async fn set_status(
+    link: &Link,
+    board: u8,
+    mask: Status,
+    value: Status,
+) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     let value = value & mask;
     let mut status = Status(0);

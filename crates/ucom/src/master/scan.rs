@@ -37,7 +37,11 @@ impl Reports {
 
     /// Flash ids that differ only in bit 7: they share an identifier (D-07).
     pub fn ambiguous(&self) -> Vec<(u8, u8)> {
-        self.ids.iter().filter(|id| **id < 128 && self.ids.contains(&(**id | 128))).map(|id| (*id, id | 128)).collect()
+        self.ids
+            .iter()
+            .filter(|id| **id < 128 && self.ids.contains(&(**id | 128)))
+            .map(|id| (*id, id | 128))
+            .collect()
     }
 }
 
@@ -164,7 +168,8 @@ impl Slot {
     fn seen(&self, number: u8) -> Option<BoardSeen> {
         let (info, _) = self.answers.last()?;
         // The newest status of the answers that agree.
-        let agreed = |i: &BoardInfo| self.answers.iter().filter(|(o, _)| identity(o) == identity(i)).count() > 1;
+        let agreed =
+            |i: &BoardInfo| self.answers.iter().filter(|(o, _)| identity(o) == identity(i)).count() > 1;
         let info = self.answers.iter().rev().map(|(i, _)| i).find(|i| agreed(i)).unwrap_or(info);
         let texts = self.answers.iter().filter(|(i, _)| identity(i) == identity(info));
         let description = texts.filter_map(|(_, text)| text.clone()).next_back();
@@ -275,7 +280,11 @@ fn judge(report: &mut ScanReport) {
     for (i, first) in report.boards.iter().enumerate() {
         let flash_number = first.info.flash_number;
         for second in report.boards.iter().skip(i + 1).filter(|b| b.info.flash_number == flash_number) {
-            findings.push(ScanFinding::SameFlash { first: first.number, second: second.number, flash_number });
+            findings.push(ScanFinding::SameFlash {
+                first: first.number,
+                second: second.number,
+                flash_number,
+            });
         }
     }
     findings.extend(reports.ambiguous().into_iter().map(|(low, high)| ScanFinding::Ambiguous { low, high }));

@@ -164,7 +164,13 @@ impl Core {
     }
 
     /// Queues a frame; its serial number is that of [`Core::left`].
-    pub(crate) fn queue(&mut self, owner: Option<ProcedureId>, to: Sequence, message: ToBoard, forget: Forget) -> u64 {
+    pub(crate) fn queue(
+        &mut self,
+        owner: Option<ProcedureId>,
+        to: Sequence,
+        message: ToBoard,
+        forget: Forget,
+    ) -> u64 {
         self.queue_frame(owner, message.encode(to, &self.profile), forget)
     }
 
@@ -210,8 +216,12 @@ impl Core {
         self.statistics.sent(now, frame);
         let Ok((function, _)) = frame.address() else { return };
         match function {
-            Function::Reset => self.report_until = self.report_until.max(now + self.times.report_window + 500_000),
-            Function::AskReport => self.report_until = self.report_until.max(now + self.times.report_ask + 500_000),
+            Function::Reset => {
+                self.report_until = self.report_until.max(now + self.times.report_window + 500_000)
+            }
+            Function::AskReport => {
+                self.report_until = self.report_until.max(now + self.times.report_ask + 500_000)
+            }
             _ => {}
         }
     }

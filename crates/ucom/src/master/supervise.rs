@@ -2,13 +2,16 @@
 
 use std::prelude::v1::*;
 
+use super::Event;
 use super::boards::Life;
-use super::shared::{Core, Forget, Session};
 use super::event::Supervision;
 use super::io::Snapshot;
-use super::Event;
+use super::shared::{Core, Forget, Session};
 use crate::profile::{AliveMode, OnLost};
-use crate::{Admin, Assembled, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status, StringAssembler, ToBoard};
+use crate::{
+    Admin, Assembled, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status,
+    StringAssembler, ToBoard,
+};
 
 impl Core {
     /// From now on life signs go out.
@@ -60,7 +63,8 @@ impl Core {
             self.urgent(everybody, ToBoard::Alive);
         }
         if mode != AliveMode::Broadcast || everybody.is_none() {
-            let known: Vec<u8> = self.boards.iter().filter(|(_, b)| b.info.is_some()).map(|(n, _)| n).collect();
+            let known: Vec<u8> =
+                self.boards.iter().filter(|(_, b)| b.info.is_some()).map(|(n, _)| n).collect();
             for number in known.into_iter().filter_map(Sequence::new) {
                 self.urgent(number, ToBoard::Alive);
             }
@@ -105,8 +109,12 @@ impl Core {
         if self.session == Session::Quiet {
             return;
         }
-        let due: Vec<u8> =
-            self.data.iter().filter(|(_, d)| d.repeat.is_some_and(|at| self.now >= at)).map(|(n, _)| *n).collect();
+        let due: Vec<u8> = self
+            .data
+            .iter()
+            .filter(|(_, d)| d.repeat.is_some_and(|at| self.now >= at))
+            .map(|(n, _)| *n)
+            .collect();
         for board in due {
             self.send_inputs(board);
         }
@@ -191,7 +199,8 @@ impl Core {
         let ucom_id = report.ucom_id;
         match self.boards.with_ucom_id(ucom_id) {
             Some(board) => {
-                let was_running = self.boards.get(board).is_some_and(|b| b.life != Life::Unarmed || b.running(self.now));
+                let was_running =
+                    self.boards.get(board).is_some_and(|b| b.life != Life::Unarmed || b.running(self.now));
                 let known = self.boards.of(board);
                 if core::mem::replace(&mut known.rebooted, true) && !was_running {
                     return;

@@ -196,7 +196,8 @@ impl Bench {
 
     pub fn chain_with(flash_ids: &[u16], profile: Profile) -> Self {
         let mut pins = WirePins::chain(flash_ids.len());
-        let boards = flash_ids.iter().map(|flash| Box::new(node(*flash, pins.remove(0), profile)) as Box<dyn Member>);
+        let boards =
+            flash_ids.iter().map(|flash| Box::new(node(*flash, pins.remove(0), profile)) as Box<dyn Member>);
         Self::new(profile, boards.collect())
     }
 
@@ -213,7 +214,8 @@ impl Bench {
             }
         }
         let masters = self.pending_master.map(|f| (f.id(), From::Master));
-        let others = self.pending.iter().enumerate().filter_map(|(i, f)| f.map(|f| (f.id(), From::Member(i))));
+        let others =
+            self.pending.iter().enumerate().filter_map(|(i, f)| f.map(|f| (f.id(), From::Member(i))));
         if let Some((_, from)) = masters.into_iter().chain(others).min_by_key(|(id, _)| *id) {
             self.transmit(from);
             return true;
@@ -311,7 +313,11 @@ impl Bench {
             if let Some(result) = done {
                 return result;
             }
-            assert!(self.step(limit), "still busy after {limit_s} s of virtual time (fault {:?})", self.fault);
+            assert!(
+                self.step(limit),
+                "still busy after {limit_s} s of virtual time (fault {:?})",
+                self.fault
+            );
         }
     }
 
@@ -323,7 +329,11 @@ impl Bench {
     /// Times at which the master sent this frame.
     pub fn times_of(&self, text: &str) -> Vec<u64> {
         let wanted = frame(text);
-        self.log.iter().filter(|(_, from, f)| *from == From::Master && *f == wanted).map(|(at, ..)| *at).collect()
+        self.log
+            .iter()
+            .filter(|(_, from, f)| *from == From::Master && *f == wanted)
+            .map(|(at, ..)| *at)
+            .collect()
     }
 
     pub fn count(&self, text: &str) -> usize {

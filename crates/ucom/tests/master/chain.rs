@@ -22,7 +22,12 @@ fn p2_init_of_real_boards() {
         for (i, _) in ids.iter().enumerate() {
             assert_eq!(bench.board(i).number().map(|n| n.number()), Some(i as u8 + 1));
         }
-        let highest = bench.sent().iter().filter_map(|t| u16::from_str_radix(&t[..3], 16).ok()).filter(|id| id >> 6 == 10).max();
+        let highest = bench
+            .sent()
+            .iter()
+            .filter_map(|t| u16::from_str_radix(&t[..3], 16).ok())
+            .filter(|id| id >> 6 == 10)
+            .max();
         assert_eq!(highest, Some(0x280 + (count + 1).min(31)));
     }
 }

@@ -11,7 +11,14 @@ const IDS: [u16; 3] = [0x21, 0x42, 0x63];
 /// Every kind for frame `at`; the bit that is damaged follows from the frame's number.
 pub fn kinds(at: usize) -> [Fault; 6] {
     let bit = (at * 7 + 3) as u8;
-    [Fault::Lost, Fault::Doubled, Fault::Swapped, Fault::Delayed(30), Fault::Delayed(250), Fault::Corrupted(bit)]
+    [
+        Fault::Lost,
+        Fault::Doubled,
+        Fault::Swapped,
+        Fault::Delayed(30),
+        Fault::Delayed(250),
+        Fault::Corrupted(bit),
+    ]
 }
 
 /// No two boards have one number, and what the report says is what the boards are.

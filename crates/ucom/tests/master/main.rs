@@ -5,6 +5,7 @@ mod bench;
 mod chain;
 mod faults;
 mod probing;
+mod robust;
 mod running;
 mod scripted;
 mod update;

@@ -17,7 +17,12 @@ fn p20_probe_finds_the_profile() {
         Profile::default(),
         Profile { endian: Endian::Big, ..Profile::default() },
         Profile { endian: Endian::Big, string_count_includes_header: true, ..Profile::default() },
-        Profile { report_mode: ReportMode::All4, chain_auto_opinit: true, dlc_strict: true, ..Profile::default() },
+        Profile {
+            report_mode: ReportMode::All4,
+            chain_auto_opinit: true,
+            dlc_strict: true,
+            ..Profile::default()
+        },
         Profile {
             endian: Endian::Big,
             string_count_includes_header: true,
@@ -98,14 +103,17 @@ fn doctor_tells_silence_rate_and_termination_apart() {
     silent.controller = Some(Controller { no_acknowledge: 3, ..Default::default() });
     assert!(text(&silent).contains("nobody acknowledges our frames (3 times)"));
     silent.controller = Some(Controller { protocol_errors: 40, ..Default::default() });
-    assert!(text(&silent).contains("40 bus errors and no frame / frames are there but none can be read: usually another bit rate"));
+    assert!(text(&silent).contains(
+        "40 bus errors and no frame / frames are there but none can be read: usually another bit rate"
+    ));
     silent.other_bitrate = Some(500_000);
     assert!(text(&silent).contains("wrong bit rate: frames come at 500000 bit/s"));
     let mut good = observe(&mut initialised(&[0x21, 0x42]));
     good.controller = Some(Controller { tec: Some(0), rec: Some(0), ..Default::default() });
     assert!(findings(&good).iter().all(|f| f.severity == Severity::Good), "{}", text(&good));
     assert!(text(&good).contains("2 boards already have numbers"));
-    good.controller = Some(Controller { protocol_errors: 7, tec: Some(120), rec: Some(3), ..Default::default() });
+    good.controller =
+        Some(Controller { protocol_errors: 7, tec: Some(120), rec: Some(3), ..Default::default() });
     assert!(text(&good).contains("termination missing"));
 }
 
@@ -120,7 +128,12 @@ fn doctor_names_what_is_wrong_in_the_chain() {
     bench.run(300);
     let o = observe(&mut bench);
     let t = text(&o);
-    assert!(t.contains("1 boards have no number beside 1 that have one / they rebooted, or the init wire behind board 1"), "{t}");
+    assert!(
+        t.contains(
+            "1 boards have no number beside 1 that have one / they rebooted, or the init wire behind board 1"
+        ),
+        "{t}"
+    );
     assert!(t.contains("board 2 rebooted"), "{t}");
     assert!(findings(&o).is_sorted_by_key(|f| f.severity));
 }

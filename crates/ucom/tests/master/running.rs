@@ -2,7 +2,8 @@
 
 use ucom::master::io::ParValue;
 use ucom::master::{
-    AdminChange, Error, Event, InitOptions, Life, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel, Supervision,
+    AdminChange, Error, Event, InitOptions, Life, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel,
+    Supervision,
 };
 use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
@@ -80,10 +81,15 @@ fn d36_p14_descriptions_are_cached() {
     let mut bench = initialised(&[0x21, 0x42]);
     for board in [1, 2] {
         bench.go(Request::Start { board, force: false }, 10).unwrap();
-        let Ok(Outcome::Description { description, .. }) = bench.go(Request::Describe { board, fresh: false }, 10) else {
+        let Ok(Outcome::Description { description, .. }) =
+            bench.go(Request::Describe { board, fresh: false }, 10)
+        else {
             panic!()
         };
-        assert_eq!((description.description.as_str(), description.so.as_slice()), ("head pan control", &SO.map(String::from)[..]));
+        assert_eq!(
+            (description.description.as_str(), description.so.as_slice()),
+            ("head pan control", &SO.map(String::from)[..])
+        );
     }
     assert_eq!((bench.count("581#"), bench.count("582#")), (1, 0));
     bench.go(Request::Describe { board: 2, fresh: true }, 10).unwrap();
@@ -129,9 +135,13 @@ fn d14_dump_is_accepted_only_if_the_totals_fit() {
 fn p6_nothing_is_mixed_up() {
     let dump = [
         "1:582#010001000000",
-        "2:582#0200", "3:582#68656164207061", "4:582#6E",
-        "5:582#0100", "6:582#7370656564",
-        "7:582#0100", "8:582#706F73",
+        "2:582#0200",
+        "3:582#68656164207061",
+        "4:582#6E",
+        "5:582#0100",
+        "6:582#7370656564",
+        "7:582#0100",
+        "8:582#706F73",
     ];
     let mut bytes: Vec<String> = dump.iter().map(|t| t.to_string()).collect();
     // A string's packages but the last have 8 bytes.
@@ -148,10 +158,15 @@ fn p6_nothing_is_mixed_up() {
         script = script.at(ms, "583#0100");
     }
     let mut bench = Bench::script(script);
-    let Ok(Outcome::Description { description, .. }) = bench.go(Request::Describe { board: 2, fresh: true }, 10) else {
+    let Ok(Outcome::Description { description, .. }) =
+        bench.go(Request::Describe { board: 2, fresh: true }, 10)
+    else {
         panic!("{:?}", bench.events.last())
     };
-    assert_eq!((description.description.as_str(), description.ci[0].as_str(), description.so[0].as_str()), ("head pa n", "speed", "pos"));
+    assert_eq!(
+        (description.description.as_str(), description.ci[0].as_str(), description.so[0].as_str()),
+        ("head pa n", "speed", "pos")
+    );
 }
 
 /// D-37: flags by read-modify-write, outputs never without the loop.
@@ -159,10 +174,16 @@ fn p6_nothing_is_mixed_up() {
 fn d37_flags() {
     let mut bench = running(&[0x21], &[1]);
     let change = AdminChange { debug: Some(true), ..Default::default() };
-    let Ok(Outcome::Admin { admin, .. }) = bench.go(Request::Admin { board: 1, change, force: false }, 10) else { panic!() };
+    let Ok(Outcome::Admin { admin, .. }) = bench.go(Request::Admin { board: 1, change, force: false }, 10)
+    else {
+        panic!()
+    };
     assert_eq!(admin, Admin { run: true, active: true, debug: true, global_debug: false });
     let change = AdminChange { run: Some(false), ..Default::default() };
-    let Ok(Outcome::Admin { admin, .. }) = bench.go(Request::Admin { board: 1, change, force: false }, 10) else { panic!() };
+    let Ok(Outcome::Admin { admin, .. }) = bench.go(Request::Admin { board: 1, change, force: false }, 10)
+    else {
+        panic!()
+    };
     assert_eq!(admin, Admin { debug: true, ..Admin::default() });
     assert!(!bench.board(0).application.running);
 }
@@ -171,8 +192,13 @@ fn d37_flags() {
 #[test]
 fn stop_in_reverse() {
     let mut bench = running(&[0x21], &[1]);
-    for (level, status) in [(StopLevel::Outputs, 0xAB), (StopLevel::Loop, 0x8B), (StopLevel::Application, 0x1B)] {
-        let Ok(Outcome::Status { info, .. }) = bench.go(Request::Stop { board: 1, level, force: false }, 10) else { panic!() };
+    for (level, status) in
+        [(StopLevel::Outputs, 0xAB), (StopLevel::Loop, 0x8B), (StopLevel::Application, 0x1B)]
+    {
+        let Ok(Outcome::Status { info, .. }) = bench.go(Request::Stop { board: 1, level, force: false }, 10)
+        else {
+            panic!()
+        };
         assert_eq!(info.status.0, status);
         assert!(!bench.board(0).application.active);
     }
@@ -184,9 +210,11 @@ fn stop_in_reverse() {
 /// P-15, D-51: a lost board is told within 3.1 s of its last life sign, the policy's frames leave within 100 ms.
 #[test]
 fn p15_d51_lost_boards() {
-    for (on_lost, frame) in
-        [(OnLost::StopAll, Some("600#00000000")), (OnLost::StopBoard, Some("602#00000000")), (OnLost::Report, None)]
-    {
+    for (on_lost, frame) in [
+        (OnLost::StopAll, Some("600#00000000")),
+        (OnLost::StopBoard, Some("602#00000000")),
+        (OnLost::Report, None),
+    ] {
         let profile = Profile { on_lost, ..Profile::default() };
         let mut bench = Bench::chain_with(&[0x21, 0x42], profile);
         bench.go(Request::Init(InitOptions::default()), 20).unwrap();
@@ -224,7 +252,9 @@ fn only_a_master_stops_boards() {
     let script = (0..5).fold(Script::default(), |s, i| s.at(i * 1000, "681#"));
     let mut bench = Bench::script(script);
     bench.run(20_000);
-    assert!(bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { change: Supervision::Lost, .. })));
+    assert!(
+        bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { change: Supervision::Lost, .. }))
+    );
     assert!(bench.sent().is_empty());
 }
 

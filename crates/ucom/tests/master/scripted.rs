@@ -4,26 +4,22 @@ use ucom::master::{Error, Event, InitFinding, InitOptions, Outcome, Request, Sca
 
 use crate::bench::{Bench, Script};
 
-/// Board 1 to n of the golden chain as a table.
+/// Boards 1 to n of the golden chain as a table.
 fn golden(boards: usize) -> Script {
-    let flash = [0x21, 0x42, 0x63];
-    let reports = ["441#21", "482#42", "4C3#63"];
-    let mut script = Script::default().on("000#", &reports[..boards]).on("240#", &reports[..boards]);
-    for n in 1..=boards {
-        let ask = |f: u16| format!("{:03X}#", f << 6 | n as u16);
-        let info = |status: &str| format!("{}{:02X}000{n}{status}34126E38", format_args!("{:03X}#", 5 << 6 | n), flash[n - 1]);
-        let texts = [format!("{:03X}#0200", 5 << 6 | n), format!("{:03X}#55436F4D32206865", 5 << 6 | n), format!("{:03X}#61642070616E", 5 << 6 | n)];
-        let first = info(if n == 1 { "19" } else { "19" });
-        let after = info("1B");
-        let with = |head: &str| [head.to_owned(), texts[0].clone(), texts[1].clone(), texts[2].clone()];
-        let ack = format!("{:03X}#0{n}", 3 << 6 | n);
-        script = script.on(&ask(10), &[&ack]);
-        let before: Vec<String> = with(&first).to_vec();
-        let later: Vec<String> = with(&after).to_vec();
-        let refs = |v: &[String]| v.iter().map(String::as_str).collect::<Vec<_>>().iter().map(|s| s.to_string()).collect::<Vec<_>>();
-        let (b, l) = (refs(&before), refs(&later));
-        script = script.once(&ask(8), &b.iter().map(String::as_str).collect::<Vec<_>>());
-        script = script.on(&ask(8), &l.iter().map(String::as_str).collect::<Vec<_>>());
+    let reports = &["441#21", "482#42", "4C3#63"][..boards];
+    let mut script = Script::default().on("000#", reports).on("240#", reports);
+    for (i, flash) in [0x21, 0x42, 0x63].into_iter().enumerate().take(boards) {
+        let n = i + 1;
+        // Status 19 first, 1B once OPINIT has been set.
+        let answer = |status: &str| {
+            let numbers = format!("14{n}#{flash:02X}000{n}{status}34126E38");
+            [numbers, format!("14{n}#0200"), format!("14{n}#55436F4D32206865"), format!("14{n}#61642070616E")]
+        };
+        let (before, after) = (answer("19"), answer("1B"));
+        script = script
+            .on(&format!("28{n}#"), &[&format!("0C{n}#0{n}")])
+            .once(&format!("20{n}#"), &before.each_ref().map(String::as_str))
+            .on(&format!("20{n}#"), &after.each_ref().map(String::as_str));
     }
     script
 }
@@ -101,9 +97,13 @@ fn p3_lost_ack_asks_info_first() {
 #[test]
 fn p4_d24_ack_mismatch_is_refused() {
     for ack in ["0C1#02", "0C2#01"] {
-        let mut bench = Bench::script(Script::default().on("000#", &["441#21"]).on("240#", &["441#21"]).on("281#", &[ack]));
+        let mut bench = Bench::script(
+            Script::default().on("000#", &["441#21"]).on("240#", &["441#21"]).on("281#", &[ack]),
+        );
         let report = init(&mut bench);
-        let refused = |f: &InitFinding| matches!(f, InitFinding::Refused { board: 1, error: Error::AckMismatch { .. } });
+        let refused = |f: &InitFinding| {
+            matches!(f, InitFinding::Refused { board: 1, error: Error::AckMismatch { .. } })
+        };
         assert!(report.findings.iter().any(refused), "{:?}", report.findings);
         assert!(report.boards.is_empty());
         assert_eq!(bench.count("282#"), 0);
@@ -116,12 +116,17 @@ fn p16_spontaneous_report() {
     let mut bench = Bench::script(golden(1).at(9_000, "441#21"));
     init(&mut bench);
     bench.run(10_000);
-    let rebooted: Vec<_> =
-        bench.events.iter().filter(|(_, e)| matches!(e, Event::Supervision { .. })).map(|(at, e)| (*at, e.clone())).collect();
+    let rebooted: Vec<_> = bench
+        .events
+        .iter()
+        .filter(|(_, e)| matches!(e, Event::Supervision { .. }))
+        .map(|(at, e)| (*at, e.clone()))
+        .collect();
     assert_eq!(rebooted.len(), 1, "{rebooted:?}");
     let (at, event) = &rebooted[0];
     assert!((9_000_000..9_010_000).contains(at));
-    let expected = Event::Supervision { board: 1, change: ucom::master::Supervision::Rebooted { ucom_id: 0x21 } };
+    let expected =
+        Event::Supervision { board: 1, change: ucom::master::Supervision::Rebooted { ucom_id: 0x21 } };
     assert_eq!(*event, expected);
 }
 
@@ -138,7 +143,8 @@ fn p17_d08_second_master() {
         let forced = InitOptions { force: true, ..Default::default() };
         assert!(matches!(bench.go(Request::Init(forced), 10), Ok(Outcome::Init(r)) if r.is_ok()));
     }
-    let mut bench = Bench::script(golden(1).at(100, "683#").at(110, "601#01010000").at(120, "381#0000640065006600"));
+    let mut bench =
+        Bench::script(golden(1).at(100, "683#").at(110, "601#01010000").at(120, "381#0000640065006600"));
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 10), Ok(Outcome::Init(r)) if r.is_ok()));
     // 600 ms of listening before the first frame.
     assert!(bench.log.iter().find(|(_, f, _)| *f == crate::bench::From::Master).unwrap().0 >= 600_000);
@@ -161,8 +167,7 @@ fn dt21_two_boards_with_one_flash_id() {
     let info = |n: u8, status: &str| vec![format!("14{n}#21000{n}{status}34126E38"), format!("14{n}#0000")];
     let mut script = Script::default().on("000#", &["441#21"]).on("240#", &["441#21"]);
     for n in 1..=2 {
-        let refs = |v: Vec<String>| v;
-        let (first, later) = (refs(info(n, "19")), refs(info(n, "1B")));
+        let (first, later) = (info(n, "19"), info(n, "1B"));
         script = script
             .on(&format!("28{n}#"), &[&format!("0C{n}#0{n}")])
             .once(&format!("20{n}#"), &first.iter().map(String::as_str).collect::<Vec<_>>())
@@ -178,15 +183,13 @@ fn dt21_two_boards_with_one_flash_id() {
 /// A board that reported and was never reached: the init wire is broken behind the last one.
 #[test]
 fn init_names_a_broken_wire() {
-    let script = golden(1).on("000#", &[]);
-    let mut bench = Bench::script(Script::default());
-    bench.members[0] = Box::new(script);
-    let mut script = Script::default().on("000#", &["441#21", "482#42"]).on("240#", &["441#21", "482#42"]);
-    script = script
+    let script = Script::default()
+        .on("000#", &["441#21", "482#42"])
+        .on("240#", &["441#21", "482#42"])
         .on("281#", &["0C1#01"])
         .once("201#", &["141#2100011934126E38", "141#0000"])
         .on("201#", &["141#2100011B34126E38", "141#0000"]);
-    bench.members[0] = Box::new(script);
+    let mut bench = Bench::script(script);
     let report = init(&mut bench);
     assert_eq!(report.findings, [InitFinding::NotReached { after: 1, ids: vec![0x42] }]);
     assert!(report.findings[0].to_string().contains("0x42 after position 1"));

@@ -1,6 +1,8 @@
 //! Firmware updates of real boards of this crate and of tables of frames.
 
-use ucom::master::update::{UpdateFailure, UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateTarget};
+use ucom::master::update::{
+    UpdateFailure, UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateTarget,
+};
 use ucom::master::{Error, Event, InitOptions, Outcome, Request, RunBoard, RunOptions};
 use ucom::{Frame, Memory};
 
@@ -49,7 +51,8 @@ fn golden_update() {
     let sent: Vec<String> = bench.log[before..].iter().map(|(.., f)| f.to_string()).collect();
     let prog: Vec<&String> = sent.iter().filter(|t| t.starts_with("2C1#")).collect();
     assert_eq!(prog.len(), 2 * 136);
-    let first = ["2C1#4355010001000000", "2C1#00000000F4010000", "2C1#3F4BC13AFFFFFFFF", "2C1#FFFFFFFFFFFFFFFF"];
+    let first =
+        ["2C1#4355010001000000", "2C1#00000000F4010000", "2C1#3F4BC13AFFFFFFFF", "2C1#FFFFFFFFFFFFFFFF"];
     assert_eq!(prog[..4], first);
     assert_eq!((prog[7].as_str(), prog[8].as_str()), ("2C1#FFFFFFFFFFFFDC22", "2C1#0B30557A9FC4E90E"));
     // OPINIT stays: 1B before and after.
@@ -157,7 +160,7 @@ impl Member for Loader {
             }
             _ if text.starts_with("2C1#") => {
                 self.frames += 1;
-                if self.frames % 8 == 0 {
+                if self.frames.is_multiple_of(8) {
                     let block = self.frames / 8 - 1;
                     let usual = if block + 1 == self.blocks { "101#" } else { "181#" };
                     if block + 1 == self.blocks {
@@ -181,9 +184,14 @@ fn loader(loader: Loader) -> Bench {
 /// P-8: READY after 0.9 s, erase 8 s: no false timeout.
 #[test]
 fn p8_slow_boards_are_waited_for() {
-    let mut bench = loader(Loader { delay: |block| if block == 17 { 8_000 } else { 900 }, ..Loader::new(34) });
+    let mut bench =
+        loader(Loader { delay: |block| if block == 17 { 8_000 } else { 900 }, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
-    assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 1), "{report:?}");
+    assert_eq!(
+        (report.boards[0].outcome, report.boards[0].attempts),
+        (UpdateOutcome::Verified, 1),
+        "{report:?}"
+    );
 }
 
 /// P-9, U-9: DSP_PROGFINISHED lost: PC_INFO says that it is done.
@@ -191,7 +199,11 @@ fn p8_slow_boards_are_waited_for() {
 fn p9_lost_finished_is_a_success() {
     let mut bench = loader(Loader { special: |_, block| (block == 33).then_some(""), ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
-    assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 1), "{report:?}");
+    assert_eq!(
+        (report.boards[0].outcome, report.boards[0].attempts),
+        (UpdateOutcome::Verified, 1),
+        "{report:?}"
+    );
     assert_eq!(bench.count("041#"), 1);
 }
 
@@ -224,7 +236,11 @@ fn p11_attempts_by_error() {
         assert_eq!(report.exit_code(), exit, "case {i}: {report:?}");
         assert!(bench.count("1C1#0400") >= attempts, "case {i}: the transfer is cleared each time");
         let half = report.boards[0].outcome;
-        assert_eq!(half, if exit == 5 { UpdateOutcome::Incomplete } else { UpdateOutcome::NotStarted }, "case {i}");
+        assert_eq!(
+            half,
+            if exit == 5 { UpdateOutcome::Incomplete } else { UpdateOutcome::NotStarted },
+            "case {i}"
+        );
     }
     // Healed by the second attempt.
     let special = |reset, block| (reset == 1 && block == 16).then_some("081#01");
@@ -240,7 +256,8 @@ fn overrun_widens_the_gap() {
     let mut bench = loader(Loader { special, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::Verified);
-    let times: Vec<u64> = bench.log.iter().filter(|(.., f)| f.to_string().starts_with("2C1#")).map(|(at, ..)| *at).collect();
+    let times: Vec<u64> =
+        bench.log.iter().filter(|(.., f)| f.to_string().starts_with("2C1#")).map(|(at, ..)| *at).collect();
     let last: Vec<u64> = times[times.len() - 8..].windows(2).map(|w| w[1] - w[0]).collect();
     let first: Vec<u64> = times[..8].windows(2).map(|w| w[1] - w[0]).collect();
     assert!(last.iter().min() > first.iter().max(), "{first:?} {last:?}");
@@ -379,7 +396,9 @@ fn progress_is_of_both_cycles() {
     let bytes: Vec<_> = bench
         .events
         .iter()
-        .filter_map(|(_, e)| if let Event::Progress { progress, .. } = e { Some(progress.bytes) } else { None })
+        .filter_map(
+            |(_, e)| if let Event::Progress { progress, .. } = e { Some(progress.bytes) } else { None },
+        )
         .collect();
     assert_eq!(bytes, (1..=34).map(|i| 64 * i).collect::<Vec<u64>>());
 }
@@ -429,9 +448,13 @@ fn every_frame_of_an_update_disturbed() {
                     assert!(again.boards[0].outcome.is_done(), "{at} {fault:?}: {again:?}");
                 }
             }
-            assert_eq!(check_program(&mut bench, 0, 128), OLD, "the other board: {at} {fault:?} {:?}", bench.log[at]);
+            assert_eq!(
+                check_program(&mut bench, 0, 128),
+                OLD,
+                "the other board: {at} {fault:?} {:?}",
+                bench.log[at]
+            );
         }
-        // What was lost, doubled or late is healed; see below for what may not be.
     }
     println!("{failed} of {} disturbed updates ended in a named error", 6 * (to - from));
 }

@@ -73,7 +73,8 @@ impl IoDescription {
         if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
             return Ok(index);
         }
-        let mut near: Vec<(f64, &String)> = names.iter().map(|n| (strsim::jaro_winkler(n, name), n)).collect();
+        let mut near: Vec<(f64, &String)> =
+            names.iter().map(|n| (strsim::jaro_winkler(n, name), n)).collect();
         near.retain(|(likeness, _)| *likeness > 0.6);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
         let near = near.into_iter().take(3).map(|(_, n)| n.clone()).collect();

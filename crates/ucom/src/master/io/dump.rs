@@ -7,7 +7,9 @@ use crate::master::error::Incomplete;
 use crate::master::link::Link;
 use crate::master::request::{TRIES, info};
 use crate::master::{Error, Outcome};
-use crate::{Assembled, BoardInfo, Dimensions, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
+use crate::{
+    Assembled, BoardInfo, Dimensions, FromBoard, Function, Payload, Status, StringAssembler, ToBoard,
+};
 
 /// Most strings that a description may announce: 1365 boards' worth of words would not fit on any bus.
 const MAX_STRINGS: u32 = 4096;
@@ -73,7 +75,8 @@ impl Collector {
 async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescription, Incomplete>>, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::DumpIo).await;
-    let mut collector = Collector { dimensions: None, strings: Vec::new(), assembler: StringAssembler::new() };
+    let mut collector =
+        Collector { dimensions: None, strings: Vec::new(), assembler: StringAssembler::new() };
     let mut until = link.now() + times.gap.max(times.info);
     loop {
         let Some(heard) = link.next(until).await else {

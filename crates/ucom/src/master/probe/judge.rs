@@ -128,13 +128,19 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };
-    let observed = format!("{zero} boards answer PC_INFO to 0, {top} to 31, {} to their number", seen.infos.len());
+    let observed =
+        format!("{zero} boards answer PC_INFO to 0, {top} to 31, {} to their number", seen.infos.len());
     let value = broadcast.map(|b| b.to_string());
     // Before the numbers' start: 0 cannot be both.
-    let first = if seen.zero_answers { Some("0") } else { seen.infos.keys().next().filter(|n| **n == 1).map(|_| "1") };
+    let first = if seen.zero_answers {
+        Some("0")
+    } else {
+        seen.infos.keys().next().filter(|n| **n == 1).map(|_| "1")
+    };
     rows.add("addr.broadcast", ("number that means everybody", "nothing"), observed, value.as_deref());
     let lowest = if seen.zero_answers { Some(0) } else { seen.infos.keys().next().copied() };
-    let observed = lowest.map_or("no board has a number".into(), |n| format!("lowest number that answers: {n}"));
+    let observed =
+        lowest.map_or("no board has a number".into(), |n| format!("lowest number that answers: {n}"));
     rows.add("addr.first", ("number of the first board", "position in the chain"), observed, first);
 }
 
@@ -147,7 +153,8 @@ fn strings(rows: &mut Rows, seen: &Seen) {
         };
         headers.iter().filter(fit).count()
     };
-    let readings = [(Endian::Little, false), (Endian::Little, true), (Endian::Big, false), (Endian::Big, true)];
+    let readings =
+        [(Endian::Little, false), (Endian::Little, true), (Endian::Big, false), (Endian::Big, true)];
     let best = readings.into_iter().max_by_key(|(e, i)| fits(*e, *i)).filter(|(e, i)| {
         let n = fits(*e, *i);
         n > 0 && readings.iter().filter(|(oe, oi)| fits(*oe, *oi) == n).count() == 1
@@ -161,14 +168,17 @@ fn strings(rows: &mut Rows, seen: &Seen) {
         0x0300 => Some(other),
         _ => None,
     });
-    let offsets = by_offset.map_or("no dump with two packages".into(), |e| format!("second offset of a dump: {e}"));
+    let offsets =
+        by_offset.map_or("no dump with two packages".into(), |e| format!("second offset of a dump: {e}"));
     let words = best.map_or("no string that decides".into(), |(e, _)| format!("count of strings: {e}"));
     let endian = by_offset.or(best.map(|(e, _)| e)).map(|e| e.to_string());
     let texts = ("byte order of 16-bit fields", "first byte, second byte");
     rows.add("endian", texts, format!("{words}; {offsets}"), endian.as_deref());
     let observed = match headers.first() {
         None => "no string".into(),
-        Some((count, packages)) => format!("header {:02X} {:02X}, {packages} packages follow", count[0], count[1]),
+        Some((count, packages)) => {
+            format!("header {:02X} {:02X}, {packages} packages follow", count[0], count[1])
+        }
     };
     let inclusive = best.map(|(_, inclusive)| if inclusive { "yes" } else { "no" });
     let texts = ("does the count of a string include its header", "number of messages");
@@ -198,7 +208,12 @@ fn pins(rows: &mut Rows, seen: &Seen) {
 fn programs(rows: &mut Rows, seen: &Seen) {
     let texts = ("checksum of the Program ID", "checksum of the firmware");
     let Some(image) = &seen.image else {
-        return rows.add("prog.checksum", texts, "not measured: needs an image that a board has".into(), None);
+        return rows.add(
+            "prog.checksum",
+            texts,
+            "not measured: needs an image that a board has".into(),
+            None,
+        );
     };
     let endian = rows.profile.endian;
     let ids: BTreeSet<u16> = seen.heads().map(|h| endian.word([h[4], h[5]])).collect();
@@ -216,7 +231,11 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     }
     let shown: Vec<String> = ids.iter().map(|id| format!("0x{id:04X}")).collect();
     let fits: Vec<String> = found.iter().map(|(form, order)| format!("{form} ({order})")).collect();
-    let observed = format!("boards show {}; {} fits", shown.join(", "), if fits.is_empty() { "none".into() } else { fits.join(", ") });
+    let observed = format!(
+        "boards show {}; {} fits",
+        shown.join(", "),
+        if fits.is_empty() { "none".into() } else { fits.join(", ") }
+    );
     let form = found.first().filter(|(first, _)| found.iter().all(|(form, _)| form == first));
     let value = form.map(|(form, _)| form.to_string());
     rows.add("prog.checksum", texts, observed, value.as_deref());
@@ -235,8 +254,17 @@ pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
         (false, false) => None,
     };
     let word = |held| if held { "runs on" } else { "stops" };
-    let observed = format!("with life signs to all it {}, with those to its number it {}", word(broadcast), word(unicast));
+    let observed = format!(
+        "with life signs to all it {}, with those to its number it {}",
+        word(broadcast),
+        word(unicast)
+    );
     let value = mode.map(|m| m.to_string());
-    rows.add("alive.mode", ("to whom life signs go", "to all boards, every 500 ms"), observed, value.as_deref());
+    rows.add(
+        "alive.mode",
+        ("to whom life signs go", "to all boards, every 500 ms"),
+        observed,
+        value.as_deref(),
+    );
     (report.rows, report.profile) = (rows.rows, rows.profile);
 }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::prelude::v1::*;
 
-use super::judge::{Answers, Seen, judge};
 use super::ProbeOptions;
+use super::judge::{Seen, judge};
 use crate::master::control::start_application;
 use crate::master::init::{InitOptions, init};
 use crate::master::link::Link;
@@ -41,7 +41,7 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
     let all: Vec<Sequence> = Sequence::all().filter(|n| n.number() > 0).collect();
     for _ in 0..ROUNDS {
         for (from, answer) in raw_infos(&link, &all, 0).await {
-            seen.infos.entry(from).or_insert_with(Answers::default).push(answer);
+            seen.infos.entry(from).or_default().push(answer);
         }
     }
     if let Some(board) = seen.first_board() {

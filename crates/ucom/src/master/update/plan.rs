@@ -58,8 +58,12 @@ impl PlanError {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NoTarget | Self::Twice { .. } => "`ucom update N IMAGE` with a number, a list or `all`",
-            Self::Empty | Self::HalfWord { .. } => "is it the right file? `ucom update --dry-run` shows what it holds",
-            Self::SecondMissing { .. } | Self::SecondUnused { .. } => "see `prog.plan` in `ucom help profile`",
+            Self::Empty | Self::HalfWord { .. } => {
+                "is it the right file? `ucom update --dry-run` shows what it holds"
+            }
+            Self::SecondMissing { .. } | Self::SecondUnused { .. } => {
+                "see `prog.plan` in `ucom help profile`"
+            }
             Self::Void => "`--date YYYY-MM-DD`",
         }
     }
@@ -117,7 +121,9 @@ impl UpdatePlan {
             Plan::VerifyWrite => [(image, Memory::Program); 2],
             Plan::ExloaderApp => [(second()?, Memory::Ram), (image, Memory::Program)],
             Plan::PmemXmem => [(image, Memory::Program), (second()?, Memory::Data)],
-            Plan::Raw => [(image, Memory::Program), (options.second.as_ref().unwrap_or(image), Memory::Program)],
+            Plan::Raw => {
+                [(image, Memory::Program), (options.second.as_ref().unwrap_or(image), Memory::Program)]
+            }
         };
         let id = |image: &UpdateImage| checksum(profile.prog_checksum, profile.prog_endian, &image.bytes);
         let header = |cycle, (image, memory): (&UpdateImage, Memory)| Header {
@@ -192,7 +198,10 @@ mod tests {
             UpdatePlan::new(options, Header::ANY_BOARD, &Profile { prog_plan, ..Profile::default() })
         };
         assert!(matches!(planned(&two, Plan::VerifyWrite), Err(PlanError::SecondUnused { .. })));
-        assert!(matches!(planned(&options(vec![1; 2]), Plan::ExloaderApp), Err(PlanError::SecondMissing { .. })));
+        assert!(matches!(
+            planned(&options(vec![1; 2]), Plan::ExloaderApp),
+            Err(PlanError::SecondMissing { .. })
+        ));
         let plan = planned(&two, Plan::ExloaderApp).unwrap();
         assert_eq!((plan.cycles[0].block(0).unwrap()[6], plan.cycles[1].block(0).unwrap()[6]), (0x10, 0));
         let plan = planned(&two, Plan::PmemXmem).unwrap();
@@ -201,6 +210,9 @@ mod tests {
         assert_eq!((raw.frames(0), raw.expected), (16, None));
         assert_eq!(raw.cycles[0].block(0), Some([7; 64]));
         assert!(matches!(planned(&options(vec![]), Plan::Raw), Err(PlanError::Empty)));
-        assert!(matches!(planned(&options(vec![1]), Plan::VerifyWrite), Err(PlanError::HalfWord { bytes: 1 })));
+        assert!(matches!(
+            planned(&options(vec![1]), Plan::VerifyWrite),
+            Err(PlanError::HalfWord { bytes: 1 })
+        ));
     }
 }

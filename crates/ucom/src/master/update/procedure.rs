@@ -368,7 +368,9 @@ async fn group(link: &Link, run: &mut Run) -> Result<(), Error> {
         // A board whose READY was lost may have gone on with the others and be done.
         if !matches!(why, Broken::Device { .. }) && shows(link, board, &plan).await {
             verify(link, run, board, &plan).await;
-        } else if judge(link, run, board, &plan, 1, Some(why)).await.is_some() && link.profile().prog_attempts > 1 {
+        } else if judge(link, run, board, &plan, 1, Some(why)).await.is_some()
+            && link.profile().prog_attempts > 1
+        {
             run.active.push(board);
             one(link, run, board, 2).await?;
         }

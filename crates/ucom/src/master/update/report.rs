@@ -69,7 +69,9 @@ pub enum UpdateFailure {
         erased: bool,
     },
     /// The board did not take a block in time.
-    #[error("no DSP_READY for block {block} of cycle {cycle} within {waited_ms} ms, after {attempts} attempts")]
+    #[error(
+        "no DSP_READY for block {block} of cycle {cycle} within {waited_ms} ms, after {attempts} attempts"
+    )]
     Timeout {
         /// 1 or 2.
         cycle: u32,
@@ -83,7 +85,9 @@ pub enum UpdateFailure {
         erased: bool,
     },
     /// DSP_PROGFINISHED came, or should have, and the board shows another program.
-    #[error("the board shows Program ID 0x{program_id:04X}, date 0x{date:04X} instead of 0x{wanted_id:04X}, 0x{wanted_date:04X}")]
+    #[error(
+        "the board shows Program ID 0x{program_id:04X}, date 0x{date:04X} instead of 0x{wanted_id:04X}, 0x{wanted_date:04X}"
+    )]
     NotVerified {
         /// On the board.
         program_id: u16,

@@ -12,10 +12,20 @@ use crate::{BLOCK_LEN, ErrorCode, FromBoard, Function, Sequence, ToBoard};
 /// Why an attempt ended early, for one board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Broken {
-    Device { code: ErrorCode, cycle: u32, block: usize },
-    Timeout { cycle: u32, block: usize, waited_ms: u64 },
+    Device {
+        code: ErrorCode,
+        cycle: u32,
+        block: usize,
+    },
+    Timeout {
+        cycle: u32,
+        block: usize,
+        waited_ms: u64,
+    },
     /// Nothing came after the very last block: PC_INFO must tell (U-9).
-    NoFinish { waited_ms: u64 },
+    NoFinish {
+        waited_ms: u64,
+    },
 }
 
 /// Boards that take part in an attempt, and what became of them.

@@ -338,10 +338,10 @@ impl Usart {
             idle.min(timeout)
         };
         let Some(first) = self.rx_wire.front() else {
-            return match (self.idle_from, self.timeout_from) {
-                (Some(from), _) | (None, Some(from)) => silent(from),
-                (None, None) => NEVER,
-            };
+            // Each of the two has come or not: a moment that is over would be looked at in every cycle.
+            let idle = self.idle_from.filter(|_| idle_on).map_or(NEVER, |from| from.saturating_add(frame));
+            let timeout = self.timeout_from.filter(|_| self.cr1 & cr1::RTOIE != 0);
+            return idle.min(timeout.map_or(NEVER, |from| from.saturating_add(self.timeout())));
         };
         let byte_by_byte = self.cr1 & cr1::RXNEIE != 0 || self.cr3 & DMAR == 0 || !self.rates_match();
         if byte_by_byte {

@@ -56,7 +56,7 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 8] = [
+const CHECKS: [Check; 10] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
@@ -69,6 +69,8 @@ const CHECKS: [Check; 8] = [
         demo_files: &["recording.mcap", "recording.csv"],
     },
     Check { script: "host/check_serial_host.py", program: Some("jtc"), demo_files: &[] },
+    Check { script: "ucom/check_boards.py", program: Some("ucom"), demo_files: &[] },
+    Check { script: "ucom/check_pc.py", program: Some("ucom"), demo_files: &[] },
 ];
 
 /// A step for each reference; `demo` is where the demo left its files.
@@ -89,7 +91,9 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
         ] {
             run(&mut cargo(&["build", "--release", "--package", package, "--example", example]))?;
         }
-        run(&mut cargo(&["build", "--release", "--package", "jtc-cli"]))?;
+        for package in ["jtc-cli", "ucom-cli"] {
+            run(&mut cargo(&["build", "--release", "--package", package]))?;
+        }
         built = true;
         Ok(Outcome::Passed)
     });

@@ -115,7 +115,7 @@ fn p12_cancel_leaves_the_board_usable() {
     signal(&update, "-INT");
     peer.wait("1C1#0400");
     let said = ended(update).ends(5);
-    assert_eq!(said.json()["boards"][0]["outcome"], "erased", "{}", said.out);
+    assert_eq!(said.json()["boards"][0]["outcome"], "incomplete", "{}", said.out);
     let info = sim.ucom(&["--json", "info", "1"]).ends(0).json();
     assert_eq!(info["boards"][0]["application"], false);
     sim.ucom(&["update", "1", &sim.file("small.bin", &image(2000, 8))]).ends(0);

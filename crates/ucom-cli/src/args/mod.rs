@@ -133,7 +133,7 @@ pub enum Command {
                             On stdin: `ci 1 set_position=-500`, `par 1 kp=80`, `active on`, `active off`, `stop`.\n\
                             Ctrl-C stops control, then applications, in reverse order.")]
     Run(RunArgs),
-    /// Live view of boards, bus load and foreign frames; only listens
+    /// Live view of boards, bus load and foreign frames; asks once, then listens
     #[command(after_help = "Examples:\n  ucom monitor\n  ucom --json monitor --count 5")]
     Monitor(MonitorArgs),
     /// Write the frames of the bus to a file: candump log, FZI-CAN or MCAP

@@ -13,10 +13,8 @@ use crate::args::{LinkArgs, MonitorArgs};
 use crate::driver::{Driver, words};
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::shape::{bits, info_value};
+use crate::shape::{bits, info_value, state};
 
-/// Between two questions to boards.
-const ASK: Duration = Duration::from_millis(400);
 /// Seconds of bus load that the curve shows.
 pub const HISTORY: usize = 120;
 /// Lines of the log that are kept.
@@ -34,16 +32,16 @@ pub struct Watch {
     pub foreign_master: bool,
     /// Nothing may be sent.
     pub listen_only: bool,
-    asked: Instant,
-    next: u8,
+    /// The boards are to be asked who they are.
+    pub ask: bool,
     loaded: Instant,
 }
 
 impl Watch {
     fn new(url: String, listen_only: bool) -> Self {
-        let now = Instant::now();
         let (load, log) = (VecDeque::new(), VecDeque::new());
-        Self { url, load, log, foreign_master: false, listen_only, asked: now, next: 0, loaded: now }
+        let (foreign_master, ask, loaded) = (false, !listen_only, Instant::now());
+        Self { url, load, log, foreign_master, listen_only, ask, loaded }
     }
 
     /// Lets the bus go on for a moment.
@@ -73,7 +71,7 @@ impl Watch {
                 self.load.pop_front();
             }
         }
-        self.ask(driver);
+        self.question(driver);
         Ok(())
     }
 
@@ -84,23 +82,14 @@ impl Watch {
         }
     }
 
-    /// One board after the other is asked for its status, unless another PC is master: its questions go first.
-    fn ask(&mut self, driver: &mut Driver) {
-        if self.listen_only || self.foreign_master || driver.master.is_busy() || self.asked.elapsed() < ASK {
-            return;
+    /// Asks once, or when the user wants it again. Asking all the time would look like a second master to others (D-08), and
+    /// what changes is heard anyway.
+    fn question(&mut self, driver: &mut Driver) {
+        if self.ask && !driver.master.is_busy() {
+            self.ask = false;
+            // Nothing else is under way that it could meet.
+            let _ = driver.master.start(driver.now_us(), Request::Scan);
         }
-        self.asked = Instant::now();
-        let known = driver.master.boards();
-        let numbers: Vec<u8> = known.iter().filter(|(_, b)| b.info.is_some()).map(|(n, _)| n).collect();
-        let request = match numbers.iter().find(|n| **n > self.next).or(numbers.first()) {
-            Some(board) => {
-                self.next = *board;
-                Request::Info { board: *board }
-            }
-            None => Request::Scan,
-        };
-        // A board at work for nobody else: it cannot be busy.
-        let _ = driver.master.start(driver.now_us(), request);
     }
 }
 
@@ -136,6 +125,7 @@ fn value(driver: &Driver, watch: &Watch) -> Value {
     let board = |(number, b): (u8, &Board)| {
         let mut value = b.info.map_or_else(|| json!({ "number": number }), |i| info_value(number, &i, &profile));
         value["description"] = json!(b.description);
+        value["state"] = json!(doing(b, now));
         value["life"] = json!(life(b));
         value["alive_age_s"] = json!(age_s(b, now));
         value["frames_per_s"] = json!(statistics.frames_per_s(number, now));
@@ -176,6 +166,18 @@ fn text(driver: &Driver) -> String {
     text
 }
 
+/// What a board does, in one word: what is heard counts more than an old answer.
+pub fn doing(board: &Board, now_us: u64) -> &'static str {
+    if board.running(now_us) {
+        return "running";
+    }
+    match (board.life, board.status()) {
+        (Life::Alive, _) => "started",
+        (_, Some(status)) => state(status),
+        (_, None) => "?",
+    }
+}
+
 /// Life signs in a word.
 pub fn life(board: &Board) -> &'static str {
     match board.life {
@@ -204,6 +206,7 @@ fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64) -> Result<(), Fai
                     if ctrl_c || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) {
                         return Ok(());
                     }
+                    watch.ask |= key.code == KeyCode::Char('r') && !watch.listen_only;
                 }
             }
             watch.turn(driver)?;

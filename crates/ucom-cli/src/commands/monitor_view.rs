@@ -8,9 +8,8 @@ use ratatui::widgets::{Block, BorderType, Cell, Padding, Paragraph, Row, Sparkli
 use ucom::Status;
 use ucom::master::{Board, Boards, Life, Statistics};
 
-use super::monitor::{Watch, age_s, life};
+use super::monitor::{Watch, age_s, doing, life};
 use crate::driver::Driver;
-use crate::shape::state;
 
 /// Bits worth a place of their own, as short words.
 const BITS: [(Status, &str); 5] = [
@@ -52,7 +51,7 @@ fn summary(watch: &Watch, statistics: &Statistics, now: u64) -> Paragraph<'stati
     } else if watch.listen_only {
         "only listens".dark_gray()
     } else {
-        "asks one board after the other; changes nothing".dark_gray()
+        "asked once who is there, now only listens; r asks again".dark_gray()
     };
     let foreign: Vec<String> = statistics.foreign.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
     let foreign = match foreign.is_empty() {
@@ -91,17 +90,14 @@ fn table(boards: &Boards, statistics: &Statistics, now: u64) -> Table<'static> {
 }
 
 fn row(number: u8, b: &Board, statistics: &Statistics, now: u64) -> Row<'static> {
-    let state = b.status().map_or(Cell::from("?"), |status| {
-        let colour = match state(status) {
-            "running" => Color::Rgb(63, 111, 224),
-            "started" => Color::Rgb(47, 131, 124),
-            "programming" => Color::Rgb(201, 131, 59),
-            _ => Color::Rgb(86, 97, 115),
-        };
-        let style = Style::new().bg(colour).fg(Color::White).add_modifier(Modifier::BOLD);
-        Cell::from(Span::styled(format!(" {} ", state(status)), style))
-    });
-    // Running boards show it by their outputs, whatever their last answer said.
+    let colour = match doing(b, now) {
+        "running" => Color::Rgb(63, 111, 224),
+        "started" => Color::Rgb(47, 131, 124),
+        "programming" => Color::Rgb(201, 131, 59),
+        _ => Color::Rgb(86, 97, 115),
+    };
+    let style = Style::new().bg(colour).fg(Color::White).add_modifier(Modifier::BOLD);
+    let state = Cell::from(Span::styled(format!(" {} ", doing(b, now)), style));
     let status = b.status().unwrap_or_default();
     let words: Vec<&str> = BITS.iter().filter(|(bit, _)| status.has(*bit)).map(|(_, word)| *word).collect();
     let alive = match (b.life, age_s(b, now)) {
@@ -134,7 +130,7 @@ fn events(watch: &Watch, area: Rect) -> Paragraph<'static> {
         .rev()
         .map(|(time_s, text)| Line::from(vec![format!("{time_s:8.1} s  ").dark_gray(), text.clone().into()]))
         .collect();
-    Paragraph::new(lines).block(panel(" events    q ends "))
+    Paragraph::new(lines).block(panel(" events    r asks again    q ends "))
 }
 
 fn panel(title: &str) -> Block<'static> {

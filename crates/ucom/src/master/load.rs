@@ -71,11 +71,11 @@ mod tests {
         assert_eq!([frame_bits(0), frame_bits(2), frame_bits(8)], [55, 75, 135]);
     }
 
-    /// The examples of section 7: SO and CI frames of 7 or 16 boards, all at 10 ms.
+    /// 7 and 16 boards with so many words of SO and CI at 10 ms, and at 1 ms.
     #[test]
     fn p19_forecasts_of_the_requirements() {
         let forecast = |boards: usize, so: u16, ci: u16, period: u32| {
-            let all = std::vec![Dimensions { ci: 3 * ci, so: 3 * so, par: 0 }; boards];
+            let all = std::vec![Dimensions { ci, so, par: 0 }; boards];
             let profile = Profile { so_period: period, ci_period: period, ..Profile::default() };
             LoadForecast::new(&all, &profile)
         };

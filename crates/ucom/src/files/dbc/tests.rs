@@ -35,7 +35,7 @@ fn value(signal: &Signal, data: &[u8]) -> i64 {
         let mut at = signal.start_bit;
         for _ in 0..signal.size {
             raw = raw << 1 | bit(at);
-            at = if at % 8 == 0 { at + 15 } else { at - 1 };
+            at = if at.is_multiple_of(8) { at + 15 } else { at - 1 };
         }
     }
     if signal.value_type == ValueType::Signed && raw >> (signal.size - 1) & 1 == 1 {

@@ -190,6 +190,11 @@ impl Board {
         self.machine.chip().usarts[Self::index(port)].host_baud = baud;
     }
 
+    /// Rate that the firmware has set at a port, bit/s; 0: none.
+    pub fn firmware_baud(&self, port: Port) -> u32 {
+        self.machine.uc.get_data().usarts[Self::index(port)].baud()
+    }
+
     /// The host sends bytes; they follow those that wait already.
     pub fn write(&mut self, port: Port, bytes: &[u8]) {
         let chip = self.machine.chip();

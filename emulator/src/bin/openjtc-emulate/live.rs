@@ -33,6 +33,8 @@ pub enum Speed {
 pub struct Live {
     board: Board,
     port: Port,
+    /// The host's rate; `None`: that of the firmware.
+    baud: Option<u32>,
     pty: Pty,
     speed: Speed,
     log: Option<DefmtLog>,
@@ -49,10 +51,18 @@ pub struct Live {
 
 impl Live {
     /// A board that has just been switched on, behind a terminal.
-    pub fn new(board: Board, port: Port, pty: Pty, speed: Speed, log: Option<DefmtLog>) -> Self {
+    pub fn new(
+        board: Board,
+        port: Port,
+        baud: Option<u32>,
+        pty: Pty,
+        speed: Speed,
+        log: Option<DefmtLog>,
+    ) -> Self {
         Self {
             board,
             port,
+            baud,
             pty,
             speed,
             log,
@@ -86,6 +96,10 @@ impl Live {
             }
             if self.stands_still()? {
                 continue;
+            }
+            let own = self.board.firmware_baud(self.port);
+            if let Some(baud) = self.baud.or((own != 0).then_some(own)) {
+                self.board.set_baud(self.port, baud);
             }
             self.board.step();
             self.report()?;

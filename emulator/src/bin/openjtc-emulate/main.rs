@@ -35,9 +35,9 @@ struct Args {
     /// Serial port of the board: 2 or 3 (that of the ST-LINK).
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(2..=3))]
     usart: u8,
-    /// Rate of the host's side of the line, bit/s.
-    #[arg(long, value_name = "BD", default_value_t = 115_200)]
-    baud: u32,
+    /// Rate of the host's side of the line, bit/s; without it always that of the firmware.
+    #[arg(long, value_name = "BD")]
+    baud: Option<u32>,
     /// Virtual time follows the clock, or runs as fast as it can.
     #[arg(long, value_name = "SPEED", default_value = "realtime")]
     speed: SpeedArg,
@@ -71,7 +71,7 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     })?;
     let elf = Elf::parse(&bytes).map_err(|e| format!("{}: {e}", args.elf.display()))?;
     let log = if args.defmt { Some(DefmtLog::new(&args.elf)?) } else { None };
-    let mut config = BoardConfig { baud: args.baud, seed: args.seed, ..BoardConfig::default() };
+    let mut config = BoardConfig { seed: args.seed, ..BoardConfig::default() };
     config.sim.seed = args.seed;
     let board = Board::new(elf, &config);
     let port = if args.usart == 2 { Port::Usart2 } else { Port::Usart3 };
@@ -85,5 +85,5 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
         SpeedArg::Realtime => Speed::Realtime,
         SpeedArg::Max => Speed::Max,
     };
-    Live::new(board, port, terminal, speed, log).run(&stop)
+    Live::new(board, port, args.baud, terminal, speed, log).run(&stop)
 }

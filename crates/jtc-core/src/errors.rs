@@ -37,13 +37,14 @@ impl Errors {
 
     /// Internal errors per joint; 0 where there is none.
     pub fn raise_joints(&mut self, bits: &[u16; JOINTS]) {
+        if !any(bits) {
+            return;
+        }
         for j in 0..JOINTS {
             self.joints[j] |= bits[j];
             self.joints_occurred[j] |= bits[j];
         }
-        if any(bits) {
-            self.occurred |= self.word();
-        }
+        self.occurred |= self.word();
     }
 
     pub fn raise_can(&mut self, flags: u32) {

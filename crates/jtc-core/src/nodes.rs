@@ -60,8 +60,7 @@ impl Node {
     }
 
     fn starting(&self) -> bool {
-        // 10 is the transition from Start to Init.
-        matches!(self.report.fsm, fsm::START | fsm::INIT | 10)
+        starting(self.report.fsm)
     }
 
     /// Lost its configuration, or back in Start or Init (J-20).
@@ -71,11 +70,8 @@ impl Node {
 
     fn faulty(&self, joint: bool) -> bool {
         let r = &self.report;
-        self.seen
-            && (fsm::is_fault(r.fsm)
-                || r.errors != 0
-                || r.mc_current != 0
-                || (joint && r.warnings & warning::SAFETY_LINE != 0))
+        let safety_line = if joint { r.warnings & warning::SAFETY_LINE } else { 0 };
+        self.seen && (fsm::is_fault(r.fsm) || (r.errors | r.mc_current | safety_line) != 0)
     }
 
     /// The node has restarted: nothing of what was known of it holds.
@@ -111,6 +107,11 @@ impl Node {
     fn wants_configuration(&self) -> bool {
         self.seen && !self.configured && !self.clear && matches!(self.report.fsm, fsm::INIT | fsm::READY)
     }
+}
+
+fn starting(state: u8) -> bool {
+    // 10 is the transition from Start to Init.
+    matches!(state, fsm::START | fsm::INIT | 10)
 }
 
 /// All nodes and the order of frames to them.
@@ -158,6 +159,11 @@ impl Nodes {
     /// Nodes that are there: the gripper can be configured as absent.
     fn present(&self) -> usize {
         if self.gripper { NODES } else { JOINTS }
+    }
+
+    /// Those nodes.
+    fn all(&self) -> &[Node] {
+        if self.gripper { &self.nodes } else { &self.nodes[..JOINTS] }
     }
 
     pub fn node(&self, n: usize) -> &Node {
@@ -232,7 +238,7 @@ impl Nodes {
     ) {
         let Some(node) = self.nodes.get_mut(n).filter(|node| node.deaf_left == 0) else { return };
         *answered |= 1 << n;
-        let was_starting = node.starting();
+        let before = node.report.fsm;
         let jump = (report.position - node.report.position).abs();
         if node.valid && jump > config.position_jump_max {
             node.misbehaved = true;
@@ -240,7 +246,7 @@ impl Nodes {
         node.report = *report;
         node.seen = true;
         if node.starting() {
-            if !was_starting || report.fsm == fsm::START {
+            if !starting(before) || report.fsm == fsm::START {
                 // Fallen back: the configuration is lost and has to be accepted again.
                 (node.configured, node.valid, node.refused) = (false, false, false);
             }
@@ -257,7 +263,7 @@ impl Nodes {
     fn count_silence(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
         // While every node boots there is nobody to acknowledge.
-        let somebody = self.nodes[..self.present()].iter().any(|node| node.boot_left == 0);
+        let somebody = self.all().iter().any(|node| node.boot_left == 0);
         if on_the_bus {
             self.unacknowledged = 0;
         } else if self.sent_move && somebody {
@@ -306,32 +312,29 @@ impl Nodes {
     /// CAN flags of this tick: bit 0 transmit timeout or bus-off, bit 8+n receive timeout of node n.
     pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
         let mut flags = u32::from(inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max);
-        for n in 0..self.present() {
-            if self.node(n).missed >= config.missed_moves_max {
-                flags |= 1 << (8 + n);
-            }
+        for (n, node) in self.all().iter().enumerate() {
+            flags |= u32::from(node.missed >= config.missed_moves_max) << (8 + n);
         }
         flags
     }
 
     /// A node has an error that is not being cleared, or misbehaved in this tick.
     pub fn external_error(&self) -> bool {
-        (0..self.present()).any(|n| {
-            let node = self.node(n);
-            node.misbehaved || (!node.clear && node.faulty(n < JOINTS))
-        })
+        self.all()
+            .iter()
+            .enumerate()
+            .any(|(n, node)| node.misbehaved || (!node.clear && node.faulty(n < JOINTS)))
     }
 
     /// A node is still being cleared: the cause of its error is not gone.
     pub fn clearing(&self) -> bool {
-        (0..self.present()).any(|n| self.node(n).clear)
+        self.all().iter().any(|node| node.clear)
     }
 
     /// Node init word: bit n set while node n is not initialised.
     pub fn init_word(&self) -> u8 {
         let mut word = 0;
-        for n in 0..self.present() {
-            let node = self.node(n);
+        for (n, node) in self.all().iter().enumerate() {
             let accurate = n == GRIPPER || node.report.warnings & warning::POSITION_NOT_ACCURATE == 0;
             if node.fallen_back() || !accurate {
                 word |= 1 << n;
@@ -342,34 +345,30 @@ impl Nodes {
 
     /// A node has lost its configuration or fallen back to Start or Init (J-20).
     pub fn fallen_back(&self) -> bool {
-        self.nodes[..self.present()].iter().any(Node::fallen_back)
+        self.all().iter().any(Node::fallen_back)
     }
 
     /// Init is done: every node is initialised and reports ReadyToOperate.
     pub fn all_ready(&self) -> bool {
-        self.init_word() == 0 && (0..self.present()).all(|n| self.node(n).report.fsm == fsm::READY)
+        self.init_word() == 0 && self.all().iter().all(|node| node.report.fsm == fsm::READY)
     }
 
     /// ClearCurrentErrors for the nodes in `mask`: those that have something to clear are commanded to Init until they follow.
     /// What has merely occurred is cleared only while the arm is `limp`: it is no reason to drop it.
     pub fn clear(&mut self, mask: u8, limp: bool) {
-        for n in 0..self.present() {
+        let present = self.present();
+        for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
             let joint = n < JOINTS;
-            if let Some(node) = self.nodes.get_mut(n)
-                && mask & (1 << n) != 0
-                && (node.faulty(joint) || (limp && joint && node.report.mc_occurred != 0))
-            {
-                node.clear = true;
-            }
+            let to_clear = node.faulty(joint) || (limp && joint && node.report.mc_occurred != 0);
+            node.clear |= mask & (1 << n) != 0 && to_clear;
         }
     }
 
     /// ResetCanDevices for the nodes in `mask` (J-23).
     pub fn reset(&mut self, mask: u8) {
-        for n in 0..self.present() {
-            if let Some(node) = self.nodes.get_mut(n) {
-                node.reset |= mask & (1 << n) != 0;
-            }
+        let present = self.present();
+        for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
+            node.reset |= mask & (1 << n) != 0;
         }
     }
 
@@ -391,7 +390,7 @@ impl Nodes {
 
     fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
         let present = self.present();
-        let to_reset = self.nodes[..present].iter().filter(|node| node.reset).count();
+        let to_reset = self.all().iter().filter(|node| node.reset).count();
         if to_reset == present {
             for node in &mut self.nodes {
                 node.restart(config);
@@ -405,13 +404,13 @@ impl Nodes {
         }
         let mut target = [Target::NoChange; NODES];
         let mut change = false;
-        for n in 0..present {
-            target[n] = self.nodes[n].request(goal);
-            change |= target[n] != Target::NoChange;
+        for (node, target) in self.all().iter().zip(&mut target) {
+            *target = node.request(goal);
+            change |= *target != Target::NoChange;
         }
-        let configure = goal == Goal::Ready && self.nodes[..present].iter().any(Node::wants_configuration);
+        let configure = goal == Goal::Ready && self.all().iter().any(Node::wants_configuration);
         // Nodes that are enabled refuse their configuration and should not be: they come first.
-        let enabled = self.nodes[..present].iter().any(|node| node.report.fsm == fsm::ENABLED);
+        let enabled = self.all().iter().any(|node| node.report.fsm == fsm::ENABLED);
         if configure && !(change && (self.configured_last || enabled)) {
             self.configured_last = true;
             return Some(Request::ChangeMode {

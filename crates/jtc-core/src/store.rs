@@ -84,12 +84,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
 
     /// Copies points `from..to` of the segment behind those received; they count from `commit` on.
     pub fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
-        let received = self.received;
-        for i in from..to {
-            if let (Some(slot), Some(point)) = (self.points.as_mut().get_mut(received + i), segment.point(i))
-            {
-                *slot = point;
-            }
+        let slots = self.points.as_mut().get_mut(self.received + from..self.received + to).unwrap_or(&mut []);
+        for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
+            *slot = point;
         }
     }
 

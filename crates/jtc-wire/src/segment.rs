@@ -43,6 +43,7 @@ pub mod field {
 
 impl RawPoint {
     /// From the 36 bytes of a point.
+    #[inline]
     pub fn parse(bytes: &[u8; POINT_LEN]) -> Self {
         let i16_at = |i: usize| i16::from_be_bytes([bytes[2 * i], bytes[2 * i + 1]]);
         Self {
@@ -108,7 +109,12 @@ impl<'a> Segment<'a> {
 
     /// All points in order.
     pub fn points(&self) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
-        self.points.as_chunks::<POINT_LEN>().0.iter().map(RawPoint::parse)
+        self.points_from(0)
+    }
+
+    /// The points from number `first` on; none past the end.
+    pub fn points_from(&self, first: usize) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
+        self.points.as_chunks::<POINT_LEN>().0.get(first..).unwrap_or(&[]).iter().map(RawPoint::parse)
     }
 }
 

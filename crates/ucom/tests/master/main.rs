@@ -4,6 +4,7 @@
 mod bench;
 mod chain;
 mod faults;
+mod kept;
 mod probing;
 mod robust;
 mod running;

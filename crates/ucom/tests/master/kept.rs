@@ -1,0 +1,33 @@
+//! What the fuzzers found, and what they keep, on the stable toolchain.
+
+use std::path::Path;
+
+fn kept(target: &str, body: fn(&[u8])) {
+    for kind in ["corpus", "regressions"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz").join(kind).join(target);
+        for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            body(&std::fs::read(file.path()).unwrap());
+        }
+    }
+    // The same bytes in every run.
+    let mut state = 0x2545_F491_u32;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state
+    };
+    for _ in 0..300 {
+        let length = next() % 120;
+        let bytes: Vec<u8> = (0..length).map(|_| next() as u8).collect();
+        body(&bytes);
+    }
+}
+
+#[test]
+fn fuzz_targets_of_files_and_master() {
+    kept("ucom_image", ucom::files::fuzzing::image);
+    kept("ucom_recording", ucom::files::fuzzing::recording);
+    kept("ucom_inventory", ucom::files::fuzzing::inventory);
+    kept("ucom_master", ucom::master::fuzzing::frames);
+}

@@ -11,7 +11,8 @@ use crate::{
 ///
 /// Implementations deliver frames of every other member in the order of the bus, and none of their own.
 pub trait CanBus {
-    /// Puts a frame on the bus. A full transmit queue is waited for; it is no error.
+    /// Puts a frame on the bus. A full transmit queue is waited for; it is no error unless it stays full for seconds, as on a
+    /// bus where nobody acknowledges.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
 
     /// The next frame of another member; `None` when none came within `timeout`. Zero does not wait.

@@ -3,6 +3,7 @@
 mod confinement;
 mod contest;
 mod event;
+mod outcome;
 mod wire;
 
 use std::collections::VecDeque;
@@ -14,7 +15,7 @@ use confinement::Counters;
 use contest::{Contest, Starter};
 pub use event::{BusError, BusStats, Happening, MemberId, QueueError, TimedEvent};
 pub use wire::classic_frame_bits;
-use wire::{ERROR_FRAME, INTERMISSION, RECOVERY, SUSPENDED, TO_ACKNOWLEDGE};
+use wire::{ERROR_FRAME, INTERMISSION, RECOVERY, TO_ACKNOWLEDGE};
 
 /// Frames of a member that wait at most.
 const QUEUE: usize = 65_536;
@@ -341,109 +342,5 @@ impl TimedBus {
             member.on_bus() && member.acknowledges && !senders.contains(&MemberId(number))
         };
         self.members.iter().enumerate().any(hears)
-    }
-
-    fn finish(&mut self, transfer: Transfer) {
-        let Transfer { contest, mut error, .. } = transfer;
-        if !contest.collision.is_empty() {
-            self.stats.collisions += 1;
-            self.report(BusError::Collision, contest.frame, &contest.collision);
-        }
-        for member in &contest.failed {
-            self.send_failed(*member, BusError::Collision);
-        }
-        let frame = contest.frame;
-        let mut senders = contest.senders;
-        let destroyed = senders.is_empty();
-        // Whoever left cut its frame off.
-        senders.retain(|member| !self.members[member.0].left);
-        if senders.is_empty() && !destroyed && error.is_none() {
-            error = Some(BusError::Disturbed);
-        }
-        if destroyed || error.is_some() {
-            if let Some(error) = error {
-                match error {
-                    BusError::NotAcknowledged => self.stats.not_acknowledged += 1,
-                    _ => self.stats.disturbed += 1,
-                }
-                self.report(error, frame, &senders);
-                for member in &senders {
-                    self.send_failed(*member, error);
-                }
-            }
-            let involved = |number| contest.failed.contains(&number) || senders.contains(&number);
-            for number in (0..self.members.len()).map(MemberId).filter(|number| !involved(*number)) {
-                self.count(number, Counters::heard_error);
-            }
-            return;
-        }
-        self.stats.frames += 1;
-        self.stats.shared += u64::from(senders.len() > 1);
-        for member in &senders {
-            self.members[member.0].queue.pop_front();
-            self.members[member.0].last_try = false;
-            self.events.push_back(Happening::Sent { member: *member, frame });
-            self.count(*member, Counters::sent);
-            self.suspend(*member);
-        }
-        let now = time(self.now);
-        for number in (0..self.members.len()).map(MemberId) {
-            if senders.contains(&number) || !self.members[number.0].on_bus() {
-                continue;
-            }
-            // Who fell out of a collision goes on as a listener, and so it does on the wire.
-            self.count(number, Counters::heard);
-            match &mut self.members[number.0].lines {
-                Some(lines) => lines.1.put(now, frame),
-                None => self.events.push_back(Happening::Received { member: number, frame }),
-            }
-        }
-    }
-
-    fn report(&mut self, error: BusError, frame: CanFrame, senders: &[MemberId]) {
-        self.events.push_back(Happening::Error { error, frame, senders: senders.to_vec() });
-    }
-
-    fn send_failed(&mut self, number: MemberId, error: BusError) {
-        self.count(
-            number,
-            match error {
-                BusError::NotAcknowledged => Counters::not_acknowledged,
-                _ => Counters::send_failed,
-            },
-        );
-        self.suspend(number);
-        let member = &mut self.members[number.0];
-        let give_up = match (member.counters.bus_off(), member.one_shot || member.last_try) {
-            (true, _) => member.queue.len(),
-            (false, true) => 1,
-            (false, false) => 0,
-        };
-        member.last_try = false;
-        for frame in member.queue.drain(..give_up.min(member.queue.len())) {
-            self.events.push_back(Happening::Failed { member: number, frame });
-        }
-    }
-
-    fn suspend(&mut self, number: MemberId) {
-        let until = self.free_from + self.bits_ns(SUSPENDED);
-        let member = &mut self.members[number.0];
-        if member.counters.passive() {
-            member.may_start = until;
-        }
-    }
-
-    /// Moves a member's counters; a new error state is an event.
-    fn count(&mut self, number: MemberId, how: fn(&mut Counters)) {
-        let member = &mut self.members[number.0];
-        if !member.on_bus() {
-            return;
-        }
-        let before = member.counters.state().errors;
-        how(&mut member.counters);
-        let state = member.counters.state();
-        if state.errors != before {
-            self.events.push_back(Happening::State { member: number, state });
-        }
     }
 }

@@ -268,6 +268,10 @@ impl Core {
     /// A frame that only a PC sends.
     pub(crate) fn foreign_pc(&mut self, function: Function, to: u8) {
         self.statistics.foreign_pc += 1;
+        if function == Function::AskReport {
+            // The reports that follow answer the other PC: nobody has rebooted.
+            self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
+        }
         // Once a second at most.
         let news = self.foreign_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
         self.foreign_master = Some((self.now, function, to));

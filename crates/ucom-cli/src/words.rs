@@ -60,8 +60,8 @@ impl Decoder {
         };
         let who = self.who(from_pc, sequence);
         let (text, value) = match from_pc {
-            Some(true) => self.to_board(frame),
-            _ => self.from_board(now_us, function, sequence, frame),
+            Some(true) => self.pc_says(frame),
+            _ => self.board_says(now_us, function, sequence, frame),
         };
         let name = function.name().to_owned();
         Described { name, who, text, value }
@@ -80,7 +80,7 @@ impl Decoder {
         }
     }
 
-    fn to_board(&self, frame: &Frame) -> (String, Value) {
+    fn pc_says(&self, frame: &Frame) -> (String, Value) {
         let (_, message) = match ToBoard::decode(frame, &self.profile) {
             Ok(message) => message,
             Err(e) => return (e.to_string(), json!({ "malformed": e.to_string() })),
@@ -98,7 +98,7 @@ impl Decoder {
         }
     }
 
-    fn from_board(
+    fn board_says(
         &mut self,
         now_us: u64,
         function: Function,

@@ -123,7 +123,10 @@ fn names_inputs_and_motion() {
     assert_eq!(status["boards"][0]["state"], "started", "the loop was stopped");
     // D-35: what was written is only assumed.
     let par = sim.ucom(&["--json", "par", "1", "kp=150"]).ends(0).json();
-    assert_eq!((par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()), (json!(150), json!(null)));
+    assert_eq!(
+        (par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()),
+        (json!(150), json!(null))
+    );
     let said = sim.ucom(&["--json", "ci", "1", "set_positon=3"]).ends(2);
     assert!(said.json()["error"]["message"].as_str().unwrap().contains("set_position"), "{}", said.out);
     let said = sim.ucom(&["--json", "ci", "1", "2.set_position=3"]).ends(2);
@@ -141,8 +144,16 @@ fn p17_one_master_at_a_time_and_none_is_safe() {
     // Listening is welcome: the names are asked for before the loop runs, or known.
     let so = sim.ucom(&["--json", "so", "1", "--count", "1"]).ends(0).json();
     assert!(so["so"]["position"].is_i64(), "{so}");
+    // So is asking who is there: the running PC takes the answers for what they are.
+    let scan = sim.ucom(&["--json", "scan"]).ends(0).json();
+    assert_eq!(
+        (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
+        (Some("running"), Some("exloader"))
+    );
     let said = sim.ucom(&["--json", "reset"]).ends(4);
     assert_eq!(said.json()["error"]["code"], "foreign-master", "{}", said.out);
+    let so = sim.ucom(&["--json", "so", "1", "--count", "1"]).ends(0).json();
+    assert!(so["so"]["current"].is_i64(), "the board still runs: {so}");
     sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
     // kill -9: nobody says stop, the board itself must.
     signal(&run, "-KILL");
@@ -210,7 +221,10 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
         let replay = sim.ucom(&["--json", "replay", &sim.path(name), "--speed", "4"]).ends(0).json();
         assert!(replay["left_out"].as_u64().unwrap() > 5, "{replay}");
         let heard = peer.all(300);
-        assert!(heard.iter().any(|f| f == "0C2#02") && heard.iter().all(|f| f != "000#" && f != "282#"), "{name}");
+        assert!(
+            heard.iter().any(|f| f == "0C2#02") && heard.iter().all(|f| f != "000#" && f != "282#"),
+            "{name}"
+        );
     }
 }
 

@@ -44,7 +44,11 @@ fn decode_tells_names_of_frames() {
     let said = ucom_with(&["decode"], "000#\n141#2100011934126E38\n2A1#\n").ends(0);
     let lines: Vec<&str> = said.out.lines().collect();
     assert!(lines[0].contains("PC_RESET") && lines[0].contains("all"), "{}", said.out);
-    assert!(lines[1].contains("DSP_INFO") && lines[1].contains("0x1234") && lines[1].contains("EXLRUN INIT IPINIT"));
+    assert!(
+        lines[1].contains("DSP_INFO")
+            && lines[1].contains("0x1234")
+            && lines[1].contains("EXLRUN INIT IPINIT")
+    );
     assert!(lines[2].contains("foreign") && lines[2].contains("bit 5"), "{}", said.out);
     let said = ucom_with(&["--json", "decode", "-"], "(1.5) can0 1C1#0202\n").ends(0);
     let value = said.json();

@@ -25,7 +25,10 @@ fn d46_update_is_verified_and_then_up_to_date() {
     assert_eq!(update["flash_date"], "2009-06-01");
     assert_eq!(program_id(&sim, "2"), update["program_id"]);
     let update = sim.ucom(&["--json", "update", "2", &file, "--date", "2009-06-01"]).ends(0).json();
-    assert_eq!((update["outcome"].as_str(), update["boards"][0]["attempts"].as_u64()), (Some("up-to-date"), Some(0)));
+    assert_eq!(
+        (update["outcome"].as_str(), update["boards"][0]["attempts"].as_u64()),
+        (Some("up-to-date"), Some(0))
+    );
 
     let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
     let file = sim.file("golden.bin", &golden);
@@ -93,7 +96,8 @@ fn a_campaign_goes_on_and_is_resumed() {
     let first = sim.ucom(&["--json", "update", "1,3", &file_in(&sim)]).ends(0).json();
     assert_eq!(first["boards"][1]["outcome"], "verified");
     let all = sim.ucom(&["--json", "update", "all", &file_in(&sim)]).ends(0).json();
-    let outcomes: Vec<&str> = all["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
+    let outcomes: Vec<&str> =
+        all["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
     assert_eq!(outcomes, ["up-to-date", "verified", "up-to-date"]);
 }
 

@@ -62,7 +62,8 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     };
     let all = findings(&seen);
     let bad = all.iter().any(|f| f.severity == Severity::Problem);
-    let boards = seen.scan.iter().flat_map(|s| &s.boards).map(|b| board_value(b, &profile)).collect::<Vec<_>>();
+    let boards =
+        seen.scan.iter().flat_map(|s| &s.boards).map(|b| board_value(b, &profile)).collect::<Vec<_>>();
     let value = json!({ "bus": link.url()?, "healthy": !bad, "findings": all, "boards": boards });
     out.result(&value, || all.iter().map(line).collect());
     match (bad, seen.statistics.received) {

@@ -123,7 +123,8 @@ fn value(driver: &Driver, watch: &Watch) -> Value {
     let (now, profile) = (driver.now_us(), driver.master.profile());
     let (boards, statistics) = (driver.master.boards(), driver.master.statistics());
     let board = |(number, b): (u8, &Board)| {
-        let mut value = b.info.map_or_else(|| json!({ "number": number }), |i| info_value(number, &i, &profile));
+        let mut value =
+            b.info.map_or_else(|| json!({ "number": number }), |i| info_value(number, &i, &profile));
         value["description"] = json!(b.description);
         value["state"] = json!(doing(b, now));
         value["life"] = json!(life(b));

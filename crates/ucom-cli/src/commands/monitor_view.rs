@@ -24,12 +24,9 @@ const BITS: [(Status, &str); 5] = [
 pub fn draw(frame: &mut Frame<'_>, driver: &Driver, watch: &Watch) {
     let (boards, statistics, now) = (driver.master.boards(), driver.master.statistics(), driver.now_us());
     let rows = boards.iter().count().max(1) as u16;
-    let [head, middle, log] = Layout::vertical([
-        Constraint::Length(5),
-        Constraint::Length(rows + 3),
-        Constraint::Min(4),
-    ])
-    .areas(frame.area());
+    let [head, middle, log] =
+        Layout::vertical([Constraint::Length(5), Constraint::Length(rows + 3), Constraint::Min(4)])
+            .areas(frame.area());
     let [facts, curve] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(44)]).areas(head);
     frame.render_widget(summary(watch, &statistics, now), facts);
     frame.render_widget(load(watch, &statistics, now), curve);
@@ -58,7 +55,8 @@ fn summary(watch: &Watch, statistics: &Statistics, now: u64) -> Paragraph<'stati
         true => "no foreign frames".dark_gray(),
         false => format!("foreign: {}", foreign.join(", ")).yellow(),
     };
-    let counts = format!("{:.0} s, {} frames heard, {} sent", now as f64 * 1e-6, statistics.received, statistics.sent);
+    let counts =
+        format!("{:.0} s, {} frames heard, {} sent", now as f64 * 1e-6, statistics.received, statistics.sent);
     let lines = vec![Line::from(role), Line::from(counts), Line::from(foreign)];
     Paragraph::new(lines).block(panel(&format!(" {} ", watch.url)))
 }

@@ -25,6 +25,8 @@ mod fault;
 mod file;
 mod model;
 mod sim;
+#[cfg(test)]
+mod sim_tests;
 
 pub use axis::AxisConfig;
 pub use board::BoardState;

@@ -38,8 +38,7 @@ impl Shadow {
         &self.values
     }
 
-    /// The words around a parameter that a package with it would carry: those before it in the package are sent, too,
-    /// so a package starts at the parameter itself.
+    /// How many there are.
     pub(crate) fn len(&self) -> u16 {
         self.values.len() as u16
     }

@@ -17,7 +17,8 @@ impl Saturation {
     pub fn limit(&mut self, torque: f64, limits: &JointConfig, over_ms_max: u16) -> (f64, u16) {
         let limit = limits.torque_max;
         // Written so that NaN is beyond. Choices without branches: the same work in every tick.
-        self.saturated = !(torque.abs() <= limit);
+        let within = torque.abs() <= limit;
+        self.saturated = !within;
         self.over_ms = if self.saturated { self.over_ms.saturating_add(1) } else { 0 };
         let error = torque.is_nan() | (self.over_ms > over_ms_max);
         let limited = torque.max(-limit).min(limit);

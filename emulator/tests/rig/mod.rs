@@ -236,6 +236,7 @@ impl Rig {
     /// Default parameters by the host at `port`, then every joint enabled and held.
     #[track_caller]
     pub fn bring_up(&mut self, port: Port) {
+        self.wait("the board is up", 50, |rig| rig.ticks > 0);
         self.write(port, &frames::use_defaults());
         self.wait_for_hold(12_000);
     }

@@ -1,0 +1,182 @@
+//! Whole sessions with a host and an arm, in virtual time. In every tick of every session the controller on this machine
+//! computes the same, to the bit (`rig`).
+mod rig;
+
+use jtc_core::{Config, State, Tes};
+use jtc_sim::{SimConfig, host as frames};
+use jtc_wire::{DataStatus, ExecCommand, FrameStatus, RawPoint, Response, fixed};
+use openjtc_emulator::{BoardConfig, Port};
+use rig::{BOARDS, Rig, fast_elf};
+
+const HOST: Port = Port::Usart2;
+const GOAL: [f64; 6] = [0.5, 0.4, -0.5, 0.4, -0.3, 0.6];
+
+/// There and back, 4 s in all: 1001 points at 4 ms.
+fn motion() -> Vec<RawPoint> {
+    let points = frames::there_and_back(&[0.0; 6], &GOAL, 2.0, 1, 4);
+    assert_eq!(points.len(), 1001);
+    points
+}
+
+impl Rig {
+    fn upload(&mut self, points: &[RawPoint], step_ms: u16) {
+        for segment in frames::trajectory(points, step_ms, 113) {
+            self.ask(HOST, &segment);
+        }
+        assert_eq!(self.telemetry().tes, Tes::Stop);
+    }
+
+    fn exec(&mut self, command: ExecCommand) -> Response {
+        self.response(HOST, &frames::exec(command))
+    }
+
+    /// Largest distance of the real arm from the commanded position, rad.
+    fn following_error(&self) -> f64 {
+        let real = self.board.plant().truth().q;
+        let joints = self.telemetry().joints;
+        (0..6).map(|j| (joints[j].set_position - real[j]).abs()).fold(0.0, f64::max)
+    }
+
+    /// Largest speed of the real arm, rad/s.
+    fn speed(&self) -> f64 {
+        self.board.plant().truth().qd.iter().fold(0.0, |most: f64, v| most.max(v.abs()))
+    }
+}
+
+/// Lets a run go on until that execution state; the largest following error.
+#[track_caller]
+fn follow(rig: &mut Rig, until: Tes, ms: u64) -> f64 {
+    let mut worst: f64 = 0.0;
+    rig.wait("the end of the motion", ms, |rig| {
+        worst = worst.max(rig.following_error());
+        rig.telemetry().tes == until
+    });
+    worst
+}
+
+fn accepted(response: Response) -> bool {
+    (response.status, response.data) == (FrameStatus::NoError, DataStatus::NoError)
+}
+
+/// J-20, J-30..J-34, J-25: defaults, upload, execute, pause, resume, stop, again to the end, teaching.
+#[test]
+fn a_whole_session() {
+    let mut rig = Rig::new(BOARDS[0]);
+    rig.bring_up(HOST);
+    let limit = Config::default().joints.map(|j| j.position_error_max).into_iter().fold(f64::MAX, f64::min);
+    rig.upload(&motion(), 4);
+
+    // J-33: pause on the way, at rest after its ramp; resume; stop.
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    rig.run(1_000);
+    assert_eq!(rig.state(), State::Operate);
+    let moving = rig.speed();
+    assert!(moving > 0.1, "the arm moves at {moving} rad/s");
+    assert!(accepted(rig.exec(ExecCommand::Pause)));
+    let paused = follow(&mut rig, Tes::Pause, 1_000);
+    rig.run(300);
+    assert!(rig.speed() < 0.02, "at rest: {} rad/s", rig.speed());
+    let held = rig.telemetry().point;
+    assert!((500..3_000).contains(&held), "point {held}");
+    rig.run(200);
+    assert_eq!((rig.telemetry().point, rig.state()), (held, State::HoldPos));
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    rig.run(500);
+    assert!(rig.telemetry().point > held, "it goes on where it was");
+    assert!(accepted(rig.exec(ExecCommand::Stop)));
+    let stopped = follow(&mut rig, Tes::Stop, 1_000);
+    // J-34: from somewhere on the path it cannot be started.
+    assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::StartPositionMismatch);
+    assert_eq!(rig.exec(ExecCommand::Pause).data, DataStatus::NotAllowed);
+
+    // Home, then the whole trajectory: J-31.
+    let here = rig.telemetry().joints.map(|j| j.set_position);
+    rig.upload(&frames::there_and_back(&here, &[0.0; 6], 2.0, 1, 10)[..201], 10);
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    follow(&mut rig, Tes::Finish, 4_000);
+    rig.upload(&motion(), 4);
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    let followed = follow(&mut rig, Tes::Finish, 6_000);
+    assert_eq!(rig.telemetry().point, 4_000, "the last 1 ms point");
+    for (name, error) in [("paused", paused), ("stopped", stopped), ("followed", followed)] {
+        println!("{name}: {error:.5} rad");
+        assert!(error < limit / 2.0, "{name}: {error} rad, the limit is {limit}");
+    }
+
+    // J-25.
+    rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
+    rig.run(500);
+    assert_eq!(rig.state(), State::Teaching);
+    assert!(rig.speed() < 1.2);
+    rig.ask(HOST, &fixed::TEACHING_MODE_DISABLE);
+    rig.run(300);
+    assert_eq!((rig.state(), rig.telemetry().tes), (State::HoldPos, Tes::Null));
+    assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
+}
+
+/// The other boards, and the other line.
+#[test]
+fn a_short_session_on_every_board() {
+    let points = frames::there_and_back(&[0.0; 6], &GOAL.map(|q| q / 4.0), 0.5, 1, 5);
+    for board in BOARDS {
+        let mut rig = Rig::new(board);
+        rig.bring_up(Port::Usart3);
+        rig.upload(&points, 5);
+        assert!(accepted(rig.exec(ExecCommand::Execute)));
+        follow(&mut rig, Tes::Finish, 2_500);
+        assert_eq!((rig.telemetry().point, rig.status(HOST).occurred), (1000, 0), "{board}");
+    }
+}
+
+/// The program for fast lines does the same.
+#[test]
+fn a_short_session_at_15_mbd() {
+    let points = frames::there_and_back(&[0.0; 6], &GOAL.map(|q| q / 4.0), 0.5, 1, 5);
+    let mut rig = Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() });
+    rig.bring_up(HOST);
+    rig.upload(&points, 5);
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    follow(&mut rig, Tes::Finish, 2_500);
+}
+
+/// The drives with the older habits: their velocity scale, one message per interrupt, answers during transitions.
+#[test]
+fn j12_older_drives_are_not_left_behind() {
+    let sim = SimConfig {
+        drives: [jtc_sim::DriveConfig { velocity_full_scale: 2.0, ..jtc_sim::DriveConfig::older() }; 6],
+        ..SimConfig::default()
+    };
+    let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
+    rig.bring_up(HOST);
+    rig.run(500);
+    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.status(HOST).occurred, 0);
+}
+
+/// J-12: what is on the bus, millisecond by millisecond: one broadcast of the controller, begun within microseconds of the
+/// tick, and nothing else than its answers.
+#[test]
+fn j12_one_broadcast_a_tick_and_its_answers() {
+    let mut rig = Rig::new(BOARDS[0]);
+    rig.bring_up(HOST);
+    rig.upload(&motion()[..400], 4);
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    let mut starts = Vec::new();
+    for ms in 0..1_500 {
+        rig.step();
+        let (own, others): (Vec<_>, Vec<_>) = rig.bus.iter().partition(|e| e.from_controller);
+        assert_eq!(own.len(), 1, "ms {ms}");
+        assert_eq!(others.len(), 7, "ms {ms}: seven answers");
+        starts.push(own[0].start);
+        let request = own[0].frame.id().value();
+        assert!(others.iter().all(|e| e.frame.id().value() & !7 == request | 0x200), "ms {ms}");
+        let round = others.last().expect("seven").end - own[0].start;
+        assert!(round < 700 * openjtc_emulator::clock::MICROSECOND, "ms {ms}");
+    }
+    let period = openjtc_emulator::clock::MILLISECOND;
+    for pair in starts.windows(2) {
+        // The instructions from the tick's beginning to the transmit request vary.
+        let off = (pair[1] - pair[0]).abs_diff(period);
+        assert!(off < 30 * openjtc_emulator::clock::MICROSECOND, "{off}");
+    }
+}

@@ -82,6 +82,7 @@ fn build_jtc() -> Result<PathBuf> {
 fn tests() -> Result<Outcome> {
     install_tools()?;
     let jtc = build_jtc()?;
+    firmware::build_fast()?;
     run(&mut cargo(&["clippy", "--release", "--all-targets", "--", "-D", "warnings"]))?;
     let mut counts = Counts::default();
     let mut test = cargo(&["test", "--release", "--no-fail-fast"]);

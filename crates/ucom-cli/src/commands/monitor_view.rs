@@ -20,18 +20,23 @@ const BITS: [(Status, &str); 5] = [
     (Status::IPINIT, "in-pin"),
 ];
 
+/// Columns that a terminal needs for the status bits.
+const WIDE: u16 = 112;
+
 /// Draws everything.
 pub fn draw(frame: &mut Frame<'_>, driver: &Driver, watch: &Watch) {
     let (boards, statistics, now) = (driver.master.boards(), driver.master.statistics(), driver.now_us());
     let rows = boards.iter().count().max(1) as u16;
+    let wide = frame.area().width >= WIDE;
     let [head, middle, log] =
         Layout::vertical([Constraint::Length(5), Constraint::Length(rows + 3), Constraint::Min(4)])
             .areas(frame.area());
-    let [facts, curve] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(44)]).areas(head);
+    let [facts, curve] =
+        Layout::horizontal([Constraint::Fill(1), Constraint::Length(if wide { 44 } else { 24 })]).areas(head);
     frame.render_widget(summary(watch, &statistics, now), facts);
-    frame.render_widget(load(watch, &statistics, now), curve);
+    frame.render_widget(load(watch, &statistics, now, usize::from(curve.width.saturating_sub(4))), curve);
     if boards.iter().next().is_some() {
-        frame.render_widget(table(&boards, &statistics, now), middle);
+        frame.render_widget(table(&boards, &statistics, now, wide), middle);
     } else {
         let text = match watch.listen_only {
             true => "nobody talks yet; without --listen-only the boards are asked who they are",
@@ -44,11 +49,11 @@ pub fn draw(frame: &mut Frame<'_>, driver: &Driver, watch: &Watch) {
 
 fn summary(watch: &Watch, statistics: &Statistics, now: u64) -> Paragraph<'static> {
     let role = if watch.foreign_master {
-        "another PC is master; this view only listens".yellow()
+        "another PC is master; only listens".yellow()
     } else if watch.listen_only {
         "only listens".dark_gray()
     } else {
-        "asked once who is there, now only listens; r asks again".dark_gray()
+        "asked once, only listens; r asks again".dark_gray()
     };
     let foreign: Vec<String> = statistics.foreign.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
     let foreign = match foreign.is_empty() {
@@ -61,9 +66,9 @@ fn summary(watch: &Watch, statistics: &Statistics, now: u64) -> Paragraph<'stati
     Paragraph::new(lines).block(panel(&format!(" {} ", watch.url)))
 }
 
-fn load(watch: &Watch, statistics: &Statistics, now: u64) -> Sparkline<'static> {
+fn load(watch: &Watch, statistics: &Statistics, now: u64, room: usize) -> Sparkline<'static> {
     let percent = statistics.load_percent(now);
-    let heights: Vec<u64> = watch.load.iter().rev().take(40).rev().map(|p| (p * 10.0) as u64).collect();
+    let heights: Vec<u64> = watch.load.iter().rev().take(room).rev().map(|p| (p * 10.0) as u64).collect();
     let colour = if percent > 70.0 { Color::Red } else { Color::Rgb(67, 211, 158) };
     Sparkline::default()
         .data(heights)
@@ -72,22 +77,23 @@ fn load(watch: &Watch, statistics: &Statistics, now: u64) -> Sparkline<'static> 
         .block(panel(&format!(" bus load {percent:.1} % ")))
 }
 
-fn table(boards: &Boards, statistics: &Statistics, now: u64) -> Table<'static> {
-    let rows = boards.iter().map(|(number, b)| row(number, b, statistics, now));
+fn table(boards: &Boards, statistics: &Statistics, now: u64, wide: bool) -> Table<'static> {
+    let rows = boards.iter().map(|(number, b)| row(number, b, statistics, now, wide));
     let widths = [
         Constraint::Length(5),
-        Constraint::Min(20),
-        Constraint::Length(12),
-        Constraint::Length(34),
+        Constraint::Min(18),
+        Constraint::Length(13),
+        Constraint::Length(if wide { 34 } else { 0 }),
         Constraint::Length(15),
         Constraint::Length(8),
         Constraint::Min(14),
     ];
-    let head = ["board", "description", "state", "status", "life sign", "frames/s", "errors"];
+    let status = if wide { "status" } else { "" };
+    let head = ["board", "description", "state", status, "life sign", "frames/s", "errors"];
     Table::new(rows, widths).header(Row::new(head).dark_gray()).block(panel(" boards "))
 }
 
-fn row(number: u8, b: &Board, statistics: &Statistics, now: u64) -> Row<'static> {
+fn row(number: u8, b: &Board, statistics: &Statistics, now: u64, wide: bool) -> Row<'static> {
     let colour = match doing(b, now) {
         "running" => Color::Rgb(63, 111, 224),
         "started" => Color::Rgb(47, 131, 124),
@@ -97,7 +103,9 @@ fn row(number: u8, b: &Board, statistics: &Statistics, now: u64) -> Row<'static>
     let style = Style::new().bg(colour).fg(Color::White).add_modifier(Modifier::BOLD);
     let state = Cell::from(Span::styled(format!(" {} ", doing(b, now)), style));
     let status = b.status().unwrap_or_default();
-    let words: Vec<&str> = BITS.iter().filter(|(bit, _)| status.has(*bit)).map(|(_, word)| *word).collect();
+    // On a narrow terminal the state in one word must do.
+    let words: Vec<&str> =
+        BITS.iter().filter(|_| wide).filter(|(bit, _)| status.has(*bit)).map(|(_, word)| *word).collect();
     let alive = match (b.life, age_s(b, now)) {
         (Life::Unarmed, _) | (_, None) => Cell::from("-").dark_gray(),
         (Life::Alive, Some(age)) => Cell::from(format!("{age:.1} s ago")).green(),

@@ -72,6 +72,15 @@ impl Raw {
     }
 }
 
+/// Stops a thread even when a test fails.
+struct Guard<'a>(&'a AtomicBool);
+
+impl Drop for Guard<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Waits for something that other threads do.
 fn until(mut done: impl FnMut() -> bool) {
     let end = Instant::now() + PATIENCE;
@@ -91,6 +100,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
     let mut node = hub.join();
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
+        let _guard = Guard(&stop);
         // The bus is never quiet.
         scope.spawn(|| {
             for number in 0.. {
@@ -121,9 +131,21 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
             assert!(numbers.len() > 1 && numbers.windows(2).all(|pair| pair[0] + 1 == pair[1]), "{text}");
             first == "< ok >"
         });
-        stop.store(true, Ordering::Relaxed);
         assert!(alone, "a frame always shares the segment of the answer");
     });
+}
+
+#[test]
+fn what_was_on_the_bus_before_raw_mode_is_not_heard() {
+    let (server, hub) = bench();
+    let mut node = hub.join();
+    let mut client = Raw::connect(&server);
+    assert_eq!(client.read(), "< hi >");
+    assert_eq!(client.ask("< open can0 >"), "< ok >");
+    node.send(&numbered(0)).unwrap();
+    assert_eq!(client.ask("< rawmode >"), "< ok >");
+    node.send(&numbered(1)).unwrap();
+    assert!(client.read_until(">").contains(" 00000001 >"));
 }
 
 #[test]
@@ -192,25 +214,31 @@ fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
 
 #[test]
 fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
-    let (server, hub) = bench();
+    // A sender would wait for ever for a member that it waits for.
+    let hub = VirtualHub::with_patience(Duration::MAX);
+    let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     let mut node = hub.join();
     let mut sleeper = Raw::raw_mode(&server);
     let mut listener = open(&server.url("can0")).unwrap();
     // More than waits for it and fits into the buffers of any system.
     let count = 100_000;
-    let mut heard = 0;
-    for number in 0..count {
-        node.send(&numbered(number)).unwrap();
-        // Whoever reads hears all.
-        if number % 1000 == 999 {
-            while heard <= number {
-                assert_eq!(take(&mut listener), numbered(heard));
-                heard += 1;
+    let (done, waited) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let mut heard = 0;
+        for number in 0..count {
+            node.send(&numbered(number)).unwrap();
+            // Whoever reads hears all.
+            if number % 1000 == 999 {
+                while heard <= number {
+                    assert_eq!(take(&mut listener), numbered(heard));
+                    heard += 1;
+                }
             }
         }
-    }
-    let missed = server.stats().missed;
-    assert!(missed > 0, "{:?}", server.stats());
+        done.send(node).unwrap();
+    });
+    let mut node = waited.recv_timeout(10 * PATIENCE).expect("the sleeper holds up the bus");
+    assert!(server.stats().missed > 0, "{:?}", server.stats());
     // It is still a client: it finds the oldest that waited, and with room again hears what is new.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
     until(|| {

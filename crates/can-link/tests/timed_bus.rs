@@ -252,6 +252,14 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
     let events = run(&mut bus, 100 * MS);
     assert!(errors(&events).len() > 500 && errors(&events).iter().all(|e| *e == BusError::NotAcknowledged));
     assert_eq!((bus.state(alone).errors, bus.state(alone).tec), (ErrorState::Passive, Some(128)));
+    // Once passive, it leaves eight more bits to others before each try.
+    let times: Vec<_> = events
+        .iter()
+        .filter(|event| matches!(event.what, Happening::Error { .. }))
+        .map(|event| event.at_ns)
+        .collect();
+    let (active, passive) = (times[1] - times[0], times[101] - times[100]);
+    assert_eq!(passive - active, 8000);
     // One that hears and does not acknowledge does not help; the next does.
     let mute = bus.join();
     bus.set_acknowledges(mute, false);

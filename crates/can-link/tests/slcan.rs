@@ -221,8 +221,10 @@ fn refused_frames_are_sent_again_in_order() {
     for _ in 0..50 {
         assert_eq!(take(&mut bus), frame(0x700, &[]));
     }
+    // The last one, too, although nobody waits for it.
+    bus.send(&frame(0x100, &[50])).unwrap();
     drop(bus);
-    let expected: Vec<_> = (0..50).map(|number| format!("t1001{number:02X}")).collect();
+    let expected: Vec<_> = (0..=50).map(|number| format!("t1001{number:02X}")).collect();
     assert_eq!(adapter.join().unwrap(), expected);
 }
 

@@ -67,6 +67,17 @@ impl Code {
         }
     }
 
+    /// These bytes were written from outside; whether they may be code.
+    pub fn forget(&mut self, address: u32, length: u32) -> bool {
+        let mut code = false;
+        for at in address..address.saturating_add(length) {
+            let Some(place) = self.place(at) else { break };
+            *place &= WATCHED;
+            code = true;
+        }
+        code
+    }
+
     /// ITCM was or will be filled anew.
     pub fn forget_itcm(&mut self) {
         for place in &mut self.itcm {

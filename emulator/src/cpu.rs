@@ -182,9 +182,14 @@ impl Machine {
         self.uc.mem_read_as_vec(u64::from(address), length).ok()
     }
 
-    /// Change memory from outside, as a debugger does; false where nothing is.
+    /// Change memory from outside, as a debugger does, code too; false where nothing is.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> bool {
-        self.uc.mem_write(u64::from(address), bytes).is_ok()
+        let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
+        if written && self.chip().code.forget(address, bytes.len() as u32) {
+            // What was translated from the old code would go on running.
+            let _ = self.uc.ctl_flush_tb();
+        }
+        written
     }
 
     /// Read a register of a peripheral from outside, as a debugger does.

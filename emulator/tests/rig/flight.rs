@@ -69,6 +69,8 @@ impl Bytes<'_> {
 }
 
 impl Flight {
+    /// The inputs are those of the tick, the outputs not yet.
+    pub const PHASE_INPUTS: u32 = 1;
     /// The outputs belong to the tick, too.
     pub const PHASE_COMPLETE: u32 = 2;
 

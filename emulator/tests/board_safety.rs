@@ -1,0 +1,310 @@
+//! What must never go wrong: safety input, a tick that hangs, faults and panics of the program.
+mod rig;
+
+use jtc_bus::Request;
+use jtc_core::{State, Tes, error};
+use jtc_sim::{SimConfig, host as frames};
+use jtc_wire::ExecCommand;
+use openjtc_emulator::clock::{MICROSECOND, Time, to_us};
+use openjtc_emulator::fdcan::Outcome;
+use openjtc_emulator::observe::ResetCause;
+use openjtc_emulator::{BoardConfig, Port};
+use rig::{BOARDS, Flight, Rig};
+
+const HOST: Port = Port::Usart3;
+
+/// A board that holds the arm in a pose in which gravity asks for torque.
+fn holding() -> Rig {
+    let sim = SimConfig { start: [0.0, 0.5, -0.4, 0.3, 0.0, 0.0], ..SimConfig::default() };
+    let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
+    rig.bring_up(HOST);
+    rig.run(100);
+    assert!(rig.flight.torque[1].abs() > 10.0, "{:?}", rig.flight.torque);
+    rig
+}
+
+/// The same, on its way along a trajectory.
+fn moving() -> Rig {
+    let mut rig = holding();
+    let here = rig.telemetry().joints.map(|j| j.set_position);
+    let there = [0.4, 0.2, -0.2, 0.5, 0.3, 0.2];
+    for segment in frames::trajectory(&frames::there_and_back(&here, &there, 1.0, 1, 10), 10, 113) {
+        rig.ask(HOST, &segment);
+    }
+    rig.ask(HOST, &frames::exec(ExecCommand::Execute));
+    rig.run(500);
+    assert_eq!(rig.state(), State::Operate);
+    rig
+}
+
+fn torque_of(frame: &can_link::CanFrame) -> Option<[f64; 6]> {
+    let frame = jtc_bus::Frame::new(frame.id().value() as u16, frame.data())?;
+    match Request::parse(&frame) {
+        Ok(Request::Move { torque, .. }) => Some(torque),
+        _ => None,
+    }
+}
+
+/// J-22, J-12, J-21: Error in the first tick that reads 0, with zero torque in the frame of that tick; a broken wire is the
+/// same; it stays until the wire is well and the host has said so.
+#[test]
+fn j22_the_safety_input_acts_in_one_tick() {
+    for level in [Some(false), None] {
+        for mut rig in [holding(), moving()] {
+            rig.board.set_safety_input(level);
+            rig.step();
+            assert_eq!(rig.state(), State::Error, "{level:?}: in the first tick");
+            assert!(!rig.flight.safety_input && rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
+            let sent: Vec<_> = rig.bus.iter().filter(|e| e.from_controller).map(|e| &e.frame).collect();
+            assert_eq!(sent.into_iter().map(torque_of).collect::<Vec<_>>(), [Some([0.0; 6])], "on the bus");
+            // Clearing helps only when the cause is gone.
+            rig.ask(HOST, &frames::clear_all());
+            rig.run(50);
+            assert_eq!(rig.state(), State::Error);
+            rig.board.set_safety_input(Some(true));
+            rig.run(300);
+            assert_eq!(rig.state(), State::Error, "J-21: the host has not cleared it");
+            rig.ask(HOST, &frames::clear_all());
+            rig.wait_for_hold(15_000);
+            rig.run(500);
+            assert_eq!((rig.state(), rig.telemetry().tes), (State::HoldPos, Tes::Null), "J-24");
+        }
+    }
+}
+
+/// How a program came to its end.
+struct End {
+    /// Fault or last tick.
+    begin: Time,
+    /// Reset.
+    reset: Time,
+    cause: ResetCause,
+    /// What it said.
+    last_words: Vec<u8>,
+    /// Torques of the frames that passed in between.
+    torques: Vec<[f64; 6]>,
+    /// The level of the safety output before the reset.
+    safety: Option<bool>,
+}
+
+/// Lets the board end and start again. `undo` runs before the new program's first tick.
+fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
+    rig.may_hang = true;
+    let begin = rig.board.machine.now();
+    let resets = |rig: &mut Rig| rig.board.machine.chip().observers.resets.len();
+    let before = resets(rig);
+    let log = rig.board.machine.elf().symbol("LAST_WORDS").expect("last words");
+    let mut torques = Vec::new();
+    let mut seen = 0;
+    for _ in 0..20 {
+        // In small steps up to the next millisecond, so that the machine is caught between reset and start.
+        for _ in 0..99 {
+            let safety = rig.board.safety_output();
+            let next = rig.board.machine.now() + 10 * MICROSECOND;
+            rig.board.machine.run_until(next);
+            let log_of_bus = rig.board.machine.chip().fdcan.wire.log();
+            let new =
+                log_of_bus.iter().skip(seen).filter(|e| e.from_controller && e.outcome == Outcome::Good);
+            torques.extend(new.filter(|e| e.start >= begin).filter_map(|e| torque_of(&e.frame)));
+            seen = rig.board.machine.chip().fdcan.wire.log().len();
+            if resets(rig) > before {
+                let reset = rig.board.machine.chip().observers.resets[before];
+                let last_words = rig.board.machine.memory(log.address, 60).expect("memory");
+                undo(rig);
+                rig.step();
+                rig.may_hang = false;
+                return End { begin, reset: reset.time, cause: reset.cause, last_words, torques, safety };
+            }
+        }
+        rig.step();
+        let passed = rig.bus.iter().skip(seen).filter(|e| e.from_controller && e.outcome == Outcome::Good);
+        torques.extend(passed.filter_map(|e| torque_of(&e.frame)));
+        seen = 0;
+    }
+    panic!("no reset");
+}
+
+/// What holds after any such end: the error is there from the first status on, with zero torque and the safety
+/// output at 0, until the host clears it; nothing goes on by itself.
+fn latched_until_cleared(mut rig: Rig, cause: u32) {
+    rig.wait("the first tick", 10, |rig| rig.ticks > 0);
+    assert_eq!(rig.flight.cause, cause);
+    let heard = rig.hosts[1].times.len();
+    rig.wait("the first status", 100, |rig| rig.hosts[1].times.len() > heard);
+    let status = rig.status(HOST);
+    let bits = error::INTERNAL | error::EMERGENCY_OUTPUT;
+    assert_eq!((status.errors & bits, status.occurred & bits), (bits, bits), "J-12: in the first status");
+    assert_eq!((status.jtc_init, status.tes), (7, 0), "nothing is left of what the host gave");
+    for _ in 0..500 {
+        rig.step();
+        assert_eq!(rig.state(), State::Error);
+        assert_eq!(rig.board.safety_output(), Some(false), "J-22");
+        let mut own = rig.bus.iter().filter(|e| e.from_controller);
+        assert!(own.all(|e| torque_of(&e.frame).is_none_or(|torque| torque == [0.0; 6])));
+    }
+    let rest = rig.board.plant().truth().q;
+    rig.ask(HOST, &frames::clear_all());
+    rig.wait("Init", 1_000, |rig| rig.state() == State::Init);
+    rig.run(500);
+    assert_eq!((rig.state(), rig.telemetry().tes), (State::Init, Tes::Null), "J-24");
+    for (now, then) in rig.board.plant().truth().q.into_iter().zip(rest) {
+        assert!((now - then).abs() < 1e-3, "the arm moved by itself");
+    }
+    rig.bring_up(HOST);
+    assert_eq!(rig.board.safety_output(), Some(true));
+}
+
+/// Largest way of a joint since then, rad.
+fn moved(rig: &Rig, since: &[f64; 6]) -> f64 {
+    rig.board.plant().truth().q.iter().zip(since).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+}
+
+const CONTROL_STEP: &str = "control_step";
+
+/// Writes over the first instructions of a function; what was there.
+fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
+    let at = rig.board.machine.elf().symbol(CONTROL_STEP).expect("the control step").address;
+    let old = rig.board.machine.memory(at, code.len()).expect("flash");
+    assert!(rig.board.machine.poke(at, code));
+    (at, old)
+}
+
+/// J-12: a tick that does not end, and one that does not begin, end in a reset by the watchdog within 6 ms.
+#[test]
+fn j12_a_tick_that_hangs_resets_the_board() {
+    // `b .`, and the interrupt of TIM7 masked in the NVIC.
+    for hang in [true, false] {
+        let mut rig = holding();
+        let pose = rig.board.plant().truth().q;
+        let end = if hang {
+            let (at, old) = patch(&mut rig, &[0xFE, 0xE7]);
+            until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)))
+        } else {
+            rig.board.machine.write_register(0xE000_E184, 1 << (55 - 32));
+            until_reset(&mut rig, |_| ())
+        };
+        assert_eq!(end.cause, ResetCause::Watchdog);
+        let us = to_us(end.reset - end.begin);
+        println!("hang {hang}: reset after {us} µs");
+        assert!((3_000..6_000).contains(&us), "{us} µs");
+        rig.run(20);
+        let way = moved(&rig, &pose);
+        println!("the arm moved by {way:.6} rad");
+        assert!(way < 0.01, "{way} rad");
+        latched_until_cleared(rig, 4);
+    }
+}
+
+/// In motion, too; the trajectory is not gone on with.
+#[test]
+fn j24_after_a_hang_no_trajectory_goes_on() {
+    let mut rig = moving();
+    let (at, old) = patch(&mut rig, &[0xFE, 0xE7]);
+    until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
+    latched_until_cleared(rig, 4);
+}
+
+/// A fault and a panic: safety output to 0, one frame with zero torque, then the reset; the cause is kept.
+fn said_goodbye(end: &End) {
+    assert_eq!(end.cause, ResetCause::Software);
+    assert_eq!(
+        end.torques.last(),
+        Some(&[0.0; 6]),
+        "zero torque is the last word on the bus: {:?}",
+        end.torques
+    );
+    assert_eq!(end.safety, Some(false), "J-22: before the reset");
+    let us = to_us(end.reset - end.begin);
+    println!("reset after {us} µs");
+    assert!(us < 2_500, "{us} µs");
+}
+
+fn words(end: &End, n: usize) -> u32 {
+    u32::from_le_bytes(end.last_words[4 * n..][..4].try_into().expect("four"))
+}
+
+#[test]
+fn j12_a_hard_fault_takes_the_torque_away() {
+    for mut rig in [holding(), moving()] {
+        // An instruction that does not exist.
+        let (at, old) = patch(&mut rig, &[0x00, 0xDE]);
+        let end = until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
+        said_goodbye(&end);
+        assert_eq!(&end.last_words[..4], b"HFLT");
+        assert_eq!(words(&end, 2), at, "where it was");
+        assert_ne!(words(&end, 4) & 1 << 16, 0, "CFSR: undefined instruction");
+        latched_until_cleared(rig, 5);
+    }
+}
+
+/// A wild pointer: a load from where nothing is, in the tick.
+#[test]
+fn j12_a_null_pointer_is_a_hard_fault() {
+    let mut rig = holding();
+    // `movw r0, 0; movt r0, 0x6000; ldr r0, [r0]`: external memory, which is not there.
+    let (at, old) = patch(&mut rig, &[0x40, 0xF2, 0x00, 0x00, 0xC6, 0xF2, 0x00, 0x00, 0x00, 0x68]);
+    let end = until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
+    said_goodbye(&end);
+    assert_eq!((&end.last_words[..4], words(&end, 6)), (&b"HFLT"[..], 0x6000_0000), "and its address");
+    latched_until_cleared(rig, 5);
+}
+
+/// `b.w` from one address to another.
+fn branch(from: u32, to: u32) -> [u8; 4] {
+    let offset = to.wrapping_sub(from + 4);
+    let bit = |n: u32| offset >> n & 1;
+    let (s, i1, i2) = (bit(24), bit(23), bit(22));
+    let (j1, j2) = (1 ^ i1 ^ s, 1 ^ i2 ^ s);
+    let first = 0xF000 | s << 10 | offset >> 12 & 0x3FF;
+    let second = 0x9000 | j1 << 13 | j2 << 11 | offset >> 1 & 0x7FF;
+    let ([a, b], [c, d]) = ((first as u16).to_le_bytes(), (second as u16).to_le_bytes());
+    [a, b, c, d]
+}
+
+#[test]
+fn j12_a_panic_takes_the_torque_away() {
+    let mut rig = holding();
+    // Any of the functions that panic; all take a place in the source as one of their first arguments, if any.
+    const PANICS: [&str; 4] = [
+        "core::option::unwrap_failed",
+        "core::panicking::panic_bounds_check",
+        "core::result::unwrap_failed",
+        "core::panicking::panic",
+    ];
+    let elf = rig.board.machine.elf();
+    let panic = PANICS.iter().find_map(|name| elf.symbol(name).ok()).expect("a function that panics").address;
+    // In flash that is free: the four arguments, the branch, a `Location`, a name.
+    const STUB: u32 = 0x080F_0000;
+    let mut stub = vec![0x03, 0x48, 0x01, 0x46, 0x02, 0x46, 0x03, 0x46];
+    stub.extend(branch(STUB + 8, panic));
+    stub.extend([0x00, 0xBF, 0x00, 0xBF]);
+    for word in [STUB + 20, STUB + 36, 7, 77, 1] {
+        stub.extend(word.to_le_bytes());
+    }
+    stub.extend(b"hung.rs\0");
+    assert!(rig.board.machine.poke(STUB, &stub));
+    let at = rig.board.machine.elf().symbol(CONTROL_STEP).expect("the control step").address;
+    let (at, old) = patch(&mut rig, &branch(at, STUB));
+    let end = until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
+    said_goodbye(&end);
+    assert_eq!(&end.last_words[..4], b"PANC");
+    let name = String::from_utf8_lossy(&end.last_words[28..60]);
+    let name = name.trim_end_matches('\0');
+    println!("panic in {name} line {}", words(&end, 1));
+    assert!(name.ends_with(".rs") && words(&end, 1) > 0, "{name}");
+    latched_until_cleared(rig, 6);
+}
+
+/// The button and the supply are no failures: the board starts as if nothing had been, in Init, and moves nothing.
+#[test]
+fn j24_reset_and_power_on_begin_in_init() {
+    for (cause, number) in [(ResetCause::Pin, 2), (ResetCause::PowerOn, 1)] {
+        let mut rig = moving();
+        rig.board.machine.reset(cause);
+        rig.run(200);
+        assert_eq!(rig.flight.cause, number);
+        assert_eq!((rig.state(), rig.telemetry().errors), (State::Init, 0));
+        assert_eq!((rig.status(HOST).jtc_init, rig.telemetry().tes), (7, Tes::Null));
+        assert_eq!(rig.flight.phase, Flight::PHASE_COMPLETE);
+    }
+}

@@ -112,6 +112,29 @@ const ROWS: &[Row] = &[
         "KiB",
     ),
     row(
+        "UCoM: numbers for 31 boards / time on the bus",
+        "ucom_init_31_s",
+        &["ucom_init_31_bus_s"],
+        Target::None,
+        "s",
+    ),
+    row(
+        "UCoM: update of 60 KiB / time on the bus, without a frame gap",
+        "ucom_update_60k_no_gap_share",
+        &[],
+        Target::AtMost(1.25),
+        "×",
+    ),
+    row(
+        "UCoM: the same with the gap of 200 µs that boards are given",
+        "ucom_update_60k_share",
+        &[],
+        Target::None,
+        "×",
+    ),
+    row("UCoM: frames read / cantools", "ucom_decode_frames_s", &["cantools_frames_s"], Target::None, "1/s"),
+    row("UCoM: memory of a board's node", "ucom_node_bytes", &[], Target::AtMost(4096.0), "B"),
+    row(
         "tracking, worst joint / PID on straight lines",
         "tracking_worst_rms_mrad",
         &["tracking_plain_worst_rms_mrad"],
@@ -139,6 +162,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             samples.entry(name).or_default().push(value);
         }
     }
+    samples.entry("cantools_frames_s".into()).or_default().push(cantools(&work)?);
     println!("\nanchors, in turn with our own dynamics");
     for (name, value) in anchors(&work, &kernels, rounds, &mut skipped)? {
         samples.entry(name).or_default().push(value);
@@ -196,6 +220,18 @@ fn own_figures() -> Result<Figures> {
     figures.insert("sim_ms_ns".into(), ns);
     figures.insert("sim_times_real_time".into(), 1e6 / ns);
     Ok(figures)
+}
+
+/// Frames that python-can and cantools read in a second, of those that our own example reads.
+fn cantools(work: &std::path::Path) -> Result<f64> {
+    let frames = work.join("ucom-frames.log");
+    let mut ours =
+        cargo(&["run", "--release", "--quiet", "--package", "xtask", "--example", "figures", "--", "ucom"]);
+    shell::read(ours.env("OPENJTC_UCOM_FRAMES", &frames))?;
+    let mut script = command(python::environment("requirements.txt")?);
+    script.arg(root().join("references/ucom/read_frames.py")).arg(frames.with_extension("dbc")).arg(&frames);
+    script.env("PYTHONDONTWRITEBYTECODE", "1");
+    shell::read(&mut script)?.trim().parse().context("read_frames.py printed no number")
 }
 
 /// The numbers of a JSON object.

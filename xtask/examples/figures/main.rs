@@ -1,12 +1,13 @@
 //! Measures what the crates reach together and prints lines `name value`; `cargo xtask bench` puts them beside the others.
 //!
-//! `figures [libm|tick|line|tracking]`: all, or one group. Everything in virtual time is the same on every run.
+//! `figures [libm|tick|line|tracking|ucom]`: all, or one group. Everything in virtual time is the same on every run.
 
 mod libm;
 mod line;
 mod path;
 mod tick;
 mod tracking;
+mod ucom_bus;
 mod world;
 
 fn main() -> world::Result<()> {
@@ -23,6 +24,9 @@ fn main() -> world::Result<()> {
     }
     if wanted("tracking") {
         tracking::figures()?;
+    }
+    if wanted("ucom") {
+        ucom_bus::figures()?;
     }
     Ok(())
 }

@@ -1,0 +1,225 @@
+//! UCoM: numbers for 31 boards and 60 KiB of firmware for one, against the time that their frames take on the bus; reading
+//! frames; memory of a board.
+use std::hint::black_box;
+use std::time::Instant;
+
+use can_link::{CanFrame, Happening, Id, MemberId, TimedBus};
+use ucom::chain::{ChainConfig, ChainSim};
+use ucom::files::{DbcBoard, dbc};
+use ucom::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
+use ucom::master::{Event, InitOptions, Master, Outcome, Request};
+use ucom::node::Node;
+use ucom::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+use ucom::{Format, Frame, FromBoard, Function, Profile, ToBoard};
+
+use crate::print;
+use crate::world::Result;
+
+const BITRATE: u32 = 1_000_000;
+const NS_PER_US: u64 = 1000;
+
+/// The PC side, a bus and a chain of boards, in virtual time.
+struct Bench {
+    master: Master,
+    bus: TimedBus,
+    tool: MemberId,
+    boards: Vec<MemberId>,
+    chain: ChainSim,
+    /// Every frame, in the order of the bus.
+    heard: Vec<CanFrame>,
+    /// When the last frame of program data was over, and the time that boards took to answer such ones, ns.
+    asked_at: Option<u64>,
+    turn_round_ns: u64,
+}
+
+/// What a procedure cost.
+struct Cost {
+    seconds: f64,
+    busy_seconds: f64,
+    turn_round_seconds: f64,
+    outcome: Outcome,
+}
+
+fn to_wire(frame: &Frame) -> Result<CanFrame> {
+    Ok(CanFrame::classic(Id::standard(frame.id().into())?, frame.data())?)
+}
+
+fn function(frame: &Frame) -> Option<Function> {
+    frame.address().ok().map(|(function, _)| function)
+}
+
+impl Bench {
+    fn new(boards: usize, profile: Profile) -> Self {
+        let config = ChainConfig::head(&profile).with_boards(boards, &profile);
+        let chain = ChainSim::new(&config, Vec::new(), 1, &profile);
+        let mut bus = TimedBus::new(BITRATE, 1);
+        let tool = bus.join();
+        let boards = (0..chain.members()).map(|_| bus.join()).collect();
+        let master = Master::new(profile);
+        Self { master, bus, tool, boards, chain, heard: Vec::new(), asked_at: None, turn_round_ns: 0 }
+    }
+
+    fn now_us(&self) -> u64 {
+        self.bus.now_ns() / NS_PER_US
+    }
+
+    /// Runs a procedure to its end.
+    fn run(&mut self, request: Request) -> Result<Cost> {
+        let before = self.bus.stats();
+        self.turn_round_ns = 0;
+        let id = self.master.start(self.now_us(), request)?;
+        loop {
+            self.step()?;
+            while let Some(event) = self.master.take_event() {
+                let Event::Done { id: done, result } = event else { continue };
+                if done != id {
+                    continue;
+                }
+                let after = self.bus.stats();
+                let seconds = |ns: u64| ns as f64 * 1e-9;
+                return Ok(Cost {
+                    seconds: seconds(after.now_ns - before.now_ns),
+                    busy_seconds: seconds(after.busy_ns - before.busy_ns),
+                    turn_round_seconds: seconds(self.turn_round_ns),
+                    outcome: result?,
+                });
+            }
+        }
+    }
+
+    /// Lets all parties send, then goes on to the next thing that happens.
+    fn step(&mut self) -> Result<()> {
+        let now = self.now_us();
+        self.chain.advance(now);
+        for (number, member) in self.boards.iter().enumerate() {
+            while let Some(frame) = self.chain.poll(number) {
+                self.bus.queue(*member, to_wire(&frame)?)?;
+            }
+        }
+        while let Some(frame) = self.master.poll(now) {
+            self.bus.queue(self.tool, to_wire(&frame)?)?;
+        }
+        let due = self.chain.next_due_us().min(self.master.next_deadline().unwrap_or(u64::MAX)).max(now + 1);
+        let due_ns = due.saturating_mul(NS_PER_US).min(self.bus.next_ns().unwrap_or(u64::MAX));
+        while let Some(event) = self.bus.advance_to(due_ns) {
+            match event.what {
+                Happening::Received { member, frame } if member == self.tool => self.tell_tool(&frame),
+                Happening::Received { member, frame } => {
+                    if let Some(number) = self.boards.iter().position(|board| *board == member) {
+                        self.chain.hear(number, frame.id().value(), Format::BUS, frame.data());
+                    }
+                }
+                Happening::Sent { member, frame } => self.sent(member, &frame)?,
+                other => return Err(format!("nothing is disturbed here, and yet: {other:?}").into()),
+            }
+        }
+        Ok(())
+    }
+
+    fn tell_tool(&mut self, frame: &CanFrame) {
+        self.heard.push(*frame);
+        let received = Frame::received(frame.id().value(), Format::BUS, frame.data());
+        if let Ok(frame) = &received
+            && matches!(function(frame), Some(Function::DspReady | Function::ProgFinished))
+            && let Some(asked) = self.asked_at.take()
+        {
+            self.turn_round_ns += self.bus.now_ns() - asked;
+        }
+        let now = self.now_us();
+        self.master.handle(now, received);
+    }
+
+    fn sent(&mut self, member: MemberId, wire: &CanFrame) -> Result<()> {
+        let id = u16::try_from(wire.id().value())?;
+        let frame = Frame::new(id, wire.data()).ok_or("a frame of this protocol")?;
+        if member == self.tool {
+            self.heard.push(*wire);
+            if function(&frame) == Some(Function::Prog) {
+                self.asked_at = Some(self.bus.now_ns());
+            }
+        } else if let Some(number) = self.boards.iter().position(|board| *board == member) {
+            self.chain.sent(number, &frame);
+        }
+        Ok(())
+    }
+}
+
+pub fn figures() -> Result<()> {
+    let mut chain = Bench::new(31, Profile::default());
+    let cost = chain.run(Request::Init(InitOptions::default()))?;
+    let Outcome::Init(report) = &cost.outcome else { return Err("init ended otherwise".into()) };
+    if report.boards.len() != 31 {
+        return Err(format!("{} of 31 boards have a number", report.boards.len()).into());
+    }
+    print("ucom_init_31_s", cost.seconds);
+    print("ucom_init_31_bus_s", cost.busy_seconds);
+
+    for (name, gap_us) in
+        [("ucom_update_60k", Profile::default().prog_frame_gap_us), ("ucom_update_60k_no_gap", 0)]
+    {
+        update(name, Profile { prog_frame_gap_us: gap_us, ..Profile::default() })?;
+    }
+    decode(&chain.heard)?;
+    type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
+    let around = size_of::<(MemoryFlash, WirePins, MemoryStore, MemoryApplication)>();
+    print("ucom_node_bytes", (size_of::<Board>() - around) as f64);
+    Ok(())
+}
+
+/// 60 KiB for one board; from the start of the procedure to the last read-back.
+fn update(name: &str, profile: Profile) -> Result<()> {
+    let mut bench = Bench::new(1, profile);
+    bench.run(Request::Init(InitOptions::default()))?;
+    let bytes = (0..60 * 1024_u32).map(|i| (37 * i + 11) as u8).collect();
+    let image = UpdateImage { bytes, address_words: 0 };
+    let options = UpdateOptions::new(vec![UpdateTarget { board: 1, flash_number: None }], image, 0x3AC1);
+    let cost = bench.run(Request::Update(options))?;
+    let Outcome::Update(report) = &cost.outcome else { return Err("update ended otherwise".into()) };
+    if report.exit_code() != 0 {
+        return Err(format!("the update failed: {report:?}").into());
+    }
+    print(&format!("{name}_s"), cost.seconds);
+    print(&format!("{name}_bus_s"), cost.busy_seconds);
+    print(&format!("{name}_turn_round_s"), cost.turn_round_seconds);
+    // What the PC adds to the bus's own time, the boards' answers and the wait for a board that restarts.
+    let waits = cost.turn_round_seconds + f64::from(profile.xreset_wait) * 1e-3;
+    print(&format!("{name}_share"), (cost.seconds - waits) / cost.busy_seconds);
+    Ok(())
+}
+
+/// Frames that are read in a second, of those that numbering a chain takes.
+fn decode(heard: &[CanFrame]) -> Result<()> {
+    let profile = Profile::default();
+    let frames: Vec<Frame> = heard
+        .iter()
+        .filter_map(|frame| Frame::received(frame.id().value(), Format::BUS, frame.data()).ok())
+        .collect();
+    let mut best = f64::INFINITY;
+    for _ in 0..20 {
+        let start = Instant::now();
+        for _ in 0..20 {
+            for frame in black_box(&frames) {
+                black_box(
+                    FromBoard::decode(frame, &profile).is_ok() || ToBoard::decode(frame, &profile).is_ok(),
+                );
+            }
+        }
+        best = best.min(start.elapsed().as_secs_f64() / (20 * frames.len()) as f64);
+    }
+    print("ucom_decode_frames_s", 1.0 / best);
+    if let Some(path) = std::env::var_os("OPENJTC_UCOM_FRAMES") {
+        // For the other reader: one frame a line.
+        let text: String = heard.iter().map(|frame| format!("(0.0) can0 {}\n", candump(frame))).collect();
+        std::fs::write(&path, text)?;
+        let board = |number| DbcBoard { number, ..DbcBoard::default() };
+        let dbc = dbc(&(1..=31).map(board).collect::<Vec<_>>(), profile.endian);
+        std::fs::write(std::path::Path::new(&path).with_extension("dbc"), dbc)?;
+    }
+    Ok(())
+}
+
+/// As candump writes it.
+fn candump(frame: &CanFrame) -> String {
+    let data: String = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
+    format!("{:03X}#{data}", frame.id().value())
+}

@@ -206,3 +206,23 @@ fn d07_reports_by_data_byte() {
     assert!(report.findings.contains(&ScanFinding::Unnumbered { ucom_id: 0x21 }));
     assert!(report.findings.contains(&ScanFinding::Disagrees { ucom_id: 0x21 }));
 }
+
+/// D-14: before a request is repeated the truncated answer must have run dry, or old and new packages mix.
+#[test]
+fn d14_a_truncated_answer_runs_dry() {
+    let info = "141#2100011B34126E38";
+    let late = [
+        info,
+        "1:141#0300",
+        "2:141#6162636465666768",
+        "130:141#6162636465666768",
+        "180:141#6162636465666768",
+    ];
+    let whole = [info, "1:141#0100", "2:141#6865616420"];
+    let mut bench = Bench::script(Script::default().once("201#", &late).on("201#", &whole));
+    let Ok(Outcome::Info(seen)) = bench.go(Request::Info { board: 1 }, 5) else { panic!() };
+    assert_eq!(seen.description.as_deref(), Some("head "));
+    let asked = bench.times_of("201#");
+    assert_eq!(asked.len(), 2);
+    assert!(asked[1] >= asked[0] + 280_000, "{asked:?}");
+}

@@ -104,6 +104,8 @@ struct Loader {
     delay: fn(usize) -> u64,
     /// Answer to a block instead of READY; empty: none.
     special: fn(usize, usize) -> Option<&'static str>,
+    /// After this frame the board complains at once and takes no more.
+    refuses_at: Option<usize>,
     out: Vec<(u64, Frame)>,
     waiting: bool,
     status: u8,
@@ -118,6 +120,7 @@ impl Loader {
             resets: 0,
             delay: |_| 1,
             special: |_, _| None,
+            refuses_at: None,
             out: Vec::new(),
             waiting: false,
             status: 0x1B,
@@ -160,6 +163,12 @@ impl Member for Loader {
             }
             _ if text.starts_with("2C1#") => {
                 self.frames += 1;
+                if self.refuses_at == Some(self.frames) {
+                    self.say(now + 10, "081#02");
+                }
+                if self.refuses_at.is_some_and(|at| self.frames >= at) {
+                    return;
+                }
                 if self.frames.is_multiple_of(8) {
                     let block = self.frames / 8 - 1;
                     let usual = if block + 1 == self.blocks { "101#" } else { "181#" };
@@ -247,6 +256,16 @@ fn p11_attempts_by_error() {
     let mut bench = loader(Loader { special, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 2));
+}
+
+/// An error in the middle of a block is an answer, too: no waiting for READY, no further attempt.
+#[test]
+fn errors_in_the_middle_of_a_block_count() {
+    let mut bench = loader(Loader { refuses_at: Some(3), ..Loader::new(34) });
+    let report = update(&mut bench, options(&[1], 1000));
+    assert_eq!((bench.count("041#"), report.exit_code()), (1, 1), "{report:?}");
+    let code = |f: &UpdateFailure| matches!(f, UpdateFailure::Device { code, .. } if code.number() == 2);
+    assert!(report.boards[0].failure.as_ref().is_some_and(code));
 }
 
 /// An overrun makes the next attempt leave more time between frames.

@@ -7,7 +7,20 @@ use std::{env, fs};
 const BAUD_DEFAULT: u32 = 115_200;
 const BAUD_MAX: u32 = 15_000_000;
 
+const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
+
 fn main() {
+    let chosen = |board: &&str| {
+        let feature = board.to_uppercase().replace('-', "_");
+        env::var_os(format!("CARGO_FEATURE_{feature}")).is_some()
+    };
+    let boards = BOARDS.iter().filter(|board| chosen(board)).count();
+    if boards != 1 {
+        panic!(
+            "{boards} boards: choose one by --no-default-features --features BOARD, where BOARD is one of {BOARDS:?}"
+        );
+    }
+
     let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it"));
     fs::copy("memory.x", out.join("memory.x")).expect("memory.x is beside this file");
     println!("cargo::rustc-link-search={}", out.display());

@@ -9,7 +9,6 @@ mod firmware;
 mod fuzz;
 mod links;
 // For the checks of the board's program.
-#[allow(dead_code)]
 mod panics;
 mod python;
 mod rules;

@@ -113,6 +113,8 @@ struct Running {
     exception: usize,
     start: u64,
     excluded: u64,
+    /// Stack pointer when it began.
+    base: Option<u32>,
 }
 
 /// All observers.
@@ -126,6 +128,8 @@ pub struct Observers {
     pub latencies: Vec<Latency>,
     /// Lowest stack pointer while exception n ran; 0: no exception.
     pub lowest_sp: Vec<u32>,
+    /// Most bytes of stack that exception n took in one run, with the frames of those that interrupted it; not for 0.
+    pub deepest: Vec<u32>,
     /// Resets, oldest first.
     pub resets: Vec<Reset>,
     /// Faults, oldest first.
@@ -141,6 +145,7 @@ impl Default for Observers {
             handlers: vec![Count::default(); EXCEPTIONS],
             latencies: vec![Latency::default(); EXCEPTIONS],
             lowest_sp: vec![u32::MAX; EXCEPTIONS],
+            deepest: vec![0; EXCEPTIONS],
             resets: Vec::new(),
             faults: Vec::new(),
         }
@@ -167,6 +172,7 @@ impl Observers {
         self.handlers.fill(Count::default());
         self.latencies.fill(Latency::default());
         self.lowest_sp.fill(u32::MAX);
+        self.deepest.fill(0);
     }
 
     /// A watched instruction comes; the return address to watch when a function begins here.
@@ -200,7 +206,7 @@ impl Observers {
             latency.worst = latency.last;
             latency.at = now;
         }
-        self.running.push(Running { exception, start: instructions, excluded: 0 });
+        self.running.push(Running { exception, start: instructions, excluded: 0, base: None });
     }
 
     /// The innermost exception returns.
@@ -223,7 +229,12 @@ impl Observers {
 
     /// The stack pointer now.
     pub fn note_sp(&mut self, sp: u32) {
-        let context = self.running.last().map_or(0, |r| r.exception);
+        let mut context = 0;
+        if let Some(running) = self.running.last_mut() {
+            context = running.exception;
+            let base = *running.base.get_or_insert(sp);
+            self.deepest[context] = self.deepest[context].max(base.saturating_sub(sp));
+        }
         self.lowest_sp[context] = self.lowest_sp[context].min(sp);
     }
 

@@ -20,7 +20,7 @@ use jtc_sim::{FaultKind, host as frames};
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
 
 #[allow(unused_imports, reason = "each test uses its part")]
-pub use elf::{BOARDS, elf, fast_elf, version};
+pub use elf::{BOARDS, Version, elf, fast_elf, version};
 pub use flight::{FLIGHT_SIZE, Flight};
 pub use host::Host;
 pub use shadow::Shadow;

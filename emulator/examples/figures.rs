@@ -1,0 +1,125 @@
+//! Figures of a board's program, counted on the emulated chip: instructions, latencies of interrupts, stack.
+//!
+//! `cargo run --release --example figures -- ELF [--cycles]` prints lines that are the same on every machine. `--cycles` adds what
+//! llvm-mca's model of the Cortex-M7 makes of one control step, which depends on the version of LLVM.
+#[path = "figures/cycles.rs"]
+mod cycles;
+#[path = "../tests/rig/mod.rs"]
+mod rig;
+#[path = "figures/session.rs"]
+mod session;
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use openjtc_emulator::clock::to_ns;
+use openjtc_emulator::observe::Observers;
+use openjtc_emulator::{BoardConfig, Elf, FIRST_LINE};
+use rig::Rig;
+use session::Session;
+
+/// Handlers of the program, by their number in the vector table and the priority that they run at.
+const HANDLERS: [(&str, usize); 8] = [
+    ("TIM7, the tick", FIRST_LINE + 55),
+    ("TIM5, time of the links", FIRST_LINE + 50),
+    ("USART2", FIRST_LINE + 38),
+    ("USART3", FIRST_LINE + 39),
+    ("DMA1 stream 0", FIRST_LINE + 11),
+    ("DMA1 stream 1", FIRST_LINE + 12),
+    ("DMA1 stream 2", FIRST_LINE + 13),
+    ("DMA1 stream 3", FIRST_LINE + 14),
+];
+
+/// Longest time from the tick's timer to its first instruction, ns.
+const LATENCY_MAX: u64 = 1_000;
+
+/// Bytes of stack that are never to be used.
+const STACK_SPARE: u32 = 4_096;
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("figures: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    let with_cycles = arguments.iter().any(|a| a == "--cycles");
+    arguments.retain(|a| a != "--cycles");
+    let [path] = &arguments[..] else { return Err("one ELF file is needed".into()) };
+    let elf = Elf::parse(&std::fs::read(path).map_err(|e| format!("{path}: {e}"))?)?;
+    let version = rig::version(&elf).ok_or("the file has no version record")?;
+    let stack = stack(&elf)?;
+    let rig = Rig::of(elf, &BoardConfig { baud: version.baud, ..Default::default() });
+    let mut session = Session::new(rig)?;
+    session.run();
+
+    println!("  control step, instructions:");
+    for (state, steps) in session.steps() {
+        println!("    {state}: {} to {} in {} steps", steps.min, steps.max, steps.count);
+    }
+    println!("  control step that works at what a host sent, instructions:");
+    for (name, state, steps) in session.serving() {
+        println!("    {name} in {state}: {} to {} in {} steps", steps.min, steps.max, steps.count);
+    }
+    let mut machine = session.into_machine();
+    let observers = &machine.chip().observers;
+    println!("  with a host at {} Bd on each line, the arm moving:", version.baud);
+    handlers(observers)?;
+    stacks(observers, stack)?;
+    if with_cycles {
+        cycles::print(path, &version)?;
+    }
+    Ok(())
+}
+
+/// First address above the stack, and its last.
+fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
+    let word = elf.segments.iter().find(|(at, _)| *at == 0x0800_0000).ok_or("no vector table")?;
+    let top = u32::from_le_bytes(word.1[..4].try_into()?);
+    // The stack fills the tightly coupled memory from its beginning.
+    Ok((top, 0x2000_0000))
+}
+
+/// Each handler: its instructions without those of handlers that interrupt it, how late it began, its stack.
+fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
+    for (name, number) in HANDLERS {
+        let (count, latency) = (observers.handlers[number], observers.latencies[number]);
+        if count.calls > 0 {
+            println!(
+                "    {name}: {} to {} instructions, begins at most {} ns late",
+                count.min,
+                count.max,
+                to_ns(latency.worst)
+            );
+        }
+    }
+    let tick = to_ns(observers.latencies[HANDLERS[0].1].worst);
+    if tick > LATENCY_MAX {
+        return Err(format!("the tick begins {tick} ns late, {LATENCY_MAX} ns are allowed").into());
+    }
+    Ok(())
+}
+
+/// Bytes by context, with the frames of what interrupts it; each may be interrupted by those of a higher priority.
+fn stacks(observers: &Observers, (top, bottom): (u32, u32)) -> Result<(), Box<dyn Error>> {
+    let size = top - bottom;
+    let mut sum = top - observers.lowest_sp[0];
+    println!("  stack, bytes:");
+    println!("    start and links: {sum}");
+    for (name, number) in HANDLERS {
+        if observers.handlers[number].calls > 0 {
+            println!("    {name}: {}", observers.deepest[number]);
+            sum += observers.deepest[number];
+        }
+    }
+    println!("    all at once: {sum} of {size}");
+    if sum + STACK_SPARE > size {
+        return Err(format!("the stack has {size} bytes, {STACK_SPARE} of which should be spare").into());
+    }
+    Ok(())
+}

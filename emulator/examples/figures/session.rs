@@ -1,0 +1,174 @@
+//! The session that is measured: every state, with traffic on both lines all the time.
+use std::collections::BTreeMap;
+use std::error::Error;
+
+use jtc_core::{State, Tes};
+use jtc_sim::host as frames;
+use jtc_wire::{ExecCommand, FrameType, RawPoint, fixed, trajectory};
+use openjtc_emulator::{Machine, Port};
+
+use crate::rig::Rig;
+
+/// The commanding host.
+const HOST: Port = Port::Usart2;
+/// The one that only makes traffic.
+const OTHER: Port = Port::Usart3;
+
+/// Instructions of some steps.
+#[derive(Clone, Copy, Default)]
+pub struct Steps {
+    pub count: u64,
+    pub min: u64,
+    pub max: u64,
+}
+
+impl Steps {
+    fn add(&mut self, instructions: u64) {
+        self.min = if self.count == 0 { instructions } else { self.min.min(instructions) };
+        self.max = self.max.max(instructions);
+        self.count += 1;
+    }
+}
+
+/// Names of the states, by number.
+const STATES: [&str; 6] = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
+
+/// A rig whose control steps are counted.
+pub struct Session {
+    pub rig: Rig,
+    counter: openjtc_emulator::Counter,
+    calls: u64,
+    steps: BTreeMap<u8, Steps>,
+    serving: BTreeMap<(u8, u8), Steps>,
+    traffic: Vec<Vec<u8>>,
+    turn: usize,
+}
+
+impl Session {
+    /// Before the first tick.
+    pub fn new(mut rig: Rig) -> Result<Self, Box<dyn Error>> {
+        let counter = rig.board.machine.count("control_step")?;
+        let mut long = vec![0; 60_000];
+        let n = trajectory(&mut long, (1, 0, 1), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
+        long.truncate(n);
+        // What a host could send at any time: refused, good, and bytes that are none, full of headers.
+        let traffic = vec![
+            long,
+            fixed::CLEAR_OCCURRED_ERRORS.to_vec(),
+            [0x9B, 0x04, 0xEA, 0x56].repeat(250),
+            fixed::PUMP_OFF.to_vec(),
+        ];
+        Ok(Self {
+            rig,
+            counter,
+            calls: 0,
+            steps: BTreeMap::new(),
+            serving: BTreeMap::new(),
+            traffic,
+            turn: 0,
+        })
+    }
+
+    /// Everything.
+    pub fn run(&mut self) {
+        self.hold();
+        self.run_ms(1_000);
+        self.execute();
+        self.run_ms(600);
+        self.write(&frames::exec(ExecCommand::Pause));
+        self.until("pause", 3_000, |rig| rig.telemetry().tes == Tes::Pause);
+        self.write(&frames::exec(ExecCommand::Execute));
+        self.until("the end", 6_000, |rig| rig.telemetry().tes == Tes::Finish);
+        self.write(&fixed::TEACHING_MODE_ENABLE);
+        self.until("teaching", 2_000, |rig| rig.state() == State::Teaching);
+        self.run_ms(1_000);
+        self.write(&fixed::TEACHING_MODE_DISABLE);
+        self.until("no teaching", 2_000, |rig| rig.state() == State::HoldPos);
+        self.rig.board.set_safety_input(Some(false));
+        self.run_ms(500);
+        self.rig.board.set_safety_input(Some(true));
+        self.write(&frames::clear_all());
+        self.until("the arm is held again", 20_000, |rig| rig.state() == State::HoldPos);
+    }
+
+    /// From power-on to every joint enabled and held.
+    pub fn hold(&mut self) {
+        self.until("the first tick", 50, |rig| rig.ticks > 0);
+        self.run_ms(300);
+        self.write(&frames::use_defaults());
+        self.until("the arm is held", 20_000, |rig| {
+            let nodes = rig.board.plant().node_states();
+            rig.state() == State::HoldPos && nodes[..6] == [jtc_bus::fsm::ENABLED; 6]
+        });
+    }
+
+    /// Uploads a motion that takes every joint along, and starts it.
+    pub fn execute(&mut self) {
+        let goal = [0.6, 0.5, -0.6, 0.5, -0.4, 0.8];
+        for segment in frames::trajectory(&frames::there_and_back(&[0.0; 6], &goal, 1.5, 1, 5), 5, 113) {
+            self.write(&segment);
+        }
+        self.until("the upload", 10_000, |rig| rig.telemetry().tes == Tes::Stop);
+        self.write(&frames::exec(ExecCommand::Execute));
+        self.until("the beginning", 3_000, |rig| rig.telemetry().point > 0);
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        self.rig.write(HOST, bytes);
+    }
+
+    fn step(&mut self) {
+        if self.rig.board.pending(OTHER) < 500 {
+            let next = self.traffic[self.turn].clone();
+            self.turn = (self.turn + 1) % self.traffic.len();
+            self.rig.write(OTHER, &next);
+        }
+        self.rig.step();
+        let count = self.rig.board.machine.counted(self.counter);
+        if count.calls > self.calls {
+            assert_eq!(count.calls, self.calls + 1, "one control step a millisecond");
+            self.calls = count.calls;
+            let (state, event) = (self.rig.flight.state, self.rig.flight.event);
+            match event.kind {
+                0 => self.steps.entry(state).or_default().add(count.last),
+                kind => {
+                    let frame_type = if kind == 1 { event.frame_type } else { 0 };
+                    self.serving.entry((frame_type, state)).or_default().add(count.last);
+                }
+            }
+        }
+    }
+
+    /// Lets time pass.
+    pub fn run_ms(&mut self, ms: u64) {
+        (0..ms).for_each(|_| self.step());
+    }
+
+    fn until(&mut self, what: &str, ms: u64, done: impl Fn(&Rig) -> bool) {
+        for _ in 0..ms {
+            if done(&self.rig) {
+                return;
+            }
+            self.step();
+        }
+        panic!("{what}: not within {ms} ms, {:?}", self.rig.state());
+    }
+
+    /// Steps without anything from a host, by the name of the state.
+    pub fn steps(&self) -> impl Iterator<Item = (&'static str, Steps)> {
+        self.steps.iter().map(|(state, steps)| (STATES[usize::from(*state)], *steps))
+    }
+
+    /// Steps that work at something from a host: what it is, in which state.
+    pub fn serving(&self) -> impl Iterator<Item = (String, &'static str, Steps)> {
+        self.serving.iter().map(|((frame_type, state), steps)| {
+            let name = FrameType::from_byte(*frame_type).map_or("no frame".to_owned(), |t| t.to_string());
+            (name, STATES[usize::from(*state)], *steps)
+        })
+    }
+
+    /// The machine, with what it counted.
+    pub fn into_machine(self) -> Machine {
+        self.rig.board.machine
+    }
+}

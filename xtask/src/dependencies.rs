@@ -19,7 +19,9 @@ fn direct(manifest: &str) -> BTreeSet<String> {
             }
         } else if inside && let Some((key, _)) = line.split_once('=') {
             let name = key.trim().split('.').next().unwrap_or_default();
-            if !name.is_empty() && !name.starts_with('#') {
+            // Comments, and further lines of a value, are no names.
+            let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+            if !name.is_empty() && name.chars().all(is_name) {
                 names.insert(name.to_owned());
             }
         }
@@ -71,7 +73,8 @@ mod tests {
 
     #[test]
     fn manifests_are_read_in_every_form() {
-        let manifest = "[package]\nname = \"x\"\n[dependencies]\nserde = \"1\"\nclap.workspace = true\n# no = 1\n\
+        let manifest = "[package]\nname = \"x\"\n[dependencies]\nserde = { version = \"1\", features = [\n  \"derive\",\n\
+                        ], optional = true }\nclap.workspace = true\n# no = 1\n\
                         [dev-dependencies.proptest]\nworkspace = true\n[features]\nsim = []\n";
         let expected: BTreeSet<String> = ["serde", "clap", "proptest"].map(String::from).into();
         assert_eq!(direct(manifest), expected);

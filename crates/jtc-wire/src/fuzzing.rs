@@ -10,7 +10,7 @@ use std::vec::Vec;
 use crate::{Command, FrameRef, FrameType, Lengths, RawPoint, crc16};
 
 pub use reference::{Event, events};
-pub use script::stream_parser;
+pub use script::{stream_parser, stream_regions};
 pub use status::status_stream;
 
 /// A frame of any type and body, with a right CRC, whether or not its type can have that length.
@@ -30,25 +30,30 @@ fn body_len(kind: FrameType, pick: u8) -> usize {
     }
 }
 
-/// Type, pick of a length, then the body (repeated or cut to the length): parse, say in words, send again, parse again.
+/// The frame that an input of [`frame_bodies`] stands for: type, pick of a length, then the body, repeated or cut to the length.
+pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
+    let [kind, pick, rest @ ..] = data else { return None };
+    let kind = FrameType::from_byte(kind % 0x12)?;
+    let body: Vec<u8> = rest.iter().chain(&[0]).copied().cycle().take(body_len(kind, *pick)).collect();
+    Some(sealed(kind as u8, &body))
+}
+
+/// The frame of [`body_frame`]: parse, say in words, send again, parse again.
 pub fn frame_bodies(data: &[u8]) {
-    let [kind, pick, rest @ ..] = data else { return };
-    let Some(kind) = FrameType::from_byte(kind % 0x12) else { return };
+    let Some(bytes) = body_frame(data) else { return };
+    let frame = FrameRef::new_checked(&bytes).expect("a good frame");
+    assert_eq!(frame.body(), &bytes[4..bytes.len() - 2]);
 
     // A body that no receiver hands out must not break anything either.
-    let raw = FrameRef { frame_type: kind, bytes: rest };
+    let raw = FrameRef { frame_type: frame.frame_type, bytes: &data[2..] };
     if let Ok(command) = Command::parse(raw) {
-        let mut out = vec![0; rest.len() + 64];
+        let mut out = vec![0; data.len() + 64];
         let _ = command.emit(&mut out);
         let _ = format!("{command} {command:#}");
     }
 
-    let body: Vec<u8> = rest.iter().chain(&[0]).copied().cycle().take(body_len(kind, *pick)).collect();
-    let bytes = sealed(kind as u8, &body);
-    let frame = FrameRef::new_checked(&bytes).expect("a good frame");
-    assert_eq!(frame.body(), body);
     let _ = format!("{frame}");
-    if body.len() < 200 || pick.is_multiple_of(16) {
+    if frame.body().len() < 200 || data[1].is_multiple_of(16) {
         let _ = format!("{frame:#}");
     }
     let Ok(command) = Command::parse(frame) else { return };

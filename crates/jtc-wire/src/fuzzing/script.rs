@@ -175,6 +175,30 @@ impl Driver {
     }
 }
 
+/// The bytes of such a script, cut where it has gaps, for those who have a line and a receiver of their own.
+pub fn stream_regions(data: &[u8]) -> Vec<Vec<u8>> {
+    let mut reader = Reader(data);
+    reader.byte();
+    let mut regions = vec![Vec::new()];
+    // From the last byte on.
+    let mut silence = 200;
+    while !reader.0.is_empty() && regions.iter().map(Vec::len).sum::<usize>() < 150_000 {
+        match reader.step() {
+            Step::Bytes(bytes) if bytes.is_empty() => {}
+            Step::Bytes(bytes) => {
+                if silence >= GAP_US {
+                    regions.push(Vec::new());
+                }
+                regions.last_mut().expect("one at least").extend(bytes);
+                silence = 200;
+            }
+            Step::Silence(us) => silence += us,
+            Step::Hold(_) | Step::Pieces(_) | Step::Lazy(_) => {}
+        }
+    }
+    regions
+}
+
 /// First byte: size of the buffer. Then steps. The receiver must find what the reference finds in the whole stream.
 pub fn stream_parser(data: &[u8]) {
     const CAPACITY: [usize; 5] = [64, 256, 1500, 11_000, crate::FRAME_MAX];

@@ -33,6 +33,8 @@ const HANDLERS: [(&str, usize); 8] = [
 /// Longest time from the tick's timer to its first instruction, ns.
 const LATENCY_MAX: u64 = 1_000;
 
+/// How long every instruction is looked at, ms.
+const MASK_MS: u64 = 150;
 /// Bytes of stack that are never to be used.
 const STACK_SPARE: u32 = 4_096;
 
@@ -66,10 +68,17 @@ fn run() -> Result<(), Box<dyn Error>> {
     for (name, state, steps) in session.serving() {
         println!("    {name} in {state}: {} to {} in {} steps", steps.min, steps.max, steps.count);
     }
+    let mask = session.longest_mask(MASK_MS);
     let mut machine = session.into_machine();
     let observers = &machine.chip().observers;
     println!("  with a host at {} Bd on each line, the arm moving:", version.baud);
     handlers(observers)?;
+    // The tick begins at once unless interrupts are masked.
+    let late = mask * 1_000_000_000 / u64::from(version.core_hz);
+    println!("    interrupts are masked for at most {mask} instructions = {late} ns");
+    if late > LATENCY_MAX {
+        return Err(format!("the tick may begin {late} ns late, {LATENCY_MAX} ns are allowed").into());
+    }
     stacks(observers, stack)?;
     if with_cycles {
         cycles::print(path, &version)?;

@@ -5,12 +5,15 @@ use std::error::Error;
 use jtc_core::{State, Tes};
 use jtc_sim::host as frames;
 use jtc_wire::{ExecCommand, FrameType, RawPoint, fixed, trajectory};
-use openjtc_emulator::{Machine, Port};
+use openjtc_emulator::clock::MILLISECOND;
+use openjtc_emulator::{FIRST_LINE, Machine, Port, RegisterARM};
 
 use crate::rig::Rig;
 
 /// The commanding host.
 const HOST: Port = Port::Usart2;
+/// Exception of the tick.
+const TIM7: usize = FIRST_LINE + 55;
 /// The one that only makes traffic.
 const OTHER: Port = Port::Usart3;
 
@@ -165,6 +168,30 @@ impl Session {
             let name = FrameType::from_byte(*frame_type).map_or("no frame".to_owned(), |t| t.to_string());
             (name, STATES[usize::from(*state)], *steps)
         })
+    }
+
+    /// Lets time pass one instruction after another: the most instructions, outside the tick, for which interrupts were masked.
+    pub fn longest_mask(&mut self, ms: u64) -> u64 {
+        let (mut masked, mut longest) = (0, 0);
+        for _ in 0..ms {
+            let end = (self.rig.board.now_ms() + 1) * MILLISECOND;
+            let machine = &mut self.rig.board.machine;
+            let cycle = machine.chip().cycle();
+            while machine.now() + 200 * cycle < end {
+                let before = machine.instructions();
+                machine.run_until(machine.now() + cycle);
+                if machine.instructions() == before {
+                    // It sleeps; what wakes it can be looked at a little late.
+                    machine.run_until(machine.now() + 100 * cycle);
+                }
+                let tick = machine.chip().core.contexts.contains(&TIM7);
+                let mask = machine.register(RegisterARM::PRIMASK) & 1 == 1 && !tick;
+                masked = if mask { masked + 1 } else { 0 };
+                longest = longest.max(masked);
+            }
+            self.step();
+        }
+        longest
     }
 
     /// The machine, with what it counted.

@@ -1,8 +1,8 @@
 //! Both serial lines: gaps, long frames, whose record is whose, floods.
 mod rig;
 
-use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response, fixed, trajectory};
-use openjtc_emulator::clock::{MILLISECOND, to_us};
+use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response, fixed, pid_param, trajectory};
+use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, to_us};
 use openjtc_emulator::{BoardConfig, Port};
 use rig::{BOARDS, PORTS, Rig, fast_elf, index};
 
@@ -36,25 +36,35 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        let frame = fixed::PID_PARAM_USE_DEFAULT;
+        // Long enough that no silence behind it tells the program that it is there.
+        let mut frame = [0; 126];
+        pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
         // With the bytes' own time the silence is 0.2 ms shorter than the time between the halves.
-        for ms in [1, 2, 3, 4, 6, 7, 8, 12] {
+        // At any moment between two ticks.
+        let moments = [0, 300, 600].into_iter().flat_map(|us| [1, 3, 4, 5, 6, 8, 12].map(|ms| (us, ms)));
+        for (us, ms) in moments {
+            let later = |rig: &mut Rig| {
+                let moment = rig.board.now_ms() * MILLISECOND + us * MICROSECOND;
+                rig.board.machine.run_until(moment);
+            };
             let records = |rig: &Rig| rig.hosts[index(port)].records.clone();
             rig.hosts[index(port)].records.clear();
+            later(&mut rig);
             rig.write(port, &frame[..3]);
             rig.run(ms);
+            later(&mut rig);
             rig.write(port, &frame[3..]);
             rig.run(60);
-            let good = Response::good(FrameType::PidParamUseDefault, DataStatus::NoError, 6);
-            if ms < 5 {
-                assert_eq!(records(&rig), [good], "{ms} ms");
+            let good = Response::good(FrameType::PidParam, DataStatus::NoError, 126);
+            if ms <= 5 {
+                assert_eq!(records(&rig), [good], "{ms} ms and {us} µs");
                 continue;
             }
-            let cut = Response::bad(0x08, FrameStatus::DiscontinuousFrame, 3);
+            let cut = Response::bad(0x07, FrameStatus::DiscontinuousFrame, 3);
             let rest = Response::bad(0, FrameStatus::IncorrectHeader, 0);
             let found = records(&rig);
             assert_eq!(found.len(), 2, "{ms} ms: {found:?}");
-            assert_eq!(found[0], cut, "{ms} ms");
+            assert_eq!(found[0], cut, "{ms} ms and {us} µs");
             assert_eq!(found[1].status, rest.status, "{ms} ms: the rest of the frame is none");
         }
         assert_eq!(rig.status(port).jtc_init & 2, 0, "the gains were given");

@@ -67,6 +67,68 @@ fn j12_tim7_ticks_a_thousand_times_a_second() {
     }
 }
 
+/// Where DMA and the core share memory it is not cached, and a null pointer leads nowhere. ARMv7-M B3.5.9: RASR has XN in bit 28,
+/// AP in bits 26..24, TEX S C B in bits 21..16, the size in bits 5..1.
+#[test]
+fn memory_is_protected_and_shared_memory_is_not_cached() {
+    for board in BOARDS {
+        let mut rig = Rig::new(board);
+        rig.run(20);
+        assert_eq!(rig.register(0xE000_ED94) & 1, 1, "{board}: MPU_CTRL");
+        assert_eq!(rig.register(0xE000_ED14) >> 16 & 3, 3, "{board}: both caches");
+        let regions = *rig.board.machine.chip().scs.mpu_regions();
+        // The region with the highest number that holds an address decides.
+        let at = |address: u32| {
+            let holds = |(rbar, rasr): &(u32, u32)| {
+                let size = 1u64 << ((rasr >> 1 & 31) + 1);
+                let start = u64::from(*rbar & !31);
+                rasr & 1 == 1 && (start..start + size).contains(&u64::from(address))
+            };
+            regions.iter().rev().find(|region| holds(region)).map(|(_, rasr)| *rasr)
+        };
+        assert_eq!(at(0).map(|rasr| rasr >> 24 & 7), Some(0), "{board}: no access at 0");
+        for shared in [0x3000_0000, 0x3001_FFFC] {
+            let rasr = at(shared).unwrap_or_else(|| panic!("{board}: no region at {shared:#x}"));
+            assert_eq!((rasr >> 19 & 7, rasr >> 16 & 3), (1, 0), "{board}: normal, not cached: {rasr:#x}");
+            assert_eq!((rasr >> 24 & 7, rasr >> 28 & 1), (3, 1), "{board}: data of anybody: {rasr:#x}");
+        }
+    }
+}
+
+/// J-12: nothing else runs at the tick's priority, so nothing delays it but critical sections.
+#[test]
+fn j12_the_tick_is_above_all_other_interrupts() {
+    const ENABLED: u32 = 0xE000_E100;
+    const PRIORITIES: u32 = 0xE000_E400;
+    for board in BOARDS {
+        let mut rig = Rig::new(board);
+        rig.run(20);
+        let enabled: Vec<u32> =
+            (0..150).filter(|n| rig.register(ENABLED + n / 32 * 4) >> (n % 32) & 1 == 1).collect();
+        assert!(enabled.contains(&55), "{board}: {enabled:?}");
+        for line in enabled {
+            let priority = rig.register(PRIORITIES + line / 4 * 4) >> (8 * (line % 4)) & 0xFF;
+            assert_eq!(priority == 0, line == 55, "{board}: interrupt {line} has priority {priority:#x}");
+        }
+    }
+}
+
+/// J-01: eight data bits, no parity, one stop bit, no flow control.
+#[test]
+fn j01_both_lines_are_8n1() {
+    for board in BOARDS {
+        let mut rig = Rig::new(board);
+        rig.run(20);
+        for usart in [0x4000_4400, 0x4000_4800] {
+            let (cr1, cr2, cr3) = (rig.register(usart), rig.register(usart + 4), rig.register(usart + 8));
+            assert_eq!(cr1 & (1 << 28 | 1 << 12 | 1 << 10), 0, "{board}: M1, M0, PCE in {cr1:#x}");
+            assert_eq!(cr2 & 3 << 12, 0, "{board}: STOP in {cr2:#x}");
+            assert_eq!(cr3 & 3 << 8, 0, "{board}: CTSE, RTSE in {cr3:#x}");
+            assert_eq!(cr3 & 3 << 6, 3 << 6, "{board}: DMAT, DMAR in {cr3:#x}");
+        }
+    }
+}
+
 #[test]
 fn j04_a_status_on_both_ports_every_40_ms() {
     for board in BOARDS {

@@ -4,7 +4,7 @@ mod rig;
 
 use jtc_core::{Config, State, Tes};
 use jtc_sim::{SimConfig, host as frames};
-use jtc_wire::{DataStatus, ExecCommand, FrameStatus, RawPoint, Response, fixed};
+use jtc_wire::{DataStatus, ExecCommand, FrameStatus, RawPoint, Response, fixed, pid_param};
 use openjtc_emulator::{BoardConfig, Port};
 use rig::{BOARDS, Rig, fast_elf};
 
@@ -112,6 +112,34 @@ fn a_whole_session() {
     rig.run(300);
     assert_eq!((rig.state(), rig.telemetry().tes), (State::HoldPos, Tes::Null));
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
+}
+
+/// J-40: with a host's own numbers, friction tables, over limits and errors, every torque has the bits that a PC computes,
+/// and every frame and status its bytes. The rig compares them in each tick; here it is seen that there was something to compare.
+#[test]
+fn j40_torques_have_the_same_bits_as_on_a_pc() {
+    let mut rig = Rig::new(BOARDS[0]);
+    rig.wait("the board is up", 50, |rig| rig.ticks > 0);
+    let mut frame = [0; 200];
+    let gains = core::array::from_fn(|j| [7_000.1 + 90.0 * j as f64, 900.7, 61.3, -0.011, 0.013]);
+    let n = pid_param(&mut frame, &gains).expect("it fits");
+    rig.ask(HOST, &frame[..n]);
+    rig.ask(HOST, &fixed::FRICTION_TABLE_USE_DEFAULT);
+    rig.ask(HOST, &fixed::ARM_MODEL_USE_DEFAULT);
+    rig.wait_for_hold(12_000);
+    rig.upload(&motion(), 4);
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    let mut moved = std::collections::BTreeSet::new();
+    for _ in 0..1_500 {
+        rig.step();
+        moved.insert(rig.flight.torque.map(f64::to_bits));
+    }
+    assert!(moved.len() > 1_000, "{} different torques", moved.len());
+    // A joint that is stuck: the position error grows over its limit.
+    rig.inject(jtc_sim::FaultKind::Friction { joint: 1, factor: 30.0 });
+    rig.wait("an error", 2_000, |rig| rig.state() == State::Error);
+    rig.run(200);
+    assert_ne!(rig.status(HOST).joints[1].internal_occurred, 0, "of that joint");
 }
 
 /// The other boards, and the other line.

@@ -151,6 +151,20 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     end(words)
 }
 
+/// An interrupt that nobody expects, the one that cannot be masked among them.
+///
+/// # Safety
+/// Only the processor calls it.
+#[cortex_m_rt::exception]
+unsafe fn DefaultHandler(number: i16) {
+    let mut words =
+        LastWords { magic: LastWords::PANIC, line: number.cast_unsigned().into(), ..LastWords::NONE };
+    for (to, from) in words.file.iter_mut().zip(b"unexpected interrupt") {
+        *to = *from;
+    }
+    end(words)
+}
+
 /// Entry of the hard fault, to which all faults lead. The stack may be what failed: a new one is begun, with
 /// where the old one was in the first argument.
 #[unsafe(naked)]

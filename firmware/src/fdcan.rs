@@ -19,6 +19,8 @@ const CAN: Registers = FDCAN1;
 
 /// Looks at a register before something that should happen in a few clock periods is given up.
 const PATIENCE: u32 = 10_000;
+/// The same within a tick, which has no time to lose: it looks again a millisecond later.
+const PATIENCE_IN_TICK: u32 = 100;
 
 /// Frames heard in a tick.
 pub struct Heard {
@@ -83,7 +85,7 @@ impl Fdcan {
     pub fn start() -> Self {
         rcc::enable_and_reset::<peripherals::FDCAN1>();
         CAN.cccr().modify(|w| w.set_init(true));
-        wait(|| CAN.cccr().read().init());
+        wait(PATIENCE, || CAN.cccr().read().init());
         CAN.cccr().modify(|w| w.set_cce(true));
         CAN.cccr().modify(|w| {
             w.set_fdoe(true);
@@ -121,7 +123,7 @@ impl Fdcan {
         });
         CAN.txesc().write(|w| w.set_tbds(ram::SIZE_CODE));
 
-        leave_init();
+        leave_init(PATIENCE);
         Self { last: 0, sent: false, recovering: false, counters: Counters::new() }
     }
 
@@ -176,17 +178,25 @@ impl Fdcan {
     }
 
     /// ISO 11898-1: a controller that is off the bus comes back 129 times 11 recessive bits after the program
-    /// allows it to. True while it is off.
+    /// allows it to. True while it cannot send: no frame would leave, and drives keep their last torque.
     fn recover(&mut self) -> bool {
-        if CAN.cccr().read().init() {
-            // The controller itself has stopped. Access to its configuration forgets all transmit requests.
-            CAN.cccr().modify(|w| w.set_cce(true));
-            leave_init();
+        let control = CAN.cccr().read();
+        // INIT: the controller itself has stopped. ASM: it could not use its message memory, and now only listens.
+        if control.init() || control.asm() {
+            CAN.cccr().modify(|w| w.set_init(true));
+            wait(PATIENCE_IN_TICK, || CAN.cccr().read().init());
+            // Access to its configuration forgets all transmit requests.
+            CAN.cccr().modify(|w| {
+                w.set_cce(true);
+                w.set_asm(false);
+            });
+            leave_init(PATIENCE_IN_TICK);
             if !self.recovering {
                 self.counters.bus_off = self.counters.bus_off.wrapping_add(1);
             }
         }
-        self.recovering = CAN.psr().read().bo();
+        let stopped = CAN.cccr().read().init();
+        self.recovering = CAN.psr().read().bo() || stopped || control.asm();
         self.recovering
     }
 }
@@ -215,17 +225,17 @@ fn set_timing() {
 }
 
 /// Ends the set-up. The bit is cleared in another clock domain: it must read 0 before it may be set again.
-fn leave_init() {
+fn leave_init(patience: u32) {
     CAN.cccr().modify(|w| {
         w.set_cce(false);
         w.set_init(false);
     });
-    wait(|| !CAN.cccr().read().init());
+    wait(patience, || !CAN.cccr().read().init());
 }
 
-/// Waits until `done`, but not for ever.
-fn wait(done: impl Fn() -> bool) -> bool {
-    (0..PATIENCE).any(|_| done())
+/// Looks `patience` times whether it is `done`.
+fn wait(patience: u32, done: impl Fn() -> bool) -> bool {
+    (0..patience).any(|_| done())
 }
 
 /// The frame in receive buffer `n`; `None` when it has a format that this bus has not.
@@ -275,7 +285,7 @@ pub fn last_frame() {
         return;
     }
     CAN.txbcr().write_value(Txbcr((1 << ram::TX) - 1));
-    wait(|| CAN.txbrp().read().0 == 0);
+    wait(PATIENCE, || CAN.txbrp().read().0 == 0);
     let zero = Request::Move { torque: [0.0; JOINTS], pump: false }.emit();
     for n in 0..ram::TX {
         if request(n, &zero) {

@@ -2,6 +2,7 @@
 //!
 //! The slot holds a copy, so that a parser can take more bytes while the tick works a long frame off, slice by slice.
 use core::cell::Cell;
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use critical_section::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -21,6 +22,9 @@ const ROUNDS: usize = 64;
 
 /// There may be something to do: a tick has ended, or a line has fallen idle.
 pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+
+/// Counts up with every round of the links: the tick sees by it that they are alive.
+pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
 
 /// What the tick works on: an event of a line, copied. Integers only: all zeros are a value.
 pub struct Handover {
@@ -196,6 +200,7 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn) -> ! {
     let mut report = Report::new();
     loop {
         WORK.wait().await;
+        ROUNDS_DONE.fetch_add(1, Ordering::Relaxed);
         for _ in 0..ROUNDS {
             let mut more = false;
             for link in &mut links {

@@ -40,6 +40,7 @@ const WATCHDOG_US: u32 = 4_500;
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
+    board::safety_output_low_at_start();
     let boot = fault::boot();
     let p = clocks::init();
     memory::init();

@@ -83,12 +83,14 @@ pub fn take() -> Memory {
 }
 
 /// Regions of the protection unit: base, log2 of the size, attributes.
-const REGIONS: [(u32, u32, u32); 3] = [
-    // External memory that is not there: without this the core may read it speculatively and hang. The lowest and
-    // highest quarters of the 4 GB are left out.
+const REGIONS: [(u32, u32, u32); 4] = [
+    // External memory that is not there: without this the core may read it speculatively and hang. The lowest three
+    // eighths and the highest of the 4 GB are left out.
     (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
     // The instruction memory at address 0 is not used: following a null pointer is a fault.
     (0x0000_0000, 16, NO_ACCESS),
+    // Below the stack: an overflow is a fault at the very store that overflows.
+    (0x1FFC_0000, 18, NO_ACCESS),
     // What DMA reads and writes: normal memory, not cached.
     (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
 ];

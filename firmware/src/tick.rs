@@ -1,6 +1,7 @@
 //! The tick: TIM7 at the highest priority, a thousand times a second. It owns the controller and everything that moves or
 //! stops the arm; all it shares with the rest is the slot and a summary for the log.
 use core::cell::Cell;
+use core::sync::atomic::Ordering;
 
 use critical_section::Mutex;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
@@ -22,6 +23,11 @@ use crate::uart::Transmitter;
 
 /// The controller with its trajectory elsewhere.
 type Jtc = Controller<&'static mut [RawPoint]>;
+
+/// Ticks without a sign of life of the links after which the arm is stopped: a host could not do it.
+const LINKS_SILENT_ERROR: u32 = 100;
+/// Ticks after which the watchdog brings the links back.
+const LINKS_SILENT_RESET: u32 = 200;
 
 /// What a tick needs.
 pub struct Parts {
@@ -50,12 +56,14 @@ pub struct Summary {
     pub errors: u16,
     /// Joint bus.
     pub bus: Counters,
+    /// Ticks that were left out because the one before took too long.
+    pub left_out: u32,
 }
 
 impl Summary {
     /// Before the first tick.
     pub const fn new() -> Self {
-        Self { state: 0, errors: 0, bus: Counters::new() }
+        Self { state: 0, errors: 0, bus: Counters::new(), left_out: 0 }
     }
 }
 
@@ -69,6 +77,25 @@ struct Tick {
     awaiting: Awaiting,
     watchdog: IndependentWatchdog<'static, IWDG1>,
     flight: &'static mut Flight,
+    links: Links,
+    left_out: u32,
+}
+
+/// Whether the links are alive.
+#[derive(Default)]
+struct Links {
+    rounds: u32,
+    silent: u32,
+}
+
+impl Links {
+    /// Ticks since their last sign of life.
+    fn silent(&mut self) -> u32 {
+        let rounds = link::ROUNDS_DONE.load(Ordering::Relaxed);
+        self.silent = if rounds == self.rounds { self.silent.saturating_add(1) } else { 0 };
+        self.rounds = rounds;
+        self.silent
+    }
 }
 
 /// The tick's own; it takes it out while it runs.
@@ -90,6 +117,8 @@ pub fn start(parts: Parts) {
         awaiting: Awaiting::new(),
         watchdog,
         flight: boot.flight,
+        links: Links::default(),
+        left_out: 0,
     });
     if boot.cause.failed() {
         tick.controller.raise_internal();
@@ -118,6 +147,9 @@ pub fn summary() -> Summary {
 
 #[interrupt]
 fn TIM7() {
+    if !pac::TIM7.sr().read().uif() {
+        return;
+    }
     pac::TIM7.sr().write(|w| w.set_uif(false));
     let Some(tick) = critical_section::with(|cs| TICK.borrow(cs).take()) else { return };
     let summary = tick.run();
@@ -159,9 +191,24 @@ impl Tick {
         let (state, errors) = (telemetry.state, telemetry.errors);
         self.flight.complete(&outputs, telemetry);
         self.pins.show(state);
+        let silent = self.links.silent();
+        if silent == LINKS_SILENT_ERROR {
+            self.controller.raise_internal();
+        }
         // Everything is done: this, and only this, keeps the processor from being reset.
-        self.watchdog.pet();
-        Summary { state: state as u8, errors, bus: counters }
+        if silent < LINKS_SILENT_RESET {
+            self.watchdog.pet();
+        }
+        self.leave_out_late_tick();
+        Summary { state: state as u8, errors, bus: counters, left_out: self.left_out }
+    }
+
+    /// A tick that is due already is left out: drives must not get two frames back to back (J-12).
+    fn leave_out_late_tick(&mut self) {
+        if pac::TIM7.sr().read().uif() {
+            pac::TIM7.sr().write(|w| w.set_uif(false));
+            self.left_out = self.left_out.wrapping_add(1);
+        }
     }
 }
 

@@ -86,6 +86,16 @@ fn receive(pin: Peri<'static, impl Pin>, function: u8) {
 /// Port D bit of the safety output; all boards have it there.
 const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } else { 4 };
 
+/// First of all after a reset: the safety output drives 0, whatever the start-up of the clocks comes to. Drives may
+/// still hold the torque of before.
+pub fn safety_output_low_at_start() {
+    pac::RCC.ahb4enr().modify(|w| w.set_gpioden(true));
+    // Reading back makes sure that the clock runs.
+    pac::RCC.ahb4enr().read();
+    safety_output_low();
+    pac::GPIOD.moder().modify(|w| w.set_moder(SAFETY_OUTPUT_BIT, pac::gpio::vals::Moder::OUTPUT));
+}
+
 /// Takes the safety output to 0 from anywhere, whatever state the program is in.
 pub fn safety_output_low() {
     pac::GPIOD.bsrr().write(|w| w.set_br(SAFETY_OUTPUT_BIT, true));

@@ -61,8 +61,9 @@ fn run() -> Result<(), Box<dyn Error>> {
     session.run();
 
     println!("  control step, instructions:");
-    for (state, steps) in session.steps() {
-        println!("    {state}: {} to {} in {} steps", steps.min, steps.max, steps.count);
+    for (state, status, steps) in session.steps() {
+        let and = if status { " and a status" } else { "" };
+        println!("    {state}{and}: {} to {} in {} steps", steps.min, steps.max, steps.count);
     }
     println!("  control step that works at what a host sent, instructions:");
     for (name, state, steps) in session.serving() {

@@ -41,7 +41,7 @@ pub struct Session {
     pub rig: Rig,
     counter: openjtc_emulator::Counter,
     calls: u64,
-    steps: BTreeMap<u8, Steps>,
+    steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
     traffic: Vec<Vec<u8>>,
     turn: usize,
@@ -133,7 +133,7 @@ impl Session {
             self.calls = count.calls;
             let (state, event) = (self.rig.flight.state, self.rig.flight.event);
             match event.kind {
-                0 => self.steps.entry(state).or_default().add(count.last),
+                0 => self.steps.entry((state, self.rig.flight.status)).or_default().add(count.last),
                 kind => {
                     let frame_type = if kind == 1 { event.frame_type } else { 0 };
                     self.serving.entry((frame_type, state)).or_default().add(count.last);
@@ -157,9 +157,9 @@ impl Session {
         panic!("{what}: not within {ms} ms, {:?}", self.rig.state());
     }
 
-    /// Steps without anything from a host, by the name of the state.
-    pub fn steps(&self) -> impl Iterator<Item = (&'static str, Steps)> {
-        self.steps.iter().map(|(state, steps)| (STATES[usize::from(*state)], *steps))
+    /// Steps without anything from a host: the name of the state, whether a status went out.
+    pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
+        self.steps.iter().map(|((state, status), steps)| (STATES[usize::from(*state)], *status, *steps))
     }
 
     /// Steps that work at something from a host: what it is, in which state.

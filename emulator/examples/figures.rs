@@ -16,7 +16,7 @@ use openjtc_emulator::clock::to_ns;
 use openjtc_emulator::observe::Observers;
 use openjtc_emulator::{BoardConfig, Elf, FIRST_LINE};
 use rig::Rig;
-use session::Session;
+use session::{Session, Steps};
 
 /// Handlers of the program, by their number in the vector table and the priority that they run at.
 const HANDLERS: [(&str, usize); 8] = [
@@ -65,6 +65,8 @@ fn run() -> Result<(), Box<dyn Error>> {
         let and = if status { " and a status" } else { "" };
         println!("    {state}{and}: {} to {} in {} steps", steps.min, steps.max, steps.count);
     }
+    let Steps { min, max, count } = session.on_path();
+    println!("    Operate, on the path at full speed: {min} to {max} in {count} steps");
     println!("  control step that works at what a host sent, instructions:");
     for (name, state, steps) in session.serving() {
         println!("    {name} in {state}: {} to {} in {} steps", steps.min, steps.max, steps.count);

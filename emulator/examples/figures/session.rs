@@ -33,6 +33,9 @@ impl Steps {
     }
 }
 
+/// Longer than any ramp of the path time, ms.
+const RAMP: u32 = 250;
+
 /// Names of the states, by number.
 const STATES: [&str; 6] = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
 
@@ -43,6 +46,11 @@ pub struct Session {
     calls: u64,
     steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
+    /// Steps on the path at full speed, with nothing beside them.
+    on_path: Steps,
+    /// The point of the last step, and steps since the path time went otherwise than a millisecond a tick.
+    point: u32,
+    steady: u32,
     traffic: Vec<Vec<u8>>,
     turn: usize,
 }
@@ -67,6 +75,9 @@ impl Session {
             calls: 0,
             steps: BTreeMap::new(),
             serving: BTreeMap::new(),
+            on_path: Steps::default(),
+            point: 0,
+            steady: 0,
             traffic,
             turn: 0,
         })
@@ -131,7 +142,12 @@ impl Session {
         if count.calls > self.calls {
             assert_eq!(count.calls, self.calls + 1, "one control step a millisecond");
             self.calls = count.calls;
-            let (state, event) = (self.rig.flight.state, self.rig.flight.event);
+            let (state, event, point) = (self.rig.flight.state, self.rig.flight.event, self.rig.flight.point);
+            self.steady = if point == self.point + 1 { self.steady + 1 } else { 0 };
+            self.point = point;
+            if self.steady > RAMP && event.kind == 0 && !self.rig.flight.status {
+                self.on_path.add(count.last);
+            }
             match event.kind {
                 0 => self.steps.entry((state, self.rig.flight.status)).or_default().add(count.last),
                 kind => {
@@ -160,6 +176,11 @@ impl Session {
     /// Steps without anything from a host: the name of the state, whether a status went out.
     pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
         self.steps.iter().map(|((state, status), steps)| (STATES[usize::from(*state)], *status, *steps))
+    }
+
+    /// Steps on the path at full speed, without a status and without anything from a host.
+    pub fn on_path(&self) -> Steps {
+        self.on_path
     }
 
     /// Steps that work at something from a host: what it is, in which state.

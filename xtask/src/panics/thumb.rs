@@ -3,7 +3,7 @@
 /// What an instruction means for the flow of control and for the making of addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// B, B<cc>, CBZ, CBNZ or BL to an address.
+    /// B, `B<cc>`, CBZ, CBNZ or BL to an address.
     Direct(u32),
     /// BX, BLX, MOV or LDR to the program counter: an address that is known only when it runs.
     Indirect(u8),

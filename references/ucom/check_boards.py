@@ -15,7 +15,9 @@ REPORTS = {"441#21", "482#42", "4C3#63", "404#04", "4DF#7F"}
 
 def status(peer: Peer, board: int) -> str:
     """Status byte of PC_INFO."""
-    frames = peer.ask(f"{0x200 + board:03X}#", 0.15)
+    # A running board's process data come in between.
+    answer = f"{0x140 + board:03X}#"
+    frames = [frame for frame in peer.ask(f"{0x200 + board:03X}#", 0.15) if frame.startswith(answer)]
     return frames[0][10:12] if frames else ""
 
 

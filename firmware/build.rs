@@ -45,7 +45,8 @@ fn main() {
     }
 }
 
-/// The commit that is built, with `+` when files were changed since; "unknown" outside a repository.
+/// The commit that is built, with `+` at its end when files were changed since. Always thirteen characters: the log takes the
+/// same time in every build, and figures of one build are those of the next.
 fn build_id() -> String {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok()?;
@@ -55,10 +56,11 @@ fn build_id() -> String {
         println!("cargo::rerun-if-changed={head}");
     }
     match (
-        git(&["rev-parse", "--short=12", "HEAD"]),
+        git(&["rev-parse", "--short=13", "HEAD"]),
         git(&["status", "--porcelain", "--", "..", ":!../docs"]),
     ) {
-        (Some(hash), Some(changes)) => format!("{hash}{}", if changes.is_empty() { "" } else { "+" }),
-        _ => "unknown".to_owned(),
+        (Some(hash), Some(changes)) if changes.is_empty() => hash,
+        (Some(hash), Some(_)) => format!("{}+", &hash[..12]),
+        _ => "not-in-a-repo".to_owned(),
     }
 }

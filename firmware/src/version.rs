@@ -22,7 +22,7 @@ pub struct Version {
     pub version: [u8; 12],
     /// Board, as its feature is called.
     pub board: [u8; 24],
-    /// Commit, with `+` when files were changed since, or `unknown`.
+    /// Commit, with `+` when files were changed since, or `not-in-a-repo`.
     pub build: [u8; 24],
     /// Points that the trajectory store holds.
     pub points: u32,

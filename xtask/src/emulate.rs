@@ -117,13 +117,21 @@ fn figures(update: bool) -> Result<()> {
 
 fn compare(kept: &Path, text: &str) -> Result<()> {
     let old = std::fs::read_to_string(kept).with_context(|| kept.display().to_string())?;
-    if old == text {
+    let (old, new): (Vec<&str>, Vec<&str>) = (lasting(&old).collect(), lasting(text).collect());
+    if old == new {
         return Ok(());
     }
-    for (old, new) in old.lines().zip(text.lines()).filter(|(old, new)| old != new) {
+    for (old, new) in old.iter().zip(&new).filter(|(old, new)| old != new) {
         println!("- {old}\n+ {new}");
     }
     bail!("the figures are not those of {FIGURES}; if that is meant: cargo xtask emulate --update")
+}
+
+/// What is the same in every build. How late an interrupt begins depends on when bytes meet ticks, to the nanosecond; the program
+/// that measures it compares it with its limit.
+fn lasting(text: &str) -> impl Iterator<Item = &str> {
+    let lines = text.lines().filter(|line| !line.contains("interrupts are masked"));
+    lines.map(|line| line.split(", begins at most").next().unwrap_or_default())
 }
 
 /// A board that a host program can open, until it is interrupted.

@@ -242,3 +242,33 @@ fn p20_probe_finds_big_endian_boards() {
     let init = sim.ucom(&["--json", "init", "--profile", &sim.path("found.toml")]).ends(0).json();
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
+
+/// Ctrl-C while a board moves stops it at once; its own supervision is only for a PC that has died.
+#[test]
+fn an_interrupted_motion_is_stopped() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    let mut peer = sim.peer();
+    let moving = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
+    peer.wait("601#01010000");
+    peer.wait("381#");
+    signal(&moving, "-INT");
+    // Run = 0 of the PC, before the board's time of 1.5 s is over.
+    let since = std::time::Instant::now();
+    peer.wait("601#00000000");
+    assert!(since.elapsed() < std::time::Duration::from_millis(1000), "{:?}", since.elapsed());
+    let said = ended(moving);
+    assert_eq!(said.code, 0, "{}", said.err);
+}
+
+/// D-34: three inputs share a frame; those that were not named keep their initial values.
+#[test]
+fn d34_an_input_leaves_its_neighbours_alone() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    sim.ucom(&["start", "1"]).ends(0);
+    let mut peer = sim.peer();
+    sim.ucom(&["ci", "1", "set_position=1500"]).ends(0);
+    // 1500, and the initial 1000 and 900.
+    assert_eq!(peer.wait("341#"), "341#0000DC05E8038403");
+}

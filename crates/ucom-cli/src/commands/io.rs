@@ -86,6 +86,8 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         .iter()
         .map(|a| Ok((a, ucom_index(&description, board, a)?)))
         .collect::<Result<Vec<_>, Failure>>()?;
+    // Inputs go three at a time: what is beside the one that is set must not become 0.
+    initial(&mut driver, board)?;
     for (assignment, _) in &values {
         let now = driver.now_us();
         driver.master.set_input(now, board, &assignment.name, assignment.value as u16)?;
@@ -149,7 +151,15 @@ fn move_for(driver: &mut Driver, args: &CiArgs, duration: Duration, out: &Output
     let plan = RunBoard { board, ci: settings(&args.values), par: Vec::new() };
     let options = RunOptions { boards: vec![plan], active: true, force: args.force.force };
     driver.master.watch(board, None, true);
-    driver.run(Request::Run(options))?;
+    if let Err(failure) = driver.run(Request::Run(options)) {
+        // It may have begun to move.
+        if failure.exit != crate::failure::REFUSED
+            && let Err(e) = driver.stop_board(board, StopLevel::Loop)
+        {
+            out.note(format!("board {board}: {}", e.message));
+        }
+        return Err(failure);
+    }
     let mut last = None;
     let end = Instant::now() + duration;
     while Instant::now() < end && !driver.stop_asked() {
@@ -161,7 +171,8 @@ fn move_for(driver: &mut Driver, args: &CiArgs, duration: Duration, out: &Output
             }
         }
     }
-    driver.run(Request::Stop { board, level: StopLevel::Loop, force: true })?;
+    // Not as a procedure that Ctrl-C cancels: it is what Ctrl-C asks for.
+    driver.stop_board(board, StopLevel::Loop)?;
     let names = driver.master.description(board).map(|d| d.so).unwrap_or_default();
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {

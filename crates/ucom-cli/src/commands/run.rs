@@ -84,7 +84,10 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     if args.debug {
         for board in &boards {
             let change = AdminChange { debug: Some(true), ..Default::default() };
-            driver.run(Request::Admin { board: *board, change, force: true })?;
+            if let Err(failure) = driver.run(Request::Admin { board: *board, change, force: true }) {
+                halt(&mut driver, &boards, out);
+                return Err(failure);
+            }
         }
     }
     let lost = supervise(&mut driver, args, &boards, out);

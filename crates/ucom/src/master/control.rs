@@ -7,7 +7,7 @@ use super::request::{TRIES, admin, info, numbers, set_status};
 use super::scan::{REPORTS, Reports, collect_reports};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
-use crate::{Admin, BoardInfo, FromBoard, Function, Status, ToBoard};
+use crate::{Admin, BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 
 /// Changes to the flags of a board; `None` leaves one as it is (D-37).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -178,21 +178,11 @@ pub(crate) async fn enter_exloader(
     board: u8,
     flash_number: Option<u16>,
 ) -> Result<BoardInfo, Error> {
-    let to = link.board(board)?;
-    link.send(to, ToBoard::XReset).await;
-    link.with(|core| {
-        core.boards.of(board).application_ended();
-        core.forget_parameters(board);
-    });
-    link.sleep(link.times().xreset_wait).await;
-    let what = "its exloader did not come up";
-    let limit = 3_000 * MS;
-    let exloader = wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what);
-    let info = match (exloader.await, flash_number) {
+    let info = match (xreset_taken(link, board).await, flash_number) {
         (Err(Error::NoAnswer { .. }), Some(flash_number)) => {
             link.note(format!("board {board} lost its number: giving it back"));
             repair(link, board, flash_number).await?;
-            wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await?
+            exloader_runs(link, board, EXLOADER_WAIT).await?
         }
         (result, _) => result?,
     };
@@ -200,6 +190,40 @@ pub(crate) async fn enter_exloader(
         return Ok(info);
     }
     set_status(link, board, Status::PROG, Status::PROG).await
+}
+
+/// How long an exloader may take to come up.
+const EXLOADER_WAIT: u64 = 3_000 * MS;
+
+async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, Error> {
+    let what = "its exloader did not come up";
+    wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await
+}
+
+/// PC_XRESET until it is taken. It has no answer: a board that answers PC_INFO and has not left its application did not
+/// hear it. One that is silent reboots, or has lost its number, and is not disturbed.
+async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
+    let to = link.board(board)?;
+    let soon = EXLOADER_WAIT / 3;
+    for _ in 1..TRIES {
+        send_xreset(link, to).await;
+        match exloader_runs(link, board, soon).await {
+            Err(Error::NotReached { .. }) => {}
+            Err(Error::NoAnswer { .. }) => return exloader_runs(link, board, EXLOADER_WAIT - soon).await,
+            other => return other,
+        }
+    }
+    send_xreset(link, to).await;
+    exloader_runs(link, board, EXLOADER_WAIT).await
+}
+
+async fn send_xreset(link: &Link, to: Sequence) {
+    link.send(to, ToBoard::XReset).await;
+    link.with(|core| {
+        core.boards.of(to.number()).application_ended();
+        core.forget_parameters(to.number());
+    });
+    link.sleep(link.times().xreset_wait).await;
 }
 
 use super::init::repair;
@@ -278,28 +302,58 @@ pub(crate) async fn admin_procedure(
     Ok(Outcome::Admin { board, admin })
 }
 
-/// Outputs off, then the loop, then the application: the start order in reverse.
+/// Outputs off, then the loop, then the application: the start order in reverse. A step that gets no answer does not keep
+/// the next ones from being taken; the first that failed is told.
 pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
-    let known = info(&link, board).await?.info;
-    let mut now = known;
-    if known.status.has(Status::MSTART) {
-        let off = AdminChange { active: Some(false), ..Default::default() };
-        change_flags(&link, board, off).await?;
-        if level != StopLevel::Outputs {
-            link.with(|core| {
-                if let Some(data) = core.data.get_mut(&board) {
-                    data.repeat = None;
-                }
-            });
-            change_flags(&link, board, AdminChange { run: Some(false), ..off }).await?;
+    let known = match info(&link, board).await {
+        Ok(seen) => seen.info,
+        Err(error) => {
+            stop_unheard(&link, board, level).await?;
+            return Err(error);
         }
-        if level == StopLevel::Application {
-            link.with(|core| core.boards.of(board).application_ended());
-            set_status(&link, board, Status::MSTART, Status(0)).await?;
-        }
-        now = info(&link, board).await?.info;
+    };
+    if !known.status.has(Status::MSTART) {
+        return Ok(Outcome::Status { board, info: known });
     }
+    let off = AdminChange { active: Some(false), ..Default::default() };
+    let mut done = change_flags(&link, board, off).await.map(drop);
+    if level != StopLevel::Outputs {
+        stop_inputs(&link, board);
+        let ended = change_flags(&link, board, AdminChange { run: Some(false), ..off }).await;
+        done = done.and(ended.map(drop));
+    }
+    if level == StopLevel::Application {
+        link.with(|core| core.boards.of(board).application_ended());
+        done = done.and(set_status(&link, board, Status::MSTART, Status(0)).await.map(drop));
+    }
+    done?;
+    let now = info(&link, board).await?.info;
     Ok(Outcome::Status { board, info: now })
+}
+
+fn stop_inputs(link: &Link, board: u8) {
+    link.with(|core| {
+        if let Some(data) = core.data.get_mut(&board) {
+            data.repeat = None;
+        }
+    });
+}
+
+/// The stop of a board that does not answer PC_INFO: it may run all the same. What it knows of flags is not read first.
+async fn stop_unheard(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
+    let to = link.board(board)?;
+    let told = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();
+    let run = told.run && level == StopLevel::Outputs;
+    stop_inputs(link, board);
+    // No answer is what is expected here.
+    let _ = admin(link, board, Admin { run, active: false, ..told }).await;
+    for _ in 0..TRIES {
+        if level == StopLevel::Application {
+            link.send(to, ToBoard::SetStatus { mask: Status::MSTART.0, value: 0 }).await;
+        }
+        link.sleep(20 * MS).await;
+    }
+    Ok(())
 }

@@ -225,9 +225,10 @@ async fn take_number(link: &Link, number: u8) -> Result<bool, Error> {
         if acknowledged {
             return Ok(true);
         }
-        // The acknowledge may have been lost: never repeat PC_INIT blindly.
+        // The acknowledge may have been lost: never repeat PC_INIT blindly. Half an answer is enough: somebody has this
+        // number, and who it is will be asked again.
         link.listen(1 << number, &[Function::DspInfo]);
-        if let Answer::Info(..) = ask_info(link, number).await? {
+        if !matches!(ask_info(link, number).await?, Answer::Silence) {
             return Ok(true);
         }
     }

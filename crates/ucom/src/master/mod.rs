@@ -201,7 +201,9 @@ impl Master {
 
     /// No more life signs and repeated inputs: boards that run become safe by themselves (D-50).
     pub fn end_session(&mut self) {
-        lock(&self.core).session = Session::Quiet;
+        let mut core = lock(&self.core);
+        core.session = Session::Quiet;
+        core.stops.clear();
     }
 
     /// The boards as last seen.

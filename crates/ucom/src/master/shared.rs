@@ -97,6 +97,8 @@ pub(crate) struct Core {
     pub foreign_master: Option<(u64, Function, u8)>,
     /// Reports until then are answers.
     pub report_until: u64,
+    /// Stops of the policy that are said again, and when: one frame can be lost.
+    pub stops: Vec<(u64, Sequence)>,
     pub boards: Boards,
     pub data: BTreeMap<u8, ProcessData>,
     pub descriptions: BTreeMap<(u16, u16), IoDescription>,
@@ -121,6 +123,7 @@ impl Core {
             session: Session::Quiet,
             foreign_master: None,
             report_until: 0,
+            stops: Vec::new(),
             boards: Boards::default(),
             data: BTreeMap::new(),
             descriptions: BTreeMap::new(),

@@ -13,6 +13,9 @@ use crate::{
     StringAssembler, ToBoard,
 };
 
+/// Between a stop and its repetition, µs.
+const STOP_AGAIN: u64 = 30_000;
+
 impl Core {
     /// From now on life signs go out.
     pub(crate) fn start_session(&mut self) {
@@ -51,6 +54,7 @@ impl Core {
             self.event(Event::Supervision { board, change });
         }
         lost.into_iter().for_each(|number| self.on_lost(number));
+        self.stop_again();
         self.repeat_inputs();
     }
 
@@ -79,16 +83,16 @@ impl Core {
         }
         match (self.profile.on_lost, self.profile.everybody()) {
             (OnLost::Report, _) => {}
-            (OnLost::StopAll, Some(everybody)) => self.urgent(everybody, ToBoard::Admin(Admin::default())),
+            (OnLost::StopAll, Some(everybody)) => self.stop_running(everybody),
             (OnLost::StopAll, None) => {
                 let known: Vec<u8> = self.boards.iter().map(|(n, _)| n).collect();
                 for number in known.into_iter().filter_map(Sequence::new) {
-                    self.urgent(number, ToBoard::Admin(Admin::default()));
+                    self.stop_running(number);
                 }
             }
             (OnLost::StopBoard, _) => {
                 if let Some(number) = Sequence::new(board) {
-                    self.urgent(number, ToBoard::Admin(Admin::default()));
+                    self.stop_running(number);
                 }
             }
         }
@@ -96,6 +100,19 @@ impl Core {
             let all: Vec<u8> = self.data.keys().copied().collect();
             all.into_iter().for_each(|number| self.stop_inputs(number));
         }
+    }
+
+    /// Run = 0 at once, and twice again: what stops motion must not hang on one frame. It has no further effect.
+    fn stop_running(&mut self, to: Sequence) {
+        self.urgent(to, ToBoard::Admin(Admin::default()));
+        self.stops.extend([(self.now + STOP_AGAIN, to), (self.now + 2 * STOP_AGAIN, to)]);
+    }
+
+    fn stop_again(&mut self) {
+        let now = self.now;
+        let due: Vec<Sequence> = self.stops.iter().filter(|(at, _)| *at <= now).map(|(_, to)| *to).collect();
+        self.stops.retain(|(at, _)| *at > now);
+        due.into_iter().for_each(|to| self.urgent(to, ToBoard::Admin(Admin::default())));
     }
 
     fn stop_inputs(&mut self, board: u8) {
@@ -157,7 +174,8 @@ impl Core {
         });
         let quiet = self.session == Session::Quiet;
         let inputs = self.data.values().filter_map(|data| data.repeat.filter(|_| !quiet));
-        alive.into_iter().chain(supervised).chain(inputs).min()
+        let stops = self.stops.iter().map(|(at, _)| *at);
+        alive.into_iter().chain(supervised).chain(inputs).chain(stops).min()
     }
 
     /// A frame from the bus.

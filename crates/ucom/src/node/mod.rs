@@ -183,7 +183,10 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             self.error(ErrorCode::CanTransmit);
         }
         match FromBoard::decode(frame, &self.config.profile) {
-            Ok((_, FromBoard::InitAck(_))) => self.numbered(),
+            // One of before the number was forgotten says nothing about the number that is being taken.
+            Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
+                self.numbered();
+            }
             Ok((_, FromBoard::Ready)) => self.programming.answered(),
             _ => {}
         }
@@ -200,7 +203,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.outbox.trouble = true;
         self.counters.not_sent = self.counters.not_sent.saturating_add(1);
         match FromBoard::decode(frame, &self.config.profile) {
-            Ok((_, FromBoard::InitAck(_))) => self.outbox.ack = true,
+            Ok((_, FromBoard::InitAck(_))) => self.outbox.ack = self.taking.or(self.number).is_some(),
             Ok((_, FromBoard::Ready)) => self.programming.answered(),
             _ => {}
         }

@@ -312,3 +312,19 @@ fn d43_cancel_and_again() {
     }
     assert_eq!(bus.boards[0].record().unwrap().program_id, 0x4B3F);
 }
+
+/// D-24: an acknowledge that the controller gave up after the number was forgotten is not offered again, and does not keep
+/// the board awake.
+#[test]
+fn d24_no_acknowledge_without_a_number() {
+    let mut bus = in_state(Idle);
+    let board = &mut bus.boards[0];
+    let (now, ack) = (bus.now, "0C1#01".parse::<Frame>().unwrap());
+    board.receive(now, &"281#".parse().unwrap());
+    assert_eq!(board.poll(now), Some(ack));
+    board.receive(now, &"1C1#0800".parse().unwrap());
+    board.not_sent(now, &ack);
+    assert_eq!(board.number(), None);
+    assert_eq!(board.poll(now), None);
+    assert!(board.next_deadline() > now, "nothing to do");
+}

@@ -156,6 +156,8 @@ pub struct Bench {
     pub events: Vec<(u64, Event)>,
     /// Frame number and its fault.
     pub fault: Option<(usize, Fault)>,
+    /// Frames with these beginnings are lost, each so often; `<` is the master, `>` a board.
+    pub lose: Vec<(&'static str, u32)>,
     /// Nothing arrives any more at members or at the master.
     pub cut: Vec<usize>,
     pending_master: Option<Frame>,
@@ -176,6 +178,7 @@ impl Bench {
             log: Vec::new(),
             events: Vec::new(),
             fault: None,
+            lose: Vec::new(),
             cut: Vec::new(),
             pending_master: None,
             pending,
@@ -244,7 +247,10 @@ impl Bench {
         }
         let number = self.log.len();
         self.log.push((self.now, from, frame));
-        let fault = self.fault.filter(|(at, _)| *at == number).map(|(_, fault)| fault);
+        let text = format!("{} {frame}", if from == From::Master { '<' } else { '>' });
+        let lose = self.lose.iter_mut().find(|(start, left)| *left > 0 && text.starts_with(*start));
+        let lost = lose.map(|(_, left)| *left -= 1).map(|()| Fault::Lost);
+        let fault = lost.or(self.fault.filter(|(at, _)| *at == number).map(|(_, fault)| fault));
         match fault {
             Some(Fault::Lost) => {}
             Some(Fault::Doubled) => {

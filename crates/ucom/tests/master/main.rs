@@ -5,6 +5,7 @@ mod bench;
 mod chain;
 mod faults;
 mod kept;
+mod losses;
 mod probing;
 mod robust;
 mod running;

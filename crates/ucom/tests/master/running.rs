@@ -232,7 +232,8 @@ fn p15_d51_lost_boards() {
         assert!((3_000 * MS..=3_100 * MS).contains(&(lost - last)), "{}", lost - last);
         for text in ["600#00000000", "602#00000000"] {
             let times = bench.times_of(text);
-            assert_eq!(times.len(), usize::from(frame == Some(text)), "{on_lost:?} {text}");
+            // Said three times: one frame can be lost.
+            assert_eq!(times.len(), 3 * usize::from(frame == Some(text)), "{on_lost:?} {text}");
             assert!(times.iter().all(|at| at - lost <= 100 * MS));
         }
         // Inputs of the lost board are no longer repeated.
@@ -268,7 +269,7 @@ fn d26_reboot_of_a_running_board() {
     let change = Supervision::Rebooted { ucom_id: 0x42 };
     assert!(bench.events.iter().any(|(_, e)| *e == Event::Supervision { board: 2, change }));
     assert!(!bench.board(0).application.running);
-    assert_eq!(bench.count("600#00000000"), 1);
+    assert_eq!(bench.count("600#00000000"), 3);
     // Repair gives it its number back.
     let repair = Request::Repair { board: 2, flash_number: 0x42, force: false };
     assert!(matches!(bench.go(repair, 10), Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42));

@@ -13,10 +13,10 @@ import sys
 import time
 
 import can
+from frames import messages
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 GROUPS = ["239.74.163.9", "ff15::7079:7468:9"]
-FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
 PATIENCE_S = 10.0
 
 
@@ -26,25 +26,6 @@ def echo_program() -> list[str]:
         return [str(pathlib.Path(built) / "echo")]
     cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", "echo"]
     return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml"), "--"]
-
-
-def messages(rng: random.Random) -> list[can.Message]:
-    """One of each kind and length. Ids are even, those of the echoes odd."""
-    found = []
-    for extended in (False, True):
-        top = 0x1FFFFFFF if extended else 0x7FF
-
-        def message(**fields) -> can.Message:
-            number = rng.randrange(0, top) & ~1
-            return can.Message(arbitration_id=number, is_extended_id=extended, check=True, **fields)
-
-        for length in range(9):
-            found.append(message(data=rng.randbytes(length)))
-            found.append(message(is_remote_frame=True, dlc=length))
-        for length in FD_LENGTHS:
-            for switch in (False, True):
-                found.append(message(is_fd=True, bitrate_switch=switch, data=rng.randbytes(length)))
-    return found
 
 
 def echoed(bus: can.BusABC) -> can.Message:

@@ -12,9 +12,9 @@ import sys
 import time
 
 import can
+from frames import messages
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
 PATIENCE_S = 120.0
 BURST = 2000
 
@@ -42,25 +42,6 @@ def same(sent: can.Message, got: can.Message) -> None:
         assert getattr(sent, field) == getattr(got, field), f"{field}: {sent} became {got}"
     assert sent.arbitration_id + 1 == got.arbitration_id, f"{sent} became {got}"
     assert bytes(sent.data) == bytes(got.data), f"{sent} became {got}"
-
-
-def messages(rng: random.Random) -> list[can.Message]:
-    """One of each kind and length. Ids are even, those of the answers odd."""
-    found = []
-    for extended in (False, True):
-        top = 0x1FFFFFFF if extended else 0x7FF
-
-        def message(**fields) -> can.Message:
-            number = rng.randrange(0, top) & ~1
-            return can.Message(arbitration_id=number, is_extended_id=extended, check=True, **fields)
-
-        for length in range(9):
-            found.append(message(data=rng.randbytes(length)))
-            found.append(message(is_remote_frame=True, dlc=length))
-        for length in FD_LENGTHS:
-            for switch in (False, True):
-                found.append(message(is_fd=True, bitrate_switch=switch, data=rng.randbytes(length)))
-    return found
 
 
 def check(path: str, seed: int) -> None:

@@ -21,8 +21,10 @@ pub(super) struct Jobs {
     info: Option<Place>,
     info_again: bool,
     dump_io: Option<Place>,
+    /// When the dump may begin or go on.
     dump_io_at: u64,
-    dump_io_again: bool,
+    /// When the next one may begin, if it was asked for during this one.
+    dump_io_again: Option<u64>,
     /// Offset of the next package.
     dump_ci: Option<u16>,
     dump_ci_again: bool,
@@ -41,7 +43,7 @@ impl Jobs {
             info_again: false,
             dump_io: None,
             dump_io_at: 0,
-            dump_io_again: false,
+            dump_io_again: None,
             dump_ci: None,
             dump_ci_again: false,
             so: None,
@@ -56,12 +58,24 @@ impl Jobs {
         self.info = self.info.or(Some(Place::First));
     }
 
+    /// The same; and no answer leaves before `due_us`, when the request with the same identifier is gone (D-05).
     pub fn ask_dump_io(&mut self, due_us: u64) {
-        self.dump_io_again = self.dump_io.is_some();
-        if !self.dump_io_again {
+        if let Some(Place::String { .. }) = self.dump_io {
+            self.dump_io_again = Some(due_us);
+        } else {
             self.dump_io = Some(Place::First);
             self.dump_io_at = due_us;
         }
+    }
+
+    fn info_done(&mut self) {
+        self.info = core::mem::take(&mut self.info_again).then_some(Place::First);
+    }
+
+    fn dump_io_done(&mut self) {
+        let again = self.dump_io_again.take();
+        self.dump_io = again.map(|_| Place::First);
+        self.dump_io_at = again.unwrap_or(0);
     }
 
     pub fn ask_dump_ci(&mut self) {
@@ -120,17 +134,19 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
 
     fn next_of_info(&mut self) -> Option<FromBoard> {
         let profile = &self.config.profile;
-        let (payload, next) = match self.jobs.info? {
+        let made = match self.jobs.info? {
             Place::First => {
                 let info = self.board_info(self.number?.number());
-                (info.payload(profile.endian), Place::String { string: 0, package: 0 })
+                Some((info.payload(profile.endian), Place::String { string: 0, package: 0 }))
             }
-            Place::String { package: at, .. } => package(self.store.description(), 0, at, profile)?,
+            Place::String { package: at, .. } => package(self.store.description(), 0, at, profile),
         };
-        let done = matches!(next, Place::String { string: 1, .. });
-        let again = done && core::mem::take(&mut self.jobs.info_again);
-        self.jobs.info = if again { Some(Place::First) } else { (!done).then_some(next) };
-        Some(FromBoard::Info(payload))
+        match made {
+            Some((_, next @ Place::String { string: 0, .. })) => self.jobs.info = Some(next),
+            // The end; or the description has become shorter meanwhile, and the PC asks again.
+            _ => self.jobs.info_done(),
+        }
+        made.map(|(payload, _)| FromBoard::Info(payload))
     }
 
     /// The text of the `string`-th string of the IO description (D-36).
@@ -156,14 +172,18 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
         let profile = &self.config.profile;
         let dimensions = self.application.dimensions();
-        let (payload, next) = match self.jobs.dump_io? {
-            Place::First => (dimensions.payload(profile.endian), Place::String { string: 0, package: 0 }),
-            Place::String { string, package: at } => package(self.io_text(string), string, at, profile)?,
+        let made = match self.jobs.dump_io? {
+            Place::First => Some((dimensions.payload(profile.endian), Place::String { string: 0, package: 0 })),
+            Place::String { string, package: at } => package(self.io_text(string), string, at, profile),
         };
-        let done = matches!(next, Place::String { string, .. } if string >= dimensions.strings());
-        let again = done && core::mem::take(&mut self.jobs.dump_io_again);
-        self.jobs.dump_io = if again { Some(Place::First) } else { (!done).then_some(next) };
-        Some(FromBoard::IoDescription(payload))
+        match made {
+            Some((_, next @ Place::String { string, .. })) if string < dimensions.strings() => {
+                self.jobs.dump_io = Some(next);
+            }
+            // The end; or a text has become shorter meanwhile, and the PC asks again.
+            _ => self.jobs.dump_io_done(),
+        }
+        made.map(|(payload, _)| FromBoard::IoDescription(payload))
     }
 
     fn next_of_so(&mut self) -> Option<FromBoard> {

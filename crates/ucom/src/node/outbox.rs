@@ -112,17 +112,18 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.outbox.push_report(self.after_ms(wait));
     }
 
-    /// MCA_ADMIN_DATA as an answer: not at once, the PC's frame with this identifier must be gone (D-05).
+    /// MCA_ADMIN_DATA as an answer: not at once, the PC's frame with this identifier must be gone (D-05). What was to be
+    /// told anyway goes with it: one frame says both.
     pub(super) fn answer_admin(&mut self) {
-        let due = self.after_ms(self.config.profile.shared_delay);
-        self.outbox.admin_at = Some(self.outbox.admin_at.map_or(due, |at| at.min(due)));
+        self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }
 
-    /// MCA_ADMIN_DATA unasked: after a random time, the PC may be about to send the same identifier (D-05).
+    /// MCA_ADMIN_DATA unasked: after a random time, the PC may be about to send the same identifier (D-05). An answer that
+    /// waits for its time says it, too.
     pub(super) fn tell_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);
-        self.outbox.admin_at = Some(self.outbox.admin_at.map_or(due, |at| at.min(due)));
+        self.outbox.admin_at.get_or_insert(due);
     }
 
     /// The next frame: single ones by urgency, then the answers of several frames.

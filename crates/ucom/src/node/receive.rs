@@ -63,16 +63,23 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// D-12: DSP_ERROR 7, but not for what would be ignored anyway.
+    /// D-12: DSP_ERROR 7, but not for what would be ignored anyway, and not without a number: all such boards would say it
+    /// at once with one identifier (D-06).
     fn wrong_length(&mut self, function: Function, to: Sequence) {
         self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);
         let served = matches!(self.app, App::Up | App::Running);
         match function {
+            _ if self.number.is_none() => {}
             Function::Init if self.number != Some(to) => {}
             Function::Prog if self.programming.discarding() => {}
             Function::Prog if self.prog => self.abort(ErrorCode::CanReceive),
             Function::Prog if self.is_everybody(to) => {}
-            Function::Ci | Function::Par | Function::McaStart | Function::Admin | Function::DumpCi
+            Function::Ci
+            | Function::Par
+            | Function::McaStart
+            | Function::Admin
+            | Function::DumpCi
+            | Function::Alive
                 if !served => {}
             _ => self.error(ErrorCode::CanReceive),
         }

@@ -7,5 +7,6 @@ mod bus;
 mod compatibility;
 mod golden;
 mod random;
+mod shared_ids;
 mod states;
 mod update;

@@ -5,14 +5,7 @@ use std::fmt::Display;
 use jtc_host::port::PortError;
 use jtc_host::recording::RecordingError;
 
-/// Wrong usage or unreadable input.
-pub const USAGE: u8 = 2;
-/// No link to the controller.
-pub const NO_LINK: u8 = 3;
-/// Refused by a check, nothing was sent or moved.
-pub const REFUSED: u8 = 4;
-/// A fault while running.
-pub const FAULT: u8 = 5;
+pub use cli_kit::exit::{FAULT, NO_LINK, REFUSED, USAGE};
 
 /// The end of a command that failed.
 #[derive(Debug)]

@@ -2,14 +2,13 @@
 
 use std::time::Duration;
 
+use cli_kit::{Output, Stop};
 use ucom::Profile;
 use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request, StopLevel};
 
 use crate::args::{Boards, LinkArgs};
 use crate::failure::{Failure, NO_LINK};
 use crate::link::{Link, from_wire};
-use crate::output::Output;
-use crate::signal::Stop;
 
 /// Longest wait: so often Ctrl-C is looked at.
 const LOOK: Duration = Duration::from_millis(50);

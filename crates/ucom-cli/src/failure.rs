@@ -4,16 +4,7 @@ use std::fmt::Display;
 
 use can_link::CanError;
 
-/// A board reported an error.
-pub const DEVICE: u8 = 1;
-/// Wrong usage or unreadable input.
-pub const USAGE: u8 = 2;
-/// No bus, or no answer.
-pub const NO_LINK: u8 = 3;
-/// Refused by a check, nothing was sent or moved.
-pub const REFUSED: u8 = 4;
-/// Failed while running.
-pub const FAULT: u8 = 5;
+pub use cli_kit::exit::{DEVICE, FAULT, NO_LINK, REFUSED, USAGE};
 
 /// The end of a command that failed.
 #[derive(Debug)]

@@ -7,26 +7,26 @@ mod commands;
 mod driver;
 mod failure;
 mod link;
-mod output;
 mod shape;
-mod signal;
 mod words;
 
 use std::process::ExitCode;
 
 use clap::Parser;
+use cli_kit::Output;
 
 use args::Cli;
-use output::Output;
 
 fn main() -> ExitCode {
     // clap itself ends wrong usage with exit code 2.
     let cli = Cli::parse();
-    let out = Output::new(cli.json);
+    let out = Output::new("ucom", cli.json);
     match commands::run(cli.command, &cli.link, &out) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            out.failure(&failure);
+            if !failure.printed {
+                out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
+            }
             ExitCode::from(failure.exit)
         }
     }

@@ -1,10 +1,9 @@
 //! Boards as text and as JSON, alike for all commands.
 
+use cli_kit::table;
 use serde_json::{Value, json};
 use ucom::master::BoardSeen;
 use ucom::{BoardInfo, Profile, Status};
-
-use crate::output::table;
 
 /// A flash date as text, `2026-05-04`; the bare number where the profile's form does not fit.
 pub fn date(profile: &Profile, date: u16) -> String {

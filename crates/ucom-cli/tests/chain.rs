@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::{Sim, ended, signal};
+use cli_kit::trial::{ended, signal};
+use common::Sim;
 use serde_json::json;
 
 #[test]

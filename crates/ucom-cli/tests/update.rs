@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::{Sim, ended, image, signal};
+use cli_kit::trial::{ended, signal};
+use common::{Sim, image};
 
 fn chain(boards: &str) -> Sim {
     let sim = Sim::start(&["--boards", boards]);

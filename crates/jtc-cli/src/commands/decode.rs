@@ -2,13 +2,13 @@
 
 use std::io::Read;
 
+use cli_kit::Output;
 use jtc_host::port::{Direction, read_capture};
 use jtc_wire::{Described, FrameType, Piece, Status, pieces};
 use serde_json::{Value, json};
 
 use super::status;
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Longest piece of rubbish that is shown byte by byte.
 const SHOWN: usize = 32;

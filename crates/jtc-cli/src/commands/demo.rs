@@ -4,6 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
+use cli_kit::Output;
 use jtc_host::arm::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::SimPort;
@@ -18,7 +19,6 @@ use serde_json::json;
 use super::run_report;
 use crate::args::{DemoArgs, SimSpeed};
 use crate::failure::{FAULT, Failure};
-use crate::output::Output;
 
 /// Seed of the demo: anyone's demo gives the same figures.
 const SEED: u64 = 1;

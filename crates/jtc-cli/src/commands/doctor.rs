@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cli_kit::Output;
 use jtc_host::Session;
 use jtc_host::doctor::{Observation, RATES, Severity, findings};
 use jtc_host::port::SerialPort;
@@ -10,7 +11,6 @@ use serde_json::json;
 use super::status;
 use crate::args::LinkArgs;
 use crate::failure::{Failure, NO_LINK};
-use crate::output::Output;
 
 /// Listening at the rate asked for: 50 statuses.
 const LISTEN: Duration = Duration::from_secs(2);

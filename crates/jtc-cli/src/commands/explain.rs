@@ -1,11 +1,11 @@
 //! `jtc explain`: one page about a code, or about fault files.
 
+use cli_kit::{Output, table};
 use jtc_host::explain::{Page, find, pages};
 use serde_json::{Value, json};
 
 use crate::args::ExplainArgs;
 use crate::failure::Failure;
-use crate::output::{Output, table};
 
 /// Prints the pages that fit, or the list of all.
 pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
@@ -45,7 +45,7 @@ fn list(out: &Output) {
         let rows: Vec<Vec<String>> = pages().map(row).collect();
         format!(
             "{}\njtc explain CODE tells what a code means, what causes it and what to do",
-            table(&["name", "code"], &rows)
+            table(&["name", ">code"], &rows)
         )
     });
 }

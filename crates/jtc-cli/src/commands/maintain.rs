@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cli_kit::Output;
 use jtc_host::arm::Arm;
 use jtc_host::words;
 use serde_json::json;
@@ -9,7 +10,6 @@ use serde_json::json;
 use super::status;
 use crate::args::{ClearArgs, GripperArgs, RecoverArgs, ResetArgs, Switch};
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// All joints and the gripper.
 const ALL_NODES: u8 = 0x7F;

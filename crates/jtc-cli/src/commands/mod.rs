@@ -7,7 +7,6 @@ mod dynamics;
 mod explain;
 mod maintain;
 mod monitor;
-mod pages;
 mod params;
 mod ports;
 mod report;
@@ -18,9 +17,10 @@ mod status;
 mod teach;
 mod traj;
 
+use cli_kit::{Output, pages};
+
 use crate::args::Command;
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Does what the command line asks for.
 pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
@@ -42,7 +42,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Explain(args) => explain::explain(&args, out),
         Command::Decode => decode::decode(out),
         Command::Report(args) => report::report(&args, out),
-        Command::Completions { shell } => pages::completions(shell),
-        Command::Man { out: dir } => pages::man(dir.as_deref(), out),
+        Command::Completions { shell } => Ok(pages::completions::<crate::args::Cli>(shell)?),
+        Command::Man { out: dir } => Ok(pages::man::<crate::args::Cli>(dir.as_deref())?),
     }
 }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::io::IsTerminal;
 use std::time::Duration;
 
+use cli_kit::{Output, Stop};
 use crossterm::event::{self, Event, KeyCode, KeyModifiers};
 use jtc_host::port::SerialPort;
 use jtc_host::{Session, words};
@@ -17,8 +18,6 @@ use ratatui::widgets::{Block, BorderType, Cell, Padding, Paragraph, Row, Sparkli
 use super::status;
 use crate::args::MonitorArgs;
 use crate::failure::Failure;
-use crate::output::Output;
-use crate::signal::Stop;
 
 /// Values that the curves show: 8 s of statuses.
 const HISTORY: usize = 200;

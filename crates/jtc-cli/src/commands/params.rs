@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use cli_kit::{Output, table};
 use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
 use jtc_host::words;
 use serde_json::json;
 
 use crate::args::{FrictionKind, LinkArgs, ParamsCommand};
 use crate::failure::Failure;
-use crate::output::{Output, table};
 
 /// Does one of the family.
 pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
@@ -112,7 +112,7 @@ fn as_text(set: &ParameterSet) -> String {
         };
         let rows: Vec<_> = pid.iter().enumerate().map(row).collect();
         text += &table(
-            &["gains", "Kp N·m/rad", "Ki N·m/(rad·s)", "Kd N·m·s/rad", "∫min rad·s", "∫max rad·s"],
+            &["gains", ">Kp N·m/rad", ">Ki N·m/(rad·s)", ">Kd N·m·s/rad", ">∫min rad·s", ">∫max rad·s"],
             &rows,
         );
     }
@@ -122,7 +122,7 @@ fn as_text(set: &ParameterSet) -> String {
                 [vec![format!("joint {}", j + 1)], c.map(|v| format!("{v:.4}")).to_vec()].concat()
             };
             let rows: Vec<_> = c.iter().enumerate().map(row).collect();
-            text += &table(&["friction", "c0", "c1", "c2", "c3", "c4 1/K", "c5 °C"], &rows);
+            text += &table(&["friction", ">c0", ">c1", ">c2", ">c3", ">c4 1/K", ">c5 °C"], &rows);
         }
         Some(jtc_core::Friction::Table(tables)) => {
             let row = |(j, t): (usize, &jtc_core::TableOf<f32>)| {
@@ -130,14 +130,14 @@ fn as_text(set: &ParameterSet) -> String {
                 vec![format!("joint {}", j + 1), range(&t.velocity), range(&t.temperature)]
             };
             let rows: Vec<_> = tables.iter().enumerate().map(row).collect();
-            text += &table(&["friction table", "rad/s", "°C"], &rows);
+            text += &table(&["friction table", ">rad/s", ">°C"], &rows);
         }
         None => {}
     }
     if let Some(model) = &set.model {
         let row = |(i, l): (usize, &jtc_dynamics::Link)| vec![format!("link {i}"), format!("{:.3}", l.mass)];
         let rows: Vec<_> = model.links.iter().enumerate().map(row).collect();
-        text += &table(&["masses", "kg"], &rows);
+        text += &table(&["masses", ">kg"], &rows);
     }
     text
 }

@@ -1,10 +1,10 @@
 //! `jtc ports`: what is there, and why something cannot be used.
 
+use cli_kit::Output;
 use jtc_host::port::{PortKind, list};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Lists the serial ports.
 pub fn ports(out: &Output) -> Result<(), Failure> {

@@ -1,5 +1,6 @@
 //! `jtc report`: page and picture of a recording made earlier.
 
+use cli_kit::Output;
 use jtc_host::arm::Arm;
 use jtc_host::recording::Recording;
 use jtc_host::report::{ReportInput, Summary, html, picture_svg};
@@ -8,7 +9,6 @@ use serde_json::json;
 use super::run_report;
 use crate::args::ReportArgs;
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Writes the page and says the figures.
 pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use cli_kit::{Output, Stop};
 use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::recording::{self, Format, RecordingInfo};
@@ -18,8 +19,6 @@ use super::run_report;
 use super::traj::{Job, refuse};
 use crate::args::RunArgs;
 use crate::failure::{FAULT, Failure, REFUSED};
-use crate::output::Output;
-use crate::signal::Stop;
 
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(15);

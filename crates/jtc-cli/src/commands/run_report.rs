@@ -1,11 +1,10 @@
 //! What a run says at its end: figures per joint as a table and as JSON, and the files made of it.
 
+use cli_kit::table;
 use jtc_host::arm::Arm;
 use jtc_host::recording::{JointInfo, RecordingInfo};
 use jtc_host::report::{Facts, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
-
-use crate::output::{figure, table};
 
 /// What a recording of this arm says about itself.
 pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
@@ -49,8 +48,13 @@ pub fn figures(summary: &Summary) -> String {
             ]
         })
         .collect();
-    let head = ["", "RMS mrad", "max mrad", "peak rad/s", "peak N·m", "limit N·m", "share %"];
+    let head = ["", ">RMS mrad", ">max mrad", ">peak rad/s", ">peak N·m", ">limit N·m", ">share %"];
     table(&head, &rows)
+}
+
+/// A figure with so many decimals, or a dash where it is not known.
+fn figure(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".into(), |v| format!("{v:.digits$}"))
 }
 
 /// Upload and link as facts for the report.

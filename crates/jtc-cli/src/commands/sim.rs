@@ -1,8 +1,9 @@
 //! `jtc sim`: a simulated controller for other programs.
 
+use cli_kit::Output;
+
 use crate::args::SimArgs;
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Serves a simulated controller until SIGINT or SIGTERM.
 #[cfg(unix)]
@@ -12,7 +13,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use serde_json::json;
 
     use crate::serve::{Pty, Server};
-    use crate::signal::Stop;
+    use cli_kit::Stop;
 
     let stop = Stop::listen()?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);

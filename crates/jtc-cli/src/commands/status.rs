@@ -1,12 +1,12 @@
 //! `jtc status`, and a status as text and as JSON for all commands that show one.
 
+use cli_kit::{Output, table};
 use jtc_host::words;
 use jtc_wire::Status;
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
 use crate::failure::Failure;
-use crate::output::{Output, table};
 
 /// Prints one status.
 pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -97,7 +97,7 @@ pub fn as_text(s: &Status) -> String {
             ]
         })
         .collect();
-    text += &table(&["", "state", "position rad", "velocity rad/s", "torque N·m", "°C"], &rows);
+    text += &table(&["", "state", ">position rad", ">velocity rad/s", ">torque N·m", ">°C"], &rows);
     if let Some(g) = s.gripper {
         let is = |level| if level != 0 { "reached" } else { "not reached" };
         text += &format!(

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use cli_kit::{Output, Stop};
 use jtc_host::trajectory::Loaded;
 use jtc_host::words;
 use jtc_wire::Status;
@@ -11,8 +12,6 @@ use serde_json::json;
 
 use crate::args::{LinkArgs, TeachCommand};
 use crate::failure::Failure;
-use crate::output::Output;
-use crate::signal::Stop;
 
 /// Statuses come every 40 ms; slower ones are as good as none.
 const STATUS: Duration = Duration::from_millis(500);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use cli_kit::{Output, table};
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, Verdict};
 use jtc_host::session::UploadOptions;
@@ -12,7 +13,6 @@ use serde_json::json;
 use super::run;
 use crate::args::{CheckArgs, TrajCommand};
 use crate::failure::{Failure, REFUSED};
-use crate::output::{Output, table};
 
 /// Does one of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
@@ -119,7 +119,7 @@ fn figures(verdict: &Verdict) -> String {
             ]
         })
         .collect();
-    table(&["", "position rad", "peak rad/s", "peak rad/s²", "peak N·m"], &rows)
+    table(&["", ">position rad", ">peak rad/s", ">peak rad/s²", ">peak N·m"], &rows)
 }
 
 fn info(file: &Path, out: &Output) -> Result<(), Failure> {

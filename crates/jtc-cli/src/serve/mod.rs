@@ -6,10 +6,10 @@ mod pty;
 use std::time::{Duration, Instant};
 
 use can_link::CanBus;
+use cli_kit::Stop;
 use jtc_sim::{BusTap, World};
 
 use crate::args::SimSpeed;
-use crate::signal::Stop;
 use frames::{Frames, Incoming};
 pub use pty::{Pty, PtyError};
 

@@ -1,39 +1,14 @@
 //! Runs the `jtc` command as a user does, and a simulated controller for it to talk to.
 #![allow(dead_code)]
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use serde_json::Value;
-
-/// What a command said and how it ended.
-pub struct Said {
-    pub code: i32,
-    pub out: String,
-    pub err: String,
-}
-
-impl Said {
-    /// Its stdout as one JSON object.
-    pub fn json(&self) -> Value {
-        let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
-        serde_json::from_str(self.out.trim()).unwrap_or_else(error)
-    }
-
-    /// The same, once it ended with this code.
-    pub fn ends(self, code: i32) -> Self {
-        assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
-        self
-    }
-}
+use cli_kit::trial::{Said, program, run};
 
 fn command() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_jtc"));
-    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("JTC_")) {
-        command.env_remove(name);
-    }
-    command
+    program(env!("CARGO_BIN_EXE_jtc"), "JTC_")
 }
 
 /// Runs `jtc` with these words.
@@ -43,17 +18,7 @@ pub fn jtc(words: &[&str]) -> Said {
 
 /// Runs `jtc` with this text on its stdin.
 pub fn jtc_with(words: &[&str], stdin: &str) -> Said {
-    let mut child = command()
-        .args(words)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("jtc starts");
-    child.stdin.take().expect("stdin").write_all(stdin.as_bytes()).ok();
-    let output = child.wait_with_output().expect("jtc ends");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+    run(command(), words, stdin)
 }
 
 /// A simulated controller behind a pseudo-terminal; it ends with the test.

@@ -1,5 +1,6 @@
 //! `ucom scan`, `init`, `info`, `status`, `reset`, `xreset`, `start`, `stop`: the chain and single acts on boards.
 
+use cli_kit::Output;
 use serde_json::json;
 use ucom::files::{Inventory, InventoryBoard};
 use ucom::master::{BoardSeen, InitOptions, InitReport, Outcome, Reports, Request, StopLevel};
@@ -8,7 +9,6 @@ use ucom::{BoardInfo, Profile, Status};
 use crate::args::{ActArgs, Boards, BoardsArgs, InitArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{Failure, NO_LINK};
-use crate::output::Output;
 use crate::shape::{bits, board_table, board_value, info_value, state};
 
 /// Who is there; changes nothing.

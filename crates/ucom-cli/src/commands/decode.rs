@@ -3,14 +3,13 @@
 use std::io::BufRead;
 use std::time::Duration;
 
+use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::failure::Failure;
 use crate::link::{protocol_frame, recorded};
-use crate::output::Output;
-use crate::signal::Stop;
 use crate::words::Decoder;
 
 /// Decodes to the end, or until Ctrl-C. Exit code 2 when nothing in a file is a frame.

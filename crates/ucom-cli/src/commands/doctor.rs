@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use can_link::ErrorState;
+use cli_kit::Output;
 use serde_json::json;
 use ucom::files::{Image, ImageOptions};
 use ucom::master::doctor::{Controller, Finding, Observation, Severity, findings};
@@ -12,7 +13,6 @@ use ucom::master::{Event, Outcome, Request};
 use crate::args::{LinkArgs, ProbeArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
-use crate::output::Output;
 use crate::shape::board_value;
 
 /// How long the bus is listened to before anything is asked.

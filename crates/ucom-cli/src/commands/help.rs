@@ -1,11 +1,11 @@
 //! `ucom help`: pages about the files that ucom reads.
 
 use clap::CommandFactory;
+use cli_kit::Output;
 use serde_json::json;
 
 use crate::args::{Cli, Topic};
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Prints a page, or the program's own help.
 pub fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use cli_kit::{Output, table};
 use serde_json::{Value, json};
 use ucom::files::{DbcBoard, dbc as dbc_text};
 use ucom::master::io::{IoDescription, ParValue, short};
@@ -11,7 +12,6 @@ use super::run::{named, settings};
 use crate::args::{Assignment, CiArgs, DbcArgs, IoArgs, LinkArgs, ParArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
-use crate::output::{Output, table};
 
 /// Names of everything, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {

@@ -7,7 +7,6 @@ mod help;
 mod io;
 mod monitor;
 mod monitor_view;
-mod pages;
 mod record;
 mod run;
 mod sim;
@@ -15,9 +14,10 @@ mod update;
 
 pub use boards::seen;
 
+use cli_kit::{Output, pages};
+
 use crate::args::{Command, LinkArgs};
 use crate::failure::Failure;
-use crate::output::Output;
 
 /// Does what the command line asks for.
 pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -45,7 +45,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Replay(args) => record::replay(&args, link, out),
         Command::Decode(args) => decode::decode(&args, link, out),
         Command::Help { topic } => help::help(topic, out),
-        Command::Completions { shell } => pages::completions(shell),
-        Command::Man { out: dir } => pages::man(dir.as_deref(), out),
+        Command::Completions { shell } => Ok(pages::completions::<crate::args::Cli>(shell)?),
+        Command::Man { out: dir } => Ok(pages::man::<crate::args::Cli>(dir.as_deref())?),
     }
 }

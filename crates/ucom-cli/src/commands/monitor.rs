@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
+use cli_kit::Output;
 use crossterm::event::{self, Event as Key, KeyCode, KeyModifiers};
 use serde_json::{Value, json};
 use ucom::master::{Board, Event, Life, Request};
@@ -12,7 +13,6 @@ use super::monitor_view as view;
 use crate::args::{LinkArgs, MonitorArgs};
 use crate::driver::{Driver, words};
 use crate::failure::Failure;
-use crate::output::Output;
 use crate::shape::{bits, info_value, state};
 
 /// Seconds of bus load that the curve shows.

@@ -3,14 +3,13 @@
 use std::io::Write;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::files::recording::{CandumpWriter, Record, Recording, RecordingFormat, RecordingWriter};
 
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::failure::{FAULT, Failure};
 use crate::link::{Link, protocol_frame, recorded, replayed};
-use crate::output::Output;
-use crate::signal::Stop;
 use crate::words::Decoder;
 
 /// Where frames go.

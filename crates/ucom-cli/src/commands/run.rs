@@ -5,6 +5,7 @@ use std::io::BufRead;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use cli_kit::Output;
 use serde_json::{Map, Value, json};
 use ucom::master::io::{IoDescription, Snapshot, short};
 use ucom::master::{
@@ -14,7 +15,6 @@ use ucom::master::{
 use crate::args::{Assignment, LinkArgs, OnLost, RunArgs, SoArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{FAULT, Failure, NO_LINK};
-use crate::output::Output;
 
 /// How often `run` says how things are.
 const SAY: Duration = Duration::from_secs(1);

@@ -9,6 +9,7 @@ use can_link::{
     BusError, BusStats, CanFrame, ClientEvent, ClientId, Happening, MemberId, SocketcandGateway, TimedBus,
     TimedEvent,
 };
+use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::chain::{ChainConfig, ChainSim, Fault};
 use ucom::{Format, Frame, Profile};
@@ -16,8 +17,6 @@ use ucom::{Format, Frame, Profile};
 use crate::args::{LinkArgs, SimArgs};
 use crate::failure::Failure;
 use crate::link::to_wire;
-use crate::output::Output;
-use crate::signal::Stop;
 
 /// The name of the bus.
 const CHANNEL: &str = "can0";

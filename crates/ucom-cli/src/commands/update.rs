@@ -1,6 +1,6 @@
 //! `ucom update`: firmware onto boards, checked, written, verified.
 
-use indicatif::ProgressBar;
+use cli_kit::{Output, ProgressBar, table};
 use serde_json::{Value, json};
 use ucom::Profile;
 use ucom::files::{Image, ImageOptions, Inventory};
@@ -10,7 +10,6 @@ use ucom::master::{Event, Outcome, Request};
 use crate::args::{Boards, LinkArgs, UpdateArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{Failure, REFUSED};
-use crate::output::{Output, table};
 use crate::shape::date;
 
 /// Programs the boards that are meant.

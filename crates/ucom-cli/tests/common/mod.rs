@@ -6,35 +6,10 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use can_link::{CanBus, CanFrame, Id};
-use serde_json::Value;
-
-/// What a command said and how it ended.
-pub struct Said {
-    pub code: i32,
-    pub out: String,
-    pub err: String,
-}
-
-impl Said {
-    /// Its stdout as one JSON object.
-    pub fn json(&self) -> Value {
-        let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
-        serde_json::from_str(self.out.trim()).unwrap_or_else(error)
-    }
-
-    /// The same, once it ended with this code.
-    pub fn ends(self, code: i32) -> Self {
-        assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
-        self
-    }
-}
+use cli_kit::trial::{Said, program, run, signal};
 
 fn command() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ucom"));
-    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("UCOM_")) {
-        command.env_remove(name);
-    }
-    command
+    program(env!("CARGO_BIN_EXE_ucom"), "UCOM_")
 }
 
 /// Runs `ucom` with these words.
@@ -45,24 +20,6 @@ pub fn ucom(words: &[&str]) -> Said {
 /// Runs `ucom` with this text on its stdin.
 pub fn ucom_with(words: &[&str], stdin: &str) -> Said {
     run(command(), words, stdin)
-}
-
-fn run(mut command: Command, words: &[&str], stdin: &str) -> Said {
-    let mut child = command
-        .args(words)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("ucom starts");
-    child.stdin.take().expect("stdin").write_all(stdin.as_bytes()).ok();
-    said(child)
-}
-
-fn said(child: Child) -> Said {
-    let output = child.wait_with_output().expect("ucom ends");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
 }
 
 /// A simulated chain; it ends with the test.
@@ -148,16 +105,6 @@ impl Drop for Sim {
         self.child.kill().ok();
         self.child.wait().ok();
     }
-}
-
-/// Sends a signal to a process of the test.
-pub fn signal(child: &Child, name: &str) {
-    Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
-}
-
-/// What a started command said, once it has ended.
-pub fn ended(child: Child) -> Said {
-    said(child)
 }
 
 /// A device on the bus that sends and hears raw frames.

@@ -6,18 +6,17 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use serde_json::json;
 
-use crate::failure::Failure;
-
 /// How a command speaks.
 #[derive(Clone, Copy, Debug)]
 pub struct Output {
+    program: &'static str,
     json: bool,
 }
 
 impl Output {
-    /// Text, or JSON objects.
-    pub fn new(json: bool) -> Self {
-        Self { json }
+    /// The program's name before what went wrong; text, or JSON objects.
+    pub fn new(program: &'static str, json: bool) -> Self {
+        Self { program, json }
     }
 
     /// JSON was asked for.
@@ -34,7 +33,7 @@ impl Output {
             text()
         };
         let mut stdout = std::io::stdout().lock();
-        // A reader that has gone (`ucom status | head`) is no error.
+        // A reader that has gone (`… | head`) is no error.
         let _ = writeln!(stdout, "{}", line.trim_end());
         let _ = stdout.flush();
     }
@@ -63,25 +62,15 @@ impl Output {
         bar
     }
 
-    /// Prints why a command failed.
-    pub fn failure(&self, failure: &Failure) {
-        if failure.printed {
-            return;
-        }
+    /// Prints why a command failed: the exit code, a short name for programs, what happened, what to do next.
+    pub fn failure(&self, exit: u8, code: &str, message: &str, hint: &str) {
         if self.json {
-            let error = json!({
-                "error": {
-                    "code": failure.code,
-                    "message": failure.message,
-                    "hint": failure.hint,
-                    "exit": failure.exit,
-                }
-            });
-            println!("{error}");
+            let error = json!({ "code": code, "message": message, "hint": hint, "exit": exit });
+            println!("{}", json!({ "error": error }));
         }
-        eprintln!("ucom: {}", failure.message);
-        if !failure.hint.is_empty() {
-            eprintln!("      {}", failure.hint);
+        eprintln!("{}: {message}", self.program);
+        if !hint.is_empty() {
+            eprintln!("{:1$}  {hint}", "", self.program.len());
         }
     }
 }

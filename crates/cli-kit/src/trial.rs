@@ -1,0 +1,60 @@
+//! For tests: runs a command as a user does.
+
+use std::io::Write;
+use std::process::{Child, Command, Stdio};
+
+use serde_json::Value;
+
+/// What a command said and how it ended.
+pub struct Said {
+    /// Its exit code; −1 when a signal ended it.
+    pub code: i32,
+    /// Its stdout.
+    pub out: String,
+    /// Its stderr.
+    pub err: String,
+}
+
+impl Said {
+    /// Its stdout as one JSON object; panics if it is none.
+    pub fn json(&self) -> Value {
+        let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
+        serde_json::from_str(self.out.trim()).unwrap_or_else(error)
+    }
+
+    /// The same, once it ended with this code; panics if it ended with another.
+    pub fn ends(self, code: i32) -> Self {
+        assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
+        self
+    }
+}
+
+/// A program without the variables that the surroundings may have set for it: those that begin with `prefix`.
+pub fn program(path: &str, prefix: &str) -> Command {
+    let mut command = Command::new(path);
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with(prefix)) {
+        command.env_remove(name);
+    }
+    command
+}
+
+/// Runs a command with these words, and this text on its stdin, to its end.
+pub fn run(mut command: Command, words: &[&str], stdin: &str) -> Said {
+    let pipes = command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = pipes.spawn().expect("it starts");
+    // A command that ends without reading its stdin closes it.
+    child.stdin.take().expect("stdin").write_all(stdin.as_bytes()).ok();
+    ended(child)
+}
+
+/// What a started command said, once it has ended.
+pub fn ended(child: Child) -> Said {
+    let output = child.wait_with_output().expect("it ends");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    Said { code: output.status.code().unwrap_or(-1), out: text(&output.stdout), err: text(&output.stderr) }
+}
+
+/// Sends a signal to a process of the test, as `kill` names it: `-INT`.
+pub fn signal(child: &Child, name: &str) {
+    Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
+}

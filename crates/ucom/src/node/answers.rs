@@ -173,7 +173,9 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         let profile = &self.config.profile;
         let dimensions = self.application.dimensions();
         let made = match self.jobs.dump_io? {
-            Place::First => Some((dimensions.payload(profile.endian), Place::String { string: 0, package: 0 })),
+            Place::First => {
+                Some((dimensions.payload(profile.endian), Place::String { string: 0, package: 0 }))
+            }
             Place::String { string, package: at } => package(self.io_text(string), string, at, profile),
         };
         match made {

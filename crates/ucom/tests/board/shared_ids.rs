@@ -86,7 +86,10 @@ fn d14_an_answer_ends_when_its_text_changes() {
                 }
                 bus.run(60);
                 bus.take();
-                assert!(bus.ask("5C1#", 20).iter().any(|f| f.id() == 0x6C1), "{request} after {after} frames");
+                assert!(
+                    bus.ask("5C1#", 20).iter().any(|f| f.id() == 0x6C1),
+                    "{request} after {after} frames"
+                );
                 let heard = bus.ask(request, 20);
                 let answer: Vec<_> = heard.into_iter().filter(|f| f.id() == id).collect();
                 assert_eq!(answer.iter().filter(|f| f.dlc() == begins).count(), 1, "{request}: {answer:?}");
@@ -102,7 +105,8 @@ fn d14_an_answer_ends_when_its_text_changes() {
 #[test]
 fn d06_d12_no_error_without_a_number() {
     let profile = Profile { dlc_strict: true, ..Profile::default() };
-    let all = ["000#00", "240#00", "280#00", "281#00", "282#0000", "200#00", "680#00", "000#0000000000000000"];
+    let all =
+        ["000#00", "240#00", "280#00", "281#00", "282#0000", "200#00", "680#00", "000#0000000000000000"];
     for text in all {
         let mut bus = Bus::new(&[0x21, 0x22], profile);
         assert_eq!(bus.ask(text, 300), [], "{text}");

@@ -3,7 +3,7 @@
 use std::prelude::v1::*;
 
 use super::link::Link;
-use super::request::{TRIES, admin, info, numbers, set_status};
+use super::request::{TRIES, admin, confirmed, info, numbers, set_status};
 use super::scan::{REPORTS, Reports, collect_reports};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
@@ -172,7 +172,8 @@ pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome
 
 /// XRESET, wait, poll PC_INFO until the exloader runs; PROG by SETSTATUS when it is off (U-4).
 ///
-/// A board that does not answer any more is repaired when its flash number is known.
+/// A board that does not answer any more is repaired when its flash number is known; another board that answers in its
+/// place is refused.
 pub(crate) async fn enter_exloader(
     link: &Link,
     board: u8,
@@ -186,6 +187,13 @@ pub(crate) async fn enter_exloader(
         }
         (result, _) => result?,
     };
+    if let Some(wanted) = flash_number.filter(|wanted| *wanted != info.flash_number) {
+        // One damaged answer is not another board.
+        let found = confirmed(link, board).await?.info.flash_number;
+        if found != wanted {
+            return Err(Error::WrongBoard { board, wanted, found });
+        }
+    }
     if info.status.has(Status::PROG) {
         return Ok(info);
     }

@@ -214,6 +214,12 @@ pub enum Error {
         /// Why.
         failure: super::update::UpdateFailure,
     },
+    /// The caller says that the bus is gone, see [`Master::abandon`](super::Master::abandon).
+    #[error("the bus failed: {reason}")]
+    Bus {
+        /// What its driver said.
+        reason: String,
+    },
     /// The caller asked to end.
     #[error("cancelled")]
     Cancelled,
@@ -290,8 +296,9 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Device { .. } | Self::AdminRefused { .. } | Self::StatusNotTaken { .. } => 1,
-            Self::NoEdge { .. } | Self::NoBoard { .. } | Self::Plan(_) => 2,
-            Self::NoAnswer { .. } | Self::Incomplete { .. } | Self::NotReached { .. } => 3,
+            Self::NoEdge { .. } | Self::NoBoard { .. } => 2,
+            Self::Plan(e) => e.exit_code(),
+            Self::NoAnswer { .. } | Self::Incomplete { .. } | Self::NotReached { .. } | Self::Bus { .. } => 3,
             Self::Contradiction { .. }
             | Self::AckMismatch { .. }
             | Self::WrongSequence { .. }
@@ -328,6 +335,7 @@ impl Error {
             Self::NoEdge { .. } => "no-edge",
             Self::Plan(_) => "plan",
             Self::Update { .. } => "update",
+            Self::Bus { .. } => "bus",
             Self::Cancelled => "cancelled",
         }
     }
@@ -373,6 +381,7 @@ impl Error {
             Self::NoEdge { board, .. } => format!("`ucom io {board}` lists the names"),
             Self::Plan(e) => e.hint().into(),
             Self::Update { failure, .. } => failure.hint(),
+            Self::Bus { .. } => "is the bus still there, the adapter plugged in? `ucom doctor` looks at it".into(),
             Self::Cancelled => "`ucom scan` tells in what state the boards are".into(),
         }
     }

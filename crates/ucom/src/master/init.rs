@@ -325,8 +325,11 @@ pub(crate) async fn repair_procedure(
     if let Ok(found) = numbers(&link, number).await
         && found.flash_number != flash_number
     {
-        let found = found.flash_number;
-        return Err(Error::WrongBoard { board: number, wanted: flash_number, found });
+        // One damaged answer is not another board.
+        let found = confirmed(&link, number).await?.info.flash_number;
+        if found != flash_number {
+            return Err(Error::WrongBoard { board: number, wanted: flash_number, found });
+        }
     }
     repair(&link, number, flash_number).await.map(Outcome::Repaired)
 }

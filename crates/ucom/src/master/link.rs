@@ -147,34 +147,49 @@ impl Link {
         }
     }
 
-    /// Ends `work` with [`Error::Cancelled`] when the caller asks to; its queued frames do not leave then.
+    /// Ends `work` with [`Error::Cancelled`] when the caller asks to, with [`Error::Bus`] when he says that the bus is
+    /// gone; its queued frames do not leave then.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
     ) -> Result<T, Error> {
         let mut work = pin!(work);
         poll_fn(|context| {
-            let cancelled = self.with(|core| {
-                let cancelled =
-                    core.inboxes.get_mut(&self.id).is_some_and(|inbox| core::mem::take(&mut inbox.cancel));
-                if cancelled {
+            let ended = self.with(|core| {
+                let inbox = core.inboxes.get_mut(&self.id)?;
+                let gone = inbox.bus_gone.clone().map(|reason| Error::Bus { reason });
+                let cancelled = core::mem::take(&mut inbox.cancel).then_some(Error::Cancelled);
+                let ended = gone.or(cancelled);
+                if ended.is_some() {
                     core.forget_queued(self.id);
                 }
-                cancelled
+                ended
             });
-            if cancelled { Poll::Ready(Err(Error::Cancelled)) } else { work.as_mut().poll(context) }
+            match ended {
+                Some(error) => Poll::Ready(Err(error)),
+                None => work.as_mut().poll(context),
+            }
         })
         .await
     }
 
-    /// Becomes master before the first intrusive command (D-08): listens until `master.listen` has passed, refuses
-    /// when another PC was heard in that time, then sends ALIVE until the session ends.
+    /// Becomes master before the first intrusive command (D-08): looks for another one, then sends ALIVE until the
+    /// session ends.
     pub(crate) async fn become_master(&self, force: bool) -> Result<(), Error> {
+        self.look_for_master(force).await?;
+        self.with(|core| {
+            if core.session == Session::Quiet {
+                core.start_session();
+            }
+        });
+        Ok(())
+    }
+
+    /// Listens until `master.listen` has passed, refuses when another PC was heard in that time (D-08). Not when this PC
+    /// is master already, or is forced.
+    pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
         let already = self.with(|core| core.session != Session::Quiet);
-        if already {
-            return Ok(());
-        }
-        if !force {
+        if !already && !force {
             let (since, listen, now) =
                 self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
             // The time before the command counts when the bus was listened to.
@@ -187,7 +202,6 @@ impl Link {
                 return Err(Error::ForeignMaster { function, to, ago_ms });
             }
         }
-        self.with(|core| core.start_session());
         Ok(())
     }
 

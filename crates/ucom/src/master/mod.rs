@@ -131,6 +131,15 @@ impl Master {
         self.run();
     }
 
+    /// The bus is gone: ends a procedure without another frame. [`Event::Done`] comes at once: an update's with what
+    /// is known of each board, any other's with [`Error::Bus`].
+    pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
+        if let Some(inbox) = lock(&self.core).inboxes.get_mut(&id) {
+            inbox.bus_gone = Some(reason.into());
+        }
+        self.run();
+    }
+
     /// A frame has arrived; see [`Frame::received`].
     pub fn handle(&mut self, now: u64, received: Result<Frame, Foreign>) {
         {

@@ -229,6 +229,19 @@ fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, heard: &su
     }
 }
 
+/// The status that each of these numbers shows last; an error where its answers contradict each other.
+pub(crate) async fn statuses(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Result<Status, Error>> {
+    let slots = ask_all(link, numbers).await;
+    let status = |(board, slot): (u8, Slot)| {
+        let contradiction = Error::Contradiction { board, tries: TRIES + 1 };
+        match slot.answers.last() {
+            Some((info, _)) if !slot.contradicts => (board, Ok(info.status)),
+            _ => (board, Err(contradiction)),
+        }
+    };
+    slots.into_iter().map(status).collect()
+}
+
 /// The whole scan. Nothing but `PC_REPORT` and `PC_INFO` is sent (P-1).
 pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     let mut report = ScanReport::default();

@@ -55,6 +55,8 @@ pub(crate) struct Inbox {
     pub heard: VecDeque<Heard>,
     pub wake: Option<u64>,
     pub cancel: bool,
+    /// Nothing can be sent or heard any more, and why.
+    pub bus_gone: Option<String>,
 }
 
 /// What a procedure forgets when one of its frames leaves: it cannot be an answer to it.

@@ -1,13 +1,18 @@
 //! Firmware update: the image twice in blocks of 64 bytes, checked first, written then, read back last (D-40 to D-46).
 
+mod board;
+mod campaign;
+mod failure;
+mod group;
 mod plan;
 mod procedure;
 mod report;
 mod transfer;
 
-pub use plan::{PlanError, UpdateImage, UpdatePlan};
+pub use failure::UpdateFailure;
+pub use plan::{Expected, PlanError, PlannedImage, Unverifiable, UpdateImage, UpdatePlan};
 pub(crate) use procedure::update;
-pub use report::{Progress, UpdateFailure, UpdateOutcome, UpdateReport, UpdateResult};
+pub use report::{Progress, UpdateOutcome, UpdateReport, UpdateResult};
 
 use std::prelude::v1::*;
 
@@ -39,13 +44,16 @@ pub struct UpdateOptions {
     pub image: UpdateImage,
     /// What the other cycle carries under the plans `exloader-app` (first), `pmem-xmem` and `raw` (second).
     pub second: Option<UpdateImage>,
+    /// Program ID that the board must show at the end, where the image does not tell it (plan `raw`, `prog.header` or
+    /// `prog.checksum` `none`); elsewhere the image must have it.
+    pub expect_program_id: Option<u16>,
     /// Flash date as 16 bits, see [`DateForm`](crate::DateForm).
     pub date: u16,
     /// The header names the board's flash number: another board then refuses the image.
     pub name_target: bool,
     /// One after the other, or all at once.
     pub mode: UpdateMode,
-    /// Only the checks: nothing but PC_INFO is sent.
+    /// Only the checks, the look for another PC among them: nothing but PC_INFO is sent.
     pub dry_run: bool,
     /// Also when boards run (U-2), another PC is on the bus, or the image is there already (U-3).
     pub force: bool,
@@ -62,6 +70,7 @@ impl UpdateOptions {
             targets,
             image,
             second: None,
+            expect_program_id: None,
             date,
             name_target: false,
             mode: UpdateMode::OneByOne,

@@ -2,9 +2,11 @@
 
 use std::prelude::v1::*;
 
+use core::fmt;
+
 use super::UpdateOptions;
 use crate::profile::{HeaderForm, Plan};
-use crate::{BLOCK_LEN, Checksum, Header, Memory, Profile, block_count, checksum, data_block};
+use crate::{BLOCK_LEN, BoardInfo, Checksum, Header, Memory, Profile, block_count, checksum, data_block};
 
 /// An image with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,6 +44,14 @@ pub enum PlanError {
         /// `prog.plan`.
         plan: Plan,
     },
+    /// Another image than the one that the user named by its Program ID.
+    #[error("the image has Program ID 0x{image:04X}, not 0x{expected:04X}")]
+    OtherProgram {
+        /// Of the image.
+        image: u16,
+        /// The one that was named.
+        expected: u16,
+    },
     /// Half a word.
     #[error("the image has {bytes} bytes: not whole words")]
     HalfWord {
@@ -54,6 +64,14 @@ pub enum PlanError {
 }
 
 impl PlanError {
+    /// Exit code of the commands: 2 wrong usage, 4 refused by a check.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::OtherProgram { .. } => 4,
+            _ => 2,
+        }
+    }
+
     /// What helps.
     pub fn hint(&self) -> &'static str {
         match self {
@@ -64,6 +82,7 @@ impl PlanError {
             Self::SecondMissing { .. } | Self::SecondUnused { .. } => {
                 "see `prog.plan` in `ucom help profile`"
             }
+            Self::OtherProgram { .. } => "is it the right file? without `--expect-program-id` it is not compared",
             Self::Void => "`--date YYYY-MM-DD`",
         }
     }
@@ -92,14 +111,77 @@ impl Cycle {
     }
 }
 
+/// What a board shall show at the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Expected {
+    /// Its Program ID.
+    pub program_id: u16,
+    /// Its flash date; `None`: not known, because no header of ours carries it.
+    pub date: Option<u16>,
+}
+
+impl Expected {
+    /// The board shows it.
+    pub fn is(&self, known: &BoardInfo) -> bool {
+        known.program_id == self.program_id && self.date.is_none_or(|date| date == known.date)
+    }
+}
+
+/// Why nobody knows what a board must show after the update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unverifiable {
+    /// Plan `raw`: the files hide their Program ID.
+    RawPlan,
+    /// `prog.header` is `none`: the board makes Program ID and date by itself.
+    NoHeader,
+    /// `prog.checksum` is `none`: Program IDs are no checksums of images.
+    NoChecksum,
+}
+
+impl fmt::Display for Unverifiable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::RawPlan => "with `prog.plan` raw the file hides its Program ID",
+            Self::NoHeader => "with `prog.header` none the board makes its Program ID by itself",
+            Self::NoChecksum => "with `prog.checksum` none the Program ID cannot be computed",
+        })
+    }
+}
+
+impl Unverifiable {
+    /// How it can be verified all the same.
+    pub fn hint(&self) -> &'static str {
+        "to have it verified name the Program ID that the board must show: `--expect-program-id 0x…`"
+    }
+}
+
+/// One image as it is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlannedImage {
+    /// The cycles that carry it, first and last: 1, 2 or both.
+    pub cycles: (u32, u32),
+    /// Where it goes; `None`: only the file knows (plan `raw`).
+    pub memory: Option<Memory>,
+    /// Load address, words; `None`: it is not sent.
+    pub address_words: Option<u32>,
+    /// Its length, bytes.
+    pub bytes: usize,
+    /// Its Program ID (D-44); `None`: hidden, or not computed.
+    pub program_id: Option<u16>,
+}
+
 /// What a board gets, and what it shall show afterwards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdatePlan {
     pub(crate) cycles: [Cycle; 2],
-    /// Program ID and date that the board shows at the end; `None`: the image hides them from us (plan `raw`).
-    pub expected: Option<(u16, u16)>,
-    /// The first cycle only checks: before the second nothing is lost.
-    pub first_only_checks: bool,
+    /// What was given, the image first.
+    pub images: Vec<PlannedImage>,
+    /// What the board shows at the end; `None`: nobody knows.
+    pub expected: Option<Expected>,
+    /// Why nobody knows.
+    pub unverifiable: Option<Unverifiable>,
+    /// The first cycle that may erase flash, 1 or 2: before it nothing is lost.
+    pub erases_from: u32,
 }
 
 impl UpdatePlan {
@@ -115,16 +197,28 @@ impl UpdatePlan {
                 return Err(PlanError::HalfWord { bytes: one.bytes.len() });
             }
         }
-        let second = || options.second.as_ref().ok_or(PlanError::SecondMissing { plan });
+        let other = options.second.as_ref();
+        let second = || other.ok_or(PlanError::SecondMissing { plan });
         let [first, last] = match plan {
-            Plan::VerifyWrite if options.second.is_some() => return Err(PlanError::SecondUnused { plan }),
+            Plan::VerifyWrite if other.is_some() => return Err(PlanError::SecondUnused { plan }),
             Plan::VerifyWrite => [(image, Memory::Program); 2],
             Plan::ExloaderApp => [(second()?, Memory::Ram), (image, Memory::Program)],
             Plan::PmemXmem => [(image, Memory::Program), (second()?, Memory::Data)],
-            Plan::Raw => {
-                [(image, Memory::Program), (options.second.as_ref().unwrap_or(image), Memory::Program)]
-            }
+            Plan::Raw => [(image, Memory::Program), (other.unwrap_or(image), Memory::Program)],
         };
+        let erases_from = match plan {
+            // The first cycle only checks, or fills RAM: the application in flash stays valid.
+            Plan::VerifyWrite | Plan::ExloaderApp => 2,
+            // The first cycle writes program flash; what raw files make a board do only their makers know.
+            Plan::PmemXmem | Plan::Raw => 1,
+        };
+        let unverifiable = match (plan, profile.prog_header, profile.prog_checksum) {
+            (Plan::Raw, ..) => Some(Unverifiable::RawPlan),
+            (_, HeaderForm::None, _) => Some(Unverifiable::NoHeader),
+            (.., Checksum::None) => Some(Unverifiable::NoChecksum),
+            _ => None,
+        };
+        let with_header = plan != Plan::Raw && profile.prog_header == HeaderForm::V1;
         let id = |image: &UpdateImage| checksum(profile.prog_checksum, profile.prog_endian, &image.bytes);
         let header = |cycle, (image, memory): (&UpdateImage, Memory)| Header {
             cycle,
@@ -135,21 +229,45 @@ impl UpdatePlan {
             date: options.date,
             target,
         };
-        let with_header = plan != Plan::Raw && profile.prog_header == HeaderForm::V1;
         let cycle = |number, part: (&UpdateImage, Memory)| Cycle {
             header: with_header.then(|| header(number, part).build(profile.prog_endian)),
             bytes: part.0.bytes.clone(),
+        };
+        let sent = |image: &UpdateImage, memory, cycles| PlannedImage {
+            cycles,
+            memory: (plan != Plan::Raw).then_some(memory),
+            address_words: with_header.then_some(image.address_words),
+            bytes: image.bytes.len(),
+            program_id: unverifiable.is_none().then(|| id(image)),
+        };
+        let images = match (plan, other) {
+            (_, None) => vec![sent(image, first.1, (1, 2))],
+            (Plan::ExloaderApp, Some(other)) => {
+                vec![sent(image, last.1, (2, 2)), sent(other, first.1, (1, 1))]
+            }
+            (_, Some(other)) => vec![sent(image, first.1, (1, 1)), sent(other, last.1, (2, 2))],
         };
         let program_id = id(image);
         if with_header && program_id == 0xFFFF && options.date == 0xFFFF {
             return Err(PlanError::Void);
         }
-        let known = with_header && profile.prog_checksum != Checksum::None;
-        Ok(Self {
-            cycles: [cycle(1, first), cycle(2, last)],
-            expected: known.then_some((program_id, options.date)),
-            first_only_checks: plan == Plan::VerifyWrite,
-        })
+        let expected = match (unverifiable, options.expect_program_id) {
+            (None, Some(expected)) if expected != program_id => {
+                return Err(PlanError::OtherProgram { image: program_id, expected });
+            }
+            (None, _) => Some(Expected { program_id, date: Some(options.date) }),
+            (Some(_), Some(program_id)) => {
+                Some(Expected { program_id, date: with_header.then_some(options.date) })
+            }
+            (Some(_), None) => None,
+        };
+        let unverifiable = unverifiable.filter(|_| expected.is_none());
+        Ok(Self { cycles: [cycle(1, first), cycle(2, last)], images, expected, unverifiable, erases_from })
+    }
+
+    /// Program ID that the board shall show; `None`: nobody knows.
+    pub fn program_id(&self) -> Option<u16> {
+        self.expected.map(|expected| expected.program_id)
     }
 
     /// Bytes of both cycles on the wire.
@@ -179,7 +297,7 @@ mod tests {
         let bytes: Vec<u8> = (0..1000).map(|i| (37 * i + 11) as u8).collect();
         let plan = UpdatePlan::new(&options(bytes), Header::ANY_BOARD, &Profile::default()).unwrap();
         assert_eq!((plan.frames(0), plan.frames(1), plan.total_bytes()), (136, 136, 2 * 17 * 64));
-        assert_eq!(plan.expected, Some((0x4B3F, 0x3AC1)));
+        assert_eq!(plan.expected, Some(Expected { program_id: 0x4B3F, date: Some(0x3AC1) }));
         let first = plan.cycles[0].block(0).unwrap();
         assert_eq!(first[..10], [0x43, 0x55, 1, 0, 1, 0, 0, 0, 0, 0]);
         assert_eq!(first[62..], [0xDC, 0x22]);

@@ -49,8 +49,9 @@ pub(super) struct Transferred {
 }
 
 impl Attempt<'_> {
-    /// Sends everything. `erasing` is called before the first frame that may erase.
-    pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8])) -> Transferred {
+    /// Sends everything. `erasing` is called before the first frame of a block that may erase, with the boards that take
+    /// part and those that have left.
+    pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8], &[(u8, Broken)])) -> Transferred {
         let mut out = Transferred::default();
         let mask = self.boards.iter().fold(0, |mask, b| mask | 1 << b);
         self.link.listen(mask, &[Function::DspReady, Function::ProgFinished]);
@@ -58,11 +59,11 @@ impl Attempt<'_> {
         for (index, cycle) in self.plan.cycles.iter().enumerate() {
             let number = index as u32 + 1;
             let blocks = cycle.blocks();
-            let may_erase = number == 2 || !self.plan.first_only_checks;
+            let may_erase = number >= self.plan.erases_from;
             for block in 0..blocks {
                 let Some(bytes) = cycle.block(block) else { break };
                 if block == 0 && may_erase {
-                    erasing(&self.boards);
+                    erasing(&self.boards, &out.broken);
                 }
                 self.send(&bytes).await;
                 let last = number == 2 && block + 1 == blocks;

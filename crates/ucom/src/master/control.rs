@@ -328,7 +328,7 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     let off = AdminChange { active: Some(false), ..Default::default() };
     let mut done = change_flags(&link, board, off).await.map(drop);
     if level != StopLevel::Outputs {
-        stop_inputs(&link, board);
+        link.with(|core| core.stop_inputs(board));
         let ended = change_flags(&link, board, AdminChange { run: Some(false), ..off }).await;
         done = done.and(ended.map(drop));
     }
@@ -341,20 +341,12 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     Ok(Outcome::Status { board, info: now })
 }
 
-fn stop_inputs(link: &Link, board: u8) {
-    link.with(|core| {
-        if let Some(data) = core.data.get_mut(&board) {
-            data.repeat = None;
-        }
-    });
-}
-
 /// The stop of a board that does not answer PC_INFO: it may run all the same. What it knows of flags is not read first.
 async fn stop_unheard(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
     let to = link.board(board)?;
     let told = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();
     let run = told.run && level == StopLevel::Outputs;
-    stop_inputs(link, board);
+    link.with(|core| core.stop_inputs(board));
     // No answer is what is expected here.
     let _ = admin(link, board, Admin { run, active: false, ..told }).await;
     for _ in 0..TRIES {

@@ -1,6 +1,6 @@
 //! What all procedures share: the clock, frames on their way out, inboxes, the boards as last seen.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::prelude::v1::*;
 
 use super::boards::Boards;
@@ -9,7 +9,7 @@ use super::io::{IoDescription, ProcessData};
 use super::statistics::Statistics;
 use super::times::Times;
 use super::{Event, ProcedureId};
-use crate::{Foreign, Frame, FromBoard, Function, Profile, Sequence, ToBoard};
+use crate::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, ToBoard};
 
 /// Most events that wait for their user.
 const MAX_EVENTS: usize = 4096;
@@ -73,7 +73,17 @@ struct Outgoing {
     owner: Option<ProcedureId>,
     /// What of that which the owner has heard is forgotten when this frame leaves.
     forget: Forget,
-    frame: Frame,
+    what: What,
+}
+
+enum What {
+    Frame(Frame),
+    /// The package of a board's inputs that begins with this word: as they are when it leaves, so what waits is never
+    /// stale.
+    Inputs {
+        board: u8,
+        offset: u16,
+    },
 }
 
 /// Whether this PC is master.
@@ -90,7 +100,8 @@ pub(crate) struct Core {
     pub times: Times,
     /// Time of the last call.
     pub now: u64,
-    /// Time up to which waiting ends: that of the last `poll`, so that a late caller first hands over what came.
+    /// Time up to which waiting ends: that of the last `poll`. Up to then the caller has handed over all that came, which a
+    /// late one has not up to `now`.
     pub fired: u64,
     /// Since when the bus has been listened to.
     pub since: Option<u64>,
@@ -101,6 +112,8 @@ pub(crate) struct Core {
     pub report_until: u64,
     /// Stops of the policy that are said again, and when: one frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
+    /// When inputs may be repeated again.
+    pub inputs_from: u64,
     pub boards: Boards,
     pub data: BTreeMap<u8, ProcessData>,
     pub descriptions: BTreeMap<(u16, u16), IoDescription>,
@@ -108,6 +121,8 @@ pub(crate) struct Core {
     pub inboxes: BTreeMap<ProcedureId, Inbox>,
     urgent: VecDeque<Frame>,
     normal: VecDeque<Outgoing>,
+    /// Packages of inputs in `normal`, each once: the queue stays short on a bus that does not carry them all.
+    waiting_inputs: BTreeSet<(u8, u16)>,
     queued: u64,
     sent: u64,
     events: VecDeque<Event>,
@@ -126,6 +141,7 @@ impl Core {
             foreign_master: None,
             report_until: 0,
             stops: Vec::new(),
+            inputs_from: 0,
             boards: Boards::default(),
             data: BTreeMap::new(),
             descriptions: BTreeMap::new(),
@@ -133,6 +149,7 @@ impl Core {
             inboxes: BTreeMap::new(),
             urgent: VecDeque::new(),
             normal: VecDeque::new(),
+            waiting_inputs: BTreeSet::new(),
             queued: 0,
             sent: 0,
             events: VecDeque::new(),
@@ -180,8 +197,19 @@ impl Core {
     }
 
     pub(crate) fn queue_frame(&mut self, owner: Option<ProcedureId>, frame: Frame, forget: Forget) -> u64 {
+        self.push(owner, forget, What::Frame(frame))
+    }
+
+    /// Queues the package of a board's inputs that begins with word `offset`, unless it waits already.
+    pub(crate) fn queue_inputs(&mut self, board: u8, offset: u16) {
+        if self.waiting_inputs.insert((board, offset)) {
+            self.push(None, Forget::Nothing, What::Inputs { board, offset });
+        }
+    }
+
+    fn push(&mut self, owner: Option<ProcedureId>, forget: Forget, what: What) -> u64 {
         self.queued += 1;
-        self.normal.push_back(Outgoing { serial: self.queued, owner, forget, frame });
+        self.normal.push_back(Outgoing { serial: self.queued, owner, forget, what });
         self.queued
     }
 
@@ -197,23 +225,37 @@ impl Core {
 
     /// The next frame for the bus.
     pub(crate) fn pop(&mut self) -> Option<Frame> {
-        let frame = match self.urgent.pop_front() {
-            Some(frame) => frame,
-            None => {
-                let next = self.normal.pop_front()?;
-                self.sent = next.serial;
-                if let Some(inbox) = next.owner.and_then(|owner| self.inboxes.get_mut(&owner)) {
-                    match next.forget {
-                        Forget::Nothing => {}
-                        Forget::Answers => inbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
-                        Forget::All => inbox.heard.clear(),
-                    }
-                }
-                next.frame
-            }
-        };
+        let frame = self.urgent.pop_front().or_else(|| self.pop_normal())?;
         self.note_sent(&frame);
         Some(frame)
+    }
+
+    fn pop_normal(&mut self) -> Option<Frame> {
+        loop {
+            let next = self.normal.pop_front()?;
+            self.sent = next.serial;
+            if let Some(inbox) = next.owner.and_then(|owner| self.inboxes.get_mut(&owner)) {
+                match next.forget {
+                    Forget::Nothing => {}
+                    Forget::Answers => inbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
+                    Forget::All => inbox.heard.clear(),
+                }
+            }
+            let frame = match next.what {
+                What::Frame(frame) => Some(frame),
+                What::Inputs { board, offset } => self.inputs_frame(board, offset),
+            };
+            // What there is no more of needs no frame.
+            if frame.is_some() {
+                return frame;
+            }
+        }
+    }
+
+    fn inputs_frame(&mut self, board: u8, offset: u16) -> Option<Frame> {
+        self.waiting_inputs.remove(&(board, offset));
+        let package = BufferPackage::at(&self.data.get(&board)?.ci, offset)?;
+        Some(ToBoard::Ci(package).encode(Sequence::new(board)?, &self.profile))
     }
 
     fn note_sent(&mut self, frame: &Frame) {
@@ -233,7 +275,17 @@ impl Core {
 
     /// Drops what a procedure has queued.
     pub(crate) fn forget_queued(&mut self, owner: ProcedureId) {
-        self.normal.retain(|next| next.owner != Some(owner));
+        self.retain_queued(|next| next.owner != Some(owner));
+    }
+
+    /// Drops a board's inputs that wait.
+    pub(crate) fn forget_inputs(&mut self, board: u8) {
+        self.waiting_inputs.retain(|(of, _)| *of != board);
+        self.retain_queued(|next| !matches!(next.what, What::Inputs { board: of, .. } if of == board));
+    }
+
+    fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
+        self.normal.retain(keep);
         // Whoever waits for a frame in front of the first one left must not wait for ever.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);

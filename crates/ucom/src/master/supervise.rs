@@ -5,8 +5,9 @@ use std::prelude::v1::*;
 use super::Event;
 use super::boards::Life;
 use super::event::Supervision;
-use super::io::Snapshot;
-use super::shared::{Core, Forget, Session};
+use super::io::{ProcessData, Snapshot};
+use super::load::frame_bits;
+use super::shared::{Core, Session};
 use crate::profile::{AliveMode, OnLost};
 use crate::{
     Admin, Assembled, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status,
@@ -15,6 +16,10 @@ use crate::{
 
 /// Between a stop and its repetition, µs.
 const STOP_AGAIN: u64 = 30_000;
+/// Percent of the bus that repeated inputs may take.
+const INPUTS_SHARE: u64 = 70;
+/// How far they may be behind that and catch up, µs.
+const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
     /// From now on life signs go out.
@@ -40,7 +45,8 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            let age = now.saturating_sub(at);
+            // Not up to `now`: the life sign may be among what the caller has not handed over yet.
+            let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
                 events.push((number, Supervision::Lost));
@@ -53,7 +59,9 @@ impl Core {
         for (board, change) in events {
             self.event(Event::Supervision { board, change });
         }
-        lost.into_iter().for_each(|number| self.on_lost(number));
+        if !lost.is_empty() {
+            self.on_lost(&lost);
+        }
         self.stop_again();
         self.repeat_inputs();
     }
@@ -75,27 +83,19 @@ impl Core {
         }
     }
 
-    /// The policy for a board whose life signs are gone; only a master stops boards.
-    fn on_lost(&mut self, board: u8) {
-        self.stop_inputs(board);
+    /// The policy for boards whose life signs are gone; only a master stops boards.
+    fn on_lost(&mut self, lost: &[u8]) {
+        lost.iter().for_each(|board| self.stop_inputs(*board));
         if self.session == Session::Quiet {
             return;
         }
-        match (self.profile.on_lost, self.profile.everybody()) {
-            (OnLost::Report, _) => {}
-            (OnLost::StopAll, Some(everybody)) => self.stop_running(everybody),
-            (OnLost::StopAll, None) => {
-                let known: Vec<u8> = self.boards.iter().map(|(n, _)| n).collect();
-                for number in known.into_iter().filter_map(Sequence::new) {
-                    self.stop_running(number);
-                }
-            }
-            (OnLost::StopBoard, _) => {
-                if let Some(number) = Sequence::new(board) {
-                    self.stop_running(number);
-                }
-            }
-        }
+        let stopped: Vec<Sequence> = match (self.profile.on_lost, self.profile.everybody()) {
+            (OnLost::Report, _) => return,
+            (OnLost::StopBoard, _) => lost.iter().filter_map(|n| Sequence::new(*n)).collect(),
+            (OnLost::StopAll, Some(everybody)) => vec![everybody],
+            (OnLost::StopAll, None) => self.boards.iter().filter_map(|(n, _)| Sequence::new(n)).collect(),
+        };
+        stopped.into_iter().for_each(|to| self.stop_running(to));
         if self.profile.on_lost == OnLost::StopAll {
             let all: Vec<u8> = self.data.keys().copied().collect();
             all.into_iter().for_each(|number| self.stop_inputs(number));
@@ -115,47 +115,52 @@ impl Core {
         due.into_iter().for_each(|to| self.urgent(to, ToBoard::Admin(Admin::default())));
     }
 
-    fn stop_inputs(&mut self, board: u8) {
-        if let Some(data) = self.data.get_mut(&board) {
-            data.repeat = None;
+    /// No repetition of a board's inputs any more, and none that waits. Those of a board that is only being started are no
+    /// repetition yet.
+    pub(crate) fn stop_inputs(&mut self, board: u8) {
+        if self.data.get_mut(&board).is_some_and(|data| data.repeat.take().is_some()) {
+            self.forget_inputs(board);
         }
     }
 
-    /// CI again every `ci.period`, so that a lost frame heals (D-34).
+    /// CI again every `ci.period`, so that a lost frame heals (D-34): whoever has waited longest is first.
+    ///
+    /// All repetitions together leave the bus to others for a part of the time, whatever was started with force: answers
+    /// and life signs come after inputs on the bus, and a socket takes more frames than the bus carries.
     fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
         }
-        let due: Vec<u8> = self
-            .data
-            .iter()
-            .filter(|(_, d)| d.repeat.is_some_and(|at| self.now >= at))
-            .map(|(n, _)| *n)
-            .collect();
-        for board in due {
+        let packages = |data: &ProcessData| data.ci.len().div_ceil(3) as u64;
+        while self.inputs_from <= self.now
+            && let Some((_, board, packages)) = self
+                .data
+                .iter()
+                .filter_map(|(board, data)| Some((data.repeat?, *board, packages(data))))
+                .min()
+                .filter(|(at, ..)| *at <= self.now)
+        {
+            let us = packages * frame_bits(8) * 1_000_000 / u64::from(self.profile.bitrate.max(1));
+            let credit = self.now.saturating_sub(INPUTS_CREDIT);
+            self.inputs_from = self.inputs_from.max(credit) + us * 100 / INPUTS_SHARE;
             self.send_inputs(board);
         }
     }
 
     /// All CI of a board, and the time of the next repetition.
     pub(crate) fn send_inputs(&mut self, board: u8) {
-        let (Some(to), Some(data)) = (Sequence::new(board), self.data.get_mut(&board)) else { return };
+        let Some(data) = self.data.get_mut(&board) else { return };
         if let Some(at) = data.repeat {
             let next = at + self.times.ci;
             data.repeat = Some(if self.now >= next { self.now + self.times.ci } else { next });
         }
-        let packages: Vec<_> = crate::Packages::new(&data.ci).collect();
-        for package in packages {
-            self.queue(None, to, ToBoard::Ci(package), Forget::Nothing);
-        }
+        let offsets: Vec<u16> = crate::Packages::new(&data.ci).map(|package| package.offset).collect();
+        offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
     }
 
     /// The package of CI with one word (it is atomic, D-34), at once.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
-        let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
-        if let Some(package) = crate::BufferPackage::at(&data.ci, index - index % 3) {
-            self.queue(None, to, ToBoard::Ci(package), Forget::Nothing);
-        }
+        self.queue_inputs(board, index - index % 3);
     }
 
     /// When duties are due next.
@@ -173,7 +178,8 @@ impl Core {
             }
         });
         let quiet = self.session == Session::Quiet;
-        let inputs = self.data.values().filter_map(|data| data.repeat.filter(|_| !quiet));
+        let repeats = self.data.values().filter_map(|data| data.repeat.filter(|_| !quiet));
+        let inputs = repeats.map(|at| at.max(self.inputs_from));
         let stops = self.stops.iter().map(|(at, _)| *at);
         alive.into_iter().chain(supervised).chain(inputs).chain(stops).min()
     }
@@ -228,7 +234,7 @@ impl Core {
                 self.forget_parameters(board);
                 self.event(Event::Supervision { board, change: Supervision::Rebooted { ucom_id } });
                 if was_running {
-                    self.on_lost(board);
+                    self.on_lost(&[board]);
                 }
             }
             None => {
@@ -307,9 +313,9 @@ impl Core {
 
     /// After a restart of its application nothing is known of a board's parameters (D-35).
     pub(crate) fn forget_parameters(&mut self, board: u8) {
+        self.stop_inputs(board);
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
-            data.repeat = None;
         }
     }
 }

@@ -6,6 +6,7 @@ mod chain;
 mod faults;
 mod kept;
 mod losses;
+mod overload;
 mod probing;
 mod robust;
 mod running;

@@ -188,6 +188,12 @@ impl Bench {
         }
     }
 
+    /// One more on the bus.
+    pub fn join(&mut self, member: Box<dyn Member>) {
+        self.members.push(member);
+        self.pending.push(None);
+    }
+
     pub fn script(script: Script) -> Self {
         Self::new(Profile::default(), vec![Box::new(script)])
     }

@@ -1,13 +1,14 @@
 //! Firmware updates of real boards of this crate and of tables of frames.
 
+use ucom::Memory;
 use ucom::master::update::{
     UpdateFailure, UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateTarget,
 };
 use ucom::master::{Error, Event, InitOptions, Outcome, Request, RunBoard, RunOptions};
-use ucom::{Frame, Memory};
 
-use crate::bench::{Bench, Fault, MS, Member, OLD, Script, image};
+use crate::bench::{Bench, Fault, MS, OLD, Script, image};
 use crate::chain::initialised;
+use crate::loader::{Loader, loader};
 
 const DATE: u16 = 0x3AC1;
 
@@ -90,104 +91,6 @@ fn p7_p14_flow_control_and_life_signs() {
     let alive = bench.times_of("680#");
     assert!(alive.len() > 15, "{}", alive.len());
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))), "{alive:?}");
-}
-
-/// A board as a table: takes every block; the last rule says what ends the update.
-struct Loader {
-    /// `DSP_INFO` before and after.
-    info: [&'static str; 2],
-    blocks: usize,
-    /// Frames of PC_PROG so far in this attempt.
-    frames: usize,
-    pub resets: usize,
-    /// Delay of READY, ms, by block.
-    delay: fn(usize) -> u64,
-    /// Answer to a block instead of READY; empty: none.
-    special: fn(usize, usize) -> Option<&'static str>,
-    /// After this frame the board complains at once and takes no more.
-    refuses_at: Option<usize>,
-    out: Vec<(u64, Frame)>,
-    waiting: bool,
-    status: u8,
-}
-
-impl Loader {
-    fn new(blocks: usize) -> Self {
-        Self {
-            info: ["34126E38", "3F4BC13A"],
-            blocks,
-            frames: 0,
-            resets: 0,
-            delay: |_| 1,
-            special: |_, _| None,
-            refuses_at: None,
-            out: Vec::new(),
-            waiting: false,
-            status: 0x1B,
-        }
-    }
-
-    fn say(&mut self, at: u64, text: &str) {
-        self.out.push((at, crate::bench::frame(text)));
-        self.out.sort_by_key(|(at, _)| *at);
-    }
-}
-
-impl Member for Loader {
-    fn poll(&mut self, now: u64) -> Option<Frame> {
-        let due = self.out.first().filter(|(at, _)| *at <= now && !self.waiting)?.1;
-        self.waiting = true;
-        Some(due)
-    }
-    fn sent(&mut self, _: u64, _: &Frame) {
-        self.waiting = false;
-        self.out.remove(0);
-    }
-    fn deadline(&self) -> u64 {
-        self.out.first().map_or(u64::MAX, |(at, _)| *at)
-    }
-    fn receive(&mut self, now: u64, frame: &Frame) {
-        let text = frame.to_string();
-        match text.as_str() {
-            "041#" => {
-                (self.frames, self.status) = (0, 0x1F);
-                self.resets += 1;
-            }
-            "1C1#0400" => self.status = 0x1B,
-            "1C1#0404" => self.status = 0x1F,
-            "201#" | "200#" => {
-                let done = self.frames >= 8 * self.blocks;
-                let program = self.info[usize::from(done)];
-                self.say(now + 300, &format!("141#210001{:02X}{program}", self.status));
-                self.say(now + 301, "141#0000");
-            }
-            _ if text.starts_with("2C1#") => {
-                self.frames += 1;
-                if self.refuses_at == Some(self.frames) {
-                    self.say(now + 10, "081#02");
-                }
-                if self.refuses_at.is_some_and(|at| self.frames >= at) {
-                    return;
-                }
-                if self.frames.is_multiple_of(8) {
-                    let block = self.frames / 8 - 1;
-                    let usual = if block + 1 == self.blocks { "101#" } else { "181#" };
-                    if block + 1 == self.blocks {
-                        self.status = 0x1B;
-                    }
-                    let answer = (self.special)(self.resets, block).unwrap_or(usual);
-                    if !answer.is_empty() {
-                        self.say(now + (self.delay)(block) * MS, answer);
-                    }
-                }
-            }
-            _ => {}
-        }
-    }
-}
-
-fn loader(loader: Loader) -> Bench {
-    Bench::new(Default::default(), vec![Box::new(loader)])
 }
 
 /// P-8: READY after 0.9 s, erase 8 s: no false timeout.

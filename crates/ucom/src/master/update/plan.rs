@@ -82,7 +82,9 @@ impl PlanError {
             Self::SecondMissing { .. } | Self::SecondUnused { .. } => {
                 "see `prog.plan` in `ucom help profile`"
             }
-            Self::OtherProgram { .. } => "is it the right file? without `--expect-program-id` it is not compared",
+            Self::OtherProgram { .. } => {
+                "is it the right file? without `--expect-program-id` it is not compared"
+            }
             Self::Void => "`--date YYYY-MM-DD`",
         }
     }

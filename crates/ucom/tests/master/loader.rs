@@ -1,0 +1,112 @@
+//! A board as a table of frames that takes program data.
+
+use ucom::Frame;
+
+use crate::bench::{Bench, MS, Member};
+
+/// A board as a table: takes every block; the last rule says what ends the update.
+pub struct Loader {
+    /// `DSP_INFO` before and after.
+    pub info: [&'static str; 2],
+    /// Its flash number as it is sent, by resets so far and whether the transfer was cancelled since.
+    pub flash: fn(usize, bool) -> &'static str,
+    /// Its status when all blocks have come.
+    pub done_status: u8,
+    pub blocks: usize,
+    pub cancelled: bool,
+    /// Frames of PC_PROG so far in this attempt.
+    pub frames: usize,
+    pub resets: usize,
+    /// Delay of READY, ms, by block.
+    pub delay: fn(usize) -> u64,
+    /// Answer to a block instead of READY; empty: none.
+    pub special: fn(usize, usize) -> Option<&'static str>,
+    /// After this frame the board complains at once and takes no more.
+    pub refuses_at: Option<usize>,
+    pub out: Vec<(u64, Frame)>,
+    pub waiting: bool,
+    pub status: u8,
+}
+
+impl Loader {
+    pub fn new(blocks: usize) -> Self {
+        Self {
+            info: ["34126E38", "3F4BC13A"],
+            flash: |_, _| "2100",
+            done_status: 0x1B,
+            blocks,
+            cancelled: false,
+            frames: 0,
+            resets: 0,
+            delay: |_| 1,
+            special: |_, _| None,
+            refuses_at: None,
+            out: Vec::new(),
+            waiting: false,
+            status: 0x1B,
+        }
+    }
+
+    fn say(&mut self, at: u64, text: &str) {
+        self.out.push((at, crate::bench::frame(text)));
+        self.out.sort_by_key(|(at, _)| *at);
+    }
+}
+
+impl Member for Loader {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        let due = self.out.first().filter(|(at, _)| *at <= now && !self.waiting)?.1;
+        self.waiting = true;
+        Some(due)
+    }
+    fn sent(&mut self, _: u64, _: &Frame) {
+        self.waiting = false;
+        self.out.remove(0);
+    }
+    fn deadline(&self) -> u64 {
+        self.out.first().map_or(u64::MAX, |(at, _)| *at)
+    }
+    fn receive(&mut self, now: u64, frame: &Frame) {
+        let text = frame.to_string();
+        match text.as_str() {
+            "041#" => {
+                (self.frames, self.status, self.cancelled) = (0, 0x1F, false);
+                self.resets += 1;
+            }
+            "1C1#0400" => (self.status, self.cancelled) = (0x1B, true),
+            "1C1#0404" => self.status = 0x1F,
+            "201#" | "200#" => {
+                let done = self.frames >= 8 * self.blocks;
+                let program = self.info[usize::from(done)];
+                let flash = (self.flash)(self.resets, self.cancelled);
+                self.say(now + 300, &format!("141#{flash}01{:02X}{program}", self.status));
+                self.say(now + 301, "141#0000");
+            }
+            _ if text.starts_with("2C1#") => {
+                self.frames += 1;
+                if self.refuses_at == Some(self.frames) {
+                    self.say(now + 10, "081#02");
+                }
+                if self.refuses_at.is_some_and(|at| self.frames >= at) {
+                    return;
+                }
+                if self.frames.is_multiple_of(8) {
+                    let block = self.frames / 8 - 1;
+                    let usual = if block + 1 == self.blocks { "101#" } else { "181#" };
+                    if block + 1 == self.blocks {
+                        self.status = self.done_status;
+                    }
+                    let answer = (self.special)(self.resets, block).unwrap_or(usual);
+                    if !answer.is_empty() {
+                        self.say(now + (self.delay)(block) * MS, answer);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+pub fn loader(loader: Loader) -> Bench {
+    Bench::new(Default::default(), vec![Box::new(loader)])
+}

@@ -1,10 +1,13 @@
-"""A simulated chain and a peer of its bus that knows nothing but frames."""
+"""A simulated chain, `ucom` commands on its bus, and a peer of it that knows nothing but frames."""
 
+import json
 import logging
+import os
 import pathlib
 import signal
 import subprocess
 import tempfile
+import threading
 import time
 
 import can
@@ -12,15 +15,18 @@ import can
 # python-can warns whenever a frame comes in two pieces.
 logging.getLogger("can").setLevel(logging.ERROR)
 
+PROFILE = {"little": "", "big": 'endian = "big"\nprog.endian = "big"\n'}
+
 
 class Chain:
-    """`ucom sim` on a free port, and `ucom` commands on its bus."""
+    """`ucom sim` on a free port, and `ucom` commands on its bus. Both read words in this byte order."""
 
-    def __init__(self, program: str, *options: str):
+    def __init__(self, program: str, *options: str, order: str = "little", profile: str = ""):
         self.program = program
         self.directory = tempfile.TemporaryDirectory()
+        self.profile = self.write("profile.toml", PROFILE[order] + profile)
         self.process = subprocess.Popen(
-            [program, "sim", "--listen", "127.0.0.1:0", *options],
+            [program, "--profile", self.profile, "sim", "--listen", "127.0.0.1:0", *options],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
         )
         line = self.process.stdout.readline().strip()
@@ -33,31 +39,95 @@ class Chain:
 
     def __exit__(self, *_):
         self.process.send_signal(signal.SIGTERM)
-        assert self.process.wait(10) == 0
+        ended = self.process.wait(20)
         self.directory.cleanup()
+        assert ended == 0, f"ucom sim ended with {ended}"
 
     def path(self, name: str) -> str:
         return str(pathlib.Path(self.directory.name) / name)
+
+    def write(self, name: str, content: str | bytes) -> str:
+        """A file of this chain's directory; its path."""
+        content = content.encode() if isinstance(content, str) else content
+        pathlib.Path(self.path(name)).write_bytes(content)
+        return self.path(name)
 
     def fault(self, line: str) -> None:
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
         time.sleep(0.15)  # it looks at its stdin every 50 ms
 
-    def start(self, *words: str) -> subprocess.Popen:
-        command = [self.program, "--json", "--bus", self.url, *words]
-        environment = {"UCOM_INVENTORY": self.path("inventory.toml"), "UCOM_CACHE": self.path("cache")}
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    def start(self, *words: str, profile: str | None = None) -> "Command":
+        return Command([self.program, "--json", "--bus", self.url, "--profile", profile or self.profile, *words], self)
 
     def peer(self) -> "Peer":
         return Peer(self.port)
 
 
+class Command:
+    """A running `ucom` command; every line it says is kept with its time."""
+
+    def __init__(self, words: list[str], chain: Chain):
+        environment = os.environ | {"UCOM_INVENTORY": chain.path("inventory.toml"), "UCOM_CACHE": chain.path("cache")}
+        self.process = subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        )
+        self.out: list[tuple[float, str]] = []
+        self.notes: list[tuple[float, str]] = []
+        self.readers = [
+            threading.Thread(target=self.read, args=pair, daemon=True)
+            for pair in ((self.process.stdout, self.out), (self.process.stderr, self.notes))
+        ]
+        for reader in self.readers:
+            reader.start()
+
+    def read(self, stream, lines: list[tuple[float, str]]) -> None:
+        for line in stream:
+            lines.append((time.time(), line.rstrip("\n")))
+
+    def end(self, seconds: float = 120.0) -> int:
+        """Waits for the end; the exit code, -9 for a process that was killed."""
+        try:
+            code = self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise AssertionError(f"{self.process.args[6:]} did not end within {seconds} s") from None
+        for reader in self.readers:
+            reader.join()
+        return code
+
+    def said(self) -> dict:
+        """The last JSON object of its output."""
+        return json.loads(self.out[-1][1]) if self.out else {}
+
+    def note(self, text: str) -> float | None:
+        """When it first said so on stderr."""
+        return next((at for at, line in list(self.notes) if text in line), None)
+
+    def wait_note(self, text: str, seconds: float) -> float | None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and self.process.poll() is None and self.note(text) is None:
+            time.sleep(0.02)
+        return self.note(text)
+
+    def wait_out(self, text: str, seconds: float = 30.0) -> float | None:
+        """When it first printed a line with this text."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            found = next((at for at, line in list(self.out) if text in line), None)
+            if found is not None or self.process.poll() is not None:
+                return found
+            time.sleep(0.02)
+        return None
+
+
 class Peer:
-    """Frames written as candump does: `1C1#0202`."""
+    """Frames written as candump does: `1C1#0202`, and the bus's time of those that came."""
 
     def __init__(self, port: int):
-        self.bus = can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="can0")
+        self.bus = can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="can0", tcp_tune=True)
+        self.stamp = 0.0
 
     def __enter__(self):
         return self
@@ -65,18 +135,23 @@ class Peer:
     def __exit__(self, *_):
         self.bus.shutdown()
 
-    def send(self, text: str) -> None:
+    def send(self, text: str) -> float:
+        """Sends, and tells when."""
         number, data = text.split("#")
+        now = time.time()
         self.bus.send(can.Message(arbitration_id=int(number, 16), is_extended_id=False, data=bytes.fromhex(data)))
+        return now
 
     def next(self, seconds: float) -> str | None:
-        """The next frame within a time."""
+        """The next frame within a time; `stamp` is when it was on the bus."""
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            message = self.bus.recv(left)
+        while True:
+            message = self.bus.recv(max(0.0, end - time.monotonic()))
             if message is not None:
+                self.stamp = message.timestamp
                 return f"{message.arbitration_id:03X}#{bytes(message.data).hex().upper()}"
-        return None
+            if time.monotonic() >= end:
+                return None
 
     def all(self, seconds: float) -> list[str]:
         """Everything within a time."""
@@ -92,11 +167,16 @@ class Peer:
         self.send(text)
         return self.all(seconds)
 
-    def wait(self, start: str, seconds: float = 10.0) -> str:
-        """The next frame that begins so; others are passed over."""
+    def wait(self, *starts: str, seconds: float = 15.0) -> str:
+        """The next frame that begins so; others are passed over. Empty when none came."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             frame = self.next(left)
-            if frame is not None and frame.startswith(start):
+            if frame is not None and frame.startswith(starts):
                 return frame
-        raise AssertionError(f"no {start} within {seconds} s")
+        return ""
+
+    def answer(self, text: str, *starts: str, seconds: float = 5.0) -> str:
+        """The first frame that begins so after a request: a busy machine may take its time."""
+        self.send(text)
+        return self.wait(*starts, seconds=seconds)

@@ -1,0 +1,208 @@
+"""`ucom update` against boards that this script plays on python-can's socketcand interface.
+
+Argument: the `ucom` program. Exit code 0: all agreed.
+"""
+
+import signal
+import time
+
+import rows
+import wire
+from pc_boards import Boards
+from pc_play import boards, intrusive, told
+from peer import Chain, Command
+from rows import Bench
+
+# 2009-06-01.
+DATE = 0x3AC1
+
+
+def begin(chain: Chain, image: bytes, *words: str) -> Command:
+    return chain.start("update", "1", chain.write("image.bin", image), "--date", "2009-06-01", *words)
+
+
+def blocks(image: bytes) -> int:
+    """Blocks of a cycle, the header's too."""
+    return 1 + len(wire.padded(image))
+
+
+def verified(bench: Bench, rule: str, played: Boards, command: Command, image: bytes, attempts: int = 1) -> None:
+    """The update is done as it should be."""
+    said = told(bench, rule, command, 0)
+    bench.same(rule, "outcome", said["outcome"], "verified")
+    bench.same(rule, "attempts told", said["boards"][0]["attempts"], attempts)
+    bench.same(rule, "PC_XRESET", played.attempts, attempts)
+    bench.same(rule, "program on the board", played.boards[0].program, (wire.crc16(image), DATE))
+    bench.same(rule, "what is wrong with the transfer", (played.complaints, played.early), ([], []))
+
+
+def golden(bench: Bench) -> None:
+    image = bytes((37 * i + 11) % 256 for i in range(1000))
+    for words in ((), ("--flash-id", "0x21")):
+        with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True) as played:
+            verified(bench, "13.4", played, begin(chain, image, *words), image)
+            frames = played.frames("2C1")
+            cycles = [wire.header(bench.order, n, image, DATE) + b"".join(wire.padded(image)) for n in (1, 2)]
+            data = b"".join(cycles)
+            for i, frame in enumerate(frames):
+                bench.same("13.4", f"program frame {i}:", frame, wire.frame(11, 1, data[8 * i:8 * i + 8]))
+            bench.same("13.4", "program frames", len(frames), 2 * 136)
+            if bench.order == "little" and not words:
+                header = "4355010001000000 00000000F4010000 3F4BC13AFFFFFFFF".split() + ["F" * 16] * 4
+                named = [f"2C1#{part}" for part in (*header, "FFFFFFFFFFFFDC22", "0B30557A9FC4E90E")]
+                bench.same("13.4", "first frames", frames[:9], named)
+            said = told(bench, "U-3", begin(chain, image), 0)
+            bench.same("U-3", "outcome of the same image again", (said["outcome"], played.attempts), ("up-to-date", 1))
+    bench.ok("13.4")
+
+
+def other_board(bench: Bench) -> None:
+    image = bench.image()
+    for quirk, words in (({}, ("--flash-id", "0x42")), ({"other_number": True}, ())):
+        with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, **quirk) as played:
+            told(bench, "P-5", begin(chain, image, *words), (1, 3, 4) if quirk else 4)
+            bench.same("P-5", "frames that do something", intrusive(played.end()), [])
+    bench.ok("P-5")
+
+
+def one_by_one(bench: Bench) -> None:
+    """P-7: DSP_READY comes whenever it likes; nothing of the next block comes before."""
+    image = bench.image()
+    with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, late_by=lambda: bench.random.uniform(0, 0.06)) as played:
+        verified(bench, "P-7", played, begin(chain, image), image)
+        bench.same("P-7", "program frames", len(played.frames("2C1")), 2 * 8 * blocks(image))
+    bench.ok("P-7", f"{2 * blocks(image)} blocks")
+
+
+def late_ready(bench: Bench) -> None:
+    """P-8: 0.9 s for a block, 8 s for erasing and for the end."""
+    image = bench.image(200, 400)
+    middle = bench.random.randint(1, blocks(image) - 2)
+    late = {(1, 0): 0.9, (1, middle): 0.9, (2, 0): 8.0, (2, middle): 0.9, (2, blocks(image) - 1): 8.0}
+    for tries in range(3):
+        with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, late=late) as played:
+            began = time.time()
+            command = begin(chain, image)
+            code = command.end()
+            # Where this machine was late itself, a second may have been over.
+            worst = bench.jitter.worst(began, time.time())
+            if code == 0 or worst < 0.05 or tries == 2:
+                verified(bench, "P-8", played, command, image)
+                return bench.ok("P-8", f"{sorted(late.items())}")
+
+
+def end_lost(bench: Bench) -> None:
+    image = bench.image()
+    with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, lost_finished=True) as played:
+        verified(bench, "P-9", played, begin(chain, image), image)
+    bench.ok("P-9")
+
+
+def old_program(bench: Bench) -> None:
+    image = bench.image()
+    with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, keeps_old=True) as played:
+        said = told(bench, "P-10", begin(chain, image), 5)
+        bench.expect(said["outcome"] not in ("verified", "running"), "P-10", "a failure", said)
+        bench.same("P-10", "program", played.boards[0].program, (0x1234, 0x386E))
+    bench.ok("P-10")
+
+
+def errors(bench: Bench) -> None:
+    image = bench.image()
+    last = blocks(image) - 1
+    # Code, cycle, block, attempts, exit code.
+    cases = [(2, 1, 0, 1, 1), (5, 1, 0, 1, 1), (5, 2, 0, 1, 5), (2, 2, bench.random.randint(1, last), 1, 5),
+             (1, 1, last, 3, 1), (1, 2, last, 3, 5)]
+    for code, cycle, block, attempts, leave in cases:
+        name = f"error {code} after block {block} of cycle {cycle}:"
+        with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, errors={(cycle, block): code}) as played:
+            said = told(bench, "P-11", begin(chain, image), leave)
+            frames = played.end()
+            bench.same("P-11", f"{name} attempts", frames.count("041#"), attempts)
+            per_attempt = 8 * ((cycle - 1) * blocks(image) + block + 1)
+            bench.same("P-11", f"{name} frames", len([f for f in frames if f.startswith("2C1")]), attempts * per_attempt)
+            bench.same("P-11", f"{name} attempts told", said["boards"][0]["attempts"], attempts)
+    bench.ok("P-11", "errors 2 and 5 once, 1 three times")
+    with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, errors={(1, last): 0x2A}) as played:
+        said = told(bench, "P-18", begin(chain, image), (1, 5))
+        bench.expect("42" in str(said["boards"]) or "2A" in str(said["boards"]), "P-18", "the number of the error", said)
+        bench.same("P-18", "attempts", played.attempts, 3)
+    bench.ok("P-18")
+
+
+def until(played: Boards, frames: int) -> int:
+    """Waits until so many frames of program data were heard; how many there are."""
+    end = time.monotonic() + 30
+    while (heard := len(played.frames("2C1"))) < frames:
+        assert time.monotonic() < end, f"{heard} of {frames} frames"
+        time.sleep(0.002)
+    return heard
+
+
+def cancelled(bench: Bench) -> None:
+    image = bench.image()
+    for cycle in (1, 2):
+        # Slow enough that the signal meets a block under way.
+        with bench.bus(profile="prog.frame_gap_us = 20000\n") as chain, boards(bench, chain, [0x21], numbered=True) as played:
+            command = begin(chain, image)
+            until(played, 8 * ((cycle - 1) * blocks(image) + 2) + bench.random.randint(1, 6))
+            stopped = time.time()
+            command.process.send_signal(signal.SIGINT)
+            said = told(bench, "P-12", command, 5 if cycle == 2 else (1, 3, 4, 5), seconds=20)
+            bench.same("P-12", "error told", said["boards"][0]["error"]["code"], "cancelled")
+            time.sleep(0.1)
+            frames = played.frames("2C1", "1C1")
+            bench.expect(frames[-1] == "1C1#0400" and frames[-2][:3] == "2C1", "P-12", "1C1#0400 at the end", frames[-3:])
+            late = played.times("1C1#0400")[-1] - stopped
+            limit = 0.5 * rows.BENCH + bench.jitter.worst(stopped, stopped + late)
+            bench.expect(late <= limit, "P-12", f"1C1#0400 within {limit:.1f} s", f"{late:.1f} s")
+            bench.same("P-12", "PROG", played.boards[0].status & 4, 0)
+            intact = played.boards[0].program == (0x1234, 0x386E)
+            bench.same("P-12", f"cycle {cycle}: the old application is there:", intact, cycle == 1)
+            played.attempts = 0
+            verified(bench, "P-12", played, begin(chain, image), image)
+    bench.ok("P-12", f"{len(frames[:-1]) % 8} frames of a block were sent")
+
+
+def killed(bench: Bench) -> None:
+    image = bench.image()
+    for cycle in (1, 2):
+        with bench.bus(profile="prog.frame_gap_us = 3000\n") as chain, boards(bench, chain, [0x21], numbered=True) as played:
+            command = begin(chain, image)
+            least = (cycle - 1) * blocks(image) + 1
+            heard = until(played, 8 * bench.random.randint(least, least + blocks(image) - 2) + bench.random.randint(1, 7))
+            command.process.kill()
+            bench.same("P-13", "exit code", command.end(), -9)
+            played.complaints.clear()
+            played.attempts = 0
+            verified(bench, "P-13", played, begin(chain, image), image)
+            bench.ok("P-13", f"killed in cycle {cycle}, after {heard} frames")
+
+
+def life_signs(bench: Bench) -> None:
+    """P-14: every 500 ms, while an update goes on for some seconds."""
+    image = bench.image(1000, 1200)
+    with bench.bus() as chain, boards(bench, chain, [0x21], numbered=True, late_by=lambda: 0.12) as played:
+        verified(bench, "P-14", played, begin(chain, image), image)
+        first, last = played.times("041#")[0], played.times("2C1")[-1]
+        punctual(bench, "update", [at for at in played.times("680#") if at <= last], first, last)
+
+
+def punctual(bench: Bench, what: str, signs: list[float], first: float, last: float) -> None:
+    """Life signs of a PC between two times are 500 ms apart, to 50 ms in the mean and to the bench's fifth each."""
+    gaps = [after - before for before, after in zip(signs, signs[1:])]
+    bench.expect(len(gaps) >= 4 and signs[0] <= first + 0.6, "P-14", f"life signs all the time of the {what}", signs)
+    late = bench.jitter.worst(signs[0], last)
+    mean = sum(gaps) / len(gaps)
+    bench.expect(0.45 <= mean <= 0.55, "P-14", f"500 ms in the mean while the {what} goes on", f"{mean * 1e3:.0f} ms")
+    span = (0.45 / rows.BENCH - late, 0.55 * rows.BENCH + late)
+    bench.expect(
+        all(span[0] <= gap <= span[1] for gap in gaps) and last - signs[-1] <= span[1],
+        "P-14", f"{span[0] * 1e3:.0f} to {span[1] * 1e3:.0f} ms while the {what} goes on", [round(g, 3) for g in gaps],
+    )
+    bench.ok("P-14", f"{what}: {len(signs)} life signs, {min(gaps) * 1e3:.0f} to {max(gaps) * 1e3:.0f} ms apart")
+
+
+if __name__ == "__main__":
+    rows.main([late_ready, errors, end_lost, life_signs, golden, other_board, one_by_one, old_program, cancelled, killed],
+              workers=8)

@@ -1,0 +1,52 @@
+"""State of a board that a script plays, and what boards may do otherwise."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+MSTART, ASTART, MCARUN, EXLRUN, INIT, PROG, OPINIT, IPINIT = (1 << bit for bit in range(7, -1, -1))
+NONE = (0xFFFF, 0xFFFF)
+
+
+@dataclass
+class Quirks:
+    """What these boards do otherwise, or wrong."""
+
+    order: str = "little"
+    inclusive: bool = False  # the count of a string counts its header
+    all4: bool = False  # four reports of each board
+    auto_pin: bool = False  # the pin goes up with the acknowledgement
+    strict: bool = False  # surplus bytes are refused
+    lost_acks: int = 0
+    wrong_ack: bool = False
+    lost_pins: int = 0  # so many PC_SETSTATUS for the pin are not heard
+    other_number: bool = False  # DSP_INFO has another number inside
+    keeps_old: bool = False
+    lost_finished: bool = False
+    errors: dict[tuple[int, int], int] = field(default_factory=dict)  # after a block of a cycle, from 0, this error
+    late: dict[tuple[int, int], float] = field(default_factory=dict)  # DSP_READY after a block comes so late, s
+    late_by: Callable[[], float] = lambda: 0.0  # for all other blocks
+    dump_gap: float = 0.0  # between frames of an IO description, s
+    between: Callable[[], list[str]] = list  # what else comes between them
+
+
+class Board:
+    """State of one board."""
+
+    def __init__(self, place: int, flash: int, shape: tuple[int, int, int]):
+        self.place, self.flash, self.shape = place, flash, shape
+        self.number: int | None = None
+        self.status = EXLRUN
+        self.program = (0x1234, 0x386E)
+        self.silent = False
+        self.dropping, self.busy = False, False
+        self.block, self.blocks = b"", []
+        self.serial = 0
+        self.flags = bytes(4)
+
+    def names(self) -> list[str]:
+        """Its description, then the names of inputs, outputs and parameters."""
+        kinds = zip(("ci", "so", "par"), self.shape)
+        return [f"python {self.flash:x}"] + [f"{kind}{i} of {self.flash:x}" for kind, n in kinds for i in range(n)]
+
+    def initial(self) -> list[int]:
+        return [(self.flash + i) & 0xFF for i in range(self.shape[0])]

@@ -1,0 +1,34 @@
+"""A `ucom` command against boards that a script plays."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from pc_board import Quirks
+from pc_boards import Boards
+from peer import Chain, Command
+from rows import Bench
+
+# Functions that only ask; everything else of a PC does something to boards.
+HARMLESS = (8, 9, 22, 23)
+
+
+@contextmanager
+def boards(bench: Bench, chain: Chain, flash: list[int], **how) -> Iterator[Boards]:
+    """Boards on a bus; keywords are those of `Quirks`, and shape, numbered, running of `Boards`."""
+    fixed = {key: how.pop(key) for key in ("shape", "numbered", "running") if key in how}
+    with chain.peer() as peer, Boards(peer, flash, Quirks(bench.order, **how), **fixed) as played:
+        yield played
+
+
+def told(bench: Bench, rule: str, command: Command, code: int | tuple[int, ...], seconds: float = 120.0) -> dict:
+    """Waits for the command's end with one of these exit codes; what it said."""
+    codes = (code,) if isinstance(code, int) else code
+    came = command.end(seconds)
+    notes = [line for _, line in command.notes]
+    bench.expect(came in codes, rule, f"exit code {code}", f"{came}: {command.out[-1:]} {notes[-5:]}")
+    return command.said()
+
+
+def intrusive(frames: list[str]) -> list[str]:
+    """What of the frames of a PC does something to boards."""
+    return [frame for frame in frames if int(frame[:3], 16) >> 6 not in HARMLESS]

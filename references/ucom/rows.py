@@ -1,0 +1,123 @@
+"""Rows of the protocol's tests, run beside each other: each in a process of its own, on a bus of its own.
+
+A row is a function of a `Bench`; it is run once for each byte order of words. Whatever is drawn by chance comes from a
+seed that is printed; `--seed N` draws the same again. `--only TEXT` runs the rows whose function's name has that text.
+"""
+
+import argparse
+import concurrent.futures
+import multiprocessing
+import random
+import threading
+import time
+import traceback
+
+from peer import Chain
+
+# Times of the protocol are held to within a fifth.
+BENCH = 1.2
+
+
+class Disagreement(Exception):
+    """What was expected did not come."""
+
+
+class Jitter(threading.Thread):
+    """How late this machine wakes those who sleep 5 ms: no one here can be more punctual than that."""
+
+    def __init__(self):
+        super().__init__(daemon=True)
+        self.late: list[tuple[float, float]] = []
+        self.ending = False
+
+    def run(self) -> None:
+        while not self.ending:
+            due = time.monotonic() + 0.005
+            time.sleep(0.005)
+            late = time.monotonic() - due
+            if late > 0.002:
+                self.late.append((time.time(), late))
+
+    def worst(self, since: float, until: float) -> float:
+        """Longest delay that ended between two times, s."""
+        return max((late for at, late in list(self.late) if since <= at <= until + late), default=0.0)
+
+
+class Bench:
+    """What a row works with."""
+
+    def __init__(self, program: str, order: str, seed: int, name: str):
+        self.program, self.order = program, order
+        self.random = random.Random(f"{seed} {name} {order}")
+        self.seed = seed
+        self.lines: list[str] = []
+        self.jitter = Jitter()
+        self.jitter.start()
+
+    def chain(self, *options: str, profile: str = "") -> Chain:
+        return Chain(self.program, "--seed", str(self.seed), *options, order=self.order, profile=profile)
+
+    def bus(self, profile: str = "") -> Chain:
+        """A bus without boards."""
+        return self.chain("--boards", "0", profile=profile)
+
+    def ok(self, rule: str, note: str = "") -> None:
+        """This rule holds."""
+        self.lines.append(f"{rule} {self.order}-endian ok{': ' if note else ''}{note}")
+
+    def expect(self, holds: bool, rule: str, expected: str, came) -> None:
+        if not holds:
+            raise Disagreement(f"{rule} {self.order}-endian FAIL: expected {expected}; came {came}")
+
+    def same(self, rule: str, what: str, came, expected) -> None:
+        self.expect(came == expected, rule, f"{what} {expected}", came)
+
+    def image(self, least: int = 200, most: int = 1200) -> bytes:
+        """An image of whole words."""
+        return self.random.randbytes(2 * self.random.randint(least // 2, most // 2))
+
+    def flash_ids(self, count: int) -> list[int]:
+        """Flash numbers that differ in their low seven bits."""
+        return [self.random.randrange(256) << 8 | low for low in self.random.sample(range(1, 128), count)]
+
+
+def run_row(program: str, order: str, seed: int, function) -> tuple[bool, list[str], float]:
+    """One row; whether it held, and what is to be said."""
+    start = time.monotonic()
+    bench = Bench(program, order, seed, function.__name__)
+    try:
+        function(bench)
+        held = True
+    except Disagreement as e:
+        held = False
+        bench.lines.append(str(e))
+    except Exception:
+        held = False
+        bench.lines.append(f"{function.__name__} {order}-endian FAIL: {traceback.format_exc()}")
+    bench.jitter.ending = True
+    return held, bench.lines, time.monotonic() - start
+
+
+def main(rows: list, workers: int = 12) -> None:
+    """Runs the rows of a script: its arguments are the `ucom` program and the options above. Exit code 0: all hold."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", default="")
+    arguments = parser.parse_args()
+    print(f"seed {arguments.seed}", flush=True)
+    start, held = time.monotonic(), True
+    spawn = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(workers, mp_context=spawn) as pool:
+        jobs = [
+            (row, order, pool.submit(run_row, arguments.program, order, arguments.seed, row))
+            for row in rows if arguments.only in row.__name__ for order in ("little", "big")
+        ]
+        for row, order, job in jobs:
+            good, lines, seconds = job.result()
+            held &= good
+            for line in lines:
+                print(line, flush=True)
+            print(f"  {row.__name__}, {order}-endian: {seconds:.0f} s", flush=True)
+    print(f"{time.monotonic() - start:.0f} s in all")
+    raise SystemExit(0 if held else 1)

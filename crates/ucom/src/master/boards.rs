@@ -19,6 +19,9 @@ pub enum Life {
     Lost,
 }
 
+/// So long a board's last life sign may still be under way when its application has ended, µs.
+const UNDER_WAY: u64 = 100_000;
+
 /// What is known of a board.
 #[derive(Clone, Debug, Default)]
 pub struct Board {
@@ -46,6 +49,8 @@ pub struct Board {
     pub bad_strings: u64,
     /// MCA_DSP_READY that came, asked for or not.
     pub ready_count: u64,
+    /// Since when its application is known to be stopped, and not to start by itself.
+    pub(crate) stopped_at: Option<u64>,
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
 
@@ -67,6 +72,11 @@ impl Board {
             self.errors.remove(0);
         }
         self.errors.push((at, code));
+    }
+
+    /// Whether a life sign under its number cannot be its own (D-08).
+    pub(crate) fn cannot_be_alive(&self, now: u64) -> bool {
+        self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }
 
     /// The application has ended or is about to: its life signs are no longer expected, nothing of it is known.

@@ -4,7 +4,7 @@ use std::prelude::v1::*;
 
 use super::link::Link;
 use super::request::{TRIES, admin, confirmed, info, numbers, set_status};
-use super::scan::{REPORTS, Reports, collect_reports};
+use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
 use crate::{Admin, BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
@@ -136,30 +136,60 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
         None => link.everybody(),
     };
     link.become_master(force).await?;
+    // Whether there is such a board: a frame to nobody would look like a reset without an answer.
+    let before = match board {
+        Some(board) => Some(confirmed(&link, board).await?.info),
+        None => None,
+    };
     link.listen(0, &REPORTS);
     link.ask(to, ToBoard::Reset).await;
-    let expected = link.with(|core| match board {
+    link.with(|core| match board {
         Some(board) => {
-            let known = core.boards.get(board).and_then(|b| b.info);
             *core.boards.of(board) = Default::default();
             core.data.remove(&board);
-            known.map(|info| info.flash_number as u8)
         }
         None => {
             core.boards.clear();
             core.data.clear();
-            None
         }
     });
     let mut reports = Reports::default();
     collect_reports(&link, link.times().report_window, &mut reports).await;
-    if let Some(board) = board
-        && (reports.ids.is_empty() || expected.is_some_and(|id| !reports.ids.contains(&id)))
-    {
-        let since = link.now().saturating_sub(link.times().report_window);
-        return Err(link.no_answer(board, Function::Reset, 1, since));
+    if let (Some(board), Some(before)) = (board, before) {
+        was_reset(&link, board, before, &mut reports).await?;
     }
     Ok(Outcome::Reset(reports))
+}
+
+/// A board that was reset has reported and has no number any more. Only its report may have been lost: then it is asked
+/// for another one.
+async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Reports) -> Result<(), Error> {
+    let since = link.now().saturating_sub(link.times().report_window);
+    let ucom_id = before.flash_number as u8;
+    for _ in 1..TRIES {
+        if !reports.ids.contains(&ucom_id) {
+            let mut all = Reports::default();
+            ask_reports(link, &mut all).await;
+            reports.ids.extend(all.ids.contains(&ucom_id).then_some(ucom_id));
+        }
+    }
+    match numbers(link, board).await {
+        Err(Error::NoAnswer { .. }) if reports.ids.contains(&ucom_id) => {
+            link.with(|core| *core.boards.of(board) = Default::default());
+            Ok(())
+        }
+        Err(Error::NoAnswer { .. }) => Err(link.no_answer(board, Function::Reset, 1, since)),
+        Err(error) => Err(error),
+        Ok(info) => {
+            let waited_ms = link.now().saturating_sub(since) / MS;
+            Err(Error::NotReached {
+                board,
+                what: "it did not give its number up",
+                waited_ms,
+                status: info.status,
+            })
+        }
+    }
 }
 
 /// PC_XRESET, and the board back in its exloader with programming enabled (D-23).
@@ -238,13 +268,19 @@ use super::init::repair;
 
 /// PC_START and the application up: MCA_DSP_READY, or PC_INFO that shows MSTART (D-30).
 pub(crate) async fn start_application(link: &Link, board: u8) -> Result<BoardSeen, Error> {
-    let to = link.board(board)?;
     let before = info(link, board).await?;
-    if before.info.status.has(Status::MSTART) {
+    start_from(link, before).await
+}
+
+/// The same for a board that has just been asked who it is.
+pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSeen, Error> {
+    let board = before.number;
+    let to = link.board(board)?;
+    let mut last = before.info.status;
+    if last.has(Status::MSTART) {
         return Ok(before);
     }
     let since = link.now();
-    let mut last = before.info.status;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
         link.ask(to, ToBoard::Start).await;
@@ -310,35 +346,39 @@ pub(crate) async fn admin_procedure(
     Ok(Outcome::Admin { board, admin })
 }
 
-/// Outputs off, then the loop, then the application: the start order in reverse. A step that gets no answer does not keep
-/// the next ones from being taken; the first that failed is told.
 pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
-    let known = match info(&link, board).await {
+    let info = stop_board(&link, board, level).await?;
+    Ok(Outcome::Status { board, info })
+}
+
+/// Outputs off, then the loop, then the application: the start order in reverse. A step that gets no answer does not keep
+/// the next ones from being taken; the first that failed is told.
+pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
+    let known = match info(link, board).await {
         Ok(seen) => seen.info,
         Err(error) => {
-            stop_unheard(&link, board, level).await?;
+            stop_unheard(link, board, level).await?;
             return Err(error);
         }
     };
     if !known.status.has(Status::MSTART) {
-        return Ok(Outcome::Status { board, info: known });
+        return Ok(known);
     }
     let off = AdminChange { active: Some(false), ..Default::default() };
-    let mut done = change_flags(&link, board, off).await.map(drop);
+    let mut done = change_flags(link, board, off).await.map(drop);
     if level != StopLevel::Outputs {
         link.with(|core| core.stop_inputs(board));
-        let ended = change_flags(&link, board, AdminChange { run: Some(false), ..off }).await;
+        let ended = change_flags(link, board, AdminChange { run: Some(false), ..off }).await;
         done = done.and(ended.map(drop));
     }
     if level == StopLevel::Application {
         link.with(|core| core.boards.of(board).application_ended());
-        done = done.and(set_status(&link, board, Status::MSTART, Status(0)).await.map(drop));
+        done = done.and(set_status(link, board, Status::MSTART, Status(0)).await.map(drop));
     }
     done?;
-    let now = info(&link, board).await?.info;
-    Ok(Outcome::Status { board, info: now })
+    Ok(info(link, board).await?.info)
 }
 
 /// The stop of a board that does not answer PC_INFO: it may run all the same. What it knows of flags is not read first.

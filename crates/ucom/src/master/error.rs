@@ -214,6 +214,12 @@ pub enum Error {
         /// Why.
         failure: super::update::UpdateFailure,
     },
+    /// A board that was being started, or had been, is gone; by `on_lost` all were stopped (D-51).
+    #[error("board {board} was lost while boards were started: all are stopped")]
+    Lost {
+        /// Its number.
+        board: u8,
+    },
     /// The caller says that the bus is gone, see [`Master::abandon`](super::Master::abandon).
     #[error("the bus failed: {reason}")]
     Bus {
@@ -309,7 +315,7 @@ impl Error {
             | Self::Busy { .. }
             | Self::NoApplication { .. } => 4,
             Self::Update { failure, .. } => failure.exit_code(),
-            Self::Cancelled => 5,
+            Self::Lost { .. } | Self::Cancelled => 5,
         }
     }
 
@@ -335,6 +341,7 @@ impl Error {
             Self::NoEdge { .. } => "no-edge",
             Self::Plan(_) => "plan",
             Self::Update { .. } => "update",
+            Self::Lost { .. } => "lost",
             Self::Bus { .. } => "bus",
             Self::Cancelled => "cancelled",
         }
@@ -381,6 +388,9 @@ impl Error {
             Self::NoEdge { board, .. } => format!("`ucom io {board}` lists the names"),
             Self::Plan(e) => e.hint().into(),
             Self::Update { failure, .. } => failure.hint(),
+            Self::Lost { board } => {
+                format!("`ucom info {board}`: has it rebooted, has it power? `ucom doctor` looks at bus and boards")
+            }
             Self::Bus { .. } => "is the bus still there, the adapter plugged in? `ucom doctor` looks at it".into(),
             Self::Cancelled => "`ucom scan` tells in what state the boards are".into(),
         }

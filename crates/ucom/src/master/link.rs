@@ -11,6 +11,7 @@ use core::future::{Future, poll_fn};
 use core::pin::pin;
 use core::task::Poll;
 
+use super::request::numbers;
 use super::shared::{Core, Filter, Forget, Heard, Session};
 use super::times::{MS, Times};
 use super::{Error, Event, ProcedureId};
@@ -66,10 +67,12 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// As [`Link::ask`], but errors are kept: program data, where an error may come in the middle of a block.
-    pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) {
+    /// As [`Link::ask`], but errors are kept: program data, where an error may come in the middle of a block. Returns when
+    /// the frame left.
+    pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
+        self.with(|core| core.sent_at)
     }
 
     /// As [`Link::send`] with a frame of any form.
@@ -121,7 +124,11 @@ impl Link {
 
     /// Waits; what is heard meanwhile stays in the inbox.
     pub(crate) async fn sleep(&self, us: u64) {
-        let until = self.now() + us;
+        self.sleep_until(self.now() + us).await;
+    }
+
+    /// The same up to a time.
+    pub(crate) async fn sleep_until(&self, until: u64) {
         poll_fn(|_| {
             self.with(|core| {
                 let fired = core.fired;
@@ -196,13 +203,40 @@ impl Link {
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }
-            let (now, heard) = self.with(|core| (core.now, core.foreign_master));
-            if let Some((at, function, to)) = heard.filter(|(at, ..)| now.saturating_sub(*at) <= listen) {
-                let ago_ms = now.saturating_sub(at) / MS;
-                return Err(Error::ForeignMaster { function, to, ago_ms });
-            }
+            self.no_foreign_master(listen)?;
+            self.whose_life_signs(listen).await;
+            self.no_foreign_master(2 * listen)?;
         }
         Ok(())
+    }
+
+    /// Refuses when another PC was heard within the last `window` µs.
+    fn no_foreign_master(&self, window: u64) -> Result<(), Error> {
+        let (now, heard) = self.with(|core| (core.now, core.foreign_master));
+        match heard.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
+            Some((at, function, to)) => {
+                Err(Error::ForeignMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// A life sign under the number of a board may be the board's, or another PC's for that board alone: whether it is
+    /// started, the board knows. Without an answer it is taken for the board's.
+    async fn whose_life_signs(&self, window: u64) {
+        let recent =
+            |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);
+        let unknown: Vec<u8> = self.with(|core| {
+            let boards = core.boards.iter().filter(|(_, b)| b.info.is_none() && recent(core, b.alive_at));
+            boards.map(|(number, _)| number).collect()
+        });
+        for board in unknown {
+            let answer = numbers(self, board).await;
+            let stopped = |core: &Core| core.boards.get(board).is_some_and(|b| b.stopped_at.is_some());
+            if answer.is_ok() && self.with(|core| stopped(core)) {
+                self.with(|core| core.foreign_pc(Function::Alive, board));
+            }
+        }
     }
 
     /// The board's number, checked against the profile.

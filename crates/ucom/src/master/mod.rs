@@ -8,8 +8,8 @@
 //! 3. look at [`Master::take_event`];
 //! 4. wait for the next frame, at most until [`Master::next_deadline`].
 //!
-//! What has arrived is handed over before `poll` is called, and `poll` is told the time before that: waiting ends only
-//! in `poll`, so a driver that comes late mistakes no answer for silence. Time is in microseconds from any start and must not go back (a monotonic clock).
+//! What has arrived is handed over before `poll` is called: waiting ends only in `poll`, so a driver that comes late
+//! mistakes no answer for silence ([`Master::poll_behind`] for what came while it handed over). Time is in microseconds from any start and must not go back (a monotonic clock).
 //!
 //! ```
 //! use ucom::master::{Event, Master, Outcome, Request};
@@ -151,14 +151,17 @@ impl Master {
     }
 
     /// The next frame to send; call it until it gives none.
-    ///
-    /// `now` is the time up to which everything that arrived has been handed over. A driver that is behind may give a time
-    /// before that of its last [`Master::handle`]: no wait ends beyond it, but life signs go out.
     pub fn poll(&mut self, now: u64) -> Option<Frame> {
+        self.poll_behind(now, now)
+    }
+
+    /// The same for a driver that has handed over what arrived up to `heard`, not what came between that and `now`: no
+    /// wait ends beyond `heard`, but life signs go out.
+    pub fn poll_behind(&mut self, now: u64, heard: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
             core.advance(now);
-            core.fired = core.fired.max(now);
+            core.fired = core.fired.max(heard);
             core.duties();
         }
         self.run();

@@ -210,8 +210,9 @@ pub(super) type Work = core::pin::Pin<Box<dyn Future<Output = Result<Outcome, Er
 pub(super) fn work(link: Link, request: Request) -> Work {
     let outer = link.clone();
     let inner: Work = match request {
-        // An update has something to undo when it is cancelled.
+        // These have something to undo when they are cancelled.
         Request::Update(options) => return Box::pin(update::update(link, options)),
+        Request::Run(options) => return Box::pin(run::run(link, options)),
         Request::Scan => Box::pin(scan::scan(link)),
         Request::Init(options) => Box::pin(init::init(link, options)),
         Request::Repair { board, flash_number, force } => {
@@ -230,7 +231,6 @@ pub(super) fn work(link: Link, request: Request) -> Work {
         }
         Request::Describe { board, fresh } => Box::pin(io::describe_procedure(link, board, fresh)),
         Request::InitialInputs { board } => Box::pin(io::initial_inputs_procedure(link, board)),
-        Request::Run(options) => Box::pin(run::run(link, options)),
         Request::Probe(options) => Box::pin(probe::probe(link, options)),
     };
     Box::pin(async move { outer.or_cancel(inner).await })

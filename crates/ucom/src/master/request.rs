@@ -96,6 +96,7 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
 /// Keeps what a board said.
 pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&str>) {
     link.with(|core| {
+        let now = core.now;
         let known = core.boards.of(board);
         if known.info.is_some_and(|old| old.flash_number != info.flash_number) {
             *known = Default::default();
@@ -106,6 +107,11 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
         if let Some(text) = text {
             known.description = Some(text.into());
         }
+        let starts_itself = info.status.has(Status::ASTART) && info.has_application();
+        known.stopped_at = match info.status.has(Status::MSTART) || starts_itself {
+            true => None,
+            false => known.stopped_at.or(Some(now)),
+        };
         if !info.status.has(Status::MSTART) {
             known.application_ended();
             if was_started {

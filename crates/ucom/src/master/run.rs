@@ -4,13 +4,16 @@
 use std::collections::BTreeMap;
 use std::prelude::v1::*;
 
-use super::control::{AdminChange, change_flags, start_application};
-use super::io::{Kind, describe, read_initial_inputs};
+use super::boards::Life;
+use super::control::{AdminChange, StopLevel, change_flags, start_from, stop_board};
+use super::io::{IoDescription, Kind, describe, read_initial_inputs};
 use super::link::Link;
 use super::load::LoadForecast;
-use super::request::mca_start;
+use super::request::{info, mca_start};
+use super::shared::Core;
 use super::{Error, Outcome};
-use crate::{Admin, BufferPackage, Dimensions, ToBoard};
+use crate::profile::OnLost;
+use crate::{Admin, BoardInfo, BufferPackage, Dimensions, Status, ToBoard};
 
 /// A value for an input or a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,59 +55,154 @@ pub struct RunReport {
     pub load: LoadForecast,
 }
 
+/// A run ends with every board running, or with every board as it was found.
 pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Error> {
+    let mut begun = Vec::new();
+    let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
+    if let Err(error) = &result
+        && !matches!(error, Error::Bus { .. })
+    {
+        let undone = link.or_cancel(async {
+            undo(&link, &begun).await;
+            Ok(())
+        });
+        if undone.await.is_err() {
+            link.note("not every board that was started is stopped".into());
+        }
+    }
+    result.map(Outcome::Running)
+}
+
+/// What a run has begun on a board, and takes back when it fails.
+struct Begun {
+    board: u8,
+    /// How far it is stopped then, so that it is as it was found.
+    back: Option<StopLevel>,
+}
+
+async fn undo(link: &Link, begun: &[Begun]) {
+    for Begun { board, back } in begun.iter().rev() {
+        if let Some(level) = back
+            && let Err(error) = stop_board(link, *board, *level).await
+        {
+            link.note(format!("board {board} may still be started: {error}"));
+        }
+    }
+}
+
+async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) -> Result<RunReport, Error> {
     for plan in &options.boards {
         link.board(plan.board)?;
     }
     link.become_master(options.force).await?;
-    // First everything that can be refused: names, load.
+    // First everything that can be refused, and as much of it as is known before anything is started: names, load.
+    let mut found = Vec::new();
     let mut described = BTreeMap::new();
     for plan in &options.boards {
-        let seen = start_application(&link, plan.board).await?;
-        let description = describe(&link, plan.board, &seen.info).await?;
-        for (kind, settings) in [(Kind::Ci, &plan.ci), (Kind::Par, &plan.par)] {
-            for setting in settings {
-                description.find(plan.board, kind, &setting.name)?;
-            }
+        let seen = info(link, plan.board).await?;
+        if let Some(description) = known_description(link, &seen.info) {
+            add(link, options, plan, description, &mut described)?;
         }
-        described.insert(plan.board, description);
+        found.push(seen);
     }
-    let load = forecast(&link, &described.iter().map(|(n, d)| (*n, d.dimensions())).collect());
-    if load.exceeds() && !options.force {
-        return Err(Error::Load(load));
+    for (plan, seen) in options.boards.iter().zip(found) {
+        // What does not run yet is stopped as far as it was; what runs is not ours to stop.
+        let status = seen.info.status;
+        let back = match (status.has(Status::MSTART), status.has(Status::MCARUN)) {
+            (false, _) => Some(StopLevel::Application),
+            (true, false) => Some(StopLevel::Loop),
+            (true, true) => None,
+        };
+        begun.push(Begun { board: plan.board, back });
+        let seen = start_from(link, seen).await?;
+        let description = describe(link, plan.board, &seen.info).await?;
+        add(link, options, plan, description, &mut described)?;
     }
     let mut boards = Vec::new();
-    for plan in &options.boards {
+    for (plan, begun) in options.boards.iter().zip(begun) {
         let Some(description) = described.get(&plan.board) else { continue };
-        let mut ci = read_initial_inputs(&link, plan.board, description.dimensions().ci).await?;
-        for setting in &plan.ci {
-            let index = description.find(plan.board, Kind::Ci, &setting.name)?;
-            if let Some(place) = ci.get_mut(usize::from(index)) {
-                *place = setting.value;
-            }
-        }
-        link.with(|core| {
-            if let Some(data) = core.data.get_mut(&plan.board) {
-                data.ci = ci;
-            }
-            core.send_inputs(plan.board);
-        });
-        for setting in &plan.par {
-            let index = description.find(plan.board, Kind::Par, &setting.name)?;
-            link.with(|core| core.send_parameter(plan.board, index, setting.value));
-        }
-        // Nothing may start before its values have left.
-        link.flush().await;
-        mca_start(&link, plan.board).await?;
-        repeat_inputs(&link, plan.board);
-        let running = AdminChange { run: Some(true), ..Default::default() };
-        let mut admin = change_flags(&link, plan.board, running).await?;
-        if options.active {
-            admin = change_flags(&link, plan.board, AdminChange { active: Some(true), ..running }).await?;
-        }
-        boards.push((plan.board, admin));
+        nobody_lost(link, options)?;
+        boards.push((plan.board, start_loop(link, options, plan, description, begun).await?));
     }
-    Ok(Outcome::Running(RunReport { boards, load }))
+    nobody_lost(link, options)?;
+    Ok(RunReport { boards, load: forecast(link, &described) })
+}
+
+/// The description of the program on a board, if it is known already.
+fn known_description(link: &Link, info: &BoardInfo) -> Option<IoDescription> {
+    let key = (info.program_id, info.date);
+    link.with(|core| core.descriptions.get(&key).filter(|_| info.has_application()).cloned())
+}
+
+/// One more board is described: its names must be those that are meant, and the load bearable.
+fn add(
+    link: &Link,
+    options: &RunOptions,
+    plan: &RunBoard,
+    description: IoDescription,
+    described: &mut BTreeMap<u8, IoDescription>,
+) -> Result<(), Error> {
+    for (kind, settings) in [(Kind::Ci, &plan.ci), (Kind::Par, &plan.par)] {
+        for setting in settings {
+            description.find(plan.board, kind, &setting.name)?;
+        }
+    }
+    described.insert(plan.board, description);
+    let load = forecast(link, described);
+    if load.exceeds() && !options.force { Err(Error::Load(load)) } else { Ok(()) }
+}
+
+/// Inputs, parameters, the loop, and the outputs if they are wanted.
+async fn start_loop(
+    link: &Link,
+    options: &RunOptions,
+    plan: &RunBoard,
+    description: &IoDescription,
+    begun: &mut Begun,
+) -> Result<Admin, Error> {
+    let board = plan.board;
+    let mut ci = read_initial_inputs(link, board, description.dimensions().ci).await?;
+    for setting in &plan.ci {
+        let index = description.find(board, Kind::Ci, &setting.name)?;
+        if let Some(place) = ci.get_mut(usize::from(index)) {
+            *place = setting.value;
+        }
+    }
+    link.with(|core| {
+        if let Some(data) = core.data.get_mut(&board) {
+            data.ci = ci;
+        }
+        core.send_inputs(board);
+    });
+    for setting in &plan.par {
+        let index = description.find(board, Kind::Par, &setting.name)?;
+        link.with(|core| core.send_parameter(board, index, setting.value));
+    }
+    // Nothing may start before its values have left.
+    link.flush().await;
+    let told = mca_start(link, board).await?;
+    if begun.back.is_none() && !told.active && options.active {
+        begun.back = Some(StopLevel::Outputs);
+    }
+    repeat_inputs(link, board);
+    let running = AdminChange { run: Some(true), ..Default::default() };
+    let admin = change_flags(link, board, running).await?;
+    if !options.active {
+        return Ok(admin);
+    }
+    change_flags(link, board, AdminChange { active: Some(true), ..running }).await
+}
+
+/// Where the loss of one board stops all, none is started after it.
+fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
+    let lost = |core: &mut Core, number: u8| {
+        core.boards.get(number).is_some_and(|b| b.life == Life::Lost || b.rebooted)
+    };
+    let lost = link.with(|core| {
+        let stops = core.profile.on_lost == OnLost::StopAll;
+        options.boards.iter().map(|plan| plan.board).find(|board| stops && lost(core, *board))
+    });
+    lost.map_or(Ok(()), |board| Err(Error::Lost { board }))
 }
 
 fn repeat_inputs(link: &Link, board: u8) {
@@ -117,10 +215,11 @@ fn repeat_inputs(link: &Link, board: u8) {
 }
 
 /// With the boards that run already (P-19).
-fn forecast(link: &Link, wanted: &BTreeMap<u8, Dimensions>) -> LoadForecast {
+fn forecast(link: &Link, described: &BTreeMap<u8, IoDescription>) -> LoadForecast {
     link.with(|core| {
         let now = core.now;
-        let mut all = wanted.clone();
+        let mut all: BTreeMap<u8, Dimensions> =
+            described.iter().map(|(board, description)| (*board, description.dimensions())).collect();
         for (number, board) in core.boards.iter().filter(|(_, b)| b.running(now)) {
             if let Some(data) = core.data.get(&number) {
                 let so = data.so.dimension() as u16;

@@ -9,7 +9,7 @@ use super::io::{IoDescription, ProcessData};
 use super::statistics::Statistics;
 use super::times::Times;
 use super::{Event, ProcedureId};
-use crate::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, ToBoard};
+use crate::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, Status, ToBoard};
 
 /// Most events that wait for their user.
 const MAX_EVENTS: usize = 4096;
@@ -125,6 +125,8 @@ pub(crate) struct Core {
     waiting_inputs: BTreeSet<(u8, u16)>,
     queued: u64,
     sent: u64,
+    /// When the last frame of a procedure left.
+    pub sent_at: u64,
     events: VecDeque<Event>,
     dropped: u64,
 }
@@ -152,6 +154,7 @@ impl Core {
             waiting_inputs: BTreeSet::new(),
             queued: 0,
             sent: 0,
+            sent_at: 0,
             events: VecDeque::new(),
             dropped: 0,
         }
@@ -234,6 +237,7 @@ impl Core {
         loop {
             let next = self.normal.pop_front()?;
             self.sent = next.serial;
+            self.sent_at = self.now;
             if let Some(inbox) = next.owner.and_then(|owner| self.inboxes.get_mut(&owner)) {
                 match next.forget {
                     Forget::Nothing => {}
@@ -261,8 +265,11 @@ impl Core {
     fn note_sent(&mut self, frame: &Frame) {
         let now = self.now;
         self.statistics.sent(now, frame);
-        let Ok((function, _)) = frame.address() else { return };
+        let Ok((function, to)) = frame.address() else { return };
+        let starts = |status: &u8| Status(*status).has(Status::MSTART);
         match function {
+            Function::Start => self.may_start(to),
+            Function::SetStatus if frame.data().get(1).is_some_and(starts) => self.may_start(to),
             Function::Reset => {
                 self.report_until = self.report_until.max(now + self.times.report_window + 500_000)
             }
@@ -271,6 +278,13 @@ impl Core {
             }
             _ => {}
         }
+    }
+
+    /// A board, or everybody, was told to start the application.
+    fn may_start(&mut self, to: Sequence) {
+        let everybody = self.profile.everybody() == Some(to);
+        let told = self.boards.iter_mut().filter(|(number, _)| everybody || *number == to.number());
+        told.for_each(|(_, board)| board.stopped_at = None);
     }
 
     /// Drops what a procedure has queued.
@@ -325,6 +339,11 @@ impl Core {
     /// A frame that only a PC sends.
     pub(crate) fn foreign_pc(&mut self, function: Function, to: u8) {
         self.statistics.foreign_pc += 1;
+        if let Some(to) = Sequence::new(to)
+            && matches!(function, Function::Start | Function::SetStatus)
+        {
+            self.may_start(to);
+        }
         if function == Function::AskReport {
             // The reports that follow answer the other PC: nobody has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);

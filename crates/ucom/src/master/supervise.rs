@@ -208,7 +208,10 @@ impl Core {
         let everybody = number == self.profile.unnumbered();
         match function {
             Function::DumpIo => frame.dlc() == 0,
-            Function::Admin | Function::Alive => everybody,
+            Function::Alive => {
+                everybody || self.boards.get(number.number()).is_some_and(|b| b.cannot_be_alive(self.now))
+            }
+            Function::Admin => everybody,
             _ => !function.from_board(),
         }
     }
@@ -274,6 +277,7 @@ impl Core {
             }
             FromBoard::Admin(admin) => {
                 let board = self.boards.of(from);
+                board.stopped_at = None;
                 if board.admin.replace(admin) != Some(admin) {
                     self.event(Event::Admin { board: from, admin });
                 }
@@ -282,7 +286,8 @@ impl Core {
                 }
             }
             FromBoard::So(package) => {
-                self.boards.of(from).so_at = Some(now);
+                let board = self.boards.of(from);
+                (board.so_at, board.stopped_at) = (Some(now), None);
                 let snapshot = self.data.get_mut(&from).and_then(|data| data.so.push(now, &package));
                 if let Some(snapshot) = snapshot.filter(|_| self.data.get(&from).is_some_and(|d| d.watched)) {
                     let snapshot: Snapshot = snapshot;
@@ -305,7 +310,11 @@ impl Core {
                 }
             }
             // After PC_START it is an answer; another one means nothing by itself (D-30).
-            FromBoard::McaReady => self.boards.of(from).ready_count += 1,
+            FromBoard::McaReady => {
+                let board = self.boards.of(from);
+                board.ready_count += 1;
+                board.stopped_at = None;
+            }
             _ => {}
         }
         self.deliver(from, message);

@@ -12,6 +12,8 @@ mod probing;
 mod robust;
 mod running;
 mod scripted;
+mod second_pc;
+mod starting;
 mod update;
 mod update_ends;
 mod update_group;

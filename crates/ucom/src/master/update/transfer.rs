@@ -83,11 +83,11 @@ impl Attempt<'_> {
     /// The eight frames of a block; what came before the last one left is no answer to it.
     async fn send(&self, block: &[u8; BLOCK_LEN]) {
         let (frames, _) = block.as_chunks::<8>();
-        for (i, data) in frames.iter().enumerate() {
-            if i > 0 && self.gap_us > 0 {
-                self.link.sleep(self.gap_us).await;
-            }
-            self.link.feed(self.to, ToBoard::Prog(*data)).await;
+        let mut next = 0;
+        for data in frames {
+            self.link.sleep_until(next).await;
+            // From the start of one frame to that of the next.
+            next = self.link.feed(self.to, ToBoard::Prog(*data)).await + self.gap_us;
         }
     }
 

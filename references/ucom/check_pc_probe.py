@@ -1,4 +1,4 @@
-"""`ucom probe` against boards that read the protocol otherwise; this script plays them on python-can's socketcand interface.
+"""`ucom probe` against boards that read the protocol otherwise, played on python-can's socketcand interface.
 
 Argument: the `ucom` program. Exit code 0: all agreed.
 """
@@ -55,10 +55,9 @@ def numbering(bench: Bench, several: list[dict]) -> None:
             agrees(bench, out, quirks)
             # The profile that was found works.
             said = told(bench, "P-20", chain.start("init", "--renew", profile=out), 0)
-            flash = [board.flash for board in played.boards]
-            bench.same("P-20", f"{quirks}: boards with this profile", [b["flash_number"] for b in said["boards"]], flash)
-            names = [board.names()[0] for board in played.boards]
-            bench.same("P-20", f"{quirks}: descriptions", [b["description"] for b in said["boards"]], names)
+            seen = [(b["flash_number"], b["description"]) for b in said["boards"]]
+            there = [(board.flash, board.names()[0]) for board in played.boards]
+            bench.same("P-20", f"{quirks}: boards with this profile", seen, there)
         bench.ok("P-20", f"{bench.order} {' '.join(quirks) or 'and nothing else'}")
 
 
@@ -92,7 +91,7 @@ def some_by_chance(bench: Bench) -> None:
 
 
 def harmless(bench: Bench) -> None:
-    """Without `--init` nothing is done to a numbered chain, and what can be asked is found; the same of started boards."""
+    """Without `--init` nothing is done to numbered or started boards, and what can be asked is found."""
     for started in (False, True):
         quirks = {"inclusive": True, "all4": True}
         how = {"numbered": True, "shape": (7, 4, 2), "running": 3 if started else 0}
@@ -113,4 +112,5 @@ def harmless(bench: Bench) -> None:
 
 
 if __name__ == "__main__":
-    rows.main([some_by_chance, as_decided, inclusive_counts, four_reports, own_pins, strict_lengths, all_together, harmless])
+    rows.main([some_by_chance, as_decided, inclusive_counts, four_reports, own_pins, strict_lengths, all_together,
+               harmless])

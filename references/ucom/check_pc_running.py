@@ -63,20 +63,22 @@ def interleaved(bench: Bench) -> None:
         bench.same("P-6", "names of board 2", came, board.names())
         bench.same("P-6", "dimensions of board 2", tuple(len(said[kind]) for kind in ("ci", "so", "par")), board.shape)
         bench.same("P-6", "initial inputs of board 2", said["initial_ci"], board.initial())
+        # A string may pause for 100 ms; a machine that is so late itself cuts it off.
         asked = len(played.frames("582#"))
-        bench.expect(asked == 1 or bench.jitter.worst(began, time.time()) > 0.03, "P-6", "one dump is enough", f"{asked} requests")
+        if bench.jitter.worst(began, time.time()) < 0.03:
+            bench.same("P-6", "requests of the dump", asked, 1)
         played.quirks.between = list
         (said,) = told(bench, "P-6", chain.start("info", "3"), 0)["boards"]
-        bench.same("P-6", "board 3", (said["flash_number"], said["description"]), (flash[2], played.boards[2].names()[0]))
+        third = (flash[2], played.boards[2].names()[0])
+        bench.same("P-6", "board 3", (said["flash_number"], said["description"]), third)
         number = bench.random.randint(4, 13)
         so = chain.start("so", str(number), "--count", "20")
         told(bench, "P-6", so, 0)
-        names = [f"so{i}" for i in range(6)]
         for line in (json.loads(line) for _, line in so.out):
             words = list(line["so"].values())
             first = words[0] & 0xFF if words else 0
             expected = [number << 8 | (first + i) & 0xFF for i in range(6)]
-            bench.same("P-6", f"outputs of board {number}:", (line["board"], len(line["so"]), words), (number, len(names), expected))
+            bench.same("P-6", "board and its outputs", (line["board"], words), (number, expected))
         traffic.ending.set()
         traffic.join()
         bench.ok("P-6", f"{sent / seconds:.0f} frames/s of ten boards during the dump")
@@ -106,15 +108,12 @@ def lost_and_back(bench: Bench) -> None:
         bench.expect(lost is not None, "P-15", "an event", command.notes)
         last = max(at for at, frame in played.said if frame == "682#")
         late = bench.jitter.worst(last, lost)
-        span = (3.0 / rows.BENCH, 3.1 * rows.BENCH + late)
-        bench.expect(span[0] <= lost - last <= span[1], "P-15", f"the event after {span[0]:.2f} to {span[1]:.2f} s", f"{lost - last:.2f} s")
+        bench.within("P-15", "the event", lost - last, 3.0 / rows.BENCH, 3.1 * rows.BENCH + late)
         time.sleep(0.5)
         stops = played.times(SAFE)
         limit = 0.1 * rows.BENCH + bench.jitter.worst(lost - 0.5, lost + 0.5)
-        bench.expect(
-            stops != [] and -limit <= stops[0] - lost <= limit, "P-15", f"{SAFE} within {limit:.2f} s of the event",
-            [round(at - lost, 3) for at in stops],
-        )
+        bench.expect(stops != [], "P-15", SAFE, played.frames("6"))
+        bench.within("P-15", SAFE, stops[0] - lost, -limit, limit)
         bench.expect(not played.boards[0].status & MCARUN, "P-15", "board 1 stopped, too", played.boards[0].status)
         after = [frame for at, frame in list(played.heard) if at > stops[0] + limit and frame.startswith("34")]
         bench.same("P-15", "inputs after the stop", after, [])
@@ -122,7 +121,8 @@ def lost_and_back(bench: Bench) -> None:
         back = command.wait_note("board 2: back", 3.0)
         bench.expect(back is not None, "P-15", "back", command.notes)
         told(bench, "P-15", command, 5)
-        bench.ok("P-15", f"lost after {lost - last:.2f} s, {SAFE} {1e3 * (stops[0] - lost):+.0f} ms from the event, {len(stops)} times")
+        after = f"{1e3 * (stops[0] - lost):+.0f} ms"
+        bench.ok("P-15", f"lost after {lost - last:.2f} s, {SAFE} {after} from the event, {len(stops)} times")
 
 
 def rebooted(bench: Bench) -> None:
@@ -142,7 +142,9 @@ def rebooted(bench: Bench) -> None:
 def second_master(bench: Bench) -> None:
     """P-17: whatever only a PC sends, every 100 ms."""
     image = bench.image()
-    foreign = bench.random.sample(["680#", "205#", "240#", "585#", "600#00000000", "345#0000000000000000", "2C5#0000000000000000"], 4)
+    zeros = "0" * 16
+    frames = ["680#", "205#", "240#", "585#", "600#00000000", f"345#{zeros}", f"2C5#{zeros}"]
+    foreign = bench.random.sample(frames, 4)
     with bench.bus() as chain, chain.peer() as other, boards(bench, chain, bench.flash_ids(1), numbered=True) as played:
         path = chain.write("image.bin", image)
         commands = [("start", "1"), ("update", "1", path), ("init", "--renew"), ("run", "1", "--for", "1")]
@@ -172,7 +174,8 @@ def load(bench: Bench) -> None:
     shape = (3, 12, 0)
     # Whole packages of 135 bits: outputs every 10 ms, inputs every 20 ms.
     percent = 16 * (4 * 100 + 1 * 50) * 135 / 1e6 * 100
-    with bench.bus() as chain, boards(bench, chain, bench.flash_ids(16), numbered=True, shape=shape, running=16) as played:
+    how = {"numbered": True, "shape": shape, "running": 16}
+    with bench.bus() as chain, boards(bench, chain, bench.flash_ids(16), **how) as played:
         command = chain.start("run", "1-16", "--for", "1")
         said = told(bench, "P-19", command, 4)
         forecast = [int(word) for word in said["error"]["message"].split() if word.isdigit()]

@@ -1,4 +1,4 @@
-"""Boards that a script plays, written from the protocol's tables alone, with everything that boards may do otherwise."""
+"""A chain of boards that a script plays, written from the protocol's tables alone."""
 
 import heapq
 import itertools

@@ -72,6 +72,10 @@ class Bench:
     def same(self, rule: str, what: str, came, expected) -> None:
         self.expect(came == expected, rule, f"{what} {expected}", came)
 
+    def within(self, rule: str, what: str, seconds: float, low: float, high: float) -> None:
+        """A time between two others, s."""
+        self.expect(low <= seconds <= high, rule, f"{what} after {low:.3f} to {high:.3f} s", f"{seconds:.3f} s")
+
     def image(self, least: int = 200, most: int = 1200) -> bytes:
         """An image of whole words."""
         return self.random.randbytes(2 * self.random.randint(least // 2, most // 2))

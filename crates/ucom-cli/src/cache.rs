@@ -1,18 +1,51 @@
-//! Descriptions of applications that were read before, by Program ID and flash date (D-36).
+//! Names of boards' inputs, outputs and parameters that were read before (D-36), and what their words mean (D-11).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use ucom::files::{BoardEdges, EdgeTable};
 use ucom::master::io::IoDescription;
 use ucom::master::{Outcome, Request};
+use ucom::{BoardInfo, Profile};
 
-use crate::args::CacheArgs;
+use crate::args::{CacheArgs, LinkArgs};
 use crate::commands::seen;
 use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
 
+/// The edge table that is taken without being named.
+const EDGES: &str = "ucom-edges.toml";
+
+/// A board, its names, and what its words mean.
+#[derive(Clone, Debug)]
+pub struct Known {
+    /// Its number.
+    pub board: u8,
+    /// Its answer to PC_INFO.
+    pub info: BoardInfo,
+    /// Its names.
+    pub names: IoDescription,
+    /// Types, scales and units.
+    pub edges: BoardEdges,
+    /// What the edge table names and the program has not.
+    pub strays: Vec<String>,
+}
+
+impl LinkArgs {
+    /// The edge table; without a file an empty one.
+    pub fn edges(&self) -> Result<EdgeTable, Failure> {
+        let here = Path::new(EDGES);
+        let path = match &self.edges {
+            Some(path) => path,
+            None if here.exists() => here,
+            None => return Ok(EdgeTable::default()),
+        };
+        EdgeTable::read(path).map_err(|e| Failure::usage(e).hint("ucom help edges shows the form"))
+    }
+}
+
 impl CacheArgs {
-    /// Where descriptions are kept; `None` when there is no place for them.
-    fn directory(&self) -> Option<PathBuf> {
+    /// Where things are remembered; `None` when there is no place for them.
+    pub fn directory(&self) -> Option<PathBuf> {
         let base = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
         let of_user = || base("XDG_CACHE_HOME").or_else(|| base("HOME").map(|home| home.join(".cache")));
         self.cache.clone().or_else(|| of_user().map(|dir| dir.join("ucom")))
@@ -22,30 +55,58 @@ impl CacheArgs {
         Some(self.directory()?.join(format!("io-{program_id:04X}-{date:04X}.json")))
     }
 
-    /// The description of a board's application: known, or read from the board now. What cannot be kept is read anew next
-    /// time: that is no error.
-    pub fn describe(&self, driver: &mut Driver, board: u8) -> Result<IoDescription, Failure> {
-        if let (Some(known), false) = (driver.master.description(board), self.fresh) {
-            return Ok(known);
+    /// A board with its names. They are known from before, or its application runs and is asked; what cannot be kept is
+    /// read anew next time: that is no error.
+    pub fn known(&self, driver: &mut Driver, table: &EdgeTable, board: u8) -> Result<Known, Failure> {
+        let info = seen(driver, board)?.info;
+        if let Some(names) = self.kept(driver, &info) {
+            return Ok(with_edges(board, info, names, table, driver.master.profile()));
         }
-        let seen = seen(driver, board)?;
-        let key = (seen.info.program_id, seen.info.date);
-        let file = self.file(key);
-        if !self.fresh
-            && let Some(text) = file.as_ref().and_then(|file| std::fs::read_to_string(file).ok())
-            && let Ok(known) = serde_json::from_str::<IoDescription>(&text)
-        {
-            driver.master.know_description(key, known);
-        }
-        let description = match driver.run(Request::Describe { board, fresh: self.fresh })? {
+        self.described(driver, table, board)
+    }
+
+    /// The same for a board whose application must run.
+    pub fn described(&self, driver: &mut Driver, table: &EdgeTable, board: u8) -> Result<Known, Failure> {
+        let info = seen(driver, board)?.info;
+        let key = (info.program_id, info.date);
+        self.kept(driver, &info);
+        let names = match driver.run(Request::Describe { board, fresh: self.fresh })? {
             Outcome::Description { description, .. } => description,
             other => return Err(unexpected(&other)),
         };
         if let (Some(directory), Some(file), Ok(text)) =
-            (self.directory(), file, serde_json::to_string_pretty(&description))
+            (self.directory(), self.file(key), serde_json::to_string_pretty(&names))
         {
             let _ = std::fs::create_dir_all(directory).and_then(|()| std::fs::write(file, text));
         }
-        Ok(description)
+        Ok(with_edges(board, info, names, table, driver.master.profile()))
     }
+
+    /// What is known of a program without asking for it.
+    fn kept(&self, driver: &mut Driver, info: &BoardInfo) -> Option<IoDescription> {
+        let key = (info.program_id, info.date);
+        if self.fresh || !info.has_application() {
+            return None;
+        }
+        if let Some(names) = driver.master.descriptions().remove(&key) {
+            return Some(names);
+        }
+        let text = std::fs::read_to_string(self.file(key)?).ok()?;
+        let names: IoDescription = serde_json::from_str(&text).ok()?;
+        driver.master.know_description(key, names.clone());
+        Some(names)
+    }
+}
+
+fn with_edges(
+    board: u8,
+    info: BoardInfo,
+    names: IoDescription,
+    table: &EdgeTable,
+    profile: Profile,
+) -> Known {
+    let program = table.program(info.program_id).filter(|_| info.has_application());
+    let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
+    let edges = BoardEdges::new(&names, program, &profile);
+    Known { board, info, names, edges, strays }
 }

@@ -8,7 +8,9 @@ mod driver;
 mod failure;
 mod link;
 mod shape;
+mod values;
 mod words;
+mod written;
 
 use std::process::ExitCode;
 

@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use ucom::files::Given;
+
 /// Which boards are meant: numbers, a list, ranges, or all.
 #[derive(Clone, Debug, Eq, PartialEq)]
 pub enum Boards {
@@ -42,14 +44,14 @@ impl FromStr for Boards {
 }
 
 /// `NAME=VALUE` or `BOARD.NAME=VALUE`.
-#[derive(Clone, Debug, Eq, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Assignment {
     /// The board, when it is named.
     pub board: Option<u8>,
     /// Name or index.
     pub name: String,
-    /// The word that is sent.
-    pub value: i32,
+    /// The value; what word it becomes is the edge's matter.
+    pub value: Given,
 }
 
 impl FromStr for Assignment {
@@ -58,14 +60,7 @@ impl FromStr for Assignment {
     fn from_str(text: &str) -> Result<Self, String> {
         let form = "the form is NAME=VALUE or BOARD.NAME=VALUE";
         let (left, right) = text.split_once('=').ok_or_else(|| format!("\"{text}\" has no value; {form}"))?;
-        let right = right.trim();
-        let value = match right.strip_prefix("0x").or(right.strip_prefix("0X")) {
-            Some(hex) => i32::from_str_radix(hex, 16).ok(),
-            None => right.parse().ok(),
-        };
-        let value = value.filter(|v| (-32768..=65535).contains(v));
-        let value =
-            value.ok_or_else(|| format!("\"{right}\" is no word: -32768..65535 or 0x0000..0xFFFF"))?;
+        let value = right.parse().map_err(|e| format!("{}: {e}", left.trim()))?;
         let (board, name) = match left.split_once('.') {
             Some((board, name)) if board.trim().parse::<u8>().is_ok() => (board.trim().parse().ok(), name),
             _ => (None, left),
@@ -121,15 +116,17 @@ mod tests {
     }
 
     #[test]
-    fn assignments_are_words_of_16_bits() {
+    fn assignments_are_names_with_values() {
         let parsed = |text: &str| text.parse::<Assignment>().unwrap();
-        assert_eq!(parsed("kp=120"), Assignment { board: None, name: "kp".into(), value: 120 });
+        let number = |value: f64, unit: &str| Given::Number { value, unit: unit.into() };
+        assert_eq!(parsed("kp=120"), Assignment { board: None, name: "kp".into(), value: number(120.0, "") });
         assert_eq!(
-            parsed("2.set_position=-20"),
-            Assignment { board: Some(2), name: "set_position".into(), value: -20 }
+            parsed("2.set_position=-20.5deg"),
+            Assignment { board: Some(2), name: "set_position".into(), value: number(-20.5, "deg") }
         );
-        assert_eq!(parsed("0=0xFFFF").value, 65535);
-        for wrong in ["kp", "kp=", "kp=70000", "kp=-40000", "=3", "1.=3", "kp=1.5"] {
+        assert_eq!(parsed("0=0xFFFF").value, Given::Raw(65535));
+        assert_eq!(parsed("brake=off").value, Given::Switch(false));
+        for wrong in ["kp", "kp=", "kp=x", "kp=0x12345", "=3", "1.=3", "kp=1,5"] {
             assert!(wrong.parse::<Assignment>().is_err(), "{wrong}");
         }
     }

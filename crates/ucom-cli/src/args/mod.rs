@@ -51,6 +51,10 @@ pub struct LinkArgs {
     /// How the boards read the protocol, TOML; `ucom help profile` shows the form, `ucom probe` makes one
     #[arg(long, global = true, env = "UCOM_PROFILE", value_name = "FILE", help_heading = "Common")]
     pub profile: Option<PathBuf>,
+    /// What the words of inputs, outputs and parameters mean, TOML; default: ucom-edges.toml, where it is there; see
+    /// `ucom help edges`
+    #[arg(long, global = true, env = "UCOM_EDGES", value_name = "FILE", help_heading = "Common")]
+    pub edges: Option<PathBuf>,
 }
 
 /// Go on where a check would refuse.
@@ -111,7 +115,10 @@ pub enum Command {
     )]
     Update(UpdateArgs),
     /// Names of inputs, outputs and parameters, and initial inputs
-    #[command(after_help = "Examples:\n  ucom io 1\n  ucom --json io all\n  ucom io 1 --fresh")]
+    #[command(
+        after_help = "Examples:\n  ucom io 1\n  ucom --json io all\n  ucom io 1 --fresh\n  ucom io all --template ucom-edges.toml\n\n\
+                            A template begins an edge table: types, scales and units of all names; `ucom help edges`."
+    )]
     Io(IoArgs),
     /// Controller inputs by name: show the initial ones, or set some
     #[command(
@@ -120,8 +127,12 @@ pub enum Command {
     )]
     Ci(CiArgs),
     /// Parameters by name: show the names, or set some
-    #[command(after_help = "Examples:\n  ucom par 1\n  ucom par 1 kp=120 current_max=1500\n\n\
-                            The protocol cannot read parameters back: what was written is marked as assumed.")]
+    #[command(
+        after_help = "Examples:\n  ucom par 1\n  ucom par 1 kp=120 current_max=1500\n  ucom par all --save head.yaml\n  \
+                            ucom par --apply head.yaml --dry-run\n  ucom par 1-3 --apply head.yaml\n\n\
+                            The protocol cannot read parameters back: what was written just now is marked as assumed, what\n\
+                            was written before is only remembered. `ucom help params` shows the form of parameter files."
+    )]
     Par(ParArgs),
     /// Sensor outputs of running boards, live; only listens
     #[command(
@@ -129,9 +140,11 @@ pub enum Command {
     )]
     So(SoArgs),
     /// Start boards and keep them running under supervision until Ctrl-C
-    #[command(after_help = "Examples:\n  ucom run all\n  ucom run 1,2 --active --ci 1.set_position=1500\n\n\
+    #[command(
+        after_help = "Examples:\n  ucom run all\n  ucom run 1,2 --active --ci 1.set_position=1500\n  ucom run all --params head.yaml --active\n\n\
                             On stdin: `ci 1 set_position=-500`, `par 1 kp=80`, `active on`, `active off`, `stop`.\n\
-                            Ctrl-C stops control, then applications, in reverse order.")]
+                            Ctrl-C stops control, then applications, in reverse order."
+    )]
     Run(RunArgs),
     /// Live view of boards, bus load and foreign frames; asks once, then listens
     #[command(after_help = "Examples:\n  ucom monitor\n  ucom --json monitor --count 5")]
@@ -164,8 +177,8 @@ pub enum Command {
         after_help = "Examples:\n  ucom dbc --out chain.dbc\n  ucom dbc 1-4 > chain.dbc\n  ucom dbc none > messages.dbc"
     )]
     Dbc(DbcArgs),
-    /// A page about profiles, simulated chains or faults
-    #[command(after_help = "Examples:\n  ucom help profile\n  ucom help sim\n  ucom help faults")]
+    /// A page about profiles, edge tables, parameter files, simulated chains or faults
+    #[command(after_help = "Examples:\n  ucom help profile\n  ucom help params\n  ucom help faults")]
     Help {
         /// The page; without it this program's own help
         topic: Option<Topic>,
@@ -196,6 +209,10 @@ pub enum Topic {
     Sim,
     /// Fault files.
     Faults,
+    /// Edge tables: types, scales and units of process data.
+    Edges,
+    /// Parameter files.
+    Params,
 }
 
 #[cfg(test)]

@@ -134,6 +134,9 @@ pub struct IoArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
+    /// Begin an edge table of all names, TOML; - is stdout
+    #[arg(long, env = "UCOM_TEMPLATE", value_name = "FILE")]
+    pub template: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
 }
@@ -170,12 +173,24 @@ pub struct CiArgs {
 /// Options of `ucom par`.
 #[derive(Args, Debug)]
 pub struct ParArgs {
-    /// Board number
-    #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
-    pub board: u8,
+    /// Board number, list, range, or all; with --apply those of the file
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
     /// NAME=VALUE; a name is the start of a description, or an index
-    #[arg(value_name = "NAME=VALUE")]
+    #[arg(value_name = "NAME=VALUE", conflicts_with = "apply")]
     pub values: Vec<Assignment>,
+    /// Write a parameter file, YAML: what was written last, and all other names as comments; - is stdout
+    #[arg(long, env = "UCOM_SAVE", value_name = "FILE", conflicts_with = "apply")]
+    pub save: Option<PathBuf>,
+    /// Check a parameter file against the boards, then write its parameters
+    #[arg(long, env = "UCOM_APPLY", value_name = "FILE")]
+    pub apply: Option<PathBuf>,
+    /// With --apply: check everything, write nothing
+    #[arg(long, env = "UCOM_DRY_RUN", value_parser = FalseyValueParser::new())]
+    pub dry_run: bool,
+    /// Names of the boards, as `ucom init` wrote them
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
     #[command(flatten)]
     pub cache: CacheArgs,
     #[command(flatten)]
@@ -224,6 +239,12 @@ pub struct RunArgs {
     /// Parameters to begin with, BOARD.NAME=VALUE
     #[arg(long, env = "UCOM_PAR", value_name = "B.NAME=V", value_delimiter = ',')]
     pub par: Vec<Assignment>,
+    /// Parameters and first inputs from a file, YAML; `ucom help params` shows the form
+    #[arg(long, env = "UCOM_PARAMS", value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// Names of the boards, as `ucom init` wrote them
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
     /// What to do when a board is lost; default: the profile's on_lost
     #[arg(long, env = "UCOM_ON_LOST", value_enum, value_name = "POLICY")]
     pub on_lost: Option<OnLost>,

@@ -13,6 +13,8 @@ pub fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {
         Some(Topic::Profile) => ucom::profile::help(),
         Some(Topic::Sim) => ucom::chain::help(),
         Some(Topic::Faults) => ucom::chain::FAULT_HELP.to_owned(),
+        Some(Topic::Edges) => ucom::files::edges::EDGE_HELP.to_owned(),
+        Some(Topic::Params) => ucom::files::params::PARAMS_HELP.to_owned(),
         None => Cli::command().render_long_help().to_string(),
     };
     out.result(&json!({ "text": text }), || text.clone());

@@ -1,63 +1,124 @@
-//! `ucom io`, `ci`, `par`, `dbc`: inputs, outputs and parameters by name.
+//! `ucom io`, `ci`, `dbc`: inputs, outputs and parameters by name.
 
+use std::io::Write;
 use std::time::{Duration, Instant};
 
 use cli_kit::{Output, table};
 use serde_json::{Value, json};
-use ucom::files::{DbcBoard, dbc as dbc_text};
-use ucom::master::io::{IoDescription, ParValue, short};
+use ucom::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
+use ucom::master::io::{IoDescription, Kind};
 use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel};
 
-use super::run::{named, settings};
-use crate::args::{Assignment, CiArgs, DbcArgs, IoArgs, LinkArgs, ParArgs};
+use super::params::{become_master, deliver, drain};
+use super::run::named;
+use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
+use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
+use crate::values::{Prepared, Word, only, words};
 
-/// Names of everything, and initial inputs where the application runs.
+/// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let edges = link.edges()?;
     let mut driver = Driver::open(link, out)?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
-        let description = args.cache.describe(&mut driver, board)?;
+        let known = args.cache.known(&mut driver, &edges, board)?;
+        for stray in &known.strays {
+            out.note(format!(
+                "edge table: program 0x{:04X} (board {board}) has no {stray}",
+                known.info.program_id
+            ));
+        }
         // Without a started application there is nobody to ask for them.
-        let initial = initial(&mut driver, board).ok();
-        boards.push((board, description, initial));
+        let initial = match args.template {
+            None => initial(&mut driver, board).ok(),
+            Some(_) => None,
+        };
+        boards.push((known, initial));
+    }
+    if let Some(file) = &args.template {
+        let mut programs: Vec<(u16, &IoDescription)> = Vec::new();
+        for (known, _) in &boards {
+            if programs.iter().all(|(id, _)| *id != known.info.program_id) {
+                programs.push((known.info.program_id, &known.names));
+            }
+        }
+        let ids: Vec<u16> = programs.iter().map(|(id, _)| *id).collect();
+        let text = EdgeTable::template(&programs);
+        return deliver(file, &text, json!({ "programs": ids }), out, |file| {
+            format!(
+                "{file}: a table of {} programs to be looked over; `ucom help edges` explains it",
+                ids.len()
+            )
+        });
     }
     let value = json!({ "boards": boards.iter().map(io_value).collect::<Vec<_>>() });
     out.result(&value, || boards.iter().map(io_text).collect::<Vec<_>>().join("\n"));
     Ok(())
 }
 
-type Described = (u8, IoDescription, Option<Vec<u16>>);
+type Described = (Known, Option<Vec<u16>>);
 
-fn io_value((board, d, initial): &Described) -> Value {
-    let initial = initial.as_ref().map(|words| words.iter().map(|w| *w as i16).collect::<Vec<_>>());
+fn io_value((known, initial): &Described) -> Value {
+    let inputs = known.edges.all(Kind::Ci);
+    let initial =
+        initial.as_ref().map(|words| words.iter().zip(inputs).map(|(w, e)| e.json(*w)).collect::<Vec<_>>());
+    let d = &known.names;
+    let edges = |kind| known.edges.all(kind).iter().map(edge_value).collect::<Vec<_>>();
     json!({
-        "board": board,
+        "board": known.board,
         "description": d.description,
         "ci": d.ci,
         "so": d.so,
         "par": d.par,
         "initial_ci": initial,
+        "edges": { "ci": edges(Kind::Ci), "so": edges(Kind::So), "par": edges(Kind::Par) },
     })
 }
 
-fn io_text((board, d, initial): &Described) -> String {
+/// What is known of an edge's words; null without a table.
+fn edge_value(edge: &Edge) -> Value {
+    if !edge.known {
+        return Value::Null;
+    }
+    json!({
+        "type": type_name(edge),
+        "scale": edge.scale,
+        "offset": edge.offset,
+        "unit": edge.unit,
+        "min": edge.min,
+        "max": edge.max,
+    })
+}
+
+fn type_name(edge: &Edge) -> &'static str {
+    match edge.kind {
+        EdgeType::Int16 => "int16",
+        EdgeType::Uint16 => "uint16",
+        EdgeType::Hex => "hex",
+        EdgeType::Bool => "bool",
+    }
+}
+
+fn io_text((known, initial): &Described) -> String {
     let mut rows = Vec::new();
-    for (i, name) in d.ci.iter().enumerate() {
-        let word = initial.as_ref().and_then(|words| words.get(i));
-        let word = word.map_or_else(String::new, |w| format!("initially {}", *w as i16));
-        rows.push(vec!["input".into(), i.to_string(), name.clone(), word]);
+    for (kind, word) in [(Kind::Ci, "input"), (Kind::So, "output"), (Kind::Par, "parameter")] {
+        for (i, (name, edge)) in known.names.names(kind).iter().zip(known.edges.all(kind)).enumerate() {
+            let initial = initial.as_ref().filter(|_| kind == Kind::Ci).and_then(|words| words.get(i));
+            let initial =
+                initial.map_or_else(String::new, |w| format!("initially {}", edge.text_with_unit(*w)));
+            let (low, high) = edge.limits();
+            let means = match (edge.known, edge.kind) {
+                (false, _) => String::new(),
+                (true, EdgeType::Bool | EdgeType::Hex) => type_name(edge).into(),
+                (true, _) => format!("{} {low}..{high} {}", type_name(edge), edge.unit).trim_end().to_owned(),
+            };
+            rows.push(vec![word.into(), i.to_string(), name.clone(), means, initial]);
+        }
     }
-    for (kind, names) in [("output", &d.so), ("parameter", &d.par)] {
-        rows.extend(
-            names
-                .iter()
-                .enumerate()
-                .map(|(i, name)| vec![kind.into(), i.to_string(), name.clone(), String::new()]),
-        );
-    }
-    format!("board {board}: {}\n{}", d.description, table(&["", ">#", "name", ""], &rows))
+    let table = table(&["", ">#", "name", "", ""], &rows);
+    format!("board {}: {}\n{table}", known.board, known.names.description)
 }
 
 fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
@@ -69,87 +130,61 @@ fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
 
 /// Shows initial inputs, or sets some; with `--for` the board moves under supervision.
 pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let edges = link.edges()?;
     let mut driver = Driver::open(link, out)?;
-    let board = only(args.board, &args.values)?;
+    let board = args.board;
+    only(&[board], &args.values, "set")?;
     if let Some(duration) = args.duration {
-        return move_for(&mut driver, args, duration, out);
+        return move_for(&mut driver, args, duration, &edges, out);
     }
-    let description = args.cache.describe(&mut driver, board)?;
+    let known = args.cache.described(&mut driver, &edges, board)?;
     if args.values.is_empty() {
         let words = initial(&mut driver, board)?;
-        print_words("initial_ci", board, &description.ci, &words, out);
+        print_words("initial_ci", &known, Kind::Ci, &words, out);
         return Ok(());
     }
+    let words = words(&known, Kind::Ci, &args.values)?;
     let running = become_master(&mut driver, board, args.force.force)?;
-    let values = args
-        .values
-        .iter()
-        .map(|a| Ok((a, ucom_index(&description, board, a)?)))
-        .collect::<Result<Vec<_>, Failure>>()?;
     // Inputs go three at a time: what is beside the one that is set must not become 0.
     initial(&mut driver, board)?;
-    for (assignment, _) in &values {
-        let now = driver.now_us();
-        driver.master.set_input(now, board, &assignment.name, assignment.value as u16)?;
+    for word in &words {
+        let (now, setting) = (driver.now_us(), word.setting(&known, Kind::Ci));
+        driver.master.set_input(now, board, &setting.name, setting.value)?;
     }
     drain(&mut driver)?;
-    let set: Vec<Value> = values
-        .iter()
-        .map(|(a, i)| json!({ "name": description.ci.get(usize::from(*i)), "index": i, "value": a.value }))
-        .collect();
+    let value = |w: &Word| {
+        let edge = known.edges.get(Kind::Ci, w.index.into());
+        json!({ "name": w.name, "index": w.index, "value": edge.map(|e| e.json(w.word)) })
+    };
+    let set: Vec<Value> = words.iter().map(value).collect();
     out.result(&json!({ "board": board, "set": set, "running": running }), || {
-        let line = |(a, i): &(&Assignment, u16)| {
-            format!(
-                "board {board}: {} = {}\n",
-                description.ci.get(usize::from(*i)).map_or("?", |n| n),
-                a.value
-            )
-        };
+        let line = |w: &Word| format!("board {board}: {} = {}\n", w.name, w.text);
         let end = if running {
             ""
         } else {
             "the control loop does not run: ucom run, or ucom ci … --for S, makes things move\n"
         };
-        values.iter().map(line).collect::<String>() + end
+        words.iter().map(line).collect::<String>() + end
     });
     Ok(())
 }
 
-fn ucom_index(d: &IoDescription, board: u8, a: &Assignment) -> Result<u16, Failure> {
-    Ok(d.find(board, ucom::master::io::Kind::Ci, &a.name)?)
-}
-
-/// Listens for another PC before anything is sent (D-08), and reads whether the loop runs.
-fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, Failure> {
-    let change = ucom::master::AdminChange::default();
-    match driver.run(Request::Admin { board, change, force })? {
-        Outcome::Admin { admin, .. } => Ok(admin.run),
-        other => Err(unexpected(&other)),
-    }
-}
-
-/// Lets what is queued leave.
-fn drain(driver: &mut Driver) -> Result<(), Failure> {
-    let end = Instant::now() + Duration::from_millis(30);
-    while Instant::now() < end {
-        driver.turn(Duration::from_millis(5))?;
-    }
-    Ok(())
-}
-
-fn only(board: u8, values: &[Assignment]) -> Result<u8, Failure> {
-    match values.iter().find(|a| a.board.is_some_and(|b| b != board)) {
-        Some(a) => Err(Failure::usage(format!("{} belongs to another board than {board}", a.name))),
-        None => Ok(board),
-    }
-}
-
 /// Runs the board for a while and shows where it got to.
-fn move_for(driver: &mut Driver, args: &CiArgs, duration: Duration, out: &Output) -> Result<(), Failure> {
-    let board = args.board;
-    // The application must be up to be described; `run` starts it and keeps what is described.
-    let plan = RunBoard { board, ci: settings(&args.values), par: Vec::new() };
-    let options = RunOptions { boards: vec![plan], active: true, force: args.force.force };
+fn move_for(
+    driver: &mut Driver,
+    args: &CiArgs,
+    duration: Duration,
+    edges: &EdgeTable,
+    out: &Output,
+) -> Result<(), Failure> {
+    let (board, force) = (args.board, args.force.force);
+    let mut prepared = Prepared::default();
+    prepared.add(driver, &args.cache, edges, board, force)?;
+    let Some(known) = prepared.known.get(&board) else { return Ok(()) };
+    let words = words(known, Kind::Ci, &args.values).inspect_err(|_| prepared.undo(driver))?;
+    let ci = words.iter().map(|w| w.setting(known, Kind::Ci)).collect();
+    let plan = RunBoard { board, ci, par: Vec::new() };
+    let options = RunOptions { boards: vec![plan], active: true, force };
     driver.master.watch(board, None, true);
     if let Err(failure) = driver.run(Request::Run(options)) {
         // It may have begun to move.
@@ -173,7 +208,6 @@ fn move_for(driver: &mut Driver, args: &CiArgs, duration: Duration, out: &Output
     }
     // Not as a procedure that Ctrl-C cancels: it is what Ctrl-C asks for.
     driver.stop_board(board, StopLevel::Loop)?;
-    let names = driver.master.description(board).map(|d| d.so).unwrap_or_default();
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
         return Err(Failure::new(
@@ -183,77 +217,42 @@ fn move_for(driver: &mut Driver, args: &CiArgs, duration: Duration, out: &Output
         )
         .hint("ucom doctor looks for the reason"));
     }
-    print_words("so", board, &names, &words, out);
+    print_words("so", known, Kind::So, &words, out);
     Ok(())
 }
 
-fn print_words(key: &str, board: u8, names: &[String], words: &[u16], out: &Output) {
-    out.result(&json!({ "board": board, key: named(names, words) }), || {
+fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output) {
+    let (names, edges) = (known.names.names(kind), known.edges.all(kind));
+    out.result(&json!({ "board": known.board, key: named(names, edges, words) }), || {
         let row = |(i, word): (usize, &u16)| {
             let name = names.get(i).cloned().unwrap_or_default();
-            vec![i.to_string(), name, (*word as i16).to_string()]
+            let edge = edges.get(i);
+            let (text, unit) = edge.map_or_else(Default::default, |e| (e.text(*word), e.unit.clone()));
+            vec![i.to_string(), name, text, unit]
         };
         let rows: Vec<Vec<String>> = words.iter().enumerate().map(row).collect();
-        table(&[">#", "name", ">value"], &rows)
+        table(&[">#", "name", ">value", ""], &rows)
     });
-}
-
-/// Shows parameter names, or writes some.
-pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
-    let board = only(args.board, &args.values)?;
-    let description = args.cache.describe(&mut driver, board)?;
-    if !args.values.is_empty() {
-        become_master(&mut driver, board, args.force.force)?;
-        for a in &args.values {
-            description.find(board, ucom::master::io::Kind::Par, &a.name)?;
-        }
-        for a in &args.values {
-            let now = driver.now_us();
-            driver.master.set_parameter(now, board, &a.name, a.value as u16)?;
-        }
-        drain(&mut driver)?;
-    }
-    let assumed = driver.master.parameters(board);
-    let word = |i: usize| match assumed.get(i) {
-        Some(ParValue::Assumed(word)) => Some(*word as i16),
-        _ => None,
-    };
-    let list: Vec<Value> = description
-        .par
-        .iter()
-        .enumerate()
-        .map(|(i, name)| json!({ "index": i, "name": name, "assumed": word(i) }))
-        .collect();
-    out.result(&json!({ "board": board, "par": list }), || {
-        let row = |(i, name): (usize, &String)| {
-            let value = word(i).map_or_else(|| "unknown".into(), |w| format!("{w} (assumed)"));
-            vec![i.to_string(), name.clone(), value]
-        };
-        let rows: Vec<Vec<String>> = description.par.iter().enumerate().map(row).collect();
-        table(&[">#", "name", "value"], &rows) + "the protocol has no way to read parameters back\n"
-    });
-    Ok(())
 }
 
 /// Writes a DBC file with the boards' names.
 pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let profile = link.profile()?;
+    let (profile, edges) = (link.profile()?, link.edges()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {
         let mut driver = Driver::open(link, out)?;
         for number in driver.numbers(&args.boards)? {
-            let d = args.cache.describe(&mut driver, number)?;
-            let names = |list: &[String]| list.iter().map(|n| short(n).to_owned()).collect();
-            boards.push(DbcBoard { number, ci: names(&d.ci), so: names(&d.so), par: names(&d.par) });
+            let known = args.cache.known(&mut driver, &edges, number)?;
+            boards.push(DbcBoard::new(number, &known.names, &known.edges));
         }
     }
     let text = dbc_text(&boards, profile.endian);
     match &args.out {
         None if out.is_json() => out.result(&json!({ "text": text }), String::new),
-        None => print!("{text}"),
+        None => std::io::stdout().write_all(&windows(&text))?,
         Some(path) => {
-            std::fs::write(path, text).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+            std::fs::write(path, windows(&text))
+                .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
             let file = path.display().to_string();
             let numbers: Vec<u8> = boards.iter().map(|b| b.number).collect();
             out.result(&json!({ "file": file, "boards": numbers }), || {
@@ -262,4 +261,10 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         }
     }
     Ok(())
+}
+
+/// Readers of DBC files take them for Windows-1252; units have letters like ° and µ, which it has where Latin-1 has them.
+fn windows(text: &str) -> Vec<u8> {
+    let byte = |c: char| u8::try_from(u32::from(c)).ok().filter(|b| !(0x80..0xA0).contains(b));
+    text.chars().map(|c| byte(c).unwrap_or(b'?')).collect()
 }

@@ -7,6 +7,7 @@ mod help;
 mod io;
 mod monitor;
 mod monitor_view;
+mod params;
 mod record;
 mod run;
 mod sim;
@@ -34,7 +35,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Update(args) => update::update(&args, link, out),
         Command::Io(args) => io::io(&args, link, out),
         Command::Ci(args) => io::ci(&args, link, out),
-        Command::Par(args) => io::par(&args, link, out),
+        Command::Par(args) => params::par(&args, link, out),
         Command::So(args) => run::so(&args, link, out),
         Command::Run(args) => run::run(&args, link, out),
         Command::Monitor(args) => monitor::monitor(&args, link, out),

@@ -7,27 +7,28 @@ use std::time::{Duration, Instant};
 
 use cli_kit::Output;
 use serde_json::{Map, Value, json};
-use ucom::master::io::{IoDescription, Snapshot, short};
+use ucom::files::Edge;
+use ucom::master::io::{Kind, Snapshot, short};
 use ucom::master::{
     AdminChange, Event, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel, Supervision,
 };
 
+use super::params::Applied;
 use crate::args::{Assignment, LinkArgs, OnLost, RunArgs, SoArgs};
+use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
 use crate::failure::{FAULT, Failure, NO_LINK};
+use crate::values::{Prepared, Word, for_board, only, words};
+use crate::written::History;
 
 /// How often `run` says how things are.
 const SAY: Duration = Duration::from_secs(1);
 
-/// Assignments as the library takes them.
-pub fn settings(list: &[Assignment]) -> Vec<Setting> {
-    list.iter().map(|a| Setting { name: a.name.clone(), value: a.value as u16 }).collect()
-}
-
-/// Words by the names of their edges, signed (D-11).
-pub fn named(names: &[String], words: &[u16]) -> Value {
+/// Values by the names of their edges, in their units where an edge table knows them (D-11).
+pub fn named(names: &[String], edges: &[Edge], words: &[u16]) -> Value {
     let key = |i: usize| names.get(i).map_or_else(|| format!("#{i}"), |name| short(name).to_owned());
-    let pairs = words.iter().enumerate().map(|(i, word)| (key(i), json!(*word as i16)));
+    let value = |i: usize, word: u16| edges.get(i).map_or_else(|| json!(word as i16), |edge| edge.json(word));
+    let pairs = words.iter().enumerate().map(|(i, word)| (key(i), value(i, *word)));
     Value::Object(pairs.collect::<Map<_, _>>())
 }
 
@@ -43,35 +44,36 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     }
     let mut driver = Driver::with_profile(link, profile, out)?;
     let boards = driver.numbers(&args.boards)?;
-    let of = |list: &[Assignment], board: u8| {
-        settings(&list.iter().filter(|a| a.board.is_none_or(|b| b == board)).cloned().collect::<Vec<_>>())
+    only(&boards, &args.ci, "run")?;
+    only(&boards, &args.par, "run")?;
+    let file = match &args.params {
+        Some(path) => Some(Applied::read(path, &args.inventory, |n| boards.contains(&n))?),
+        None => None,
     };
-    if let Some(stray) =
-        args.ci.iter().chain(&args.par).find(|a| a.board.is_some_and(|b| !boards.contains(&b)))
-    {
-        let board = stray.board.unwrap_or_default();
-        return Err(Failure::usage(format!(
-            "{board}.{}: board {board} is not among those to run",
-            stray.name
-        )));
+    // Who is there comes first: it needs no started application.
+    if let Some(file) = &file {
+        file.identities(&mut driver)?;
     }
-    let plan = |board: &u8| RunBoard { board: *board, ci: of(&args.ci, *board), par: of(&args.par, *board) };
-    let options = RunOptions {
-        boards: boards.iter().map(plan).collect(),
-        active: args.active,
-        force: args.force.force,
-    };
+    let edges = link.edges()?;
+    let mut prepared = Prepared::default();
+    for board in &boards {
+        prepared.add(&mut driver, &args.cache, &edges, *board, args.force.force)?;
+    }
+    let plans = plans(args, &prepared, file.as_ref()).inspect_err(|_| prepared.undo(&mut driver))?;
+    let options = RunOptions { boards: plans.clone(), active: args.active, force: args.force.force };
     let report = match driver.run(Request::Run(options)) {
         Ok(Outcome::Running(report)) => report,
         Ok(other) => return Err(unexpected(&other)),
         Err(failure) => {
             // What has been started is not left running without a PC.
-            if failure.exit != crate::failure::REFUSED {
-                halt(&mut driver, &boards, out);
+            match failure.exit {
+                crate::failure::REFUSED => prepared.undo(&mut driver),
+                _ => halt(&mut driver, &boards, out),
             }
             return Err(failure);
         }
     };
+    remember(args, &prepared, &plans);
     let running = json!({
         "event": "running",
         "boards": report.boards.iter().map(|(n, a)| json!({ "board": n, "flags": a.to_string() })).collect::<Vec<_>>(),
@@ -90,7 +92,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
             }
         }
     }
-    let lost = supervise(&mut driver, args, &boards, out);
+    let lost = supervise(&mut driver, args, &prepared, out);
     halt(&mut driver, &boards, out);
     out.result(&json!({ "event": "stopped" }), || "stopped".into());
     match lost? {
@@ -100,10 +102,41 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     }
 }
 
+/// What each board is to get: the file's values, then those of the command line.
+fn plans(args: &RunArgs, prepared: &Prepared, file: Option<&Applied>) -> Result<Vec<RunBoard>, Failure> {
+    let from_file = file.map(|f| f.words(|n| prepared.known.get(&n))).transpose()?.unwrap_or_default();
+    let plan = |known: &Known| {
+        let board = known.board;
+        let of_file = from_file.iter().find(|(n, _)| *n == board).map(|(_, words)| words);
+        let settings = |kind, first: Option<&Vec<Word>>, values: &[Assignment]| {
+            let mut all: Vec<Word> = first.cloned().unwrap_or_default();
+            for word in words(known, kind, &for_board(values, board))? {
+                all.retain(|w| w.index != word.index);
+                all.push(word);
+            }
+            Ok::<_, Failure>(all.iter().map(|w| w.setting(known, kind)).collect())
+        };
+        let ci = settings(Kind::Ci, of_file.map(|(ci, _)| ci), &args.ci)?;
+        let par = settings(Kind::Par, of_file.map(|(_, par)| par), &args.par)?;
+        Ok(RunBoard { board, ci, par })
+    };
+    prepared.known.values().map(plan).collect()
+}
+
+/// The parameters that were written, for `ucom par`.
+fn remember(args: &RunArgs, prepared: &Prepared, plans: &[RunBoard]) {
+    for plan in plans.iter().filter(|plan| !plan.par.is_empty()) {
+        let Some(known) = prepared.known.get(&plan.board) else { continue };
+        let index = |s: &Setting| known.names.find(plan.board, Kind::Par, &s.name).ok();
+        let words = plan.par.iter().filter_map(|s| Some((index(s)?, s.value)));
+        History::of(&args.cache, &known.info).wrote(words);
+    }
+}
+
 /// Supervision until Ctrl-C, `stop`, or the end of the time. Returns how often a board was lost.
-fn supervise(driver: &mut Driver, args: &RunArgs, boards: &[u8], out: &Output) -> Result<u32, Failure> {
-    let words = words();
-    boards.iter().for_each(|board| driver.master.watch(*board, None, true));
+fn supervise(driver: &mut Driver, args: &RunArgs, prepared: &Prepared, out: &Output) -> Result<u32, Failure> {
+    let lines = typed();
+    prepared.known.keys().for_each(|board| driver.master.watch(*board, None, true));
     let (start, mut said) = (Instant::now(), Instant::now());
     let mut lost = 0;
     let mut last: BTreeMap<u8, Snapshot> = BTreeMap::new();
@@ -121,11 +154,11 @@ fn supervise(driver: &mut Driver, args: &RunArgs, boards: &[u8], out: &Output) -
                 other => driver.tell(&other, None),
             }
         }
-        while let Ok(line) = words.try_recv() {
+        while let Ok(line) = lines.try_recv() {
             if line.trim() == "stop" {
                 return Ok(lost);
             }
-            if let Err(e) = obey(driver, line.trim(), boards) {
+            if let Err(e) = obey(driver, args, line.trim(), prepared) {
                 out.note(e.message);
             }
         }
@@ -135,8 +168,8 @@ fn supervise(driver: &mut Driver, args: &RunArgs, boards: &[u8], out: &Output) -
         if said.elapsed() >= SAY && out.is_json() {
             said = Instant::now();
             for (board, snapshot) in &last {
-                let names = driver.master.description(*board).map(|d| d.so).unwrap_or_default();
-                let so = named(&names, &snapshot.words);
+                let Some(known) = prepared.known.get(board) else { continue };
+                let so = named(&known.names.so, known.edges.all(Kind::So), &snapshot.words);
                 let time_s = snapshot.time_us as f64 * 1e-6;
                 out.result(
                     &json!({ "event": "so", "board": board, "time_s": time_s, "so": so }),
@@ -148,7 +181,7 @@ fn supervise(driver: &mut Driver, args: &RunArgs, boards: &[u8], out: &Output) -
 }
 
 /// Lines on stdin, read beside the bus.
-fn words() -> Receiver<String> {
+fn typed() -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
@@ -161,7 +194,7 @@ fn words() -> Receiver<String> {
 }
 
 /// `ci 1 set_position=1500`, `par 1 kp=80`, `active on`, `active off`.
-fn obey(driver: &mut Driver, line: &str, boards: &[u8]) -> Result<(), Failure> {
+fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) -> Result<(), Failure> {
     let form = || {
         Failure::usage(format!(
             "\"{line}\": known are ci N NAME=VALUE, par N NAME=VALUE, active on|off, stop"
@@ -176,21 +209,31 @@ fn obey(driver: &mut Driver, line: &str, boards: &[u8]) -> Result<(), Failure> {
                 Some("off") => false,
                 _ => return Err(form()),
             };
-            for board in boards {
+            for board in prepared.known.keys() {
                 let change = AdminChange { active: Some(on), ..Default::default() };
                 driver.run(Request::Admin { board: *board, change, force: true })?;
             }
             Ok(())
         }
         Some(kind @ ("ci" | "par")) => {
-            let board = parts.next().and_then(|n| n.parse().ok()).ok_or_else(form)?;
-            for word in parts {
-                let a: Assignment = word.parse().map_err(Failure::usage)?;
-                let now = driver.now_us();
+            let board: u8 = parts.next().and_then(|n| n.parse().ok()).ok_or_else(form)?;
+            let not_run = || Failure::usage(format!("board {board} is not among those that run"));
+            let known = prepared.known.get(&board).ok_or_else(not_run)?;
+            let values: Vec<Assignment> =
+                parts.map(|word| word.parse().map_err(Failure::usage)).collect::<Result<_, _>>()?;
+            only(&[board], &values, "set")?;
+            let kind = if kind == "ci" { Kind::Ci } else { Kind::Par };
+            let words = words(known, kind, &values)?;
+            for word in &words {
+                let (now, Setting { name, value }) = (driver.now_us(), word.setting(known, kind));
                 match kind {
-                    "ci" => driver.master.set_input(now, board, &a.name, a.value as u16)?,
-                    _ => driver.master.set_parameter(now, board, &a.name, a.value as u16)?,
+                    Kind::Ci => driver.master.set_input(now, board, &name, value)?,
+                    _ => driver.master.set_parameter(now, board, &name, value)?,
                 };
+            }
+            if kind == Kind::Par {
+                let words = words.iter().map(|w| (w.index, w.word));
+                History::of(&args.cache, &known.info).wrote(words);
             }
             Ok(())
         }
@@ -214,14 +257,15 @@ fn halt(driver: &mut Driver, boards: &[u8], out: &Output) {
 pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = Driver::open(link, out)?;
     let boards = driver.numbers(&args.boards)?;
-    let mut descriptions = BTreeMap::new();
+    let edges = link.edges()?;
+    let mut all = BTreeMap::new();
     for board in boards {
-        let description = args.cache.describe(&mut driver, board)?;
-        driver.master.watch(board, Some(description.dimensions().so), true);
-        descriptions.insert(board, description);
+        let known = args.cache.known(&mut driver, &edges, board)?;
+        driver.master.watch(board, Some(known.names.dimensions().so), true);
+        all.insert(board, known);
     }
     if args.csv {
-        head(&descriptions)?;
+        head(&all)?;
     }
     let mut left = args.count.unwrap_or(u64::MAX);
     let (start, mut heard) = (driver.now_us(), Instant::now());
@@ -235,7 +279,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;
                     heard = Instant::now();
-                    show(args, &descriptions, board, &snapshot, start, out);
+                    show(args, &all, board, &snapshot, start, out);
                 }
                 other => driver.tell(&other, None),
             }
@@ -256,38 +300,51 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn head(descriptions: &BTreeMap<u8, IoDescription>) -> Result<(), Failure> {
-    let mut names = descriptions.values().map(|d| &d.so);
-    let first = names.next().cloned().unwrap_or_default();
-    if names.any(|other| *other != first) {
+fn head(all: &BTreeMap<u8, Known>) -> Result<(), Failure> {
+    let column = |(name, edge): (&String, &Edge)| match (edge.known, edge.unit.as_str()) {
+        (true, unit) if !unit.is_empty() => quoted(&format!("{} [{unit}]", short(name))),
+        _ => quoted(short(name)),
+    };
+    let columns = |known: &Known| {
+        known.names.so.iter().zip(known.edges.all(Kind::So)).map(column).collect::<Vec<_>>().join(",")
+    };
+    let mut heads = all.values().map(columns);
+    let first = heads.next().unwrap_or_default();
+    if heads.any(|other| other != first) {
         return Err(Failure::usage("boards with different outputs do not fit into one table")
             .hint("one board at a time, or --json"));
     }
-    let columns: Vec<&str> = first.iter().map(|n| short(n)).collect();
-    println!("time_s,board,{}", columns.join(","));
+    println!("time_s,board,{first}");
     Ok(())
+}
+
+/// A field of a CSV table (RFC 4180).
+fn quoted(text: &str) -> String {
+    let plain = !text.contains([',', '"', '\n', '\r']);
+    if plain { text.into() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
 fn show(
     args: &SoArgs,
-    descriptions: &BTreeMap<u8, IoDescription>,
+    all: &BTreeMap<u8, Known>,
     board: u8,
     snapshot: &Snapshot,
     start_us: u64,
     out: &Output,
 ) {
     let time_s = snapshot.time_us.saturating_sub(start_us) as f64 * 1e-6;
-    let names = descriptions.get(&board).map(|d| d.so.as_slice()).unwrap_or_default();
-    let list: Vec<String> = snapshot.words.iter().map(|w| (*w as i16).to_string()).collect();
+    let Some(known) = all.get(&board) else { return };
+    let (names, edges) = (&known.names.so, known.edges.all(Kind::So));
     if args.csv {
+        let list: Vec<String> = snapshot.words.iter().zip(edges).map(|(w, e)| e.text(*w)).collect();
         println!("{time_s:.6},{board},{}", list.join(","));
         return;
     }
-    let value = json!({ "time_s": time_s, "board": board, "so": named(names, &snapshot.words) });
+    let value = json!({ "time_s": time_s, "board": board, "so": named(names, edges, &snapshot.words) });
     out.result(&value, || {
-        let pair =
-            |(i, w): (usize, &u16)| format!("{} {:>6}", names.get(i).map_or("?", |n| short(n)), *w as i16);
-        let pairs: Vec<String> = snapshot.words.iter().enumerate().map(pair).collect();
+        let pairs = names.iter().zip(edges).zip(&snapshot.words);
+        let pairs: Vec<String> =
+            pairs.map(|((n, e), w)| format!("{} {:>6}", short(n), e.text_with_unit(*w))).collect();
         format!("{time_s:9.3} s  board {board}  {}", pairs.join("  "))
     });
 }

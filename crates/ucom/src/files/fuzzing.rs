@@ -2,8 +2,13 @@
 
 use std::prelude::v1::*;
 
+use crate::Profile;
+use crate::master::io::{IoDescription, Kind};
+
+use super::edges::{BoardEdges, EdgeTable, Given};
 use super::image::{Format, Gaps, Image, ImageOptions};
 use super::inventory::Inventory;
+use super::params::{ParamsFile, SavedBoard, SavedEdge, check_board, params_text};
 use super::recording::{CandumpWriter, FZI_HEADER, Recording, read_mcap};
 
 /// Images in every form; the first byte chooses.
@@ -44,5 +49,67 @@ pub fn inventory(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     if let Ok(inventory) = Inventory::parse(text) {
         assert_eq!(Inventory::parse(&inventory.to_toml()).expect("our own form"), inventory);
+    }
+}
+
+/// Edge tables: for every edge of one, what is shown of a word gives that word again, unless a limit forbids it.
+pub fn edges(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(table) = EdgeTable::parse(text) else { return };
+    for id in [0x1234, 1, 0, 0xFFFF] {
+        let Some(program) = table.program(id) else { continue };
+        for kind in [Kind::Ci, Kind::So, Kind::Par] {
+            for (i, name) in program.names(kind).enumerate() {
+                let Some(edge) = program.edge(kind, i, name) else { continue };
+                for word in [0, 1, 0x7FFF, 0x8000, 0xFFFF] {
+                    let given: Given = edge.text_with_unit(word).parse().expect("what is shown can be given");
+                    let (again, text) = (edge.word(&given), edge.text(word));
+                    let limited = edge.min.is_some() || edge.max.is_some();
+                    // Offsets that are far larger than the scale leave no digits for it.
+                    let coarse = edge.offset.abs() > edge.scale.abs() * 1e9;
+                    let same = again.as_ref().is_ok_and(|w| edge.text(*w) == text);
+                    assert!(
+                        same || limited || coarse || edge.kind == super::EdgeType::Bool,
+                        "{edge:?} {word} {text} {again:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Parameter files: what is read is checked against a board, and what fits is written as a text that gives the same words.
+pub fn params(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(file) = ParamsFile::parse(text) else { return };
+    let profile = Profile::default();
+    for board in &file.boards {
+        let names =
+            |list: &[super::params::ParamsEntry]| list.iter().map(|e| e.name.clone()).collect::<Vec<_>>();
+        let description =
+            IoDescription { ci: names(&board.ci), par: names(&board.par), ..Default::default() };
+        let edges = BoardEdges::new(&description, None, &profile);
+        let Ok((_, par)) = check_board(board, &description, &edges) else { continue };
+        let word = |i: usize| par.iter().find(|w| usize::from(w.index) == i).map(|w| w.word);
+        let saved = |(i, edge): (usize, &super::Edge)| SavedEdge {
+            edge: edge.clone(),
+            word: word(i),
+            remark: String::new(),
+        };
+        let all = edges.all(Kind::Par).iter().enumerate().map(saved).collect();
+        let saved = SavedBoard {
+            number: board.number,
+            description: description.clone(),
+            par: all,
+            ..Default::default()
+        };
+        let again = ParamsFile::parse(&params_text(&[saved])).expect("our own form");
+        let again = again.board(board.number).expect("the same board");
+        let (_, words) = check_board(again, &description, &edges).expect("our own names and values");
+        let pairs =
+            |list: &[super::params::ParamsWord]| list.iter().map(|w| (w.index, w.word)).collect::<Vec<_>>();
+        let mut before = pairs(&par);
+        before.sort_unstable();
+        assert_eq!(pairs(&words), before);
     }
 }

@@ -6,7 +6,13 @@ fn kept(target: &str, body: fn(&[u8])) {
     for kind in ["corpus", "regressions"] {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz").join(kind).join(target);
         for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-            body(&std::fs::read(file.path()).unwrap());
+            let bytes = std::fs::read(file.path()).unwrap();
+            body(&bytes);
+            // Texts are short: each cut short, and each without one of its bytes.
+            for at in 0..bytes.len().min(600) {
+                body(&bytes[..at]);
+                body(&[&bytes[..at], &bytes[at + 1..]].concat());
+            }
         }
     }
     // The same bytes in every run.
@@ -29,5 +35,7 @@ fn fuzz_targets_of_files_and_master() {
     kept("ucom_image", ucom::files::fuzzing::image);
     kept("ucom_recording", ucom::files::fuzzing::recording);
     kept("ucom_inventory", ucom::files::fuzzing::inventory);
+    kept("ucom_edges", ucom::files::fuzzing::edges);
+    kept("ucom_params", ucom::files::fuzzing::params);
     kept("ucom_master", ucom::master::fuzzing::frames);
 }

@@ -12,20 +12,42 @@ mod tests;
 
 use std::fmt::Write;
 
+use super::edges::{BoardEdges, Edge};
+use crate::master::io::{IoDescription, Kind, short};
 use crate::{Endian, Function, Sender, Sequence, Status};
 use names::Names;
 
+/// An input, output or parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DbcEdge {
+    /// What its signal is called; becomes an identifier.
+    pub name: String,
+    /// What its word means (D-11).
+    pub edge: Edge,
+}
+
 /// A board whose process data are known.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DbcBoard {
     /// Its number.
     pub number: u8,
-    /// Descriptions of the controller inputs, one each.
-    pub ci: Vec<String>,
-    /// Descriptions of the sensor outputs.
-    pub so: Vec<String>,
-    /// Descriptions of the parameters.
-    pub par: Vec<String>,
+    /// The controller inputs, one each.
+    pub ci: Vec<DbcEdge>,
+    /// The sensor outputs.
+    pub so: Vec<DbcEdge>,
+    /// The parameters.
+    pub par: Vec<DbcEdge>,
+}
+
+impl DbcBoard {
+    /// A board with its names and what their words mean.
+    pub fn new(number: u8, description: &IoDescription, edges: &BoardEdges) -> Self {
+        let of = |kind: Kind| {
+            let pairs = description.names(kind).iter().zip(edges.all(kind));
+            pairs.map(|(name, edge)| DbcEdge { name: short(name).into(), edge: edge.clone() }).collect()
+        };
+        Self { number, ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
+    }
 }
 
 /// One signal of a message.
@@ -39,11 +61,13 @@ struct Signal {
     signed: bool,
     /// ` M` or ` m3`, or nothing.
     multiplex: String,
+    /// Scale, offset and unit, where they are known.
+    edge: Option<Edge>,
 }
 
 impl Signal {
     fn field(name: &str, byte: usize, bits: usize) -> Self {
-        Self { name: name.into(), byte, bit: 0, bits, signed: false, multiplex: String::new() }
+        Self { name: name.into(), byte, bit: 0, bits, signed: false, multiplex: String::new(), edge: None }
     }
 
     fn line(&self, endian: Endian, receiver: &str) -> String {
@@ -56,9 +80,14 @@ impl Signal {
             (false, 64) => (0, 0),
             (false, bits) => (0, (1_i64 << bits) - 1),
         };
-        let Self { name, multiplex, bits, .. } = self;
+        let Self { name, multiplex, bits, edge, .. } = self;
+        let (scale, offset, unit) = edge.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
+        let (low, high) = match edge {
+            Some(edge) if edge.known => edge.range(),
+            _ => (low as f64, high as f64),
+        };
         format!(
-            " SG_ {name}{multiplex} : {start}|{bits}@{order}{sign} (1,0) [{low}|{high}] \"\" {receiver}\n"
+            " SG_ {name}{multiplex} : {start}|{bits}@{order}{sign} ({scale},{offset}) [{low}|{high}] \"{unit}\" {receiver}\n"
         )
     }
 }
@@ -156,18 +185,19 @@ fn fields(function: Function) -> Vec<Signal> {
 }
 
 /// The signals of a buffer: the offset selects, three words each.
-fn multiplexed(edges: &[String], kind: &str) -> Vec<Signal> {
+fn multiplexed(edges: &[DbcEdge], kind: &str) -> Vec<Signal> {
     let offset = Signal { multiplex: " M".into(), ..Signal::field("offset", 0, 16) };
     let mut signals = vec![offset];
     let mut names = Names::without(&["offset"]);
     for (i, edge) in edges.iter().enumerate().take(1 << 16) {
         signals.push(Signal {
-            name: names.name(edge, &format!("{kind}_{i}")),
+            name: names.name(&edge.name, &format!("{kind}_{i}")),
             byte: 2 + 2 * (i % 3),
             bit: 0,
             bits: 16,
-            signed: true,
+            signed: edge.edge.signed(),
             multiplex: format!(" m{}", i - i % 3),
+            edge: Some(edge.edge.clone()),
         });
     }
     signals

@@ -9,7 +9,10 @@ use super::*;
 use crate::{BufferPackage, Frame, Packages};
 
 fn boards() -> Vec<DbcBoard> {
-    let texts = |list: &[&str]| list.iter().map(|t| (*t).to_owned()).collect();
+    let edge = Edge::bare(&crate::Profile::default());
+    let texts = |list: &[&str]| {
+        list.iter().map(|t| DbcEdge { name: (*t).to_owned(), edge: edge.clone() }).collect::<Vec<_>>()
+    };
     vec![
         DbcBoard {
             number: 1,
@@ -78,6 +81,32 @@ fn p21_so_frames_decode_by_name() {
             names.iter().zip(numbers).map(|(n, v)| ((*n).to_owned(), i64::from(v))).collect();
         assert_eq!(seen, expected);
     }
+}
+
+/// D-11: type, scale, offset, unit and limits of the edge table are those of the signals.
+#[test]
+fn d11_signals_carry_scale_offset_and_unit() {
+    let table = "[[program]]\nprogram_id = 1\nso.angle = { scale = 0.01, unit = \"deg\", min = -60, max = 60 }\n\
+                 so.warm = { type = \"uint16\", scale = -0.1, offset = -40, unit = \"°C\" }\nso.bits = { type = \"hex\" }\n";
+    let table = crate::files::EdgeTable::parse(table).unwrap();
+    let names = ["angle [x]", "warm", "bits", "bare"].map(str::to_owned).to_vec();
+    let description = IoDescription { so: names, ..Default::default() };
+    let edges = BoardEdges::new(&description, table.program(1), &crate::Profile::default());
+    let text = dbc(&[DbcBoard::new(1, &description, &edges)], Endian::Little);
+    let dbc = Dbc::try_from(text.as_str()).expect("a DBC file");
+    let signals = &message(&dbc, Function::So.id(Sequence::new(1).unwrap())).signals;
+    let seen: Vec<_> = signals[1..]
+        .iter()
+        .map(|s| (s.name.as_str(), s.factor, s.offset, s.unit.as_str(), s.value_type == ValueType::Signed))
+        .collect();
+    let expected = [
+        ("angle", 0.01, 0.0, "deg", true),
+        ("warm", -0.1, -40.0, "°C", false),
+        ("bits", 1.0, 0.0, "", false),
+        ("bare", 1.0, 0.0, "", true),
+    ];
+    assert_eq!(seen, expected, "{text}");
+    assert!(text.contains("(0.01,0) [-60|60] \"deg\""), "{text}");
 }
 
 /// The golden frame of a board's information, and a SETSTATUS.

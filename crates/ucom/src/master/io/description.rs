@@ -73,8 +73,9 @@ impl IoDescription {
         if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
             return Ok(index);
         }
-        let mut near: Vec<(f64, &String)> =
-            names.iter().map(|n| (strsim::jaro_winkler(n, name), n)).collect();
+        // A unit in brackets makes no name less like another.
+        let like = |n: &str| strsim::jaro_winkler(n, name).max(strsim::jaro_winkler(short(n), name));
+        let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
         near.retain(|(likeness, _)| *likeness > 0.6);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
         let near = near.into_iter().take(3).map(|(_, n)| n.clone()).collect();

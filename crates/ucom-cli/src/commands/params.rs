@@ -1,0 +1,355 @@
+//! `ucom par`: parameters by name, and parameter files.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use cli_kit::{Output, table};
+use serde_json::{Value, json};
+use ucom::files::params::{
+    ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, ParamsWord, SavedBoard,
+    SavedEdge, check_board, check_identity, params_text,
+};
+use ucom::files::{EdgeTable, Inventory};
+use ucom::master::io::{Kind, ParValue};
+use ucom::master::{AdminChange, Outcome, Request};
+
+use super::seen;
+use crate::args::{Boards, LinkArgs, ParArgs};
+use crate::cache::Known;
+use crate::driver::{Driver, unexpected};
+use crate::failure::{Failure, REFUSED};
+use crate::values::{Word, for_board, only, words};
+use crate::written::History;
+
+/// Shows parameters, writes some, saves or applies a file.
+pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    if let Some(file) = &args.apply {
+        return apply(args, file, link, out);
+    }
+    if args.dry_run {
+        return Err(Failure::usage("--dry-run goes with --apply FILE"));
+    }
+    let edges = link.edges()?;
+    let mut driver = Driver::open(link, out)?;
+    let boards = driver.numbers(&args.boards)?;
+    only(&boards, &args.values, "set")?;
+    let mut all = Vec::new();
+    for board in &boards {
+        let values = for_board(&args.values, *board);
+        let known = match values.is_empty() {
+            true => args.cache.known(&mut driver, &edges, *board)?,
+            false => args.cache.described(&mut driver, &edges, *board)?,
+        };
+        let words = words(&known, Kind::Par, &values)?;
+        let history = History::of(&args.cache, &known.info);
+        all.push(Parameters { known, words, history });
+    }
+    write(&mut driver, &mut all, args.force.force)?;
+    if let Some(file) = &args.save {
+        return save(args, file, &all, out);
+    }
+    print(&driver, &all, matches!(args.boards, Boards::Some(ref n) if n.len() == 1), out);
+    Ok(())
+}
+
+/// A board, the words that it is to get, and what it got before.
+struct Parameters {
+    known: Known,
+    words: Vec<Word>,
+    history: History,
+}
+
+/// Writes all words of all boards; nothing before every board is ready for it.
+fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(), Failure> {
+    for board in all.iter().filter(|p| !p.words.is_empty()) {
+        become_master(driver, board.known.board, force)?;
+    }
+    for board in all.iter_mut().filter(|p| !p.words.is_empty()) {
+        for word in &board.words {
+            let (now, setting) = (driver.now_us(), word.setting(&board.known, Kind::Par));
+            driver.master.set_parameter(now, board.known.board, &setting.name, setting.value)?;
+        }
+        drain(driver)?;
+        board.history.wrote(board.words.iter().map(|w| (w.index, w.word)));
+    }
+    Ok(())
+}
+
+/// Listens for another PC before anything is sent (D-08), and reads whether the loop runs.
+pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, Failure> {
+    let change = AdminChange::default();
+    match driver.run(Request::Admin { board, change, force })? {
+        Outcome::Admin { admin, .. } => Ok(admin.run),
+        other => Err(unexpected(&other)),
+    }
+}
+
+/// Lets what is queued leave.
+pub fn drain(driver: &mut Driver) -> Result<(), Failure> {
+    let end = Instant::now() + Duration::from_millis(30);
+    while Instant::now() < end {
+        driver.turn(Duration::from_millis(5))?;
+    }
+    Ok(())
+}
+
+fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
+    let value = |p: &Parameters| {
+        let list = rows(driver, p).map(|(i, name, assumed)| {
+            let edge = p.known.edges.get(Kind::Par, i);
+            let json = |word: u16| edge.map(|e| e.json(word));
+            let last = p.history.last(i).map(|w| json!({ "value": json(w.word), "at": w.when() }));
+            let unit = edge.map(|e| &e.unit).filter(|u| !u.is_empty());
+            json!({ "index": i, "name": name, "assumed": assumed.and_then(json), "last_written": last, "unit": unit })
+        });
+        json!({ "board": p.known.board, "par": list.collect::<Vec<_>>() })
+    };
+    let values: Vec<Value> = all.iter().map(value).collect();
+    let whole = match (one, values.first()) {
+        (true, Some(first)) => first.clone(),
+        _ => json!({ "boards": values }),
+    };
+    out.result(&whole, || {
+        let mut text = String::new();
+        for p in all {
+            let row = |(i, name, assumed): (usize, &String, Option<u16>)| {
+                let shown = |word: u16| p.known.edges.get(Kind::Par, i).map_or_else(String::new, |e| e.text_with_unit(word));
+                let value = assumed.map_or_else(|| "unknown".into(), |w| format!("{} (assumed)", shown(w)));
+                let last = p.history.last(i).map(|w| format!("{} on {}", shown(w.word), w.when()));
+                vec![i.to_string(), name.clone(), value, last.unwrap_or_else(|| "-".into())]
+            };
+            let rows: Vec<Vec<String>> = rows(driver, p).map(row).collect();
+            if !one {
+                text += &format!("board {}: {}\n", p.known.board, p.known.names.description);
+            }
+            text += &table(&[">#", "name", "value", "last written by this tool"], &rows);
+        }
+        text + "the protocol has no way to read parameters back: after a restart of the application they are gone\n"
+    });
+}
+
+/// Place, name, and what this process wrote.
+fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, &'a String, Option<u16>)> {
+    let assumed = driver.master.parameters(p.known.board);
+    p.known.names.par.iter().enumerate().map(move |(i, name)| match assumed.get(i) {
+        Some(ParValue::Assumed(word)) => (i, name, Some(*word)),
+        _ => (i, name, None),
+    })
+}
+
+/// Writes a parameter file: what was written last as values, all other names as comments.
+fn save(args: &ParArgs, file: &Path, all: &[Parameters], out: &Output) -> Result<(), Failure> {
+    let names = inventory(&args.inventory)?;
+    let board = |p: &Parameters| {
+        let par = p.known.edges.all(Kind::Par).iter().enumerate().map(|(i, edge)| {
+            let last = p.history.last(i);
+            let remark = last.map_or_else(String::new, |w| format!("written {}", w.when()));
+            SavedEdge { edge: edge.clone(), word: last.map(|w| w.word), remark }
+        });
+        let ci = p.known.edges.all(Kind::Ci).iter();
+        SavedBoard {
+            number: p.known.board,
+            flash_number: p.known.info.flash_number,
+            name: name_of(names.as_ref(), p.known.info.flash_number).unwrap_or_default().into(),
+            program_id: p.known.info.program_id,
+            description: p.known.names.clone(),
+            par: par.collect(),
+            ci: ci.map(|edge| SavedEdge { edge: edge.clone(), word: None, remark: String::new() }).collect(),
+        }
+    };
+    let saved: Vec<SavedBoard> = all.iter().map(board).collect();
+    let values: usize = saved.iter().flat_map(|b| &b.par).filter(|e| e.word.is_some()).count();
+    let whole: usize = saved.iter().map(|b| b.par.len()).sum();
+    let numbers: Vec<u8> = saved.iter().map(|b| b.number).collect();
+    let result = json!({ "boards": numbers, "values": values, "parameters": whole });
+    deliver(file, &params_text(&saved), result, out, |file| {
+        format!(
+            "{file}: {values} of {whole} parameters of {} boards with the value this tool wrote last; the others are comments",
+            numbers.len()
+        )
+    })
+}
+
+/// A text that was asked for: into a file, or to stdout for `-`.
+pub fn deliver(
+    file: &Path,
+    text: &str,
+    mut result: Value,
+    out: &Output,
+    words: impl FnOnce(&str) -> String,
+) -> Result<(), Failure> {
+    if file == Path::new("-") {
+        result["text"] = json!(text);
+        out.result(&result, || text.into());
+        return Ok(());
+    }
+    ucom::files::write_text(file, text).map_err(Failure::usage)?;
+    let name = file.display().to_string();
+    result["file"] = json!(name);
+    out.result(&result, || words(&name));
+    Ok(())
+}
+
+/// The inventory, where there is one.
+pub fn inventory(path: &Path) -> Result<Option<Inventory>, Failure> {
+    match path.exists() {
+        true => Inventory::read(path).map(Some).map_err(Failure::usage),
+        false => Ok(None),
+    }
+}
+
+fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str> {
+    let board = inventory?.boards().find(|b| b.flash_number == flash_number)?;
+    Some(board.name.as_str()).filter(|name| !name.is_empty())
+}
+
+/// A parameter file that was read, against the boards that are there.
+pub struct Applied {
+    file: String,
+    boards: Vec<ParamsBoard>,
+    inventory: Option<Inventory>,
+}
+
+/// A board's words of a parameter file: first inputs, and parameters.
+pub type FileWords = (Vec<Word>, Vec<Word>);
+
+impl Applied {
+    /// Reads a file and takes from it the boards that are meant.
+    pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, Failure> {
+        let file =
+            ParamsFile::read(path).map_err(|e| Failure::usage(e).hint("ucom help params shows the form"))?;
+        let boards = file.boards.into_iter().filter(|b| meant(b.number)).collect();
+        Ok(Self { file: path.display().to_string(), boards, inventory: inventory(inventory_file)? })
+    }
+
+    /// The boards of the file.
+    pub fn numbers(&self) -> Vec<u8> {
+        self.boards.iter().map(|b| b.number).collect()
+    }
+
+    /// Whether the boards are those that the file means. Only asks.
+    pub fn identities(&self, driver: &mut Driver) -> Result<(), Failure> {
+        let mut problems = Vec::new();
+        for board in &self.boards {
+            match seen(driver, board.number) {
+                Ok(found) => {
+                    let name = name_of(self.inventory.as_ref(), found.info.flash_number);
+                    problems.extend(check_identity(board, &ParamsTarget { info: &found.info, name }));
+                }
+                Err(e) if e.code == "no-answer" => {
+                    let kind = ParamsProblemKind::Absent;
+                    problems.push(ParamsProblem { place: board.place, board: board.number, kind });
+                }
+                Err(e) => return Err(e),
+            }
+        }
+        self.verdict(problems)
+    }
+
+    /// The words of all boards, or every mistake.
+    pub fn words<'a>(
+        &self,
+        known: impl Fn(u8) -> Option<&'a Known>,
+    ) -> Result<Vec<(u8, FileWords)>, Failure> {
+        let (mut all, mut problems) = (Vec::new(), Vec::new());
+        for board in &self.boards {
+            let Some(known) = known(board.number) else { continue };
+            match check_board(board, &known.names, &known.edges) {
+                Ok((ci, par)) => {
+                    let words = |list: Vec<ParamsWord>| list.into_iter().map(word).collect();
+                    all.push((board.number, (words(ci), words(par))));
+                }
+                Err(more) => problems.extend(more),
+            }
+        }
+        self.verdict(problems).map(|()| all)
+    }
+
+    fn verdict(&self, problems: Vec<ParamsProblem>) -> Result<(), Failure> {
+        if problems.is_empty() {
+            return Ok(());
+        }
+        let lines: Vec<String> = problems.iter().map(|p| format!("{}: {p}", self.file)).collect();
+        Err(Failure::new(REFUSED, "params", lines.join("\n"))
+            .hint("nothing was written; ucom io shows names and ranges, ucom info the boards"))
+    }
+}
+
+fn word(w: ParamsWord) -> Word {
+    Word { index: w.index, name: w.name, word: w.word, text: w.text }
+}
+
+/// Checks a whole file, then writes its parameters.
+fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let edges = link.edges()?;
+    let meant = |n: u8| match &args.boards {
+        Boards::All => true,
+        Boards::None => false,
+        Boards::Some(numbers) => numbers.contains(&n),
+    };
+    let file = Applied::read(path, &args.inventory, meant)?;
+    if let Boards::Some(numbers) = &args.boards
+        && let Some(missing) = numbers.iter().find(|n| !file.numbers().contains(n))
+    {
+        return Err(Failure::usage(format!(
+            "{}: there is nothing for board {missing} in it",
+            path.display()
+        )));
+    }
+    let mut driver = Driver::open(link, out)?;
+    file.identities(&mut driver)?;
+    let known = file.numbers().into_iter().map(|board| described(args, &mut driver, &edges, board));
+    let known = known.collect::<Result<Vec<Known>, Failure>>()?;
+    let checked = file.words(|number| known.iter().find(|k| k.board == number))?;
+    let mut all = Vec::new();
+    let mut inputs = 0;
+    for (known, (_, (ci, words))) in known.into_iter().zip(checked) {
+        inputs += ci.len();
+        let history = History::of(&args.cache, &known.info);
+        all.push(Parameters { known, words, history });
+    }
+    if !args.dry_run {
+        write(&mut driver, &mut all, args.force.force)?;
+    }
+    report(&all, inputs, args.dry_run, out);
+    Ok(())
+}
+
+/// Names of a board that parameters can be written to: its application runs. To check, what is known will do.
+fn described(args: &ParArgs, driver: &mut Driver, edges: &EdgeTable, board: u8) -> Result<Known, Failure> {
+    if args.dry_run {
+        args.cache.known(driver, edges, board)
+    } else {
+        args.cache.described(driver, edges, board)
+    }
+}
+
+fn report(all: &[Parameters], inputs: usize, dry_run: bool, out: &Output) {
+    let value = |p: &Parameters| {
+        let par = p.words.iter().map(|w| {
+            let edge = p.known.edges.get(Kind::Par, w.index.into());
+            json!({ "index": w.index, "name": w.name, "value": edge.map(|e| e.json(w.word)), "word": w.word })
+        });
+        json!({ "board": p.known.board, "par": par.collect::<Vec<_>>() })
+    };
+    let boards: Vec<Value> = all.iter().map(value).collect();
+    out.result(&json!({ "written": !dry_run, "boards": boards, "ci_left_out": inputs }), || {
+        let row = |(p, w): (&Parameters, &Word)| {
+            vec![p.known.board.to_string(), w.index.to_string(), w.name.clone(), w.text.clone()]
+        };
+        let pairs = all.iter().flat_map(|p| p.words.iter().map(move |w| (p, w)));
+        let rows: Vec<Vec<String>> = pairs.map(row).collect();
+        let count = rows.len();
+        let mut text = table(&[">board", ">#", "parameter", "value"], &rows);
+        text += &match dry_run {
+            true => format!("{count} parameters fit; nothing was written\n"),
+            false => {
+                format!("{count} parameters written; there is no answer to them, and a restart ends them\n")
+            }
+        };
+        if inputs > 0 {
+            text += &format!("{inputs} first inputs are left to: ucom run --params FILE\n");
+        }
+        text
+    });
+}

@@ -1,0 +1,108 @@
+//! Values of the command line as words of the boards: names and ranges are checked before anything is sent.
+
+use std::collections::BTreeMap;
+
+use ucom::files::EdgeTable;
+use ucom::master::io::Kind;
+use ucom::master::{Outcome, Request, Setting, StopLevel};
+
+use crate::args::{Assignment, CacheArgs};
+use crate::cache::Known;
+use crate::driver::{Driver, unexpected};
+use crate::failure::Failure;
+
+/// A word for an edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Word {
+    /// Place in the buffer.
+    pub index: u16,
+    /// The whole text of the edge.
+    pub name: String,
+    /// What is sent.
+    pub word: u16,
+    /// The value in the edge's unit, with the unit.
+    pub text: String,
+}
+
+impl Word {
+    /// As the library takes it; by number, which always means this edge.
+    pub fn setting(&self, known: &Known, kind: Kind) -> Setting {
+        // A text that means another edge cannot be its name, and numbers may be names.
+        let by_name = known.names.find(known.board, kind, &self.name) == Ok(self.index);
+        let name = if by_name { self.name.clone() } else { format!("##{}", self.index) };
+        Setting { name, value: self.word }
+    }
+}
+
+/// The words of assignments for a board.
+pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Word>, Failure> {
+    let word = |a: &Assignment| {
+        let index = known.names.find(known.board, kind, &a.name)?;
+        let name = known.names.names(kind).get(usize::from(index)).cloned().unwrap_or_default();
+        let Some(edge) = known.edges.get(kind, index.into()) else {
+            return Err(Failure::usage(format!("board {} has no {} {index}", known.board, kind.name())));
+        };
+        let word = edge.word(&a.value).map_err(|e| {
+            Failure::usage(format!("board {}: {} `{}`: {e}", known.board, kind.name(), a.name))
+                .hint(format!("ucom io {} shows types, scales and units", known.board))
+        })?;
+        Ok(Word { index, name, word, text: edge.text_with_unit(word) })
+    };
+    values.iter().map(word).collect()
+}
+
+/// Values belong to the one board that is meant, or to all of them.
+pub fn for_board(values: &[Assignment], board: u8) -> Vec<Assignment> {
+    values.iter().filter(|a| a.board.is_none_or(|b| b == board)).cloned().collect()
+}
+
+/// A value for a board that is not meant is a mistake.
+pub fn only(boards: &[u8], values: &[Assignment], to: &str) -> Result<(), Failure> {
+    match values.iter().find(|a| a.board.is_some_and(|b| !boards.contains(&b))) {
+        Some(a) => {
+            let board = a.board.unwrap_or_default();
+            Err(Failure::usage(format!("{board}.{}: board {board} is not among those to {to}", a.name)))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Boards with their names, whose applications were started where only they could tell the names.
+#[derive(Default)]
+pub struct Prepared {
+    /// By number.
+    pub known: BTreeMap<u8, Known>,
+    started: Vec<u8>,
+}
+
+impl Prepared {
+    /// Asks for the names of a board; starts its application where nothing else helps. Nothing moves by that.
+    pub fn add(
+        &mut self,
+        driver: &mut Driver,
+        cache: &CacheArgs,
+        table: &EdgeTable,
+        board: u8,
+        force: bool,
+    ) -> Result<(), Failure> {
+        let known = match cache.known(driver, table, board) {
+            Err(e) if e.code == "no-application" => {
+                match driver.run(Request::Start { board, force })? {
+                    Outcome::Started(_) => self.started.push(board),
+                    other => return Err(unexpected(&other)),
+                }
+                cache.described(driver, table, board)
+            }
+            other => other,
+        };
+        self.known.insert(board, known.inspect_err(|_| self.undo(driver))?);
+        Ok(())
+    }
+
+    /// Stops what was started only to be asked: a refusal leaves the boards as they were.
+    pub fn undo(&self, driver: &mut Driver) {
+        for board in self.started.iter().rev() {
+            let _ = driver.stop_board(*board, StopLevel::Application);
+        }
+    }
+}

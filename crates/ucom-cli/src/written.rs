@@ -1,0 +1,96 @@
+//! What this tool wrote to the parameters of a board, and when. No claim about what is there now: the protocol has no
+//! read-back, and a restart of the application, which nobody has to notice, ends it (D-35).
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde::{Deserialize, Serialize};
+use ucom::{BoardInfo, DateForm};
+
+use crate::args::CacheArgs;
+
+/// One parameter.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
+pub struct Written {
+    /// The word.
+    pub word: u16,
+    /// Seconds since 1970.
+    pub at: u64,
+}
+
+/// Parameters of one board by their place in the buffer, as last written.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Eq, Serialize)]
+#[serde(default)]
+pub struct History {
+    program_id: u16,
+    date: u16,
+    par: BTreeMap<u16, Written>,
+    #[serde(skip)]
+    file: Option<PathBuf>,
+}
+
+impl History {
+    /// What is remembered of a board; nothing when it has another program by now.
+    pub fn of(cache: &CacheArgs, info: &BoardInfo) -> Self {
+        let file = cache.directory().map(|dir| dir.join(format!("written-{:04X}.json", info.flash_number)));
+        let text = file.as_ref().and_then(|file| std::fs::read_to_string(file).ok());
+        let kept = text.and_then(|text| serde_json::from_str::<Self>(&text).ok()).unwrap_or_default();
+        let same = (kept.program_id, kept.date) == (info.program_id, info.date);
+        let par = if same { kept.par } else { BTreeMap::new() };
+        Self { program_id: info.program_id, date: info.date, par, file }
+    }
+
+    /// Remembers words that were written now. What cannot be kept is forgotten: that is no error.
+    pub fn wrote(&mut self, words: impl Iterator<Item = (u16, u16)>) {
+        let at = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+        self.par.extend(words.map(|(index, word)| (index, Written { word, at })));
+        if let (Some(file), Ok(text)) = (&self.file, serde_json::to_string_pretty(self)) {
+            let made = file.parent().map_or(Ok(()), std::fs::create_dir_all);
+            let _ = made.and_then(|()| std::fs::write(file, text));
+        }
+    }
+
+    /// What was last written to a parameter.
+    pub fn last(&self, index: usize) -> Option<Written> {
+        self.par.get(&u16::try_from(index).ok()?).copied()
+    }
+}
+
+impl Written {
+    /// `2026-11-21 06:10 UTC`.
+    pub fn when(&self) -> String {
+        // Days from 1970-01-01 to 2000-01-01.
+        let days = (self.at / 86_400).saturating_sub(10_957);
+        let date = u16::try_from(days).ok().and_then(|days| DateForm::Days2000.decode(days));
+        let (year, month, day) = date.unwrap_or((2000, 1, 1));
+        let minutes = self.at % 86_400 / 60;
+        format!("{year:04}-{month:02}-{day:02} {:02}:{:02} UTC", minutes / 60, minutes % 60)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ucom::Status;
+
+    #[test]
+    fn moments_are_told_in_utc() {
+        assert_eq!(Written { word: 0, at: 1_234_567_890 }.when(), "2009-02-13 23:31 UTC");
+    }
+
+    /// Another program has other parameters, whatever their places are.
+    #[test]
+    fn d35_another_program_remembers_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let cache = CacheArgs { fresh: false, cache: Some(dir.path().into()) };
+        let info =
+            BoardInfo { flash_number: 0x21, sequence: 1, status: Status(0x8B), program_id: 7, date: 8 };
+        History::of(&cache, &info).wrote([(2, 0xFFEC)].into_iter());
+        let again = History::of(&cache, &info);
+        assert_eq!((again.last(2).map(|w| w.word), again.last(0)), (Some(0xFFEC), None));
+        let other = BoardInfo { program_id: 9, ..info };
+        assert_eq!(History::of(&cache, &other).last(2), None);
+        assert_eq!(History::of(&cache, &BoardInfo { flash_number: 0x22, ..info }).last(2), None);
+    }
+}

@@ -1,0 +1,155 @@
+//! Parameter files and edge tables against `ucom sim`.
+#![cfg(unix)]
+
+mod common;
+
+use common::Sim;
+use serde_json::json;
+
+const TABLE: &str = "[program.ci]\nset_position = { scale = 0.01, unit = \"deg\", min = -60, max = 60 }\n\
+                     [program.so]\nposition = { scale = 0.01, unit = \"deg\" }\nnobody = {}\n\
+                     [program.par]\nkd = { scale = 0.1 }\n";
+
+/// A chain with numbers, an edge table of the first board, and all applications up.
+fn started() -> (Sim, String) {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    sim.ucom(&["start", "all"]).ends(0);
+    let info = sim.ucom(&["--json", "info", "1"]).ends(0).json();
+    let table = format!("[[program]]\nprogram_id = {}\n{TABLE}", info["boards"][0]["program_id"]);
+    let table = sim.file("edges.toml", table.as_bytes());
+    (sim, table)
+}
+
+/// D-11: values are in the units of the edge table, both ways; the word itself can always be given.
+#[test]
+fn d11_values_have_the_units_of_the_edge_table() {
+    let (sim, table) = started();
+    let mut peer = sim.peer();
+    let ucom = |words: &[&str]| sim.ucom(&[&["--json", "--edges", &table], words].concat());
+    let said = ucom(&["ci", "1", "set_position=-15.5deg"]).ends(0).json();
+    assert_eq!(said["set"][0]["value"], json!(-15.5));
+    assert!(peer.wait("341#").starts_with("341#0000F2F9"), "-1550");
+    let refused = ucom(&["ci", "1", "set_position=61"]).ends(2).json();
+    assert_eq!(refused["error"]["message"], "board 1: CI `set_position`: 61 is outside -60.00..60.00 deg");
+    let io = ucom(&["io", "1"]).ends(0);
+    assert!(io.err.contains("has no SO `nobody`"), "{}", io.err);
+    let io = io.json();
+    assert_eq!(io["boards"][0]["edges"]["ci"][0]["unit"], "deg");
+    assert_eq!(io["boards"][0]["edges"]["ci"][1], json!(null));
+    assert_eq!(io["boards"][0]["initial_ci"], json!([0.0, 1000, 900]));
+    let so = ucom(&["ci", "1", "set_position=10", "--for", "1"]).ends(0).json();
+    let position = so["so"]["position"].as_f64().unwrap();
+    assert!((9.0..11.0).contains(&position), "{position} deg");
+    ucom(&["par", "1", "kd=0x0102", "kp=3"]).ends(0);
+    assert_eq!(peer.wait("3C1#"), "3C1#01000201");
+    let dbc = sim.ucom(&["--edges", &table, "dbc", "1"]).ends(0).out;
+    assert!(dbc.contains("set_position m0 : 16|16@1- (0.01,0) [-60|60] \"deg\""), "{dbc}");
+    // A table that makes no sense is told with its place.
+    let wrong = sim.file("wrong.toml", b"[[program]]\nprogram_id = 1\npar.kp = { scales = 1 }\n");
+    assert!(sim.ucom(&["--edges", &wrong, "io", "1"]).ends(2).err.contains("line 3"));
+}
+
+/// D-35: what was written before is remembered, and never taken for what is there.
+#[test]
+fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
+    let (sim, _) = started();
+    let first = |said: cli_kit::trial::Said| said.ends(0).json()["par"][0].clone();
+    let wrote = first(sim.ucom(&["--json", "par", "1", "kp=120"]));
+    assert_eq!((&wrote["assumed"], &wrote["last_written"]["value"]), (&json!(120), &json!(120)));
+    let later = first(sim.ucom(&["--json", "par", "1"]));
+    assert_eq!((&later["assumed"], &later["last_written"]["value"]), (&json!(null), &json!(120)));
+    let text = sim.ucom(&["par", "1", "--save", "-"]).ends(0).out;
+    assert!(text.contains("\n      kp: 120   #") && text.contains("\n      # kd:"), "{text}");
+}
+
+/// A whole file is checked before anything is written; every mistake comes with its line.
+#[test]
+fn a_file_is_applied_whole_or_not_at_all() {
+    let (sim, _) = started();
+    sim.ucom(&["par", "all", "kp=120"]).ends(0);
+    let file = sim.path("head.yaml");
+    sim.ucom(&["par", "all", "--save", &file]).ends(0);
+    let good = std::fs::read_to_string(&file).unwrap();
+    let mut peer = sim.peer();
+    let checked = sim.ucom(&["--json", "par", "--apply", &file, "--dry-run"]).ends(0).json();
+    assert_eq!(checked["written"], false);
+    let apply = |text: &str| sim.ucom(&["par", "--apply", &sim.file("bad.yaml", text.as_bytes())]);
+    // The mistake is in the second board: the first gets nothing either.
+    let end = good.rfind("kp: 120").unwrap();
+    let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 7..]);
+    let said = apply(&of_second("kq: 1")).ends(4);
+    assert!(
+        said.err.contains("bad.yaml: line 21") && said.err.contains("there is `kp [mA/deg]`"),
+        "{}",
+        said.err
+    );
+    assert!(apply(&of_second("kp: 70000")).ends(4).err.contains("70000 is outside"));
+    assert!(
+        apply(&good.replace("0x0022", "0x0055"))
+            .ends(4)
+            .err
+            .contains("flash number is 0x0022, the file is for 0x0055")
+    );
+    let program = good.find("program_id: 0x").unwrap() + 14;
+    let other = format!("{}0001{}", &good[..program], &good[program + 4..]);
+    assert!(apply(&other).ends(4).err.contains("belong to 0x0001"));
+    assert!(apply(&good.replace("board: 2", "board: 7")).ends(4).err.contains("board 7: it does not answer"));
+    assert!(apply(&of_second("kp: [1")).ends(2).err.contains("line"));
+    assert!(apply(&of_second("kp: x")).ends(2).err.contains("board 2, `kp`"));
+    sim.ucom(&["par", "3", "--apply", &file]).ends(2);
+    sim.ucom(&["par", "1", "kp=1", "--apply", &file]).ends(2);
+    sim.ucom(&["par", "1", "--dry-run"]).ends(2);
+    let heard = peer.all(100);
+    assert!(!heard.iter().any(|f| f.starts_with("3C")), "{heard:?}");
+    let said = sim.ucom(&["--json", "par", "--apply", &file]).ends(0).json();
+    assert_eq!((&said["written"], &said["boards"][1]["par"][0]["word"]), (&json!(true), &json!(120)));
+    let heard = peer.all(100);
+    let written: Vec<&String> = heard.iter().filter(|f| f.starts_with("3C")).collect();
+    assert_eq!(written, ["3C1#00007800", "3C2#00007800"]);
+}
+
+/// Section 7: initial inputs, then those of the file, its parameters, and only then the loop. The command line wins.
+#[test]
+fn a_run_takes_parameters_and_first_inputs_from_a_file() {
+    let (sim, _) = started();
+    // The names are known from now on.
+    sim.ucom(&["io", "1"]).ends(0);
+    sim.ucom(&["stop", "all"]).ends(0);
+    let file = |value: &str| {
+        let text = format!(
+            "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      kp: 121\n      kd: 5\n    ci:\n      set_position: {value}\n"
+        );
+        sim.file("run.yaml", text.as_bytes())
+    };
+    let mut peer = sim.peer();
+    let said = sim.ucom(&["--json", "run", "1", "--params", &file("70000"), "--for", "1"]).ends(4);
+    assert_eq!(said.json()["error"]["code"], "params");
+    let heard = peer.all(100);
+    assert!(!heard.iter().any(|f| ["301", "341", "3C1", "541"].contains(&&f[..3])), "{heard:?}");
+    // Without known names the application is started to be asked, and stopped again.
+    let words = ["--json", "run", "1", "--fresh", "--params", &file("70000"), "--for", "1"];
+    assert_eq!(sim.ucom(&words).ends(4).json()["error"]["code"], "params");
+    assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
+    assert_eq!(sim.ucom(&["--json", "status", "1"]).ends(0).json()["boards"][0]["status_byte"], 0x1B);
+    peer.all(100);
+    sim.ucom(&["run", "1", "--params", &file("1500"), "--par", "1.kd=6", "--for", "1"]).ends(0);
+    let heard = peer.all(100);
+    let at = |start: &str| {
+        let found = heard.iter().position(|f| f.starts_with(start));
+        found.unwrap_or_else(|| panic!("no {start} in {heard:?}"))
+    };
+    assert!(at("341#0000DC05") < at("3C1#00007900") && at("3C1#01000600") < at("541#"), "{heard:?}");
+    assert!(!heard.iter().any(|f| f.starts_with("3C1#01000500")), "{heard:?}");
+}
+
+#[test]
+fn pages_and_templates() {
+    let (sim, _) = started();
+    assert!(sim.ucom(&["help", "params"]).ends(0).out.contains("flash_number"));
+    assert!(sim.ucom(&["help", "edges"]).ends(0).out.contains("program_id"));
+    let table = sim.path("template.toml");
+    sim.ucom(&["io", "all", "--template", &table]).ends(0);
+    let io = sim.ucom(&["--json", "--edges", &table, "io", "2"]).ends(0).json();
+    assert_eq!(io["boards"][0]["edges"]["so"][0]["scale"], 0.01);
+}

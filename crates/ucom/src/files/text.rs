@@ -1,0 +1,69 @@
+//! Small text files: reading with a limit, writing whole or not at all, quoting.
+
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::prelude::v1::*;
+
+/// Longest file that is read, bytes.
+pub(crate) const MAX_BYTES: u64 = 1 << 20;
+
+/// A text file that cannot be used at all.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TextError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Larger than any file of its kind.
+    #[error("{}: more than {MAX_BYTES} bytes are too many", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// Reads a text; also from what has no length beforehand, as a pipe.
+pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
+    let io = |source| TextError::Io { path: path.into(), source };
+    let mut text = String::new();
+    let file = std::fs::File::open(path).map_err(io)?;
+    file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(TextError::TooLarge { path: path.into() });
+    }
+    Ok(text)
+}
+
+/// Writes a file whole or not at all.
+pub fn write_text(path: &Path, text: &str) -> Result<(), TextError> {
+    let io = |source| TextError::Io { path: path.into(), source };
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".new");
+    let beside = PathBuf::from(beside);
+    let mut file = std::fs::File::create(&beside).map_err(io)?;
+    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(io)?;
+    std::fs::rename(&beside, path).map_err(io)
+}
+
+/// A basic string of TOML, and a double-quoted scalar of YAML.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => out.extend(['\\', c]),
+            // YAML takes these for line ends or for no character at all.
+            c if c.is_control()
+                || matches!(c, '\u{2028}' | '\u{2029}' | '\u{FEFF}' | '\u{FFFE}' | '\u{FFFF}') =>
+            {
+                out += &format!("\\u{:04X}", u32::from(c));
+            }
+            c => out.push(c),
+        }
+    }
+    out + "\""
+}

@@ -1,23 +1,15 @@
-"""Simulated boards that are updated by a raw-frame peer on python-can's socketcand interface.
-
-Argument: the `ucom` program. Exit code 0: all agreed. Nothing here comes from the project's code.
-"""
+"""Rows of `check_boards.py`: simulated boards that are updated by a raw-frame peer."""
 
 import time
 
-import rows
 import wire
-from check_boards import FLASH, give_numbers, start, status
-from peer import Chain, Peer
+from boards_bench import five, give_numbers, start, status
+from peer import Peer
 from rows import Bench
 
 DATE = 0x3AC1
 # DSP_READY, DSP_PROGFINISHED and DSP_ERROR of boards 1 to 5.
 VERDICTS = ("18", "10", "08")
-
-
-def five(bench: Bench) -> Chain:
-    return bench.chain("--boards", "5", "--flash-ids", FLASH)
 
 
 def give(peer: Peer, board: int, data: bytes) -> None:
@@ -194,5 +186,4 @@ def not_asked_for(bench: Bench) -> None:
         bench.ok("PC_PROG")
 
 
-if __name__ == "__main__":
-    rows.main([mistakes_1, mistakes_2, mistakes_3, update, group, not_asked_for])
+ROWS = [mistakes_1, mistakes_2, mistakes_3, update, group, not_asked_for]

@@ -1,0 +1,46 @@
+"""What rows with simulated boards begin with."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import wire
+from peer import Chain, Peer
+from rows import Bench
+
+FLASH = "0x21,0x42,0x63,0x04,0x7F"
+
+
+def status(peer: Peer, board: int) -> str:
+    """Status byte of PC_INFO; a running board's process data come in between."""
+    return peer.answer(wire.frame(8, board), f"{0x140 + board:03X}#")[10:12]
+
+
+def give_numbers(bench: Bench, peer: Peer, boards: int) -> None:
+    """Resets all and numbers the first ones."""
+    peer.ask("000#", 0.6)
+    for board in range(1, boards + 1):
+        number = f"{board:02X}"
+        bench.same("D-T4", "acknowledgement", peer.answer(wire.frame(10, board), "0"), f"{0xC0 + board:03X}#{number}")
+        peer.ask(wire.frame(7, board, b"\x02\x02"), 0.03)
+
+
+def start(bench: Bench, peer: Peer) -> None:
+    """Board 1 with its application up."""
+    give_numbers(bench, peer, 1)
+    bench.same("D-T9", "MCA_DSP_READY", peer.answer("301#", "501#"), "501#")
+    peer.all(0.1)
+
+
+def five(bench: Bench) -> Chain:
+    return bench.chain("--boards", "5", "--flash-ids", FLASH)
+
+
+@contextmanager
+def chain_of(bench: Bench, boards: str) -> Iterator[Chain]:
+    """A chain from the text of a file."""
+    with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+        file.write(boards)
+        file.flush()
+        with bench.chain("--chain", file.name) as chain:
+            yield chain

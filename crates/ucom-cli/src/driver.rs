@@ -79,13 +79,19 @@ impl Driver {
         let id = self.master.start(self.link.now_us(), request)?;
         let mut cancelled = false;
         loop {
-            self.turn(LOOK)?;
+            if let Err(failure) = self.turn(LOOK) {
+                return self.abandon(id, failure, see);
+            }
             while let Some(event) = self.master.take_event() {
                 see(&event);
                 match event {
                     Event::Done { id: done, result } if done == id => {
-                        self.send_due()?;
-                        return result.map_err(Failure::from);
+                        let sent = self.send_due();
+                        return match result {
+                            // What became of boards is told also when the bus fails at the very end.
+                            Ok(report @ Outcome::Update(_)) => Ok(report),
+                            result => sent.and(result.map_err(Failure::from)),
+                        };
                     }
                     other => self.tell(&other, Some(id)),
                 }
@@ -96,6 +102,24 @@ impl Driver {
                 self.master.cancel(id);
             }
         }
+    }
+
+    /// The bus is gone: an update still tells what it knows of each board, anything else ends with the failure.
+    fn abandon(
+        &mut self,
+        id: ProcedureId,
+        failure: Failure,
+        see: &mut dyn FnMut(&Event),
+    ) -> Result<Outcome, Failure> {
+        self.master.abandon(id, &failure.message);
+        while let Some(event) = self.master.take_event() {
+            see(&event);
+            match event {
+                Event::Done { id: done, result: Ok(outcome) } if done == id => return Ok(outcome),
+                other => self.tell(&other, Some(id)),
+            }
+        }
+        Err(failure)
     }
 
     /// Stops a board, also after Ctrl-C: what was started is not left alone.

@@ -154,3 +154,202 @@ fn d46_power_loss_in_mid_update() {
     let update = sim.ucom(&["--json", "update", "1", &file]).ends(0).json();
     assert!(["verified", "up-to-date"].contains(&update["outcome"].as_str().unwrap()), "{update}");
 }
+
+/// D-46: the bus fails after the erase: exit code 5 and the whole report, with boards that are done; before it: 3.
+#[test]
+fn d46_a_bus_that_fails_leaves_the_report() {
+    // READYs of board 2 before the simulator is killed; the first cycle has 961.
+    for (blocks, code, outcome) in [(300, 3, "not-started"), (1200, 5, "incomplete")] {
+        let sim = chain("2");
+        let file = sim.file("app.bin", &image(60 * 1024, 11));
+        let mut peer = sim.peer();
+        let update = sim.spawn(&["--json", "update", "1,2", &file]);
+        peer.wait("101#");
+        for _ in 0..blocks {
+            peer.wait("182#");
+        }
+        let dir = sim.kill();
+        let said = ended(update).ends(code);
+        let report = said.json();
+        assert_eq!(report["exit"], code);
+        assert_eq!(report["boards"][0]["outcome"], "verified", "{report}");
+        assert_eq!(report["boards"][1]["outcome"], outcome, "{report}");
+        assert_eq!(report["boards"][1]["error"]["code"], "bus", "{report}");
+        drop(dir);
+    }
+}
+
+/// The same as text: outcome, cause and what to do.
+#[test]
+fn d46_a_bus_that_fails_is_told_in_words() {
+    let sim = chain("1");
+    let file = sim.file("app.bin", &image(60 * 1024, 12));
+    let mut peer = sim.peer();
+    let update = sim.spawn(&["update", "1", &file]);
+    for _ in 0..1200 {
+        peer.wait("181#");
+    }
+    let dir = sim.kill();
+    let said = ended(update).ends(5);
+    for word in ["incomplete", "the bus failed", "run the update again"] {
+        assert!(said.out.contains(word), "{word}: {}", said.out);
+    }
+    drop(dir);
+}
+
+/// Ctrl-C before anything is erased: exit code 4, outcome `cancelled`, and the board has what it had.
+#[test]
+fn p12_cancelled_before_the_erase() {
+    let sim = chain("1");
+    let before = program_id(&sim, "1");
+    let file = sim.file("app.bin", &image(60 * 1024, 13));
+    let mut peer = sim.peer();
+    let update = sim.spawn(&["--json", "update", "1", &file]);
+    for _ in 0..100 {
+        peer.wait("181#");
+    }
+    signal(&update, "-INT");
+    peer.wait("1C1#0400");
+    let report = ended(update).ends(4).json();
+    assert_eq!(
+        (&report["outcome"], &report["boards"][0]["error"]["code"]),
+        (&"cancelled".into(), &"cancelled".into())
+    );
+    assert_eq!(program_id(&sim, "1"), before);
+}
+
+/// D-08: a dry run looks for another PC, too.
+#[test]
+fn d08_a_dry_run_sees_another_pc() {
+    let mut sim = chain("1");
+    let file = sim.file("app.bin", &image(2000, 14));
+    sim.ucom(&["update", "1", &file, "--dry-run"]).ends(0);
+    sim.fault("foreign-master for_s=20");
+    let report = sim.ucom(&["--json", "update", "1", &file, "--dry-run"]).ends(4).json();
+    assert_eq!(report["boards"][0]["error"]["code"], "foreign-master", "{report}");
+}
+
+/// One transfer for several boards; the one that is not meant keeps what it has.
+#[test]
+fn d46_a_group_is_one_transfer() {
+    let sim = chain("4");
+    let before = program_id(&sim, "3");
+    let file = sim.file("app.bin", &image(2000, 15));
+    sim.ucom(&["xreset", "3"]).ends(0);
+    let mut peer = sim.peer();
+    let update = sim.spawn(&["--json", "update", "1,2,4", &file, "--group"]);
+    peer.wait("2C0#");
+    let report = ended(update).ends(0).json();
+    let outcomes: Vec<&str> =
+        report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
+    assert_eq!(outcomes, ["verified"; 3], "{report}");
+    assert!(peer.all(100).iter().all(|f| !f.starts_with("2C1#")), "one transfer only");
+    assert_eq!(program_id(&sim, "3"), before);
+}
+
+/// Two images: each goes where the profile's plan says, and the report has both; what does not fit is refused.
+#[test]
+fn d40_two_images_by_plan() {
+    let files = tempfile::tempdir().unwrap();
+    let file = |name: &str, bytes: &[u8]| {
+        let path = files.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let (app, other) = (file("app.bin", &image(2000, 16)), file("other.bin", &image(256, 17)));
+    let cases = [("exloader-app", "--exloader", "ram", 1), ("pmem-xmem", "--data", "data", 2)];
+    for (plan, option, memory, cycle) in cases {
+        let profile = file("profile.toml", format!("[prog]\nplan = \"{plan}\"\n").as_bytes());
+        let sim = Sim::start(&["--boards", "1", "--profile", &profile]);
+        sim.ucom(&["--profile", &profile, "init"]).ends(0);
+        let words = ["--json", "--profile", &profile, "update", "1", &app, option, &other];
+        let report = sim.ucom(&words).ends(0).json();
+        assert_eq!(report["outcome"], "verified", "{report}");
+        let images = report["images"].as_array().unwrap();
+        assert_eq!(
+            (&images[0]["file"], &images[0]["bytes"]),
+            (&app.clone().into(), &2000.into()),
+            "{report}"
+        );
+        assert_eq!(
+            (&images[1]["file"], &images[1]["bytes"]),
+            (&other.clone().into(), &256.into()),
+            "{report}"
+        );
+        assert_eq!(
+            (&images[1]["memory"], &images[1]["address_words"]),
+            (&memory.into(), &0.into()),
+            "{report}"
+        );
+        assert_eq!(images[1]["cycles"], serde_json::json!([cycle]));
+        assert!(
+            images[0]["program_id"] == report["program_id"]
+                && images[1]["program_id"] != report["program_id"]
+        );
+        // One of them is missing, or another option than this plan's is given.
+        let said = sim.ucom(&["--profile", &profile, "update", "1", &app]).ends(2);
+        assert!(said.err.contains(option) && said.err.contains(plan), "{}", said.err);
+        let said = sim.ucom(&["--profile", &profile, "update", "1", &app, "--second", &other]).ends(2);
+        assert!(said.err.contains("raw") && said.err.contains(plan), "{}", said.err);
+        let said = sim.ucom(&["update", "1", &app, option, &other]).ends(2);
+        assert!(said.err.contains("verify-write"), "{}", said.err);
+    }
+}
+
+/// U-10 with raw files: written, not verified, and said so; verified against a Program ID that is named.
+#[test]
+fn u10_raw_files_are_verified_when_their_program_id_is_named() {
+    let profile = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(profile.path(), "[prog]\nplan = \"raw\"\n").unwrap();
+    let profile = profile.path().to_str().unwrap();
+    let sim = Sim::start(&["--boards", "1", "--profile", profile]);
+    sim.ucom(&["--profile", profile, "init"]).ends(0);
+    // What a tool chain makes: header and data of each cycle in a file of its own.
+    let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
+    let cycle = |cycle, date| {
+        let header = ucom::Header {
+            cycle,
+            memory: 0,
+            address: 0,
+            length: 500,
+            program_id: 0x4B3F,
+            date,
+            target: 0xFFFF,
+        };
+        [&header.build(ucom::Endian::Little)[..], &golden].concat()
+    };
+    let (first, second) = (sim.file("1.bin", &cycle(1, 0x3AC1)), sim.file("2.bin", &cycle(2, 0x3AC1)));
+    let words = ["--profile", profile, "update", "1", &first, "--second", &second];
+    let said = sim.ucom(&words).ends(0);
+    for word in ["written", "NOT verified", "0x4B3F, 2009-06-01", "--expect-program-id"] {
+        assert!(said.out.contains(word), "{word}: {}", said.out);
+    }
+    let with = |more: &[&'static str]| {
+        let words: Vec<&str> = ["--json"].iter().chain(&words).chain(more).copied().collect();
+        sim.ucom(&words)
+    };
+    let report = with(&["--start"]).ends(0).json();
+    assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"running".into(), &false.into()));
+    assert_eq!(
+        (&report["boards"][0]["changed"], &report["program_id"]),
+        (&false.into(), &serde_json::Value::Null)
+    );
+    assert!(report["unverifiable"]["hint"].as_str().unwrap().contains("--expect-program-id"), "{report}");
+    let report = with(&["--expect-program-id", "0x4B3F"]).ends(0).json();
+    assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"up-to-date".into(), &true.into()));
+    let report = with(&["--expect-program-id", "0x4B3F", "--force"]).ends(0).json();
+    assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"verified".into(), &true.into()));
+    let report = with(&["--expect-program-id", "0x4B40"]).ends(5).json();
+    assert_eq!(report["boards"][0]["error"]["code"], "not-verified", "{report}");
+}
+
+/// An image whose Program ID is known must have the one that is named: refused before anything is sent.
+#[test]
+fn a_named_program_id_is_compared_with_the_image() {
+    let sim = chain("1");
+    let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
+    let file = sim.file("golden.bin", &golden);
+    let said = sim.ucom(&["update", "1", &file, "--expect-program-id", "0x4B40"]).ends(4);
+    assert!(said.err.contains("0x4B3F") && said.err.contains("0x4B40"), "{}", said.err);
+    sim.ucom(&["update", "1", &file, "--expect-program-id", "0x4B3F"]).ends(0);
+}

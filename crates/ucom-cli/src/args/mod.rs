@@ -1,6 +1,7 @@
 //! The command line: commands, options, their environment variables and examples.
 
 mod boards;
+mod firmware;
 mod options;
 
 use std::path::PathBuf;
@@ -9,6 +10,7 @@ use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use boards::{Assignment, Boards};
+pub use firmware::{RepairArgs, UpdateArgs};
 pub use options::*;
 
 /// Motor boards on a CAN bus from your terminal.
@@ -108,12 +110,24 @@ pub enum Command {
     /// Program boards: check, transfer twice, verify by reading back
     #[command(
         after_help = "Examples:\n  ucom update 3 firmware.hex --flash-id 0x63\n  ucom update all firmware.bin --start\n  \
-                            ucom update 1-4 firmware.s19 --dry-run\n\n\
-                            Image formats: raw binary, Intel HEX, Motorola S-record, told apart by their content.\n\
-                            Exit codes: 0 verified, or already up to date; 1 the board reported an error before anything was\n\
-                            erased; 3 no answer; 4 refused; 5 failed or cancelled after something was erased."
+                            ucom update 1-4 firmware.s19 --dry-run\n  ucom update 1-4 firmware.hex --group\n  \
+                            ucom update 3 app.hex --exloader loader.hex\n  ucom update 3 program.hex --data data.hex\n  \
+                            ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
+                            Image formats: raw binary, Intel HEX, Motorola S-record, told apart by their content. Whether two\n\
+                            files are sent is the profile's matter: `prog.plan`, see `ucom help profile`.\n\
+                            Exit codes: 0 verified, or already up to date (or written, where the profile leaves nothing to\n\
+                            verify: the report says so); 1 the board reported an error before anything was erased; 3 no answer;\n\
+                            4 refused, or cancelled before anything was erased; 5 failed or cancelled after something was erased.\n\
+                            A bus that fails is 3 before and 5 after that. The outcome of each board is in the report:\n\
+                            not-started, cancelled, up-to-date, incomplete, unknown, written, verified or running."
     )]
     Update(UpdateArgs),
+    /// Give one board its number back when it no longer answers, without a reset of the others
+    #[command(after_help = "Examples:\n  ucom repair 3\n  ucom repair 3 --flash-id 0x63\n\n\
+                            The pin of the board is lowered first, so that its neighbour cannot take the number; the flash number\n\
+                            must be the one that is named or that the inventory has.\n\
+                            Exit codes: 0 done; 2 which board is meant is not known; 3 no answer; 4 another board stands there.")]
+    Repair(RepairArgs),
     /// Names of inputs, outputs and parameters, and initial inputs
     #[command(
         after_help = "Examples:\n  ucom io 1\n  ucom --json io all\n  ucom io 1 --fresh\n  ucom io all --template ucom-edges.toml\n\n\

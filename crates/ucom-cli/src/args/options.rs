@@ -100,34 +100,6 @@ pub struct StopArgs {
     pub control_only: bool,
 }
 
-/// Options of `ucom update`.
-#[derive(Args, Debug)]
-pub struct UpdateArgs {
-    /// Board number, list, range, or all
-    #[arg(value_name = "BOARDS")]
-    pub boards: Boards,
-    /// Image: raw binary, Intel HEX or S-record
-    #[arg(value_name = "IMAGE")]
-    pub image: PathBuf,
-    /// The flash number that the board must have
-    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
-    pub flash_id: Option<u16>,
-    /// Flash date to write; default: today
-    #[arg(long, env = "UCOM_DATE", value_name = "YYYY-MM-DD")]
-    pub date: Option<String>,
-    /// Check everything, send nothing that changes a board
-    #[arg(long, env = "UCOM_DRY_RUN", value_parser = FalseyValueParser::new())]
-    pub dry_run: bool,
-    /// Start the application afterwards and see that it runs
-    #[arg(long, env = "UCOM_START", value_parser = FalseyValueParser::new())]
-    pub start: bool,
-    /// Flash numbers of the boards, as `ucom init` wrote them
-    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
-    pub inventory: PathBuf,
-    #[command(flatten)]
-    pub force: ForceArgs,
-}
-
 /// Options of `ucom io`.
 #[derive(Args, Debug)]
 pub struct IoArgs {

@@ -9,9 +9,12 @@ mod monitor;
 mod monitor_view;
 mod params;
 mod record;
+mod repair;
 mod run;
 mod sim;
 mod update;
+mod update_files;
+mod update_report;
 
 pub use boards::seen;
 
@@ -33,6 +36,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Start(args) => boards::start(&args, link, out),
         Command::Stop(args) => boards::stop(&args, link, out),
         Command::Update(args) => update::update(&args, link, out),
+        Command::Repair(args) => repair::repair(&args, link, out),
         Command::Io(args) => io::io(&args, link, out),
         Command::Ci(args) => io::ci(&args, link, out),
         Command::Par(args) => params::par(&args, link, out),

@@ -93,6 +93,13 @@ impl Sim {
         Peer { bus: can_link::open(&self.url).expect("the bus opens") }
     }
 
+    /// Ends it at once, as a power cut; its directory stays.
+    pub fn kill(mut self) -> tempfile::TempDir {
+        self.child.kill().expect("kill");
+        self.child.wait().expect("it ends");
+        std::mem::replace(&mut self.dir, tempfile::tempdir().expect("a directory"))
+    }
+
     /// Sends a signal and waits for the end: its exit code.
     pub fn end(mut self, name: &str) -> i32 {
         signal(&self.child, name);

@@ -1,0 +1,84 @@
+//! The options of `ucom update` and `ucom repair`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::FalseyValueParser;
+
+use super::ForceArgs;
+use super::boards::{Boards, flash_id};
+
+/// Options of `ucom update`.
+#[derive(Args, Debug)]
+pub struct UpdateArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS")]
+    pub boards: Boards,
+    /// Image: raw binary, Intel HEX or S-record
+    #[arg(value_name = "IMAGE")]
+    pub image: PathBuf,
+    /// The flash number that the board must have
+    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
+    pub flash_id: Option<u16>,
+    /// Flash date to write, or its 16 bits as 0x3AC1; default: today
+    #[arg(long, env = "UCOM_DATE", value_name = "YYYY-MM-DD")]
+    pub date: Option<String>,
+    /// Check everything, send nothing that changes a board
+    #[arg(long, env = "UCOM_DRY_RUN", value_parser = FalseyValueParser::new())]
+    pub dry_run: bool,
+    /// Start the application afterwards and see that it runs
+    #[arg(long, env = "UCOM_START", value_parser = FalseyValueParser::new())]
+    pub start: bool,
+    /// All these boards with one transfer, by broadcast, instead of one after the other
+    #[arg(long, env = "UCOM_GROUP", value_parser = FalseyValueParser::new())]
+    pub group: bool,
+    /// Exloader for RAM, with the profile's `prog.plan` exloader-app
+    #[arg(long, env = "UCOM_EXLOADER", value_name = "FILE")]
+    pub exloader: Option<PathBuf>,
+    /// Image of data memory, with `prog.plan` pmem-xmem
+    #[arg(long, env = "UCOM_DATA", value_name = "FILE")]
+    pub data: Option<PathBuf>,
+    /// File of the second cycle, with `prog.plan` raw; default: IMAGE again
+    #[arg(long, env = "UCOM_SECOND", value_name = "FILE")]
+    pub second: Option<PathBuf>,
+    /// Program ID that the board must show at the end, where the image does not tell it
+    #[arg(long, env = "UCOM_EXPECT_PROGRAM_ID", value_name = "ID", value_parser = program_id)]
+    pub expect_program_id: Option<u16>,
+    /// Flash numbers of the boards, as `ucom init` wrote them
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom repair`.
+#[derive(Args, Debug)]
+pub struct RepairArgs {
+    /// Board number
+    #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
+    pub board: u8,
+    /// The flash number that the board must have; default: as the inventory has it
+    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
+    pub flash_id: Option<u16>,
+    /// Flash numbers of the boards, as `ucom init` wrote them
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// A Program ID, decimal or with 0x.
+fn program_id(text: &str) -> Result<u16, String> {
+    flash_id(text).map_err(|_| format!("\"{text}\" is no Program ID, as 0x4B3F"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn program_ids_are_words() {
+        assert_eq!((program_id("0x4B3F"), program_id("19263")), (Ok(0x4B3F), Ok(0x4B3F)));
+        assert!(program_id("0x10000").is_err_and(|e| e.contains("Program ID")));
+    }
+}

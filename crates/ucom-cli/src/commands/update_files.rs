@@ -1,0 +1,153 @@
+//! The files and the date of an update, checked against what the profile's plan takes.
+
+use std::path::{Path, PathBuf};
+
+use cli_kit::Output;
+use time::{Date, Month, OffsetDateTime};
+use ucom::Profile;
+use ucom::files::{Image, ImageOptions};
+use ucom::master::update::UpdateImage;
+use ucom::profile::{HeaderForm, Plan};
+
+use crate::args::UpdateArgs;
+use crate::failure::Failure;
+
+/// What the files hold.
+pub struct Files {
+    /// The image.
+    pub image: UpdateImage,
+    /// What the other cycle carries.
+    pub second: Option<UpdateImage>,
+    /// Where they came from, in that order.
+    pub names: Vec<PathBuf>,
+}
+
+impl Files {
+    /// Reads the files that the plan takes; refuses others.
+    pub fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
+        let other = second(args, profile.prog_plan)?;
+        let image = image(&args.image, out)?;
+        let second = other.map(|file| self::image(file, out)).transpose()?;
+        let names = [Some(args.image.as_path()), other].into_iter().flatten().map(Path::to_owned).collect();
+        Ok(Self { image, second, names })
+    }
+}
+
+fn image(file: &Path, out: &Output) -> Result<UpdateImage, Failure> {
+    let image = Image::read(file, &ImageOptions::default()).map_err(|e| {
+        Failure::usage(format!("{}: {e}", file.display()))
+            .hint("formats are raw binary, Intel HEX and S-record")
+    })?;
+    for note in image.notes() {
+        out.note(format!("note: {}: {note}", file.display()));
+    }
+    Ok(UpdateImage { bytes: image.bytes().to_vec(), address_words: image.address_words() })
+}
+
+/// The file beside the image that the plan takes.
+fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
+    let options = [
+        ("--exloader", Plan::ExloaderApp, &args.exloader),
+        ("--data", Plan::PmemXmem, &args.data),
+        ("--second", Plan::Raw, &args.second),
+    ];
+    for (option, fits, given) in options {
+        if given.is_some() && plan != fits {
+            let text = format!("{option} goes with `prog.plan` {fits}, but the profile has {plan}");
+            let hint = "--profile FILE names the boards' profile; ucom help profile lists its keys and plans";
+            return Err(Failure::usage(text).hint(hint));
+        }
+    }
+    for (option, fits, given) in options {
+        match given {
+            Some(given) => return Ok(Some(given)),
+            None if plan == fits && plan != Plan::Raw => {
+                let text =
+                    format!("`prog.plan` {plan} sends two images, and there is only one: {option} FILE");
+                return Err(Failure::usage(text).hint(match plan {
+                    Plan::ExloaderApp => "IMAGE is the application, the other one the exloader for RAM",
+                    _ => "IMAGE is for program memory, the other one for data memory",
+                }));
+            }
+            None => {}
+        }
+    }
+    Ok(None)
+}
+
+/// Whether a header carries Program ID and date.
+pub fn has_header(profile: &Profile) -> bool {
+    profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
+}
+
+/// The flash date: as asked, else today (UTC); 0 where no header carries it.
+pub fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
+    let form = profile.prog_date;
+    let date = match asked {
+        Some(_) if !has_header(profile) => {
+            return Err(Failure::usage("--date: the date goes into the header, and the profile sends none")
+                .hint("see prog.plan and prog.header in ucom help profile"));
+        }
+        None if !has_header(profile) => return Ok(0),
+        Some(text) => match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
+            Some(hex) => {
+                return u16::from_str_radix(hex, 16)
+                    .map_err(|_| Failure::usage(format!("--date {text}: no 16 bits")));
+            }
+            None => parsed(text).ok_or_else(|| {
+                Failure::usage(format!("--date {text}: no day of the form YYYY-MM-DD, no number as 0x3AC1"))
+            })?,
+        },
+        None => OffsetDateTime::now_utc().date(),
+    };
+    let year = u16::try_from(date.year()).ok();
+    year.and_then(|year| form.encode(year, date.month().into(), date.day())).ok_or_else(|| {
+        Failure::usage(format!("{date} is no date that prog.date = {form} can hold"))
+            .hint("--date takes its 16 bits as well, as 0x3AC1")
+    })
+}
+
+fn parsed(text: &str) -> Option<Date> {
+    let mut parts = text.split('-');
+    let (year, month) = (parts.next()?.parse().ok()?, parts.next()?.parse::<u8>().ok()?);
+    let day = parts.next()?.parse().ok()?;
+    let date = Date::from_calendar_date(year, Month::try_from(month).ok()?, day).ok()?;
+    parts.next().is_none().then_some(date)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ucom::DateForm;
+
+    /// D-45: days of the calendar in the profile's form, or its bits.
+    #[test]
+    fn d45_dates_are_days_of_the_calendar() {
+        let fat = Profile::default();
+        let read = |text: &str| day(Some(text), &fat).ok();
+        assert_eq!((read("2009-06-01"), read("0x3AC1")), (Some(0x3AC1), Some(0x3AC1)));
+        assert_eq!(read("2024-02-29"), Some(44 << 9 | 2 << 5 | 29));
+        let wrong = [
+            "2009",
+            "2009-06",
+            "2009-06-01-1",
+            "x-06-01",
+            "1979-01-01",
+            "2009-13-01",
+            "2023-02-29",
+            "0x10000",
+        ];
+        for wrong in wrong {
+            assert!(read(wrong).is_none(), "{wrong}");
+        }
+        assert!(day(None, &fat).is_ok_and(|today| today > 0x3AC1));
+        // Bits only, as there is no calendar.
+        let raw = Profile { prog_date: DateForm::Raw, ..fat };
+        assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
+        assert!(day(None, &raw).is_err_and(|e| e.hint.contains("0x3AC1")));
+        // No header, no date.
+        let none = Profile { prog_plan: Plan::Raw, ..fat };
+        assert_eq!(day(None, &none).ok(), Some(0));
+        assert!(day(Some("2009-06-01"), &none).is_err());
+    }
+}

@@ -1,0 +1,150 @@
+//! What became of an update, as text and as JSON.
+
+use std::path::PathBuf;
+
+use cli_kit::{Output, table};
+use serde_json::{Value, json};
+use ucom::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult};
+use ucom::{BoardInfo, Memory, Profile};
+
+use super::update_files::has_header;
+use crate::shape::date;
+
+/// Prints the report; `names` are the files of its images.
+pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {
+    let images = report.images.iter().zip(names);
+    let value = json!({
+        "dry_run": report.dry_run,
+        "program_id": report.program_id,
+        "flash_date": has_header(profile).then(|| date(profile, report.date)),
+        "bytes": report.bytes,
+        "images": images.clone().map(|(image, name)| image_value(image, name)).collect::<Vec<_>>(),
+        "unverifiable": report.unverifiable.map(|why| json!({ "reason": why.to_string(), "hint": why.hint() })),
+        // The outcome of one board is what scripts ask for most.
+        "outcome": match report.boards.as_slice() {
+            [one] => json!(one.outcome.name()),
+            _ => Value::Null,
+        },
+        "boards": report.boards.iter().map(|b| result(b, report, profile)).collect::<Vec<_>>(),
+        "exit": report.exit_code(),
+    });
+    out.result(&value, || {
+        let mut text = String::new();
+        if report.dry_run {
+            text += "dry run: nothing was changed\n";
+        }
+        text += &images.map(|(image, name)| image_line(image, name)).collect::<String>();
+        if let Some(id) = report.program_id.filter(|_| !report.dry_run) {
+            let day =
+                if has_header(profile) { format!(", {}", date(profile, report.date)) } else { String::new() };
+            text += &format!("program 0x{id:04X}{day}\n");
+        }
+        text += &boards(report);
+        let failed = report.boards.iter().filter_map(|b| b.failure.as_ref().map(|f| (b.board, f)));
+        text += &failed.map(|(board, f)| format!("board {board}: {}\n", f.hint())).collect::<String>();
+        text + &unverified(report, profile)
+    });
+}
+
+fn boards(report: &UpdateReport) -> String {
+    let row = |b: &UpdateResult| {
+        let why = b.failure.as_ref().map_or_else(String::new, ToString::to_string);
+        let flash = b.flash_number.map_or_else(|| "?".into(), |f| format!("0x{f:04X}"));
+        let time = if b.time_us > 0 { format!("{:.1} s", b.time_us as f64 * 1e-6) } else { "-".into() };
+        vec![b.board.to_string(), flash, b.outcome.name().into(), b.attempts.to_string(), time, why]
+    };
+    let rows: Vec<Vec<String>> = report.boards.iter().map(row).collect();
+    table(&[">board", "flash id", "outcome", ">attempts", ">time", ""], &rows)
+}
+
+/// The board says it is done, and that is all there is.
+fn taken_on_trust(b: &UpdateResult, report: &UpdateReport) -> bool {
+    let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
+    report.unverifiable.is_some() && done && b.failure.is_none()
+}
+
+/// In words what could not be verified, why, and how it can be.
+fn unverified(report: &UpdateReport, profile: &Profile) -> String {
+    let Some(why) = report.unverifiable else { return String::new() };
+    let line = |b: &UpdateResult| {
+        let shown = |info: Option<BoardInfo>| match info {
+            Some(i) if i.has_application() => format!("0x{:04X}, {}", i.program_id, date(profile, i.date)),
+            Some(_) => "no application".into(),
+            None => "?".into(),
+        };
+        let same = match changed(b) {
+            Some(false) => ": the same program, or nothing was written",
+            _ => "",
+        };
+        let (before, after) = (shown(b.before), shown(b.after));
+        format!("board {}: written, NOT verified; PC_INFO before: {before}; now: {after}{same}\n", b.board)
+    };
+    let lines: String = report.boards.iter().filter(|b| taken_on_trust(b, report)).map(line).collect();
+    if lines.is_empty() { lines } else { format!("{lines}{why};\n{}\n", why.hint()) }
+}
+
+/// Whether PC_INFO shows another program than before.
+fn changed(b: &UpdateResult) -> Option<bool> {
+    let program = |info: BoardInfo| (info.program_id, info.date);
+    Some(program(b.before?) != program(b.after?))
+}
+
+fn memory(image: &PlannedImage) -> Option<&'static str> {
+    image.memory.map(|memory| match memory {
+        Memory::Program => "program",
+        Memory::Data => "data",
+        Memory::Ram => "ram",
+    })
+}
+
+fn image_value(image: &PlannedImage, name: &std::path::Path) -> Value {
+    let (first, last) = image.cycles;
+    json!({
+        "file": name.display().to_string(),
+        "cycles": (first..=last).collect::<Vec<u32>>(),
+        "memory": memory(image),
+        "address_words": image.address_words,
+        "bytes": image.bytes,
+        "program_id": image.program_id,
+    })
+}
+
+fn image_line(image: &PlannedImage, name: &std::path::Path) -> String {
+    let place = match (memory(image), image.address_words) {
+        (Some(memory), Some(address)) => format!(" for {memory} memory at word 0x{address:X}"),
+        (Some(memory), None) => format!(" for {memory} memory"),
+        (None, _) => String::new(),
+    };
+    let id = image.program_id.map_or_else(String::new, |id| format!(", Program ID 0x{id:04X}"));
+    let cycles = match image.cycles {
+        (first, last) if first == last => format!("cycle {first}"),
+        _ => "both cycles".into(),
+    };
+    format!("{}: {} bytes{place}{id}, {cycles}\n", name.display(), image.bytes)
+}
+
+fn result(b: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value {
+    let shown = |info: Option<BoardInfo>| {
+        info.map(|i| {
+            let application = i.has_application();
+            json!({
+                "program_id": application.then_some(i.program_id),
+                "flash_date": application.then(|| date(profile, i.date)),
+            })
+        })
+    };
+    json!({
+        "board": b.board,
+        "flash_number": b.flash_number,
+        "outcome": b.outcome.name(),
+        "verified": b.outcome.is_done() && !taken_on_trust(b, report),
+        "before": shown(b.before),
+        "after": shown(b.after),
+        "changed": changed(b),
+        "attempts": b.attempts,
+        "time_s": b.time_us as f64 * 1e-6,
+        "error": b.failure.as_ref().map(|f| json!({
+            "code": f.code(), "message": f.to_string(), "hint": f.hint(), "exit": f.exit_code(),
+        })),
+    })
+}

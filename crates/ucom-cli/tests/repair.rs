@@ -1,0 +1,62 @@
+//! `ucom repair` against `ucom sim`: one board gets its number back, the others keep theirs.
+#![cfg(unix)]
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::Sim;
+
+/// A chain of three, and the second board has lost its number.
+fn rebooted() -> Sim {
+    let mut sim = Sim::start(&["--boards", "3"]);
+    sim.ucom(&["init"]).ends(0);
+    sim.fault("power-loss board=2 for_s=0.2");
+    let end = Instant::now() + Duration::from_secs(20);
+    loop {
+        let there = sim.ucom(&["--json", "scan"]).ends(0).json();
+        let (boards, reports) =
+            (there["boards"].as_array().unwrap().len(), there["reports"].as_array().unwrap().len());
+        if (boards, reports) == (2, 3) {
+            return sim;
+        }
+        assert!(Instant::now() < end, "{there}");
+    }
+}
+
+/// 5.4: pin off three times, number, identity, pin on and read back; the flash number comes from the inventory.
+#[test]
+fn d21_a_board_gets_its_number_back() {
+    let sim = rebooted();
+    let mut peer = sim.peer();
+    let said = sim.ucom(&["--json", "repair", "2"]).ends(0).json();
+    assert_eq!((&said["repaired"], &said["board"]["number"]), (&true.into(), &2.into()), "{said}");
+    let sent: Vec<String> =
+        peer.all(100).into_iter().filter(|f| ["1C2#", "282#"].iter().any(|s| f.starts_with(s))).collect();
+    assert_eq!(sent, ["1C2#0200", "1C2#0200", "1C2#0200", "282#", "1C2#0202"]);
+    let all = sim.ucom(&["--json", "scan"]).ends(0).json();
+    assert_eq!(all["boards"].as_array().unwrap().len(), 3, "{all}");
+    // A board that is well stays so, and so do its neighbours.
+    let said = sim.ucom(&["repair", "2"]).ends(0);
+    assert!(said.out.contains("board 2 has its number"), "{}", said.out);
+    assert_eq!(sim.ucom(&["--json", "scan"]).ends(0).json()["boards"], all["boards"]);
+}
+
+/// The exit codes: 4 another board stands there, 3 no answer, 2 nobody knows which board is meant.
+#[test]
+fn repairs_that_are_refused() {
+    let sim = rebooted();
+    let said = sim.ucom(&["--json", "repair", "1", "--flash-id", "0x77"]).ends(4).json();
+    assert_eq!(said["error"]["code"], "wrong-board", "{said}");
+    // The board that would take the number is not the one that is meant: it does not keep it.
+    let said = sim.ucom(&["--json", "repair", "2", "--flash-id", "0x77"]).ends(4).json();
+    assert_eq!(said["error"]["code"], "wrong-board", "{said}");
+    assert_eq!(sim.ucom(&["--json", "scan"]).ends(0).json()["boards"].as_array().unwrap().len(), 2);
+    let said = sim.ucom(&["repair", "9"]).ends(2);
+    assert!(said.err.contains("--flash-id"), "{}", said.err);
+    sim.ucom(&["repair", "2", "--inventory", "/nowhere.toml"]).ends(2);
+    sim.ucom(&["repair", "2"]).ends(0);
+    // All have their numbers: nobody takes this one.
+    let said = sim.ucom(&["--json", "repair", "9", "--flash-id", "0x77"]).ends(3).json();
+    assert_eq!(said["error"]["code"], "no-answer", "{said}");
+}

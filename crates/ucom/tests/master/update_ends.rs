@@ -175,7 +175,7 @@ fn one_damaged_answer_is_no_swapped_board() {
         let info = |(i, (.., f)): (usize, &(u64, From, Frame))| {
             (f.to_string().starts_with("141#21") && i > before && i < reset).then_some(i)
         };
-        bench.log.iter().enumerate().filter_map(info).last().unwrap()
+        bench.log.iter().enumerate().filter_map(info).next_back().unwrap()
     };
     bench.fault = Some((asked, crate::bench::Fault::Corrupted(1)));
     let report = update(&mut bench, options(&[1], 128));

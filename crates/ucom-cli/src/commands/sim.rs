@@ -140,6 +140,9 @@ impl<'a> Server<'a> {
             let due_us = self.due_us().saturating_sub(self.now_us());
             let mut patience = Duration::from_micros(due_us).min(LOOK);
             while let Some(event) = self.gateway.next(patience) {
+                // What comes now is on the bus now, not when the clock was last looked at.
+                let now_us = self.now_us();
+                self.advance(now_us);
                 self.heard(event.client, event.event);
                 patience = Duration::ZERO;
             }

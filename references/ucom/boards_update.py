@@ -5,7 +5,7 @@ import time
 import wire
 from boards_bench import five, give_numbers, start, status
 from peer import Peer
-from rows import Bench
+from rows import BENCH, Bench
 
 DATE = 0x3AC1
 # DSP_READY, DSP_PROGFINISHED and DSP_ERROR of boards 1 to 5.
@@ -78,6 +78,11 @@ def mistake(bench: Bench, peer: Peer, name: str, image: bytes) -> bool:
             peer.send("2C1#00000000000000")
         case "a pause in a block":
             give(peer, 1, bytes(first)[:8 * bench.random.randint(1, 7)])
+            began = time.time()
+            bench.same("D-T18", f"{name}:", peer.wait(*VERDICTS), "081#0A")
+            late = bench.jitter.worst(began, peer.stamp)
+            bench.within("D-T18", "error 10", peer.stamp - began, 0.2 / BENCH - late, 0.3 + late)
+            return True
         case "cycle 2 first":
             give(peer, 1, wire.header(order, 2, image, DATE))
         case "address range":

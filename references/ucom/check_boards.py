@@ -186,15 +186,18 @@ def autostart(bench: Bench) -> None:
         peer.ask("000#", 0.6)
         began = peer.send("281#")
         bench.same("D-T16", "acknowledgement", peer.wait("0C1"), "0C1#01")
+        heard = peer.all(0.25)
         pause = peer.send("041#") - began
-        heard = peer.all(1.0)
+        heard += peer.all(1.0)
         if pause < 0.4:
             bench.expect("501#" not in heard and status(peer, 1) == "5D", "D-T16", "the exloader keeps it", heard)
         bench.ok("D-T16", f"PC_XRESET after {pause * 1e3:.0f} ms")
         peer.ask("1C1#0400", 0.05)
         peer.ask("000#", 0.6)
-        peer.send("281#")
+        began = peer.send("281#")
         bench.same("D-25", "without PC_XRESET it starts by itself:", peer.wait("501#", seconds=5.0), "501#")
+        started, late = peer.stamp - began, bench.jitter.worst(began, peer.stamp)
+        bench.within("D-25", "the application", started, 0.5 / rows.BENCH - late, 0.5 * rows.BENCH + 2.0 + late)
         peer.ask("1C1#4000", 0.05)
 
 

@@ -5,12 +5,13 @@ boards (`ucom sim --boards 0`) connects the two. Updates, running boards and pro
 """
 
 import json
+import time
 
 import cantools
 
 import rows
 import wire
-from pc_board import MCARUN
+from pc_board import MCARUN, OPINIT
 from pc_play import boards, told
 from rows import Bench
 
@@ -74,6 +75,28 @@ def acknowledgements(bench: Bench) -> None:
     bench.ok("P-4")
 
 
+def repair(bench: Bench) -> None:
+    """5.4: the pin of board 2 goes down three times before PC_INIT(2); another board's number is never given."""
+    flash = bench.flash_ids(3)
+    for deaf_master in (False, True):
+        with bench.bus() as chain, boards(bench, chain, flash) as played:
+            told(bench, "repair", chain.start("init", "--renew"), 0)
+            del played.heard[:]
+            played.later(0.0, played.crash, played.boards[2 if deaf_master else 1])
+            # Board 2 is alive, but nobody hears it, and board 3 has lost its number: it must not become number 2.
+            played.boards[1].mute = deaf_master
+            time.sleep(0.3)
+            said = told(bench, "repair", chain.start("repair", "2"), (1, 3, 4, 5) if deaf_master else 0)
+            frames = played.frames("1C2", "282")
+            bench.same("repair", "first frames", frames[:4], ["1C2#0200"] * 3 + ["282#"])
+            numbers = [board.number for board in played.boards]
+            bench.same("repair", "numbers", numbers, [1, 2, None] if deaf_master else [1, 2, 3])
+            if not deaf_master:
+                bench.same("repair", "the pin of board 2", played.boards[1].status & OPINIT, OPINIT)
+                bench.same("repair", "flash number", said["board"]["flash_number"], flash[1])
+    bench.ok("repair")
+
+
 def dbc(bench: Bench) -> None:
     """P-21: cantools reads the exported file, and recorded frames, as the tool does."""
     with bench.chain("--boards", "1") as chain, chain.peer() as peer:
@@ -106,4 +129,4 @@ def dbc(bench: Bench) -> None:
 
 
 if __name__ == "__main__":
-    rows.main([init, acknowledgements, scan, dbc])
+    rows.main([init, acknowledgements, repair, scan, dbc])

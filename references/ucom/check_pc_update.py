@@ -187,6 +187,32 @@ def killed(bench: Bench) -> None:
             bench.ok("P-13", f"killed in cycle {cycle}, after {heard} frames")
 
 
+def group(bench: Bench) -> None:
+    """Boards 1 and 3 at once by broadcast, DSP_READY whenever each likes; board 2 hears it all and is silent."""
+    image = bench.image()
+    plans = {"": {}, "board 3 complains once": {(1, bench.random.randint(1, blocks(image) - 1)): 1}}
+    for name, once in plans.items():
+        with bench.bus() as chain, boards(
+            bench, chain, bench.flash_ids(3), late_by=lambda: bench.random.uniform(0, 0.03)
+        ) as played:
+            told(bench, "group", chain.start("init", "--renew"), 0)
+            played.boards[2].once = dict(once)
+            path = chain.write("image.bin", image)
+            said = told(bench, "group", chain.start("update", "1,3", path, "--date", "2009-06-01", "--group"), 0)
+            results = [(b["board"], b["outcome"], b["attempts"]) for b in said["boards"]]
+            bench.same("group", "results", results, [(1, "verified", 1), (3, "verified", 2 if once else 1)])
+            new = (wire.crc16(image), DATE)
+            programs = [board.program for board in played.boards]
+            bench.same("group", "programs", programs, [new, (0x1234, 0x386E), new])
+            bench.same("group", "too early, or wrong", (played.early, played.complaints), ([], []))
+            bench.same("group", "frames to all", len(played.frames("2C0")), 2 * 8 * blocks(image))
+            alone = len(played.frames("2C1", "2C2")), len(played.frames("2C3"))
+            bench.same("group", "frames to one", alone, (0, 2 * 8 * blocks(image) if once else 0))
+            silent = [frame for _, frame in played.said if frame.startswith(("082", "102", "182"))]
+            bench.same("group", "of board 2", silent, [])
+        bench.ok("group", name)
+
+
 def life_signs(bench: Bench) -> None:
     """P-14: every 500 ms, while an update goes on for some seconds."""
     image = bench.image(1000, 1200)
@@ -212,5 +238,5 @@ def punctual(bench: Bench, what: str, signs: list[float], first: float, last: fl
 
 
 if __name__ == "__main__":
-    rows.main([late_ready, errors, end_lost, cancelled, killed, life_signs, golden, other_board, one_by_one,
+    rows.main([late_ready, errors, end_lost, cancelled, killed, group, life_signs, golden, other_board, one_by_one,
                old_program])

@@ -38,6 +38,8 @@ class Board:
         self.status = EXLRUN
         self.program = (0x1234, 0x386E)
         self.silent = False
+        self.mute = False  # it hears, and nobody hears it
+        self.once: dict[tuple[int, int], int] = {}  # as `Quirks.errors`, each one time
         self.dropping, self.busy = False, False
         self.block, self.blocks = b"", []
         self.serial = 0

@@ -88,6 +88,8 @@ class Boards(threading.Thread, Programming):
             heapq.heappush(self.waits, (time.monotonic() + seconds, next(self.count), lambda: act(*arguments)))
 
     def say(self, function: int, sequence: int, data: bytes = b"") -> None:
+        if any(board.mute and board.number == sequence for board in self.boards):
+            return
         frame = wire.frame(function, sequence, data)
         self.said.append((self.peer.send(frame), frame))
 

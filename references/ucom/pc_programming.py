@@ -70,8 +70,9 @@ class Programming:
         if board.serial != serial:
             return
         board.busy = False
-        if place in self.quirks.errors:
-            self.fail(board, self.quirks.errors[place])
+        code = board.once.pop(place, self.quirks.errors.get(place))
+        if code is not None:
+            self.fail(board, code)
         elif last:
             self.written(board, place[1] + 1)
         else:

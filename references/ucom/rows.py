@@ -16,6 +16,9 @@ from peer import Chain
 
 # Times of the protocol are held to within a fifth.
 BENCH = 1.2
+# A machine that wakes its programs so late, s, tells nothing about answers within 100 ms.
+TOO_LATE = 0.05
+TRIES = 3
 
 
 class Disagreement(Exception):
@@ -86,20 +89,29 @@ class Bench:
 
 
 def run_row(program: str, order: str, seed: int, function) -> tuple[bool, list[str], float]:
-    """One row; whether it held, and what is to be said."""
-    start = time.monotonic()
-    bench = Bench(program, order, seed, function.__name__)
-    try:
-        function(bench)
-        held = True
-    except Disagreement as e:
-        held = False
-        bench.lines.append(str(e))
-    except Exception:
-        held = False
-        bench.lines.append(f"{function.__name__} {order}-endian FAIL: {traceback.format_exc()}")
-    bench.jitter.ending = True
-    return held, bench.lines, time.monotonic() - start
+    """One row; whether it held, and what is to be said.
+
+    Answers within 100 ms need a machine that lets its programs run within 100 ms: a row that failed while it did not is
+    run again, three times in all.
+    """
+    start, lines = time.monotonic(), []
+    for tries in range(TRIES):
+        began = time.time()
+        bench = Bench(program, order, seed, function.__name__)
+        failure = None
+        try:
+            function(bench)
+        except Disagreement as e:
+            failure = str(e)
+        except Exception:
+            failure = f"{function.__name__} {order}-endian FAIL: {traceback.format_exc()}"
+        bench.jitter.ending = True
+        late = bench.jitter.worst(began, time.time())
+        lines += bench.lines if failure is None else [*bench.lines, failure]
+        if failure is None or late < TOO_LATE or tries == TRIES - 1:
+            break
+        lines.append(f"this machine was {late * 1e3:.0f} ms late itself: once more")
+    return failure is None, lines, time.monotonic() - start
 
 
 def main(rows: list, workers: int = 12) -> None:

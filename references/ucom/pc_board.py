@@ -44,11 +44,12 @@ class Board:
         self.block, self.blocks = b"", []
         self.serial = 0
         self.flags = bytes(4)
+        self.text = f"python {flash:x}"
 
     def names(self) -> list[str]:
         """Its description, then the names of inputs, outputs and parameters."""
         kinds = zip(("ci", "so", "par"), self.shape)
-        return [f"python {self.flash:x}"] + [f"{kind}{i} of {self.flash:x}" for kind, n in kinds for i in range(n)]
+        return [self.text] + [f"{kind}{i} of {self.flash:x}" for kind, n in kinds for i in range(n)]
 
     def initial(self) -> list[int]:
         return [(self.flash + i) & 0xFF for i in range(self.shape[0])]

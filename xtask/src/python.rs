@@ -56,7 +56,7 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-const CHECKS: [Check; 13] = [
+const CHECKS: [Check; 14] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "mujoco/check_free_fall.py", program: Some("examples/free_fall"), demo_files: &[] },
@@ -70,6 +70,7 @@ const CHECKS: [Check; 13] = [
     },
     Check { script: "host/check_serial_host.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "ucom/check_boards.py", program: Some("ucom"), demo_files: &[] },
+    Check { script: "ucom/check_codec.py", program: Some("ucom"), demo_files: &[] },
     Check { script: "ucom/check_pc.py", program: Some("ucom"), demo_files: &[] },
     Check { script: "ucom/check_pc_update.py", program: Some("ucom"), demo_files: &[] },
     Check { script: "ucom/check_pc_running.py", program: Some("ucom"), demo_files: &[] },

@@ -24,14 +24,19 @@ impl Output {
         self.json
     }
 
-    /// Prints a result: `value` as one line of JSON, or the text.
-    pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
-        let line = if self.json {
+    /// A result as it is printed: `value` as one line of JSON, or the text.
+    pub fn words(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> String {
+        if self.json {
             serde_json::to_string(value)
                 .unwrap_or_else(|e| json!({ "error": { "message": e.to_string() } }).to_string())
         } else {
             text()
-        };
+        }
+    }
+
+    /// Prints a result: `value` as one line of JSON, or the text.
+    pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
+        let line = self.words(value, text);
         let mut stdout = std::io::stdout().lock();
         // A reader that has gone (`… | head`) is no error.
         let _ = writeln!(stdout, "{}", line.trim_end());

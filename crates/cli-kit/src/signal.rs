@@ -2,6 +2,12 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// How often the thread of [`Stop::listen_with`] looks.
+const LOOK: Duration = Duration::from_millis(10);
+/// Signals so close together are one.
+const ONE_PRESS: Duration = Duration::from_millis(100);
 
 /// Set by SIGINT or SIGTERM.
 #[derive(Clone, Debug)]
@@ -17,6 +23,32 @@ impl Stop {
             signal_hook::flag::register(signal, Arc::clone(&flag))?;
         }
         Ok(Self(flag))
+    }
+
+    /// From now on the first SIGINT or SIGTERM sets the flag. The second one ends the process, whatever the rest of it does,
+    /// with the exit code that `last_words` returns; it runs in a thread of its own and may print.
+    ///
+    /// Signals that follow each other within 0.1 s are one: a terminal and a wrapper may both send theirs.
+    pub fn listen_with(last_words: impl Fn() -> u8 + Send + 'static) -> std::io::Result<Self> {
+        let came = Arc::new(AtomicBool::new(false));
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&came))?;
+        }
+        let asked = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&asked);
+        std::thread::Builder::new().name("signals".into()).spawn(move || {
+            loop {
+                std::thread::sleep(LOOK);
+                if came.swap(false, Ordering::Relaxed) {
+                    if flag.swap(true, Ordering::Relaxed) {
+                        std::process::exit(last_words().into());
+                    }
+                    std::thread::sleep(ONE_PRESS);
+                    came.store(false, Ordering::Relaxed);
+                }
+            }
+        })?;
+        Ok(Self(asked))
     }
 
     /// It was asked to end.

@@ -1,25 +1,29 @@
-//! Runs the PC side over a bus in wall-clock time: one loop, no thread.
+//! Runs the PC side over a bus in wall-clock time: one loop; what it prints waits for no reader.
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use cli_kit::{Output, Stop};
 use ucom::Profile;
-use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request, StopLevel};
+use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request, StopLevel, Supervision};
 
 use crate::args::{Boards, LinkArgs};
 use crate::failure::{Failure, NO_LINK};
-use crate::link::{Link, from_wire};
-
-/// Longest wait: so often Ctrl-C is looked at.
-const LOOK: Duration = Duration::from_millis(50);
+use crate::lines::Lines;
+use crate::link::Link;
+use crate::pump::{LOOK, Pump};
+use crate::signal::Undone;
 
 /// The PC side on an open bus.
 pub struct Driver {
     /// Procedures and boards.
     pub master: Master,
     link: Link,
+    pump: Pump,
     stop: Stop,
-    out: Output,
+    undone: Undone,
+    notes: Lines,
+    lost: Cell<u32>,
 }
 
 impl Driver {
@@ -29,9 +33,11 @@ impl Driver {
     }
 
     /// The same with another profile than the command line's.
-    pub fn with_profile(args: &LinkArgs, profile: Profile, out: &Output) -> Result<Self, Failure> {
-        let stop = Stop::listen()?;
-        Ok(Self { master: Master::new(profile), link: args.open()?, stop, out: *out })
+    pub fn with_profile(args: &LinkArgs, profile: Profile, _: &Output) -> Result<Self, Failure> {
+        let undone = Undone::default();
+        let (stop, notes) = (undone.listen()?, Lines::stderr()?);
+        let (master, link, pump) = (Master::new(profile), args.open()?, Pump::default());
+        Ok(Self { master, link, pump, stop, undone, notes, lost: Cell::new(0) })
     }
 
     /// µs since the bus was opened.
@@ -49,24 +55,9 @@ impl Driver {
         self.stop.asked()
     }
 
-    /// Sends what is due and hands over what comes, waiting for it no longer than `patience`.
+    /// Hands over what has come and sends what is due, waiting for either no longer than `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), Failure> {
-        self.send_due()?;
-        let due = self.master.next_deadline().map_or(u64::MAX, |at| at.saturating_sub(self.link.now_us()));
-        let mut wait = patience.min(LOOK).min(Duration::from_micros(due));
-        // All that has come is handed over before anything is sent or given up.
-        while let Some(frame) = self.link.receive(wait)? {
-            self.master.handle(self.link.now_us(), from_wire(&frame));
-            wait = Duration::ZERO;
-        }
-        self.send_due()
-    }
-
-    fn send_due(&mut self) -> Result<(), Failure> {
-        while let Some(frame) = self.master.poll(self.link.now_us()) {
-            self.link.send(&frame)?;
-        }
-        Ok(())
+        self.pump.turn(&mut self.master, &mut self.link, patience)
     }
 
     /// Runs a procedure to its end. Ctrl-C cancels it: what it has to undo on the boards it still does.
@@ -76,71 +67,97 @@ impl Driver {
 
     /// The same; every event goes to `see`.
     pub fn run_with(&mut self, request: Request, see: &mut dyn FnMut(&Event)) -> Result<Outcome, Failure> {
-        let id = self.master.start(self.link.now_us(), request)?;
-        let mut cancelled = false;
+        self.drive(request, true, see)
+    }
+
+    /// Stops a board, also after Ctrl-C: what was started is not left alone.
+    pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), Failure> {
+        let request = Request::Stop { board, level, force: true };
+        self.drive(request, false, &mut |_| {}).map(drop)
+    }
+
+    fn drive(
+        &mut self,
+        request: Request,
+        can_be_cancelled: bool,
+        see: &mut dyn FnMut(&Event),
+    ) -> Result<Outcome, Failure> {
+        let runs_on = matches!(request, Request::Run(_));
+        let before = self.undone.begin(&request);
+        let result = match self.master.start(self.link.now_us(), request) {
+            Ok(id) => self.finish(id, can_be_cancelled, see),
+            Err(error) => Err(error.into()),
+        };
+        // Boards that run are undone until somebody has stopped them.
+        if result.is_err() || !runs_on {
+            self.undone.set(before);
+        }
+        result
+    }
+
+    fn finish(
+        &mut self,
+        id: ProcedureId,
+        can_be_cancelled: bool,
+        see: &mut dyn FnMut(&Event),
+    ) -> Result<Outcome, Failure> {
+        let mut waits_for_cancel = can_be_cancelled;
         loop {
-            if let Err(failure) = self.turn(LOOK) {
-                return self.abandon(id, failure, see);
+            let broken = self.turn(LOOK).err();
+            if let Some(failure) = &broken {
+                // Its end follows at once, with what is known.
+                self.master.abandon(id, &failure.message);
             }
             while let Some(event) = self.master.take_event() {
                 see(&event);
                 match event {
                     Event::Done { id: done, result } if done == id => {
-                        let sent = self.send_due();
-                        return match result {
-                            // What became of boards is told also when the bus fails at the very end.
-                            Ok(report @ Outcome::Update(_)) => Ok(report),
-                            result => sent.and(result.map_err(Failure::from)),
+                        return match (result, broken) {
+                            (Err(Error::Bus { .. }), Some(failure)) => Err(failure),
+                            // What became of boards is told also when the bus fails.
+                            (result, Some(_)) | (result @ Ok(Outcome::Update(_)), None) => Ok(result?),
+                            (result, None) => {
+                                let sent = self.pump.flush(&mut self.master, &mut self.link);
+                                sent.and(result.map_err(Failure::from))
+                            }
                         };
                     }
                     other => self.tell(&other, Some(id)),
                 }
             }
-            if self.stop.asked() && !cancelled {
-                cancelled = true;
-                self.out.note("cancelling; a second Ctrl-C ends at once");
+            if let Some(failure) = broken {
+                return Err(failure);
+            }
+            if waits_for_cancel && self.stop.asked() {
+                waits_for_cancel = false;
+                self.note("cancelling; a second Ctrl-C ends at once".into());
                 self.master.cancel(id);
             }
         }
     }
 
-    /// The bus is gone: an update still tells what it knows of each board, anything else ends with the failure.
-    fn abandon(
-        &mut self,
-        id: ProcedureId,
-        failure: Failure,
-        see: &mut dyn FnMut(&Event),
-    ) -> Result<Outcome, Failure> {
-        self.master.abandon(id, &failure.message);
-        while let Some(event) = self.master.take_event() {
-            see(&event);
-            match event {
-                Event::Done { id: done, result: Ok(outcome) } if done == id => return Ok(outcome),
-                other => self.tell(&other, Some(id)),
-            }
-        }
-        Err(failure)
+    /// What was started has been stopped.
+    pub fn nothing_is_left(&self) {
+        self.undone.set(None);
     }
 
-    /// Stops a board, also after Ctrl-C: what was started is not left alone.
-    pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), Failure> {
-        let id = self.master.start(self.link.now_us(), Request::Stop { board, level, force: true })?;
-        loop {
-            self.turn(LOOK)?;
-            while let Some(event) = self.master.take_event() {
-                if let Event::Done { id: done, result } = event
-                    && done == id
-                {
-                    return result.map(|_| ()).map_err(Failure::from);
-                }
-            }
-        }
+    /// A line on stderr.
+    pub fn note(&self, text: String) {
+        self.notes.push(text);
+    }
+
+    /// How often a board was lost, by what was told.
+    pub fn lost(&self) -> u32 {
+        self.lost.get()
     }
 
     /// Words for what happens beside a procedure.
     pub fn tell(&self, event: &Event, during: Option<ProcedureId>) {
+        if let Event::Supervision { change: Supervision::Lost, .. } = event {
+            self.lost.set(self.lost.get() + 1);
+        }
         if let Some(text) = words(event, during) {
-            self.out.note(text);
+            self.note(text);
         }
     }
 
@@ -173,7 +190,6 @@ impl Driver {
 
 /// Words for an event; `None` where they would only repeat what a procedure says itself.
 pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
-    use ucom::master::Supervision;
     Some(match event {
         Event::Note { text, .. } => text.clone(),
         Event::BoardError { board, code, during: at } if *at != during || during.is_none() => {

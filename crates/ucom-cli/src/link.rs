@@ -8,11 +8,14 @@ use ucom::{Foreign, Format, Frame, Profile};
 
 use crate::args::LinkArgs;
 use crate::failure::{FAULT, Failure, NO_LINK};
+use crate::pump::Line;
 
 /// Waits that are no longer than this are kept exactly.
 const COARSE: Duration = Duration::from_millis(12);
 /// How often the bus is looked at in such a wait.
 const LOOK: Duration = Duration::from_micros(100);
+/// Sleeping takes up to so much longer than it was asked to: the end of such a wait is not slept.
+const OVERSLEPT: Duration = Duration::from_micros(150);
 
 impl LinkArgs {
     /// The profile; without a file the defaults.
@@ -58,11 +61,6 @@ impl Link {
         self.start.elapsed().as_micros() as u64
     }
 
-    /// Puts a frame on the bus.
-    pub fn send(&mut self, frame: &Frame) -> Result<(), Failure> {
-        self.send_wire(&to_wire(frame)?)
-    }
-
     /// Puts a frame of any protocol on the bus.
     pub fn send_wire(&mut self, frame: &CanFrame) -> Result<(), Failure> {
         self.bus.send(frame).map_err(lost)
@@ -83,13 +81,30 @@ impl Link {
             if left.is_zero() {
                 return Ok(None);
             }
-            std::thread::sleep(left.min(LOOK));
+            match left.checked_sub(OVERSLEPT) {
+                Some(left) => std::thread::sleep(left.min(LOOK)),
+                None => std::thread::yield_now(),
+            }
         }
     }
 
     /// How the adapter gets on with the bus.
     pub fn state(&mut self) -> ControllerState {
         self.bus.state()
+    }
+}
+
+impl Line for Link {
+    fn now_us(&self) -> u64 {
+        Link::now_us(self)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), Failure> {
+        self.send_wire(&to_wire(frame)?)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, Failure> {
+        Ok(Link::receive(self, timeout)?.map(|frame| from_wire(&frame)))
     }
 }
 

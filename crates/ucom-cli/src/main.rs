@@ -6,8 +6,11 @@ mod cache;
 mod commands;
 mod driver;
 mod failure;
+mod lines;
 mod link;
+mod pump;
 mod shape;
+mod signal;
 mod values;
 mod words;
 mod written;
@@ -27,6 +30,8 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if !failure.printed {
+                // Nobody reads what stands in stdout already.
+                let out = if lines::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
             }
             ExitCode::from(failure.exit)

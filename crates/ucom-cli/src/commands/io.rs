@@ -186,15 +186,8 @@ fn move_for(
     let plan = RunBoard { board, ci, par: Vec::new() };
     let options = RunOptions { boards: vec![plan], active: true, force };
     driver.master.watch(board, None, true);
-    if let Err(failure) = driver.run(Request::Run(options)) {
-        // It may have begun to move.
-        if failure.exit != crate::failure::REFUSED
-            && let Err(e) = driver.stop_board(board, StopLevel::Loop)
-        {
-            out.note(format!("board {board}: {}", e.message));
-        }
-        return Err(failure);
-    }
+    // What it began it has taken back when it fails.
+    driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
     let mut last = None;
     let end = Instant::now() + duration;
     while Instant::now() < end && !driver.stop_asked() {
@@ -208,6 +201,7 @@ fn move_for(
     }
     // Not as a procedure that Ctrl-C cancels: it is what Ctrl-C asks for.
     driver.stop_board(board, StopLevel::Loop)?;
+    driver.nothing_is_left();
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
         return Err(Failure::new(

@@ -13,6 +13,7 @@ use super::monitor_view as view;
 use crate::args::{LinkArgs, MonitorArgs};
 use crate::driver::{Driver, words};
 use crate::failure::Failure;
+use crate::lines::Lines;
 use crate::shape::{bits, info_value, state};
 
 /// Seconds of bus load that the curve shows.
@@ -106,14 +107,15 @@ fn lines(driver: &mut Driver, watch: &mut Watch, mut left: u64, out: &Output) ->
     let mut shown = Instant::now();
     // The first view waits for the scan.
     let first = Instant::now();
-    while left > 0 && !driver.stop_asked() {
+    let stdout = Lines::stdout()?;
+    while left > 0 && !driver.stop_asked() && !stdout.gone() {
         watch.turn(driver)?;
         if shown.elapsed() < Duration::from_secs(1) || first.elapsed() < Duration::from_millis(2000) {
             continue;
         }
         shown = Instant::now();
         left -= 1;
-        out.result(&value(driver, watch), || text(driver));
+        stdout.push(out.words(&value(driver, watch), || text(driver)));
         watch.log.clear();
     }
     Ok(())

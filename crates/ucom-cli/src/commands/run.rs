@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use cli_kit::Output;
 use serde_json::{Map, Value, json};
-use ucom::files::Edge;
+use ucom::files::{Edge, EdgeTable};
 use ucom::master::io::{Kind, Snapshot, short};
 use ucom::master::{
-    AdminChange, Event, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel, Supervision,
+    AdminChange, Event, Outcome, Request, RunBoard, RunOptions, RunReport, Setting, StopLevel,
 };
 
 use super::params::Applied;
@@ -18,6 +18,7 @@ use crate::args::{Assignment, LinkArgs, OnLost, RunArgs, SoArgs};
 use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
 use crate::failure::{FAULT, Failure, NO_LINK};
+use crate::lines::Lines;
 use crate::values::{Prepared, Word, for_board, only, words};
 use crate::written::History;
 
@@ -55,50 +56,74 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         file.identities(&mut driver)?;
     }
     let edges = link.edges()?;
-    let mut prepared = Prepared::default();
-    for board in &boards {
-        prepared.add(&mut driver, &args.cache, &edges, *board, args.force.force)?;
-    }
-    let plans = plans(args, &prepared, file.as_ref()).inspect_err(|_| prepared.undo(&mut driver))?;
-    let options = RunOptions { boards: plans.clone(), active: args.active, force: args.force.force };
-    let report = match driver.run(Request::Run(options)) {
-        Ok(Outcome::Running(report)) => report,
-        Ok(other) => return Err(unexpected(&other)),
+    let (mut prepared, mut stdout) = (Prepared::default(), Lines::stdout()?);
+    let report = match start(&mut driver, args, &boards, &edges, file.as_ref(), &mut prepared) {
+        Ok(report) => report,
         Err(failure) => {
-            // What has been started is not left running without a PC.
-            match failure.exit {
-                crate::failure::REFUSED => prepared.undo(&mut driver),
-                _ => halt(&mut driver, &boards, out),
-            }
+            // What the procedure began it has taken back itself.
+            prepared.undo(&mut driver);
             return Err(failure);
         }
     };
-    remember(args, &prepared, &plans);
     let running = json!({
         "event": "running",
         "boards": report.boards.iter().map(|(n, a)| json!({ "board": n, "flags": a.to_string() })).collect::<Vec<_>>(),
         "load_percent": report.load.percent(),
     });
-    out.result(&running, || {
+    stdout.push_always(out.words(&running, || {
         let outputs = if args.active { "outputs active" } else { "outputs safe; `active on` enables them" };
         format!("{} boards run, {outputs}; {}\nCtrl-C stops them", report.boards.len(), report.load)
-    });
-    if args.debug {
-        for board in &boards {
-            let change = AdminChange { debug: Some(true), ..Default::default() };
-            if let Err(failure) = driver.run(Request::Admin { board: *board, change, force: true }) {
-                halt(&mut driver, &boards, out);
-                return Err(failure);
-            }
-        }
-    }
-    let lost = supervise(&mut driver, args, &prepared, out);
-    halt(&mut driver, &boards, out);
-    out.result(&json!({ "event": "stopped" }), || "stopped".into());
-    match lost? {
+    }));
+    let result = want_texts(&mut driver, args, &boards)
+        .and_then(|()| supervise(&mut driver, args, &prepared, &stdout, out));
+    halt(&mut driver, &boards);
+    stdout.push_always(out.words(&json!({ "event": "stopped" }), || "stopped".into()));
+    finish(&mut stdout, &driver);
+    result?;
+    match driver.lost() {
         0 => Ok(()),
         n => Err(Failure::new(FAULT, "lost", format!("{n} times a board was lost"))
             .hint("ucom doctor looks at bus and boards")),
+    }
+}
+
+/// Names, plans, and the start of all boards.
+fn start(
+    driver: &mut Driver,
+    args: &RunArgs,
+    boards: &[u8],
+    edges: &EdgeTable,
+    file: Option<&Applied>,
+    prepared: &mut Prepared,
+) -> Result<RunReport, Failure> {
+    for board in boards {
+        prepared.add(driver, &args.cache, edges, *board, args.force.force)?;
+    }
+    let plans = plans(args, prepared, file)?;
+    let options = RunOptions { boards: plans.clone(), active: args.active, force: args.force.force };
+    match driver.run(Request::Run(options))? {
+        Outcome::Running(report) => {
+            remember(args, prepared, &plans);
+            Ok(report)
+        }
+        other => Err(unexpected(&other)),
+    }
+}
+
+/// Texts of the boards, if they are wanted.
+fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), Failure> {
+    for board in boards.iter().filter(|_| args.debug) {
+        let change = AdminChange { debug: Some(true), ..Default::default() };
+        driver.run(Request::Admin { board: *board, change, force: true })?;
+    }
+    Ok(())
+}
+
+/// Waits for the reader of stdout as long as it reads.
+fn finish(stdout: &mut Lines, driver: &Driver) {
+    let unseen = stdout.finish();
+    if unseen > 0 && !stdout.gone() {
+        driver.note(format!("{unseen} lines were dropped: nobody read them in time"));
     }
 }
 
@@ -133,12 +158,17 @@ fn remember(args: &RunArgs, prepared: &Prepared, plans: &[RunBoard]) {
     }
 }
 
-/// Supervision until Ctrl-C, `stop`, or the end of the time. Returns how often a board was lost.
-fn supervise(driver: &mut Driver, args: &RunArgs, prepared: &Prepared, out: &Output) -> Result<u32, Failure> {
-    let lines = typed();
+/// Supervision until Ctrl-C, `stop`, or the end of the time.
+fn supervise(
+    driver: &mut Driver,
+    args: &RunArgs,
+    prepared: &Prepared,
+    stdout: &Lines,
+    out: &Output,
+) -> Result<(), Failure> {
+    let typed = typed();
     prepared.known.keys().for_each(|board| driver.master.watch(*board, None, true));
     let (start, mut said) = (Instant::now(), Instant::now());
-    let mut lost = 0;
     let mut last: BTreeMap<u8, Snapshot> = BTreeMap::new();
     loop {
         driver.turn(Duration::from_millis(20))?;
@@ -147,23 +177,19 @@ fn supervise(driver: &mut Driver, args: &RunArgs, prepared: &Prepared, out: &Out
                 Event::Snapshot { board, snapshot } => {
                     last.insert(board, snapshot);
                 }
-                Event::Supervision { board, change } => {
-                    lost += u32::from(change == Supervision::Lost);
-                    driver.tell(&Event::Supervision { board, change }, None);
-                }
                 other => driver.tell(&other, None),
             }
         }
-        while let Ok(line) = lines.try_recv() {
+        while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {
-                return Ok(lost);
+                return Ok(());
             }
             if let Err(e) = obey(driver, args, line.trim(), prepared) {
-                out.note(e.message);
+                driver.note(e.message);
             }
         }
         if driver.stop_asked() || args.duration.is_some_and(|d| start.elapsed() >= d) {
-            return Ok(lost);
+            return Ok(());
         }
         if said.elapsed() >= SAY && out.is_json() {
             said = Instant::now();
@@ -171,10 +197,8 @@ fn supervise(driver: &mut Driver, args: &RunArgs, prepared: &Prepared, out: &Out
                 let Some(known) = prepared.known.get(board) else { continue };
                 let so = named(&known.names.so, known.edges.all(Kind::So), &snapshot.words);
                 let time_s = snapshot.time_us as f64 * 1e-6;
-                out.result(
-                    &json!({ "event": "so", "board": board, "time_s": time_s, "so": so }),
-                    String::new,
-                );
+                let value = json!({ "event": "so", "board": board, "time_s": time_s, "so": so });
+                stdout.push(out.words(&value, String::new));
             }
         }
     }
@@ -242,15 +266,16 @@ fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) ->
 }
 
 /// Control loops and applications end; what fails is said, and the others are stopped all the same.
-fn halt(driver: &mut Driver, boards: &[u8], out: &Output) {
+fn halt(driver: &mut Driver, boards: &[u8]) {
     for level in [StopLevel::Loop, StopLevel::Application] {
         for board in boards.iter().rev() {
             if let Err(e) = driver.stop_board(*board, level) {
-                out.note(format!("board {board}: {}", e.message));
+                driver.note(format!("board {board}: {}", e.message));
             }
         }
     }
     driver.master.end_session();
+    driver.nothing_is_left();
 }
 
 /// Outputs of boards as they come; only listens once their names are known.
@@ -264,13 +289,14 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         driver.master.watch(board, Some(known.names.dimensions().so), true);
         all.insert(board, known);
     }
+    let mut stdout = Lines::stdout()?;
     if args.csv {
-        head(&all)?;
+        stdout.push_always(head(&all)?);
     }
     let mut left = args.count.unwrap_or(u64::MAX);
     let (start, mut heard) = (driver.now_us(), Instant::now());
     let mut patient = true;
-    while left > 0 && !driver.stop_asked() {
+    while left > 0 && !driver.stop_asked() && !stdout.gone() {
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
             match event {
@@ -279,7 +305,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;
                     heard = Instant::now();
-                    show(args, &all, board, &snapshot, start, out);
+                    stdout.push(row(args, &all, board, &snapshot, start, out));
                 }
                 other => driver.tell(&other, None),
             }
@@ -293,14 +319,16 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                 )
                 .hint("ucom run, in another terminal"));
             }
-            out.note("no board sends outputs: no control loop runs (ucom run, in another terminal)");
+            driver
+                .note("no board sends outputs: no control loop runs (ucom run, in another terminal)".into());
             patient = false;
         }
     }
+    finish(&mut stdout, &driver);
     Ok(())
 }
 
-fn head(all: &BTreeMap<u8, Known>) -> Result<(), Failure> {
+fn head(all: &BTreeMap<u8, Known>) -> Result<String, Failure> {
     let column = |(name, edge): (&String, &Edge)| match (edge.known, edge.unit.as_str()) {
         (true, unit) if !unit.is_empty() => quoted(&format!("{} [{unit}]", short(name))),
         _ => quoted(short(name)),
@@ -314,8 +342,7 @@ fn head(all: &BTreeMap<u8, Known>) -> Result<(), Failure> {
         return Err(Failure::usage("boards with different outputs do not fit into one table")
             .hint("one board at a time, or --json"));
     }
-    println!("time_s,board,{first}");
-    Ok(())
+    Ok(format!("time_s,board,{first}"))
 }
 
 /// A field of a CSV table (RFC 4180).
@@ -324,27 +351,27 @@ fn quoted(text: &str) -> String {
     if plain { text.into() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
-fn show(
+/// A snapshot as a line.
+fn row(
     args: &SoArgs,
     all: &BTreeMap<u8, Known>,
     board: u8,
     snapshot: &Snapshot,
     start_us: u64,
     out: &Output,
-) {
+) -> String {
     let time_s = snapshot.time_us.saturating_sub(start_us) as f64 * 1e-6;
-    let Some(known) = all.get(&board) else { return };
+    let Some(known) = all.get(&board) else { return String::new() };
     let (names, edges) = (&known.names.so, known.edges.all(Kind::So));
     if args.csv {
         let list: Vec<String> = snapshot.words.iter().zip(edges).map(|(w, e)| e.text(*w)).collect();
-        println!("{time_s:.6},{board},{}", list.join(","));
-        return;
+        return format!("{time_s:.6},{board},{}", list.join(","));
     }
     let value = json!({ "time_s": time_s, "board": board, "so": named(names, edges, &snapshot.words) });
-    out.result(&value, || {
+    out.words(&value, || {
         let pairs = names.iter().zip(edges).zip(&snapshot.words);
         let pairs: Vec<String> =
             pairs.map(|((n, e), w)| format!("{} {:>6}", short(n), e.text_with_unit(*w))).collect();
         format!("{time_s:9.3} s  board {board}  {}", pairs.join("  "))
-    });
+    })
 }

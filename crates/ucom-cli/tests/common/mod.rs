@@ -50,7 +50,8 @@ impl Sim {
         Self { child, url: url.to_owned(), dir: tempfile::tempdir().expect("a directory") }
     }
 
-    fn command(&self) -> Command {
+    /// `ucom` on its bus.
+    pub fn command(&self) -> Command {
         let mut command = command();
         command.env("UCOM_BUS", &self.url).env("UCOM_INVENTORY", self.path("inventory.toml"));
         command.env("UCOM_CACHE", self.path("cache"));
@@ -98,6 +99,11 @@ impl Sim {
         self.child.kill().expect("kill");
         self.child.wait().expect("it ends");
         std::mem::replace(&mut self.dir, tempfile::tempdir().expect("a directory"))
+    }
+
+    /// Sends a signal to the simulator.
+    pub fn signal(&self, name: &str) {
+        signal(&self.child, name);
     }
 
     /// Sends a signal and waits for the end: its exit code.

@@ -19,6 +19,7 @@ const MAX_HEARD: usize = 16_384;
 /// A frame of a board for a procedure.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Heard {
+    /// By [`Core::passed`].
     pub at: u64,
     pub from: u8,
     pub message: FromBoard,
@@ -103,6 +104,11 @@ pub(crate) struct Core {
     /// Time up to which waiting ends: that of the last `poll`. Up to then the caller has handed over all that came, which a
     /// late one has not up to `now`.
     pub fired: u64,
+    /// Time that has certainly passed between the frames that came: what was between the last one and the next `poll`. A
+    /// caller that hands over late what came at once adds nothing, so it makes no gap in a string.
+    pub passed: u64,
+    /// When the last frame was handed over.
+    handed_over: u64,
     /// Since when the bus has been listened to.
     pub since: Option<u64>,
     pub session: Session,
@@ -138,6 +144,8 @@ impl Core {
             times: Times::of(&profile),
             now: 0,
             fired: 0,
+            passed: 0,
+            handed_over: 0,
             since: None,
             session: Session::Quiet,
             foreign_master: None,
@@ -309,9 +317,15 @@ impl Core {
         self.urgent.is_empty() && self.normal.is_empty()
     }
 
+    /// A frame is handed over.
+    pub(crate) fn mark_time(&mut self) {
+        self.passed += self.fired.saturating_sub(self.handed_over);
+        self.handed_over = self.now;
+    }
+
     /// Gives a board's message to the procedures that want it.
     pub(crate) fn deliver(&mut self, from: u8, message: FromBoard) {
-        let at = self.now;
+        let at = self.passed;
         for inbox in self.inboxes.values_mut() {
             if inbox.filter.takes(from, message.function()) && inbox.heard.len() < MAX_HEARD {
                 inbox.heard.push_back(Heard { at, from, message });

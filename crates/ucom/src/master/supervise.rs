@@ -186,6 +186,7 @@ impl Core {
 
     /// A frame from the bus.
     pub(crate) fn received(&mut self, received: Result<Frame, Foreign>) {
+        self.mark_time();
         let frame = match received.and_then(|frame| frame.address().map(|address| (frame, address))) {
             Ok((frame, (function, number))) => {
                 self.statistics.received(self.now, &frame);
@@ -297,7 +298,7 @@ impl Core {
             FromBoard::Debug(payload) => {
                 let board = self.boards.of(from);
                 let assembler = board.debug.get_or_insert_with(|| Box::new(StringAssembler::new()));
-                let text = match assembler.push(now, &payload, &self.profile) {
+                let text = match assembler.push(self.passed, &payload, &self.profile) {
                     Assembled::Complete(text) => Some(text.to_string()),
                     Assembled::Partial => None,
                     Assembled::Refused => {

@@ -1,0 +1,210 @@
+//! Lines that are printed beside the loop: a reader that does not read (`ucom run --json | less`) must not stop life signs.
+
+use std::collections::VecDeque;
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Most lines that wait.
+const WAITING: usize = 1000;
+/// At the end, a reader that takes nothing for so long is not waited for.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Stdout is held by a line that nobody reads.
+static STUCK: AtomicBool = AtomicBool::new(false);
+
+/// Whether whoever prints to stdout now would wait for ever.
+pub fn stdout_is_stuck() -> bool {
+    STUCK.load(Ordering::Relaxed)
+}
+
+/// A queue of lines and the thread that prints them.
+pub struct Lines {
+    shared: Arc<Shared>,
+    is_stdout: bool,
+    finished: bool,
+}
+
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    waiting: VecDeque<String>,
+    /// One has been taken and is not written yet.
+    writing: bool,
+    written: u64,
+    dropped: u64,
+    /// The reader has gone.
+    gone: bool,
+    closed: bool,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Lines {
+    /// To stdout.
+    pub fn stdout() -> std::io::Result<Self> {
+        Self::to(std::io::stdout(), true)
+    }
+
+    /// To stderr.
+    pub fn stderr() -> std::io::Result<Self> {
+        Self::to(std::io::stderr(), false)
+    }
+
+    fn to(writer: impl Write + Send + 'static, is_stdout: bool) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let of_thread = Arc::clone(&shared);
+        std::thread::Builder::new().name("lines".into()).spawn(move || print(&of_thread, writer))?;
+        Ok(Self { shared, is_stdout, finished: false })
+    }
+
+    /// Prints a line when its turn comes; drops it when too many wait.
+    pub fn push(&self, line: String) {
+        self.add(line, WAITING);
+    }
+
+    /// The same for a line that must not be dropped, of which there are few.
+    pub fn push_always(&self, line: String) {
+        self.add(line, usize::MAX);
+    }
+
+    fn add(&self, line: String, most: usize) {
+        let mut state = self.shared.lock();
+        if state.gone {
+            return;
+        }
+        if state.waiting.len() < most {
+            state.waiting.push_back(line);
+        } else {
+            state.dropped += 1;
+        }
+        drop(state);
+        self.shared.changed.notify_all();
+    }
+
+    /// The reader has gone (`ucom so | head`).
+    pub fn gone(&self) -> bool {
+        self.shared.lock().gone
+    }
+
+    /// Prints what waits, as long as it is read. Returns how many lines nobody will see.
+    pub fn finish(&mut self) -> u64 {
+        self.finished = true;
+        let mut state = self.shared.lock();
+        state.closed = true;
+        self.shared.changed.notify_all();
+        let (mut written, mut since) = (state.written, Instant::now());
+        while !state.gone && (state.writing || !state.waiting.is_empty()) {
+            let left = PATIENCE.saturating_sub(since.elapsed());
+            if left.is_zero() {
+                STUCK.fetch_or(self.is_stdout, Ordering::Relaxed);
+                return state.dropped + state.waiting.len() as u64 + u64::from(state.writing);
+            }
+            let waited = self.shared.changed.wait_timeout(state, left);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+            if state.written != written {
+                (written, since) = (state.written, Instant::now());
+            }
+        }
+        state.dropped
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        if !self.finished {
+            self.finish();
+        }
+    }
+}
+
+fn print(shared: &Shared, mut writer: impl Write) {
+    let mut state = shared.lock();
+    loop {
+        if let Some(mut line) = state.waiting.pop_front() {
+            state.writing = true;
+            drop(state);
+            line.truncate(line.trim_end().len());
+            line.push('\n');
+            let result = writer.write_all(line.as_bytes()).and_then(|()| writer.flush());
+            state = shared.lock();
+            state.writing = false;
+            state.written += 1;
+            state.gone |= result.is_err();
+            shared.changed.notify_all();
+        } else if state.closed {
+            return;
+        } else {
+            state = shared.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+    use super::*;
+
+    /// Takes a line only when it is told to; an error once the other side has gone.
+    struct Slow(SyncSender<Vec<u8>>);
+
+    impl Write for Slow {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            let gone = |_| std::io::Error::from(std::io::ErrorKind::BrokenPipe);
+            self.0.send(bytes.to_vec()).map_err(gone).map(|()| bytes.len())
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn slow() -> (Lines, Receiver<Vec<u8>>) {
+        let (sender, receiver) = sync_channel(0);
+        (Lines::to(Slow(sender), false).unwrap(), receiver)
+    }
+
+    /// Nobody reads: pushing goes on, what is too much is counted, and the end does not wait for ever.
+    #[test]
+    fn a_reader_that_does_not_read_stops_nothing() {
+        let (mut lines, _reader) = slow();
+        (0..3 * WAITING).for_each(|i| lines.push(i.to_string()));
+        lines.push_always("end".into());
+        // One may be with the thread already.
+        let unseen = lines.finish();
+        assert_eq!(unseen, 3 * WAITING as u64 + 1);
+    }
+
+    /// A slow reader gets every line that was taken, in order.
+    #[test]
+    fn lines_come_whole_and_in_order() {
+        let (mut lines, reader) = slow();
+        let read = std::thread::spawn(move || {
+            reader.iter().map(|l| String::from_utf8(l).unwrap()).collect::<String>()
+        });
+        (0..500).for_each(|i| lines.push(format!("{i}\n")));
+        assert_eq!(lines.finish(), 0);
+        drop(lines);
+        let expected: String = (0..500).map(|i| format!("{i}\n")).collect();
+        assert_eq!(read.join().unwrap(), expected);
+    }
+
+    #[test]
+    fn a_reader_that_has_gone_is_noticed() {
+        let (mut lines, reader) = slow();
+        drop(reader);
+        lines.push("one".into());
+        lines.finish();
+        assert!(lines.gone());
+    }
+}

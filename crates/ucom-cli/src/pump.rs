@@ -1,0 +1,233 @@
+//! Moves frames between the bus and the PC side, in the order that keeps its times honest: what has arrived is handed over
+//! before anything is taken for silence, and neither side can keep the other from its turn.
+
+use std::time::Duration;
+
+use ucom::master::Master;
+use ucom::{Foreign, Frame};
+
+use crate::failure::Failure;
+
+/// Longest wait: so often Ctrl-C is looked at.
+pub const LOOK: Duration = Duration::from_millis(50);
+/// Most frames that are handed over, and the longest time that it takes, before it is looked at what is to be sent: a
+/// flooded bus must not stop life signs.
+const MOST_HEARD: usize = 2000;
+const LONGEST_US: u64 = 50_000;
+/// Most frames that are sent before it is looked at what has arrived.
+const MOST_SENT: usize = 64;
+/// On a bus that floods without end, what is so old counts as handed over.
+const BEHIND_US: u64 = 1_000_000;
+
+/// A bus with a clock.
+pub trait Line {
+    /// µs from any start.
+    fn now_us(&self) -> u64;
+    /// Puts a frame on the bus.
+    fn send(&mut self, frame: &Frame) -> Result<(), Failure>;
+    /// The next frame; waits at most so long, and not at all for zero.
+    fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, Failure>;
+}
+
+/// What the loop remembers.
+#[derive(Debug, Default)]
+pub struct Pump {
+    /// Everything that arrived up to then has been handed over, µs.
+    heard_us: u64,
+}
+
+impl Pump {
+    /// Waits for a frame until something is to be done, no longer than `patience`; hands over all that has arrived; sends
+    /// what is due.
+    pub fn turn(
+        &mut self,
+        master: &mut Master,
+        line: &mut impl Line,
+        patience: Duration,
+    ) -> Result<(), Failure> {
+        let due = master.next_deadline().map_or(u64::MAX, |at| at.saturating_sub(line.now_us()));
+        self.hear(master, line, patience.min(LOOK).min(Duration::from_micros(due)))?;
+        self.send(master, line).map(drop)
+    }
+
+    /// Lets what is queued leave.
+    pub fn flush(&mut self, master: &mut Master, line: &mut impl Line) -> Result<(), Failure> {
+        let end = line.now_us() + BEHIND_US;
+        while self.send(master, line)? && line.now_us() < end {}
+        Ok(())
+    }
+
+    fn hear(&mut self, master: &mut Master, line: &mut impl Line, mut wait: Duration) -> Result<(), Failure> {
+        let mut first = None;
+        for _ in 0..MOST_HEARD {
+            let asked = line.now_us();
+            match line.receive(wait)? {
+                Some(frame) => {
+                    let now = line.now_us();
+                    master.handle(now, frame);
+                    if now - *first.get_or_insert(now) > LONGEST_US {
+                        break;
+                    }
+                }
+                // Nothing was there at that time.
+                None if wait.is_zero() => {
+                    self.heard_us = asked;
+                    return Ok(());
+                }
+                None => {}
+            }
+            wait = Duration::ZERO;
+        }
+        self.heard_us = self.heard_us.max(line.now_us().saturating_sub(BEHIND_US));
+        Ok(())
+    }
+
+    /// Sends what is due; `true`: there may be more.
+    fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, Failure> {
+        for _ in 0..MOST_SENT {
+            let Some(frame) = master.poll_behind(line.now_us(), self.heard_us) else { return Ok(false) };
+            line.send(&frame)?;
+        }
+        Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use ucom::Profile;
+    use ucom::master::{Event, Outcome, Request};
+
+    use super::*;
+
+    /// A bus in virtual time with board 1, which answers PC_INFO within a millisecond, and a CPU that is lost now and then.
+    struct Bench {
+        now: u64,
+        /// What is on its way to us, by time.
+        coming: VecDeque<(u64, Frame)>,
+        /// How long the CPU is lost before and after each access to the bus, µs; the list is gone through once.
+        lost: VecDeque<u64>,
+        /// A frame of somebody else comes every so many µs.
+        flood_us: Option<u64>,
+        flooded_up_to: u64,
+        sent: Vec<(u64, Frame)>,
+    }
+
+    fn frame(text: &str) -> Frame {
+        text.parse().unwrap()
+    }
+
+    impl Bench {
+        fn new(lost: impl IntoIterator<Item = u64>) -> Self {
+            let (coming, sent) = (VecDeque::new(), Vec::new());
+            Self { now: 0, coming, lost: lost.into_iter().collect(), flood_us: None, flooded_up_to: 0, sent }
+        }
+
+        fn lose(&mut self) {
+            self.now += self.lost.pop_front().unwrap_or(0);
+        }
+
+        fn next_at(&self) -> Option<u64> {
+            let flood = self.flood_us.map(|us| self.flooded_up_to + us);
+            self.coming.front().map(|(at, _)| *at).into_iter().chain(flood).min()
+        }
+
+        fn times_of(&self, text: &str) -> Vec<u64> {
+            self.sent.iter().filter(|(_, f)| *f == frame(text)).map(|(at, _)| *at).collect()
+        }
+
+        /// Runs a request to its end.
+        fn run(&mut self, master: &mut Master, request: Request) -> Result<Outcome, ucom::master::Error> {
+            let mut pump = Pump::default();
+            let id = master.start(self.now, request).unwrap();
+            while self.now < 100_000_000 {
+                pump.turn(master, self, LOOK).unwrap();
+                while let Some(event) = master.take_event() {
+                    if let Event::Done { id: done, result } = event
+                        && done == id
+                    {
+                        return result;
+                    }
+                }
+            }
+            panic!("no end within 100 s");
+        }
+    }
+
+    impl Line for Bench {
+        fn now_us(&self) -> u64 {
+            self.now
+        }
+
+        fn send(&mut self, sent: &Frame) -> Result<(), Failure> {
+            self.lose();
+            self.now += 20;
+            self.sent.push((self.now, *sent));
+            if *sent == frame("201#") {
+                let answer = ["141#2100011B34126E38", "141#0100", "141#68656164"];
+                self.coming.extend((1..).zip(answer).map(|(i, f)| (self.now + 300 * i, frame(f))));
+            }
+            self.lose();
+            Ok(())
+        }
+
+        fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, Failure> {
+            self.lose();
+            let end = self.now + timeout.as_micros() as u64;
+            let next = self.next_at().filter(|at| *at <= end);
+            self.now = next.map_or(end, |at| at.max(self.now)) + 5;
+            let heard = next.map(|at| {
+                if self.coming.front().is_some_and(|(first, _)| *first == at) {
+                    return Ok(self.coming.pop_front().unwrap().1);
+                }
+                self.flooded_up_to = at;
+                Ok(frame("385#0000640065006600"))
+            });
+            self.lose();
+            Ok(heard)
+        }
+    }
+
+    /// splitmix64.
+    fn random(seed: &mut u64) -> u64 {
+        *seed = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (*seed ^ (*seed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z ^ (z >> 27)
+    }
+
+    /// Wherever the CPU is lost, and for longer than the answer may take: what has arrived meanwhile is no silence.
+    #[test]
+    fn a_lost_cpu_is_no_silence() {
+        let ask = |lost: Vec<u64>| {
+            let mut bench = Bench::new(lost.clone());
+            let result = bench.run(&mut Master::new(Profile::default()), Request::Info { board: 1 });
+            let Ok(Outcome::Info(seen)) = result else { panic!("{lost:?}: {result:?}") };
+            assert_eq!(seen.description.as_deref(), Some("head"), "{lost:?}");
+            assert_eq!(bench.times_of("201#").len(), 1, "asked once: {lost:?}");
+        };
+        for at in 0..60 {
+            ask((0..=at).map(|i| if i == at { 130_000 } else { 0 }).collect());
+        }
+        for seed in 0..2_000 {
+            let mut state = seed;
+            ask((0..60).map(|_| random(&mut state) % 4).map(|n| if n == 0 { 110_000 } else { 0 }).collect());
+        }
+    }
+
+    /// D-50: a bus that brings more frames than can be handed over does not stop life signs, nor what has its time.
+    #[test]
+    fn d50_a_flood_does_not_stop_life_signs() {
+        let mut bench = Bench::new([]);
+        // Each takes 5 µs here.
+        bench.flood_us = Some(4);
+        let mut master = Master::new(Profile::default());
+        master.begin_session(0);
+        let result = bench.run(&mut master, Request::Info { board: 9 });
+        assert!(matches!(result, Err(ucom::master::Error::NoAnswer { board: 9, .. })), "{result:?}");
+        let alive = bench.times_of("680#");
+        assert!(bench.now < 10_000_000, "{} µs", bench.now);
+        assert!(alive.len() as u64 >= bench.now / 500_000, "{alive:?} up to {}", bench.now);
+        assert!(alive.windows(2).all(|w| (400_000..600_000).contains(&(w[1] - w[0]))), "{alive:?}");
+    }
+}

@@ -95,6 +95,17 @@ pub fn bits(text: &str) -> Result<ucom::Status, String> {
     Ok(all)
 }
 
+/// `00:40` or `0x00:0x40`: the two bytes of PC_SETSTATUS.
+pub fn raw_status(text: &str) -> Result<(u8, u8), String> {
+    let byte = |text: &str| {
+        let digits = text.strip_prefix("0x").or(text.strip_prefix("0X")).unwrap_or(text);
+        let hex = digits.chars().all(|c| c.is_ascii_hexdigit());
+        u8::from_str_radix(digits, 16).ok().filter(|_| hex && digits.len() <= 2)
+    };
+    let pair = text.split_once(':').and_then(|(mask, value)| Some((byte(mask)?, byte(value)?)));
+    pair.ok_or_else(|| format!("\"{text}\": the form is MASK:VALUE, two hexadecimal bytes, as 00:40"))
+}
+
 /// A span in seconds.
 pub fn seconds(text: &str) -> Result<std::time::Duration, String> {
     let value = text.parse::<f64>().ok().and_then(|s| std::time::Duration::try_from_secs_f64(s).ok());
@@ -137,6 +148,10 @@ mod tests {
         assert_eq!(flash_id("33"), Ok(33));
         assert!(flash_id("0x10000").is_err() && flash_id("x").is_err());
         assert_eq!(bits("astart,OPINIT"), Ok(ucom::Status(0x42)));
+        assert_eq!((raw_status("00:40"), raw_status("0xff:0X8")), (Ok((0, 0x40)), Ok((0xFF, 8))));
+        for wrong in ["40", "100:0", "x:1", "1:", "+1:0", ":"] {
+            assert!(raw_status(wrong).is_err(), "{wrong}");
+        }
         assert!(bits("OPINT").unwrap_err().contains("OPINIT"));
         assert_eq!(seconds("0.5"), Ok(std::time::Duration::from_millis(500)));
         assert!(seconds("-1").is_err() && seconds("nan").is_err() && seconds("").is_err());

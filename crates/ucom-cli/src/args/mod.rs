@@ -89,8 +89,12 @@ pub enum Command {
     Info(BoardsArgs),
     /// Status bits: show, set, clear
     #[command(
-        after_help = "Examples:\n  ucom status\n  ucom status 2 --set ASTART\n  ucom status all --clear OPINIT,ASTART\n\n\
-                            Bits: MSTART ASTART MCARUN EXLRUN INIT PROG OPINIT IPINIT; MCARUN, EXLRUN and IPINIT cannot be set."
+        after_help = "Examples:\n  ucom status\n  ucom status 2 --set ASTART\n  ucom status all --clear OPINIT,ASTART\n  \
+                            ucom status 1 --raw 00:40\n\n\
+                            Bits: MSTART ASTART MCARUN EXLRUN INIT PROG OPINIT IPINIT; MCARUN, EXLRUN and IPINIT cannot be set.\n\
+                            --raw sends one PC_SETSTATUS as it is: new = (old & ~MASK) | VALUE, so value bits outside the mask\n\
+                            are set, too. It is not repeated; `all` is one frame to everybody. What the rules expect of it is\n\
+                            shown beside what came of it; another result ends with exit code 1. Running boards: only with --force."
     )]
     Status(StatusArgs),
     /// Reset boards: outputs safe, numbers forgotten
@@ -183,6 +187,15 @@ pub enum Command {
         after_help = "Examples:\n  ucom probe\n  ucom probe --init --out boards.toml\n  ucom probe --image firmware.hex"
     )]
     Probe(ProbeArgs),
+    /// Test whether boards do what the protocol page says; by default only asks
+    #[command(
+        after_help = "Examples:\n  ucom conformance\n  ucom conformance 1 --run\n  ucom conformance 1 --program firmware.hex\n  \
+                            ucom --json conformance all --init --only D-T1,D-T4\n\n\
+                            Without options only harmless requests leave, and applications that run are left alone. Each test is\n\
+                            one of the project's acceptance tests; it says what was sent, what was expected and what came.\n\
+                            Exit codes: 0 all passed or were skipped, 1 some failed."
+    )]
+    Conformance(ConformanceArgs),
     /// What is wrong with bus, chain and boards, with the next command
     #[command(after_help = "Examples:\n  ucom doctor\n  ucom --json doctor")]
     Doctor,

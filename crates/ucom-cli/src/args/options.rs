@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use clap::builder::FalseyValueParser;
 
-use super::boards::{Assignment, Boards, bits, flash_id, seconds};
+use super::boards::{Assignment, Boards, bits, flash_id, raw_status, seconds};
 use super::{ForceArgs, ValueEnum};
 
 /// Options of `ucom sim`.
@@ -65,6 +65,9 @@ pub struct StatusArgs {
     /// Bits to clear
     #[arg(long, env = "UCOM_CLEAR", value_name = "BITS", value_parser = bits)]
     pub clear: Option<ucom::Status>,
+    /// One PC_SETSTATUS as it is: mask and value as hexadecimal bytes, value bits outside the mask included
+    #[arg(long, env = "UCOM_RAW", value_name = "MASK:VALUE", value_parser = raw_status, conflicts_with_all = ["set", "clear"])]
+    pub raw: Option<(u8, u8)>,
     #[command(flatten)]
     pub force: ForceArgs,
 }
@@ -300,6 +303,28 @@ pub struct ProbeArgs {
     /// Image that is on a board, to find the checksum of Program IDs
     #[arg(long, env = "UCOM_IMAGE", value_name = "FILE")]
     pub image: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `ucom conformance`.
+#[derive(Args, Debug)]
+pub struct ConformanceArgs {
+    /// Board number, list, range, or all
+    #[arg(value_name = "BOARDS", default_value = "all")]
+    pub boards: Boards,
+    /// Also tests that reset and number the chain anew, and that set and clear status bits
+    #[arg(long, env = "UCOM_INIT", value_parser = FalseyValueParser::new())]
+    pub init: bool,
+    /// Also tests that start applications and control loops; outputs stay safe, nothing moves
+    #[arg(long, env = "UCOM_RUN", value_parser = FalseyValueParser::new())]
+    pub run: bool,
+    /// Also tests that program boards with this image
+    #[arg(long, env = "UCOM_PROGRAM", value_name = "IMAGE")]
+    pub program: Option<PathBuf>,
+    /// Only these tests, as D-T10,D-T11
+    #[arg(long, env = "UCOM_ONLY", value_name = "TESTS", value_delimiter = ',')]
+    pub only: Vec<String>,
     #[command(flatten)]
     pub force: ForceArgs,
 }

@@ -3,12 +3,12 @@
 use cli_kit::Output;
 use serde_json::json;
 use ucom::files::{Inventory, InventoryBoard};
-use ucom::master::{BoardSeen, InitOptions, InitReport, Outcome, Reports, Request, StopLevel};
+use ucom::master::{BoardSeen, InitOptions, InitReport, Outcome, RawStatus, Reports, Request, StopLevel};
 use ucom::{BoardInfo, Profile, Status};
 
 use crate::args::{ActArgs, Boards, BoardsArgs, InitArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
 use crate::driver::{Driver, unexpected};
-use crate::failure::{Failure, NO_LINK};
+use crate::failure::{DEVICE, Failure, NO_LINK};
 use crate::shape::{bits, board_table, board_value, info_value, state};
 
 /// Who is there; changes nothing.
@@ -155,6 +155,9 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         return Err(Failure::usage(format!("{mirrors}: mirrors reality and cannot be written"))
             .hint("ucom start, ucom stop and ucom init change what these bits show"));
     }
+    if let Some(bytes) = args.raw {
+        return raw_status(args, bytes, link, out);
+    }
     let mut driver = Driver::open(link, out)?;
     let profile = driver.master.profile();
     let mut all = Vec::new();
@@ -167,6 +170,66 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     print(&all, &profile, out);
     Ok(())
+}
+
+/// One PC_SETSTATUS with these two bytes to each board, or one to all; what came of it beside what the rules say.
+fn raw_status(
+    args: &StatusArgs,
+    (mask, value): (u8, u8),
+    link: &LinkArgs,
+    out: &Output,
+) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let numbers = driver.numbers(&args.boards)?;
+    let targets: Vec<(Option<u8>, Vec<u8>)> = match args.boards {
+        Boards::All if driver.master.profile().everybody().is_some() => vec![(None, numbers)],
+        _ => numbers.into_iter().map(|n| (Some(n), vec![n])).collect(),
+    };
+    let mut all = Vec::new();
+    for (board, seen) in targets {
+        let request = Request::RawStatus { board, seen, mask, value, force: args.force.force };
+        match driver.run(request)? {
+            Outcome::RawStatus(boards) => all.extend(boards),
+            other => return Err(unexpected(&other)),
+        }
+    }
+    let row = |b: &RawStatus| {
+        json!({
+            "number": b.board,
+            "before": b.before.status.0,
+            "expected": b.expected.0,
+            "after": b.after.map(|info| info.status.0),
+            "as_expected": b.as_expected(),
+        })
+    };
+    let result = json!({ "mask": mask, "value": value, "boards": all.iter().map(row).collect::<Vec<_>>() });
+    out.result(&result, || {
+        let outside = Status(value & !mask);
+        let mut text = format!("sent: new = (old & ~0x{mask:02X}) | 0x{value:02X}\n");
+        if outside != Status(0) {
+            text += &format!("value bits outside the mask, set all the same: {outside}\n");
+        }
+        if Status(mask | value) & Status::MIRRORS != Status(0) {
+            text +=
+                &format!("{}: mirror reality, whatever is written\n", Status(mask | value) & Status::MIRRORS);
+        }
+        for b in &all {
+            let after = match b.after {
+                Some(info) => format!("0x{:02X} {}", info.status.0, info.status),
+                None => "no answer under this number any more".into(),
+            };
+            let verdict = match b.as_expected() {
+                true => String::new(),
+                false => format!("; the rules say 0x{:02X} {}", b.expected.0, b.expected),
+            };
+            text += &format!("board {}: 0x{:02X} -> {after}{verdict}\n", b.board, b.before.status.0);
+        }
+        text
+    });
+    match all.iter().all(RawStatus::as_expected) {
+        true => Ok(()),
+        false => Err(Failure::printed(DEVICE)),
+    }
 }
 
 fn numbers(outcome: Outcome) -> Result<(u8, BoardInfo), Failure> {

@@ -1,6 +1,7 @@
 //! The commands, one file each or one file a family.
 
 mod boards;
+mod conformance;
 mod decode;
 mod doctor;
 mod help;
@@ -43,6 +44,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::So(args) => run::so(&args, link, out),
         Command::Run(args) => run::run(&args, link, out),
         Command::Monitor(args) => monitor::monitor(&args, link, out),
+        Command::Conformance(args) => conformance::conformance(&args, link, out),
         Command::Doctor => doctor::doctor(link, out),
         Command::Probe(args) => doctor::probe(&args, link, out),
         Command::Dbc(args) => io::dbc(&args, link, out),

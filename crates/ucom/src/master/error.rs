@@ -164,6 +164,12 @@ pub enum Error {
         /// Their numbers.
         boards: Vec<u8>,
     },
+    /// Control loops run, and what was asked for could stop them where they are, or worse.
+    #[error("{} running its control loop", Boards(boards))]
+    LoopRuns {
+        /// Their numbers.
+        boards: Vec<u8>,
+    },
     /// The bus would be too busy.
     #[error("{0}")]
     Load(LoadForecast),
@@ -311,6 +317,7 @@ impl Error {
             | Self::WrongBoard { .. }
             | Self::ForeignMaster { .. }
             | Self::Running { .. }
+            | Self::LoopRuns { .. }
             | Self::Load(_)
             | Self::Busy { .. }
             | Self::NoApplication { .. } => 4,
@@ -333,7 +340,7 @@ impl Error {
             Self::NotReached { .. } => "not-reached",
             Self::AdminRefused { .. } => "admin-refused",
             Self::ForeignMaster { .. } => "foreign-master",
-            Self::Running { .. } => "running",
+            Self::Running { .. } | Self::LoopRuns { .. } => "running",
             Self::Load(_) => "load",
             Self::Busy { .. } => "busy",
             Self::NoBoard { .. } => "no-board",
@@ -379,7 +386,7 @@ impl Error {
             Self::ForeignMaster { .. } => {
                 "end the other program, or force this one if you know that it does not matter".into()
             }
-            Self::Running { .. } => "`ucom stop all` first, or force it".into(),
+            Self::Running { .. } | Self::LoopRuns { .. } => "`ucom stop all` first, or force it".into(),
             Self::Load(_) => "fewer boards, longer `so.period` or `ci.period`, or force it".into(),
             Self::Busy { .. } => "wait for it, or cancel it".into(),
             Self::NoBoard { .. } => "`ucom scan` lists the boards".into(),

@@ -87,7 +87,7 @@ impl Link {
         self.left(serial).await;
     }
 
-    async fn left(&self, serial: u64) {
+    pub(crate) async fn left(&self, serial: u64) {
         poll_fn(|_| if self.with(|core| core.left(serial)) { Poll::Ready(()) } else { Poll::Pending }).await;
     }
 

@@ -34,6 +34,7 @@
 //! sends life signs until [`Master::end_session`]. Scan, information and descriptions change nothing and send none.
 
 mod boards;
+pub mod conformance;
 mod control;
 pub mod doctor;
 mod error;
@@ -47,6 +48,7 @@ mod link;
 mod load;
 pub mod probe;
 mod procedures;
+mod raw_status;
 mod request;
 mod run;
 mod scan;
@@ -69,6 +71,7 @@ pub use event::{Event, Supervision};
 pub use init::{InitFinding, InitOptions, InitReport};
 pub use load::{LoadForecast, frame_bits};
 pub use procedures::{Outcome, ProcedureId, Request};
+pub use raw_status::{RawStatus, expected_status};
 pub use run::{RunBoard, RunOptions, RunReport, Setting};
 pub use scan::{Reports, ScanFinding, ScanReport};
 pub use statistics::{Rate, Statistics, WINDOW_US};

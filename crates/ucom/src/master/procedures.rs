@@ -8,7 +8,8 @@ use super::io::{self, IoDescription};
 use super::link::Link;
 use super::run::{self, RunOptions, RunReport};
 use super::scan::{self, Reports, ScanReport};
-use super::{BoardSeen, Error, probe, update};
+use super::raw_status::{self, RawStatus};
+use super::{BoardSeen, Error, conformance, probe, update};
 use crate::{Admin, BoardInfo, Status};
 
 /// Names a procedure while it runs.
@@ -46,6 +47,19 @@ pub enum Request {
         /// Their values; bits outside the mask are not sent.
         value: Status,
         /// See above.
+        force: bool,
+    },
+    /// One PC_SETSTATUS as the formula says it, value bits outside the mask included; never repeated.
+    RawStatus {
+        /// The board it goes to; `None`: all at once.
+        board: Option<u8>,
+        /// The boards to look at before and after.
+        seen: Vec<u8>,
+        /// First byte.
+        mask: u8,
+        /// Second byte.
+        value: u8,
+        /// See above; also when control loops run.
         force: bool,
     },
     /// PC_RESET.
@@ -105,6 +119,8 @@ pub enum Request {
     Run(RunOptions),
     /// Measures what a board reads otherwise.
     Probe(probe::ProbeOptions),
+    /// Whether boards do what the protocol page says.
+    Conformance(conformance::ConformanceOptions),
 }
 
 impl Request {
@@ -115,7 +131,7 @@ impl Request {
             Self::Init(_) => "init",
             Self::Repair { .. } => "repair",
             Self::Info { .. } => "info",
-            Self::SetStatus { .. } => "status",
+            Self::SetStatus { .. } | Self::RawStatus { .. } => "status",
             Self::Reset { .. } => "reset",
             Self::XReset { .. } => "xreset",
             Self::Start { .. } => "start",
@@ -126,6 +142,7 @@ impl Request {
             Self::InitialInputs { .. } => "ci",
             Self::Run(_) => "run",
             Self::Probe(_) => "probe",
+            Self::Conformance(_) => "conformance",
         }
     }
 
@@ -134,6 +151,7 @@ impl Request {
         let one = |board: &u8| 1_u32.checked_shl((*board).into()).unwrap_or(0);
         match self {
             Self::Scan | Self::Init(_) | Self::Reset { board: None, .. } | Self::Probe(_) => u32::MAX,
+            Self::RawStatus { .. } | Self::Conformance(_) => u32::MAX,
             // The broadcast of a group reaches all, and one board's program data must not meet another's start.
             Self::Update(_) => u32::MAX,
             Self::Repair { board, .. }
@@ -201,6 +219,10 @@ pub enum Outcome {
     Running(RunReport),
     /// Of [`Request::Probe`].
     Probe(probe::ProbeReport),
+    /// Of [`Request::RawStatus`].
+    RawStatus(Vec<RawStatus>),
+    /// Of [`Request::Conformance`]; look at each verdict.
+    Conformance(conformance::ConformanceReport),
 }
 
 /// A procedure under way.
@@ -232,6 +254,10 @@ pub(super) fn work(link: Link, request: Request) -> Work {
         Request::Describe { board, fresh } => Box::pin(io::describe_procedure(link, board, fresh)),
         Request::InitialInputs { board } => Box::pin(io::initial_inputs_procedure(link, board)),
         Request::Probe(options) => Box::pin(probe::probe(link, options)),
+        Request::RawStatus { board, seen, mask, value, force } => {
+            Box::pin(raw_status::raw_status(link, board, seen, (mask, value), force))
+        }
+        Request::Conformance(options) => Box::pin(conformance::conformance(link, options)),
     };
     Box::pin(async move { outer.or_cancel(inner).await })
 }

@@ -54,6 +54,8 @@ pub(crate) struct Inbox {
     pub claims: u32,
     pub filter: Filter,
     pub heard: VecDeque<Heard>,
+    /// Every frame as it is, for a procedure that looks at frames themselves.
+    pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
     /// Nothing can be sent or heard any more, and why.
@@ -250,7 +252,10 @@ impl Core {
                 match next.forget {
                     Forget::Nothing => {}
                     Forget::Answers => inbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
-                    Forget::All => inbox.heard.clear(),
+                    Forget::All => {
+                        inbox.heard.clear();
+                        inbox.raw.iter_mut().for_each(VecDeque::clear);
+                    }
                 }
             }
             let frame = match next.what {
@@ -329,6 +334,16 @@ impl Core {
         for inbox in self.inboxes.values_mut() {
             if inbox.filter.takes(from, message.function()) && inbox.heard.len() < MAX_HEARD {
                 inbox.heard.push_back(Heard { at, from, message });
+            }
+        }
+    }
+
+    /// Gives a frame as it is to the procedures that want it so.
+    pub(crate) fn deliver_raw(&mut self, frame: &Frame) {
+        let at = self.now;
+        for raw in self.inboxes.values_mut().filter_map(|inbox| inbox.raw.as_mut()) {
+            if raw.len() < MAX_HEARD {
+                raw.push_back((at, *frame));
             }
         }
     }

@@ -187,6 +187,9 @@ impl Core {
     /// A frame from the bus.
     pub(crate) fn received(&mut self, received: Result<Frame, Foreign>) {
         self.mark_time();
+        if let Ok(frame) = &received {
+            self.deliver_raw(frame);
+        }
         let frame = match received.and_then(|frame| frame.address().map(|address| (frame, address))) {
             Ok((frame, (function, number))) => {
                 self.statistics.received(self.now, &frame);

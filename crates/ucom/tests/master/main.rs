@@ -3,6 +3,7 @@
 
 mod bench;
 mod chain;
+mod conformance;
 mod faults;
 mod kept;
 mod loader;

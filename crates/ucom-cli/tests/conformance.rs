@@ -1,0 +1,60 @@
+//! `ucom conformance` and `ucom status --raw` against `ucom sim`.
+#![cfg(unix)]
+
+mod common;
+
+use common::Sim;
+use serde_json::json;
+
+/// D-T2, D-T5, D-T10, D-T11: what only asks passes on simulated boards, of either byte order.
+#[test]
+fn simulated_boards_conform() {
+    for endian in ["little", "big"] {
+        let profile = format!("endian = \"{endian}\"\n");
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("profile.toml");
+        std::fs::write(&file, profile).unwrap();
+        let file = file.to_str().unwrap();
+        let sim = Sim::start(&["--boards", "2", "--profile", file]);
+        let ucom = |words: &[&str]| sim.ucom(&[&["--json", "--profile", file], words].concat());
+        ucom(&["init"]).ends(0);
+        ucom(&["start", "1"]).ends(0);
+        let said = ucom(&["conformance"]).ends(0).json();
+        assert_eq!((&said["passed"], &said["failed"]), (&json!(5), &json!(0)), "{said}");
+        let first = &said["tests"][0];
+        assert_eq!(
+            (&first["id"], &first["verdict"], &first["sent"][0]),
+            (&json!("D-T2"), &json!("pass"), &json!("240#"))
+        );
+        let said = ucom(&["conformance", "2", "--run", "--only", "D-T12,d-t15"]).ends(0).json();
+        assert_eq!(said["passed"], 2, "{said}");
+        ucom(&["conformance", "--only", "D-T99"]).ends(2);
+        ucom(&["conformance", "1", "--init"]).ends(2);
+    }
+}
+
+/// D-22: the formula, literally; what the rules make of it stands beside what came.
+#[test]
+fn d22_raw_status_sets_bits_outside_the_mask() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let mut peer = sim.peer();
+    let said = sim.ucom(&["--json", "status", "1", "--raw", "00:40"]).ends(0).json();
+    assert_eq!(
+        said["boards"],
+        json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
+    );
+    assert_eq!(peer.wait("1C1#"), "1C1#0040");
+    // One frame to everybody.
+    sim.ucom(&["status", "all", "--raw", "40:00"]).ends(0);
+    let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
+    assert_eq!(sent, ["1C0#4000"]);
+    // Without INIT the number is gone, as expected.
+    let said = sim.ucom(&["--json", "status", "2", "--raw", "0x08:0x00"]).ends(0).json();
+    assert_eq!(
+        (&said["boards"][0]["after"], &said["boards"][0]["as_expected"]),
+        (&json!(null), &json!(true))
+    );
+    sim.ucom(&["status", "1", "--raw", "0:0", "--set", "ASTART"]).ends(2);
+    sim.ucom(&["status", "1", "--raw", "256:0"]).ends(2);
+}

@@ -313,6 +313,8 @@ impl ProgramEdges {
 
 #[cfg(test)]
 mod tests {
+    use std::panic;
+
     use super::*;
     use crate::Profile;
     use crate::files::edges::BoardEdges;

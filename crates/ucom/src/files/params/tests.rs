@@ -1,6 +1,7 @@
 //! Files read, checked and written.
 
 use proptest::prelude::*;
+use std::panic;
 use std::prelude::v1::*;
 
 use super::*;

@@ -83,7 +83,8 @@ impl Link {
             }
             match left.checked_sub(OVERSLEPT) {
                 Some(left) => std::thread::sleep(left.min(LOOK)),
-                None => std::thread::yield_now(),
+                // Not a yield: on a busy machine that gives away some milliseconds.
+                None => std::hint::spin_loop(),
             }
         }
     }

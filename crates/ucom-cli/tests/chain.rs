@@ -131,7 +131,7 @@ fn names_inputs_and_motion() {
     let said = sim.ucom(&["--json", "ci", "1", "set_positon=3"]).ends(2);
     assert!(said.json()["error"]["message"].as_str().unwrap().contains("set_position"), "{}", said.out);
     let said = sim.ucom(&["--json", "ci", "1", "2.set_position=3"]).ends(2);
-    assert!(said.json()["error"]["message"].as_str().unwrap().contains("another board"), "{}", said.out);
+    assert!(said.json()["error"]["message"].as_str().unwrap().contains("not among those"), "{}", said.out);
 }
 
 /// P-17, D-08, D-50: while one PC runs the boards a second one is refused; when it dies the boards become safe.

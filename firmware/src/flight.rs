@@ -186,7 +186,7 @@ impl Flight {
         self.state = telemetry.state as u8;
         self.tes = telemetry.tes as u8;
         self.safety_output = outputs.safety_output.into();
-        self.done = u8::from(outputs.host_done) | u8::from(outputs.status.is_some()) << 1;
+        self.done = u8::from(outputs.host_done) | u8::from(outputs.status) << 1;
         self.sent = outputs.bus.as_ref().map_or(FlightFrame::NONE, FlightFrame::of);
         self.errors = telemetry.errors;
         self.point = telemetry.point;
@@ -269,7 +269,7 @@ mod tests {
             assert_eq!(again.bus, flight.sent.frame());
             let torque = pc.telemetry().joints.map(|joint| joint.torque.to_bits());
             assert_eq!(torque, flight.torque.map(f64::to_bits));
-            assert_eq!(u8::from(again.host_done) | u8::from(again.status.is_some()) << 1, flight.done);
+            assert_eq!(u8::from(again.host_done) | u8::from(again.status) << 1, flight.done);
         }
     }
 }

@@ -184,8 +184,8 @@ impl Tick {
             self.slot.done();
             self.awaiting.push(line);
         }
-        if let Some(status) = &outputs.status {
-            send(&mut self.lines, &mut self.awaiting, status);
+        if outputs.status {
+            send(&mut self.lines, &mut self.awaiting, self.controller.status_frame());
         }
         let telemetry = self.controller.telemetry();
         let (state, errors) = (telemetry.state, telemetry.errors);

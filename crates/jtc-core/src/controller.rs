@@ -1,6 +1,6 @@
 //! The controller: state machine and tick (section 4).
 use jtc_dynamics::Dynamics;
-use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, Status};
+use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, STATUS_LEN, Status};
 
 use crate::config::{Config, PidGains, TableOf};
 use crate::defaults;
@@ -75,6 +75,7 @@ pub struct Controller<M> {
     pub(crate) work: Work,
     pub(crate) records: Records,
     since_status_ms: u16,
+    status_frame: [u8; STATUS_LEN],
     telemetry: Telemetry,
 }
 
@@ -101,6 +102,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             work: Work::Begin,
             records: Records::default(),
             since_status_ms: 0,
+            status_frame: [0; STATUS_LEN],
             telemetry: Telemetry::default(),
             config,
         }
@@ -149,11 +151,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.observe(&torque);
         // J-22: 0 in Start and while an internal error is latched.
         let safety_output = self.state != State::Start && !self.errors.internal();
-        let mut outputs = Outputs { bus: Some(bus), safety_output, status: None, host_done };
-        if self.status_due(inputs.status_free) {
-            outputs.status = Some(self.status().emit());
+        let status = self.status_due(inputs.status_free);
+        if status {
+            self.status_frame = self.status().emit();
         }
-        outputs
+        Outputs { bus: Some(bus), safety_output, status, host_done }
+    }
+
+    /// The JtcStatus frame of the last tick whose outputs said that one is to be sent; zeros before the first.
+    pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
+        &self.status_frame
     }
 
     /// What the last tick computed.

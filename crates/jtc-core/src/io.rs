@@ -1,6 +1,6 @@
 //! What goes into a tick and what comes out.
 use jtc_bus::Frame;
-use jtc_wire::{LinkEvent, STATUS_LEN};
+use jtc_wire::LinkEvent;
 
 /// How the joint bus is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +33,9 @@ pub struct Outputs {
     pub bus: Option<Frame>,
     /// Level of the safety output: true = no error (J-22).
     pub safety_output: bool,
-    /// A JtcStatus frame to send now.
-    pub status: Option<[u8; STATUS_LEN]>,
+    /// A JtcStatus frame is to be sent now: [`Controller::status_frame`](crate::Controller::status_frame) has it. It is not
+    /// in here, because these outputs are copied in every tick, and few of them have a status.
+    pub status: bool,
     /// The host event was worked off: release it.
     pub host_done: bool,
 }

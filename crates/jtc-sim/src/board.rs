@@ -2,7 +2,7 @@
 //! the firmware does it.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Config, Controller, Inputs, Outputs, POINTS_MAX, Telemetry};
-use jtc_wire::{FRAME_MAX, FrameStatus, LinkEvent, RawPoint, Receiver};
+use jtc_wire::{FRAME_MAX, FrameStatus, LinkEvent, RawPoint, Receiver, STATUS_LEN};
 
 /// Room for frames: the longest one and as much again, as a host that pipelines fills it.
 const RECEIVE_BUFFER: usize = FRAME_MAX;
@@ -71,6 +71,11 @@ impl Board {
         let resets = self.watchdog_resets;
         *self = Self::new(self.config.clone(), self.gap_us, self.watchdog_ms);
         self.watchdog_resets = resets;
+    }
+
+    /// The status of the last tick, when its outputs said that one is to be sent.
+    pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
+        self.controller.status_frame()
     }
 
     /// What the last tick computed.

@@ -188,8 +188,8 @@ impl World {
         });
         self.sent = outputs.bus;
         self.safety_output = outputs.safety_output;
-        if let Some(status) = outputs.status {
-            self.to_host.write(self.now_us(), &status);
+        if outputs.status {
+            self.to_host.write(self.now_us(), self.board.status_frame());
         }
         match self.board.worked {
             Some(Worked::Frame(frame_type)) => {

@@ -76,8 +76,9 @@ impl Shadow {
                 hosts[line].done(&flight.event);
             }
         }
-        if let Some(status) = &outputs.status {
-            self.expect_status(status, hosts);
+        if outputs.status {
+            let status = *self.controller.status_frame();
+            self.expect_status(&status, hosts);
         }
 
         let t = self.controller.telemetry();
@@ -88,7 +89,7 @@ impl Shadow {
         let ours = (t.state as u8, t.tes as u8, t.point, t.errors, outputs.safety_output);
         let board = (flight.state, flight.tes, flight.point, flight.errors, flight.safety_output);
         assert_eq!(ours, board, "tick {tick}: state, execution, point, errors, safety output");
-        let done = (outputs.host_done && host.is_some(), outputs.status.is_some());
+        let done = (outputs.host_done && host.is_some(), outputs.status);
         assert_eq!(done, (flight.host_done && host.is_some(), flight.status), "tick {tick}: host");
     }
 

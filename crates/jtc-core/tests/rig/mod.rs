@@ -90,7 +90,7 @@ impl Rig {
             resets: 0,
             booting: 0,
         };
-        let last = Outputs { bus: None, safety_output: false, status: None, host_done: false };
+        let last = Outputs { bus: None, safety_output: false, status: false, host_done: false };
         Self {
             controller: Controller::new(config, vec![RawPoint::default(); POINTS_MAX]),
             nodes: [node; 7],
@@ -166,7 +166,7 @@ impl Rig {
             self.tick();
             if let Some(s) =
                 self.statuses.iter().rev().take(1).find(|s| s.response.frame_type == frame_type as u8)
-                && self.last.status.is_some()
+                && self.last.status
                 && self.host.is_empty()
             {
                 return s.response.data;
@@ -234,7 +234,8 @@ impl Rig {
         if self.last.host_done {
             self.host.pop_front();
         }
-        if let Some(bytes) = self.last.status {
+        if self.last.status {
+            let bytes = *self.controller.status_frame();
             self.statuses.push(Status::parse(&bytes).expect("a valid status"));
         }
         let request = Request::parse(&self.last.bus.expect("a frame each tick")).expect("a valid request");

@@ -4,44 +4,26 @@ use std::io::{BufRead, Write};
 use std::prelude::v1::*;
 
 use super::{Direction, FrameKind, Record, RecordProblem, RecordedFrame, RecordingError};
-use super::{hex_bytes, read_line, seconds};
+use super::{hex_bytes, lines::Lines, seconds};
 
 /// Mark of a comment line that carries one line of the profile.
 const PROFILE: &str = "# profile: ";
 
 /// Reads records one by one.
 pub struct CandumpReader<R> {
-    input: R,
-    line: usize,
+    lines: Lines<R>,
     profile: Option<String>,
-    failed: bool,
 }
 
 impl<R: BufRead> CandumpReader<R> {
     /// From the start of the file.
     pub fn new(input: R) -> Self {
-        Self { input, line: 0, profile: None, failed: false }
+        Self { lines: Lines::new(input), profile: None }
     }
 
     /// The profile from the comment lines read so far.
     pub fn into_profile(self) -> Option<String> {
         self.profile
-    }
-
-    fn next_record(&mut self) -> Result<Option<Record>, RecordingError> {
-        while let Some(line) = read_line(&mut self.input, &mut self.line)? {
-            if let Some(text) = line.strip_prefix(PROFILE.trim_end()) {
-                let profile = self.profile.get_or_insert_default();
-                profile.push_str(text.trim());
-                profile.push('\n');
-            }
-            if line.is_empty() || line.starts_with('#') {
-                continue;
-            }
-            let problem = |problem| RecordingError::Line { line: self.line, problem };
-            return record(&line).map(Some).map_err(problem);
-        }
-        Ok(None)
     }
 }
 
@@ -50,12 +32,13 @@ impl<R: BufRead> Iterator for CandumpReader<R> {
 
     /// The next record; the first error ends it.
     fn next(&mut self) -> Option<Self::Item> {
-        if self.failed {
-            return None;
-        }
-        let next = self.next_record();
-        self.failed = next.is_err();
-        next.transpose()
+        self.lines.record(record, |comment| {
+            if let Some(text) = comment.strip_prefix(PROFILE.trim_end()) {
+                let profile = self.profile.get_or_insert_default();
+                profile.push_str(text.trim());
+                profile.push('\n');
+            }
+        })
     }
 }
 

@@ -3,7 +3,7 @@
 use std::io::{BufRead, Write};
 use std::prelude::v1::*;
 
-use super::{Record, RecordProblem, RecordedFrame, RecordingError, read_line, seconds};
+use super::{Record, RecordProblem, RecordedFrame, RecordingError, lines::Lines, seconds};
 
 /// First line of a stream.
 pub const FZI_HEADER: &str = "# FZI-CAN Stream version 1.2";
@@ -13,31 +13,18 @@ const CHANNEL: &str = "can0";
 
 /// Reads records one by one.
 pub struct FziReader<R> {
-    input: R,
-    line: usize,
-    failed: bool,
+    lines: Lines<R>,
 }
 
 impl<R: BufRead> FziReader<R> {
     /// Checks the first line.
-    pub fn new(mut input: R) -> Result<Self, RecordingError> {
-        let mut line = 0;
-        let first = read_line(&mut input, &mut line)?.unwrap_or_default();
+    pub fn new(input: R) -> Result<Self, RecordingError> {
+        let mut lines = Lines::new(input);
+        let first = lines.line()?.unwrap_or_default();
         if first != FZI_HEADER {
             return Err(RecordingError::FziHeader { first });
         }
-        Ok(Self { input, line, failed: false })
-    }
-
-    fn next_record(&mut self) -> Result<Option<Record>, RecordingError> {
-        while let Some(line) = read_line(&mut self.input, &mut self.line)? {
-            if line.is_empty() || line.starts_with('#') {
-                continue;
-            }
-            let problem = |problem| RecordingError::Line { line: self.line, problem };
-            return record(&line).map(Some).map_err(problem);
-        }
-        Ok(None)
+        Ok(Self { lines })
     }
 }
 
@@ -46,12 +33,7 @@ impl<R: BufRead> Iterator for FziReader<R> {
 
     /// The next record; the first error ends it.
     fn next(&mut self) -> Option<Self::Item> {
-        if self.failed {
-            return None;
-        }
-        let next = self.next_record();
-        self.failed = next.is_err();
-        next.transpose()
+        self.lines.record(record, |_| ())
     }
 }
 

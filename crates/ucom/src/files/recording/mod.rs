@@ -10,6 +10,7 @@ mod candump;
 mod error;
 mod frame;
 mod fzi;
+mod lines;
 mod mcap;
 #[cfg(test)]
 mod tests;
@@ -154,21 +155,6 @@ impl RecordingWriter {
             Self::Mcap(w) => w.finish().and_then(|mut out| Ok(out.flush()?)),
         }
     }
-}
-
-/// Lines of bounded length, without their ends; `None` at the end of the file.
-fn read_line(input: &mut impl BufRead, number: &mut usize) -> Result<Option<String>, RecordingError> {
-    use std::io::Read;
-    let mut line = Vec::new();
-    input.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line)?;
-    if line.is_empty() {
-        return Ok(None);
-    }
-    *number += 1;
-    if line.len() > MAX_LINE {
-        return Err(RecordingError::Line { line: *number, problem: RecordProblem::TooLong });
-    }
-    Ok(Some(String::from_utf8_lossy(&line).trim().to_owned()))
 }
 
 /// `sec.fraction` with any number of digits as nanoseconds; finer digits are dropped.

@@ -1,5 +1,6 @@
 //! What the fuzz targets run: every file reader on any bytes. A panic, or a promise broken, is a finding.
 
+use std::io::Cursor;
 use std::prelude::v1::*;
 
 use crate::Profile;
@@ -9,7 +10,7 @@ use super::edges::{BoardEdges, EdgeTable, Given};
 use super::image::{Format, Gaps, Image, ImageOptions};
 use super::inventory::Inventory;
 use super::params::{ParamsFile, SavedBoard, SavedEdge, check_board, params_text};
-use super::recording::{CandumpWriter, FZI_HEADER, Recording, read_mcap};
+use super::recording::{CandumpWriter, FZI_HEADER, FziWriter, McapWriter, Recording, read_mcap};
 
 /// Images in every form; the first byte chooses.
 pub fn image(data: &[u8]) {
@@ -29,7 +30,7 @@ pub fn image(data: &[u8]) {
     }
 }
 
-/// Recordings in every form; what candump lines give is written as lines that give the same.
+/// Recordings in every form; what is read is written in the same form and gives the same.
 pub fn recording(data: &[u8]) {
     if let Ok(recording) = Recording::read_candump(data) {
         let mut out = CandumpWriter::new(Vec::new());
@@ -40,8 +41,20 @@ pub fn recording(data: &[u8]) {
     let mut stream = FZI_HEADER.as_bytes().to_vec();
     stream.push(b'\n');
     stream.extend_from_slice(data);
-    let _ = Recording::read_fzi(&stream[..]);
-    let _ = read_mcap(data);
+    if let Ok(mut recording) = Recording::read_fzi(&stream[..]) {
+        // The form counts microseconds.
+        recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
+        let mut out = FziWriter::new(Vec::new()).expect("a vector takes all");
+        recording.records.iter().for_each(|r| out.write(r).expect("a frame of this form"));
+        assert_eq!(Recording::read_fzi(&out.into_inner()[..]).expect("our own form"), recording);
+    }
+    if let Ok(recording) = read_mcap(data) {
+        let profile = recording.profile.as_deref().unwrap_or_default();
+        let mut out = McapWriter::new(Cursor::new(Vec::new()), profile).expect("a vector takes all");
+        recording.records.iter().for_each(|r| out.write(r, None).expect("a vector takes all"));
+        let file = out.finish().expect("a vector takes all").into_inner();
+        assert_eq!(read_mcap(&file).expect("our own form").records, recording.records);
+    }
 }
 
 /// Inventories; what is read is written as a text that gives the same.

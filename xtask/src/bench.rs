@@ -1,6 +1,6 @@
 //! `cargo xtask bench`: figures beside their anchors, all measured in the same run on the same machine.
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
@@ -152,17 +152,18 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
 
     let work = shell::target().join("bench");
     std::fs::create_dir_all(&work)?;
+    let frames = work.join("ucom-frames.log");
     let kernels = dynamics_program(&work)?;
     let rounds = if quick { 1 } else { 3 };
     let mut samples: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut skipped = Vec::new();
     for round in 1..=rounds {
         println!("\nround {round} of {rounds}");
-        for (name, value) in own_figures()? {
+        for (name, value) in own_figures(&frames)? {
             samples.entry(name).or_default().push(value);
         }
     }
-    samples.entry("cantools_frames_s".into()).or_default().push(cantools(&work)?);
+    samples.entry("cantools_frames_s".into()).or_default().push(cantools(&frames)?);
     println!("\nanchors, in turn with our own dynamics");
     for (name, value) in anchors(&work, &kernels, rounds, &mut skipped)? {
         samples.entry(name).or_default().push(value);
@@ -197,17 +198,18 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// The timing program of jtc-dynamics, copied away: other crates have an example of that name too.
-fn dynamics_program(work: &std::path::Path) -> Result<PathBuf> {
+fn dynamics_program(work: &Path) -> Result<PathBuf> {
     run(&mut cargo(&["build", "--release", "--package", "jtc-dynamics", "--example", "time"]))?;
     let program = work.join("dynamics_time");
     std::fs::copy(shell::target().join("release/examples/time"), &program)?;
     Ok(program)
 }
 
-/// What the crates measure of themselves.
-fn own_figures() -> Result<Figures> {
+/// What the crates measure of themselves. The UCoM frames that were read go to `frames`, too.
+fn own_figures(frames: &Path) -> Result<Figures> {
     let example = |package: &str, name: &str| {
-        shell::read(&mut cargo(&["run", "--release", "--quiet", "--package", package, "--example", name]))
+        let mut example = cargo(&["run", "--release", "--quiet", "--package", package, "--example", name]);
+        shell::read(example.env("OPENJTC_UCOM_FRAMES", frames))
     };
     let mut figures = lines(&example("xtask", "figures")?);
     figures.append(&mut lines(&example("jtc-core", "tick")?));
@@ -222,14 +224,10 @@ fn own_figures() -> Result<Figures> {
     Ok(figures)
 }
 
-/// Frames that python-can and cantools read in a second, of those that our own example reads.
-fn cantools(work: &std::path::Path) -> Result<f64> {
-    let frames = work.join("ucom-frames.log");
-    let mut ours =
-        cargo(&["run", "--release", "--quiet", "--package", "xtask", "--example", "figures", "--", "ucom"]);
-    shell::read(ours.env("OPENJTC_UCOM_FRAMES", &frames))?;
+/// Those frames of `frames` that python-can and cantools read in a second.
+fn cantools(frames: &Path) -> Result<f64> {
     let mut script = command(python::environment("requirements.txt")?);
-    script.arg(root().join("references/ucom/read_frames.py")).arg(frames.with_extension("dbc")).arg(&frames);
+    script.arg(root().join("references/ucom/read_frames.py")).arg(frames.with_extension("dbc")).arg(frames);
     script.env("PYTHONDONTWRITEBYTECODE", "1");
     shell::read(&mut script)?.trim().parse().context("read_frames.py printed no number")
 }
@@ -258,18 +256,13 @@ fn lines(text: &str) -> Figures {
 }
 
 /// Our dynamics and those of others in turn, on the same arm and states.
-fn anchors(
-    work: &std::path::Path,
-    kernels: &std::path::Path,
-    rounds: usize,
-    skipped: &mut Vec<String>,
-) -> Result<Figures> {
+fn anchors(work: &Path, kernels: &Path, rounds: usize, skipped: &mut Vec<String>) -> Result<Figures> {
     for (header, package) in [
         ("/usr/include/eigen3/Eigen/Core", "libeigen3-dev"),
         ("/usr/include/kdl/chain.hpp", "liborocos-kdl-dev"),
         ("/usr/include/rbdl/rbdl.h", "librbdl-dev"),
     ] {
-        if !std::path::Path::new(header).exists()
+        if !Path::new(header).exists()
             && let Err(error) = shell::apt_install(&[package])
         {
             println!("without {package}: {error:#}");

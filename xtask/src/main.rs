@@ -30,7 +30,9 @@ Usage: cargo xtask COMMAND
   bench [--json FILE] [--quick]
                                performance and tracking figures beside their anchors, all measured in this run
   soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)
-  fuzz [TARGET] [--runs N]     run one fuzz target, or each of them (default: 20000000 executions each)
+  fuzz [TARGET] [--runs N] [--keep]
+                               run one fuzz target, or each of them (default: 20000000 executions each)
+                               --keep: afterwards add to fuzz/corpus what reaches code that no kept input does
   firmware [BOARD...]          build the boards' programs; sizes, and that the tick cannot panic
   emulate [--update]           boot those programs in an emulator of the chip: tests, and figures that must be those of
                                docs/board-figures.txt (--update: write them there)

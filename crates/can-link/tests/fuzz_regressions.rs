@@ -1,33 +1,11 @@
 //! The bodies of the fuzz targets over the inputs that are kept, and over some at random.
-use std::path::Path;
 
 use can_link::fuzzing::{slcan_stream, socketcand_stream};
 use proptest::prelude::*;
 
-/// Runs `body` over every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`.
-fn kept(target: &str, body: fn(&[u8])) {
-    let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz"));
-    let mut count = 0;
-    for kind in ["corpus", "regressions"] {
-        let Ok(files) = std::fs::read_dir(fuzz.join(kind).join(target)) else { continue };
-        for file in files {
-            let path = file.expect("a readable directory").path();
-            println!("{}", path.display());
-            body(&std::fs::read(path).expect("a readable file"));
-            count += 1;
-        }
-    }
-    println!("{target}: {count} kept inputs");
-}
-
 #[test]
-fn socketcand_stream_on_kept_inputs() {
-    kept("socketcand_stream", socketcand_stream);
-}
-
-#[test]
-fn slcan_stream_on_kept_inputs() {
-    kept("slcan_stream", slcan_stream);
+fn kept_inputs() {
+    test_kit::run_kept_inputs(&[("socketcand_stream", socketcand_stream), ("slcan_stream", slcan_stream)]);
 }
 
 /// Words of the protocols and rubbish, mixed.

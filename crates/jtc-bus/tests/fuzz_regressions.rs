@@ -1,7 +1,12 @@
-//! The body of the fuzz target on inputs that are worth keeping, and on some at random.
+//! The body of the fuzz target over the inputs that are kept, over frames of every kind, and over some at random.
 
 use jtc_bus::fuzzing::bus_frame;
 use proptest::prelude::*;
+
+#[test]
+fn kept_inputs() {
+    test_kit::run_kept_inputs(&[("bus_frame", bus_frame)]);
+}
 
 /// Identifier and payload of every frame of the bus, with the payload bytes that are most different.
 #[test]

@@ -1,12 +1,10 @@
 //! The bodies of the fuzz targets over the inputs that are kept, and over some at random.
-use std::path::Path;
 
 use jtc_host::fuzzing;
 use proptest::prelude::*;
+use test_kit::Target;
 
-type Body = fn(&[u8]);
-
-const TARGETS: [(&str, Body); 8] = [
+const TARGETS: [Target; 8] = [
     ("trajectory_csv", fuzzing::trajectory_csv),
     ("trajectory_table", fuzzing::trajectory_table),
     ("trajectory_json", fuzzing::trajectory_json),
@@ -19,17 +17,7 @@ const TARGETS: [(&str, Body); 8] = [
 
 #[test]
 fn kept_inputs() {
-    let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz"));
-    for (target, body) in TARGETS {
-        for kind in ["corpus", "regressions"] {
-            let Ok(files) = std::fs::read_dir(fuzz.join(kind).join(target)) else { continue };
-            for file in files {
-                let path = file.expect("a readable directory").path();
-                println!("{}", path.display());
-                body(&std::fs::read(path).expect("a readable file"));
-            }
-        }
-    }
+    test_kit::run_kept_inputs(&TARGETS);
 }
 
 proptest! {

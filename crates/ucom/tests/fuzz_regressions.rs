@@ -1,7 +1,27 @@
-//! The bodies of the fuzz targets on inputs that are worth keeping, and on some at random.
+//! The bodies of the fuzz targets over the inputs that are kept, over some made by hand, and over some at random.
 
 use proptest::prelude::*;
+use test_kit::{Target, run_kept_inputs};
+use ucom::files::fuzzing as files;
 use ucom::fuzzing::{frame, node, profile};
+use ucom::master::fuzzing as master;
+
+const TARGETS: [Target; 9] = [
+    ("ucom_frame", frame),
+    ("ucom_profile", profile),
+    ("ucom_node", node),
+    ("ucom_image", files::image),
+    ("ucom_recording", files::recording),
+    ("ucom_inventory", files::inventory),
+    ("ucom_edges", files::edges),
+    ("ucom_params", files::params),
+    ("ucom_master", master::frames),
+];
+
+#[test]
+fn kept_inputs() {
+    run_kept_inputs(&TARGETS);
+}
 
 /// Every identifier with every length, with the payload bytes that are most different.
 #[test]
@@ -52,8 +72,6 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..Default::default() })]
     #[test]
     fn random_inputs(data in prop::collection::vec(any::<u8>(), 0..400)) {
-        frame(&data);
-        node(&data);
-        profile(&data);
+        TARGETS.iter().for_each(|(_, body)| body(&data));
     }
 }

@@ -1,0 +1,66 @@
+//! What the tests of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain.
+#![forbid(unsafe_code)]
+
+use std::fs::read_dir;
+use std::path::{Path, PathBuf};
+
+/// A fuzz target's body; it panics when a promise is broken.
+pub type Body = fn(&[u8]);
+
+/// A fuzz target: the name of its file in `fuzz/fuzz_targets`, and its body.
+pub type Target = (&'static str, Body);
+
+/// Runs each body over every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. The name of the file that
+/// runs is printed, so a failing test shows it.
+///
+/// # Panics
+/// When a body does, when there is no such target, and when nothing is kept for it: a name that is written wrong would
+/// otherwise be a test of nothing.
+pub fn run_kept_inputs(targets: &[Target]) {
+    for (target, body) in targets {
+        let files = kept_inputs(target);
+        assert!(!files.is_empty(), "nothing is kept for {target} in fuzz/corpus and fuzz/regressions");
+        for path in &files {
+            println!("{}", path.display());
+            body(&std::fs::read(path).expect("a readable file"));
+        }
+        println!("{target}: {} kept inputs", files.len());
+    }
+}
+
+/// The kept inputs of a target in the order of their names.
+fn kept_inputs(target: &str) -> Vec<PathBuf> {
+    let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz"));
+    let source = fuzz.join("fuzz_targets").join(target).with_extension("rs");
+    assert!(source.is_file(), "there is no fuzz target {}", source.display());
+    let mut files = Vec::new();
+    for kind in ["corpus", "regressions"] {
+        let Ok(directory) = read_dir(fuzz.join(kind).join(target)) else { continue };
+        files.extend(directory.map(|file| file.expect("a readable directory").path()));
+    }
+    files.sort();
+    files
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::run_kept_inputs;
+
+    static BYTES: AtomicUsize = AtomicUsize::new(0);
+
+    #[test]
+    fn a_body_sees_what_is_kept() {
+        run_kept_inputs(&[("status_stream", |data| {
+            BYTES.fetch_add(data.len(), Ordering::Relaxed);
+        })]);
+        assert!(BYTES.load(Ordering::Relaxed) > 0);
+    }
+
+    #[test]
+    #[should_panic = "no fuzz target"]
+    fn a_target_that_is_none() {
+        run_kept_inputs(&[("no_target", |_| ())]);
+    }
+}

@@ -6,9 +6,9 @@ use super::control::{self, AdminChange, StopLevel};
 use super::init::{self, InitOptions, InitReport};
 use super::io::{self, IoDescription};
 use super::link::Link;
+use super::raw_status::{self, RawStatus};
 use super::run::{self, RunOptions, RunReport};
 use super::scan::{self, Reports, ScanReport};
-use super::raw_status::{self, RawStatus};
 use super::{BoardSeen, Error, conformance, probe, update};
 use crate::{Admin, BoardInfo, Status};
 

@@ -5,7 +5,7 @@ use std::io::{Seek, Write};
 use std::path::PathBuf;
 
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Compression, MessageStream, Summary, WriteOptions};
+use mcap::{Compression, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
 
 use super::cdr::{Decoder, Encoder};
 use super::{Recording, RecordingError, RecordingInfo, schema};
@@ -13,6 +13,8 @@ use crate::sample::Sample;
 
 /// Name of the metadata record with the [`RecordingInfo`].
 const METADATA: &str = "openjtc";
+/// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
+const MAX_RECORD: usize = 1 << 26;
 const STATES_TOPIC: &str = "/joint_states";
 const COMMANDS_TOPIC: &str = "/joint_commands";
 const CONTROL_TOPIC: &str = "/jtc/control";
@@ -141,7 +143,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     }
     let start_ns = info.as_ref().map_or(0, |i| i.start_unix_ns);
     let mut samples: BTreeMap<u64, Sample> = BTreeMap::new();
-    for message in MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())? {
+    let options =
+        LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
+    for message in MessageReader::new_with_options(bytes, options) {
         let message = message?;
         let time_s = message.log_time.saturating_sub(start_ns) as f64 * 1e-9;
         let sample =

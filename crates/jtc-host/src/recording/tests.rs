@@ -105,3 +105,24 @@ fn a_cut_off_mcap_file_still_gives_its_whole_chunks_or_an_error() {
         }
     }
 }
+
+/// A record inside a compressed chunk that says it is of a terabyte.
+#[test]
+fn a_damaged_length_takes_no_memory() {
+    let mut file = b"\x89MCAP0\r\n".to_vec();
+    // An LZ4 frame with one block as it is: opcode and length of a message.
+    let mut data = b"\x04\x22\x4D\x18\x60\x40\x82\x09\0\0\x80\x05".to_vec();
+    data.extend((1_u64 << 40).to_le_bytes());
+    data.extend([0; 4]);
+    file.push(6);
+    file.extend((8 + 8 + 8 + 4 + 4 + 3 + 8 + data.len() as u64).to_le_bytes());
+    file.extend([0; 16]);
+    file.extend((1_u64 << 40).to_le_bytes());
+    file.extend([0; 4]);
+    file.extend([3, 0, 0, 0]);
+    file.extend(b"lz4");
+    file.extend((data.len() as u64).to_le_bytes());
+    file.extend(data);
+    let error = mcap::read(&file).unwrap_err().to_string();
+    assert!(error.contains("length"), "{error}");
+}

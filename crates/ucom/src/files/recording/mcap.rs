@@ -6,13 +6,15 @@ use std::path::PathBuf;
 use std::prelude::v1::*;
 
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Compression, MessageStream, Summary, WriteOptions};
+use mcap::{Compression, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
 use serde::{Deserialize, Serialize};
 
 use super::{Direction, FrameKind, Record, RecordedFrame, Recording, RecordingError, hex_bytes};
 
 const TOPIC: &str = "/can";
 const METADATA: &str = "ucom";
+/// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
+const MAX_RECORD: usize = 1 << 26;
 /// JSON schema of a message.
 const SCHEMA: &str = r#"{
   "title": "CanFrame",
@@ -165,7 +167,8 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
             }
         }
     }
-    for message in MessageStream::new(file).map_err(mcap_error)? {
+    let options = LinearReaderOptions::default().with_record_length_limit(MAX_RECORD);
+    for message in MessageReader::new_with_options(file, options) {
         let message = message.map_err(mcap_error)?;
         if message.channel.topic != TOPIC || message.channel.message_encoding != "json" {
             continue;

@@ -37,6 +37,24 @@ fn d46_update_is_verified_and_then_up_to_date() {
     assert_eq!((update["outcome"].as_str(), update["program_id"].as_u64()), (Some("running"), Some(0x4B3F)));
 }
 
+/// D-41: with `--name-target` the header names the board, else it is for any.
+#[test]
+fn d41_the_header_names_the_board_if_wanted() {
+    let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x42"]);
+    sim.ucom(&["init"]).ends(0);
+    let file = sim.file("app.bin", &image(500, 1));
+    for (option, expected) in [("--name-target", "4200"), ("--start", "FFFF")] {
+        let mut peer = sim.peer();
+        let update = sim.spawn(&["update", "2", &file, "--force", option]);
+        peer.wait("2C2#4355");
+        peer.wait("2C2#");
+        // Words 8 to 11: Program ID, date, target, reserve.
+        let third = peer.wait("2C2#");
+        ended(update).ends(0);
+        assert_eq!(&third[12..16], expected, "{third}");
+    }
+}
+
 /// The exit codes 2 and 4: nothing is sent that changes a board.
 #[test]
 fn d46_refusals_change_nothing() {

@@ -29,6 +29,9 @@ pub struct UpdateArgs {
     /// Start the application afterwards and see that it runs
     #[arg(long, env = "UCOM_START", value_parser = FalseyValueParser::new())]
     pub start: bool,
+    /// Write the board's flash number into the header, so that no other board takes the image
+    #[arg(long, env = "UCOM_NAME_TARGET", value_parser = FalseyValueParser::new(), conflicts_with = "group")]
+    pub name_target: bool,
     /// All these boards with one transfer, by broadcast, instead of one after the other
     #[arg(long, env = "UCOM_GROUP", value_parser = FalseyValueParser::new())]
     pub group: bool,

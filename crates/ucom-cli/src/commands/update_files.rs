@@ -25,6 +25,11 @@ pub struct Files {
 impl Files {
     /// Reads the files that the plan takes; refuses others.
     pub fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
+        if args.name_target && !has_header(profile) {
+            return Err(Failure::usage(
+                "--name-target: the name goes into the header, and the profile sends none",
+            ));
+        }
         let other = second(args, profile.prog_plan)?;
         let image = image(&args.image, out)?;
         let second = other.map(|file| self::image(file, out)).transpose()?;

@@ -5,7 +5,7 @@ use std::io::{Seek, Write};
 use std::path::PathBuf;
 
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Compression, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
+use mcap::{Compression, McapError, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
 
 use super::cdr::{Decoder, Encoder};
 use super::{Recording, RecordingError, RecordingInfo, schema};
@@ -20,10 +20,10 @@ const COMMANDS_TOPIC: &str = "/joint_commands";
 const CONTROL_TOPIC: &str = "/jtc/control";
 const STATE_TOPIC: &str = "/jtc/state";
 
-impl From<mcap::McapError> for RecordingError {
-    fn from(e: mcap::McapError) -> Self {
+impl From<McapError> for RecordingError {
+    fn from(e: McapError) -> Self {
         match e {
-            mcap::McapError::Io(e) => e.into(),
+            McapError::Io(e) => e.into(),
             e => RecordingError::Mcap { path: PathBuf::new(), problem: e.to_string() },
         }
     }
@@ -138,6 +138,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     // A file that was cut off has no summary; its messages are still read.
     if let Ok(Some(summary)) = Summary::read(bytes) {
         for index in summary.metadata_indexes.iter().filter(|i| i.name == METADATA) {
+            // The library adds them without a look.
+            index.offset.checked_add(index.length).ok_or(McapError::BadIndex)?;
             info = Some(RecordingInfo::from_map(&mcap::read::metadata(bytes, index)?.metadata));
         }
     }

@@ -79,6 +79,10 @@ fn frame_of(text: &str) -> Result<RecordedFrame, RecordProblem> {
         return Err(RecordProblem::Id);
     }
     let made = |kind, data, dlc| RecordedFrame { id, extended: extended && !error, kind, data, dlc };
+    // The kernel reports errors as classic data frames.
+    if error && body.starts_with(['#', 'R', 'r']) {
+        return Err(RecordProblem::Data);
+    }
     if let Some(fd) = body.strip_prefix('#') {
         let (flags, data) = fd.split_at_checked(1).ok_or(RecordProblem::Data)?;
         let flags = u8::from_str_radix(flags, 16).map_err(|_| RecordProblem::Data)?;

@@ -62,8 +62,8 @@ impl fmt::Display for RecordedFrame {
             write!(f, "{:03X}#", self.id)?;
         }
         match self.kind {
-            FrameKind::Remote { length: 0 } => return write!(f, "R"),
-            FrameKind::Remote { length } => return write!(f, "R{length}"),
+            FrameKind::Remote { length: 0 } => write!(f, "R")?,
+            FrameKind::Remote { length } => write!(f, "R{length}")?,
             FrameKind::Fd { flags } => write!(f, "#{:X}", flags & 0xF)?,
             FrameKind::Data | FrameKind::Error => {}
         }

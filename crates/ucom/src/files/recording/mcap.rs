@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::prelude::v1::*;
 
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Compression, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
+use mcap::{Compression, McapError, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
 use serde::{Deserialize, Serialize};
 
 use super::{Direction, FrameKind, Record, RecordedFrame, Recording, RecordingError, hex_bytes};
@@ -103,9 +103,9 @@ impl Message {
     }
 }
 
-fn mcap_error(e: mcap::McapError) -> RecordingError {
+fn mcap_error(e: McapError) -> RecordingError {
     match e {
-        mcap::McapError::Io(e) => e.into(),
+        McapError::Io(e) => e.into(),
         e => damaged(e.to_string()),
     }
 }
@@ -162,6 +162,8 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     if let Some(summary) = Summary::read(file).map_err(mcap_error)? {
         for index in &summary.metadata_indexes {
             if index.name == METADATA {
+                // The library adds them without a look.
+                index.offset.checked_add(index.length).ok_or(McapError::BadIndex).map_err(mcap_error)?;
                 let metadata = mcap::read::metadata(file, index).map_err(mcap_error)?;
                 recording.profile = metadata.metadata.get("profile").cloned();
             }

@@ -44,6 +44,7 @@ fn d02_foreign_lines_are_recognised() {
         "12345678#11",
         "123#R",
         "123#R4",
+        "123#R8_9",
         "123##1AABB",
         "20000080#0102030405060708",
         "123#1122334455667788_B",
@@ -58,6 +59,9 @@ fn d02_foreign_lines_are_recognised() {
 fn bad_lines_are_named() {
     assert_eq!(problem("nonsense"), RecordProblem::Columns);
     assert_eq!(problem("(x) can0 123#"), RecordProblem::Time);
+    for error_that_is_no_data_frame in ["20000080##1AABB", "20000080#R8"] {
+        assert_eq!(problem(&format!("(1.0) can0 {error_that_is_no_data_frame}")), RecordProblem::Data);
+    }
     assert_eq!(problem("(1) can0 823#"), RecordProblem::Id);
     assert_eq!(problem("(1) can0 12#"), RecordProblem::Id);
     assert_eq!(problem("(1) can0 123#1"), RecordProblem::Data);

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::path::PathBuf;
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Compression, McapError, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
+use mcap::records::{self, MessageHeader, Metadata, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
 use super::{Recording, RecordingError, RecordingInfo, schema};
@@ -134,32 +135,64 @@ impl<W: Write + Seek> McapWriter<W> {
 
 /// Reads what [`McapWriter`] wrote; messages of other topics are passed over.
 pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
-    let mut info = None;
-    // A file that was cut off has no summary; its messages are still read.
-    if let Ok(Some(summary)) = Summary::read(bytes) {
-        for index in summary.metadata_indexes.iter().filter(|i| i.name == METADATA) {
-            // The library adds them without a look.
-            index.offset.checked_add(index.length).ok_or(McapError::BadIndex)?;
-            info = Some(RecordingInfo::from_map(&mcap::read::metadata(bytes, index)?.metadata));
+    let mut info: Option<RecordingInfo> = None;
+    let mut topics = BTreeMap::new();
+    let mut samples: BTreeMap<u64, Sample> = BTreeMap::new();
+    let seconds = |info: &Option<RecordingInfo>, time_ns: u64| {
+        time_ns.saturating_sub(info.as_ref().map_or(0, |i| i.start_unix_ns)) as f64 * 1e-9
+    };
+    // A file that was cut off has no end.
+    each_record(bytes, LinearReaderOptions::default().with_skip_end_magic(true), |record| {
+        match record {
+            records::Record::Metadata(metadata) if metadata.name == METADATA => {
+                info = Some(RecordingInfo::from_map(&metadata.metadata));
+            }
+            records::Record::Channel(channel) => {
+                topics.insert(channel.id, channel.topic);
+            }
+            records::Record::Message { header, data } => {
+                let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
+                let topic = topics.get(&header.channel_id).ok_or(unknown)?;
+                let sample = samples.entry(header.log_time).or_default();
+                decode(topic, &data, sample).ok_or_else(|| RecordingError::Message {
+                    path: PathBuf::new(),
+                    topic: topic.clone(),
+                    time_s: seconds(&info, header.log_time),
+                })?;
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    let samples =
+        samples.into_iter().map(|(time_ns, sample)| Sample { time_s: seconds(&info, time_ns), ..sample });
+    Ok(Recording { samples: samples.collect(), info })
+}
+
+/// Shows the records of a file that we write, those in chunks too. Attachments and indices are passed over unread: the
+/// library panics at damaged ones.
+fn each_record(
+    file: &[u8],
+    options: LinearReaderOptions,
+    mut see: impl FnMut(records::Record) -> Result<(), RecordingError>,
+) -> Result<(), RecordingError> {
+    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(MAX_RECORD));
+    let mut rest = file;
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (piece, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(piece.len()).copy_from_slice(piece);
+                reader.notify_read(piece.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { opcode: opcode @ (op::CHANNEL | op::MESSAGE | op::METADATA), data } => {
+                see(mcap::parse_record(opcode, data)?)?;
+            }
+            LinearReadEvent::Record { .. } => {}
         }
     }
-    let start_ns = info.as_ref().map_or(0, |i| i.start_unix_ns);
-    let mut samples: BTreeMap<u64, Sample> = BTreeMap::new();
-    let options =
-        LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
-    for message in MessageReader::new_with_options(bytes, options) {
-        let message = message?;
-        let time_s = message.log_time.saturating_sub(start_ns) as f64 * 1e-9;
-        let sample =
-            samples.entry(message.log_time).or_insert_with(|| Sample { time_s, ..Sample::default() });
-        let topic = message.channel.topic.as_str();
-        decode(topic, &message.data, sample).ok_or_else(|| RecordingError::Message {
-            path: PathBuf::new(),
-            topic: topic.to_owned(),
-            time_s,
-        })?;
-    }
-    Ok(Recording { info, samples: samples.into_values().collect() })
+    Ok(())
 }
 
 fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {

@@ -5,8 +5,9 @@ use std::io::{Seek, Write};
 use std::path::PathBuf;
 use std::prelude::v1::*;
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Compression, McapError, Summary, WriteOptions, io::MessageReader, sans_io::LinearReaderOptions};
+use mcap::records::{self, MessageHeader, Metadata, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{Compression, McapError, WriteOptions};
 use serde::{Deserialize, Serialize};
 
 use super::{Direction, FrameKind, Record, RecordedFrame, Recording, RecordingError, hex_bytes};
@@ -103,10 +104,12 @@ impl Message {
     }
 }
 
-fn mcap_error(e: McapError) -> RecordingError {
-    match e {
-        McapError::Io(e) => e.into(),
-        e => damaged(e.to_string()),
+impl From<McapError> for RecordingError {
+    fn from(e: McapError) -> Self {
+        match e {
+            McapError::Io(e) => e.into(),
+            e => damaged(e.to_string()),
+        }
     }
 }
 
@@ -127,12 +130,11 @@ impl<W: Write + Seek> McapWriter<W> {
         let mut out = WriteOptions::new()
             .library(concat!("openjtc ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Lz4))
-            .create(out)
-            .map_err(mcap_error)?;
+            .create(out)?;
         let metadata = BTreeMap::from([("profile".to_owned(), profile.to_owned())]);
-        out.write_metadata(&Metadata { name: METADATA.into(), metadata }).map_err(mcap_error)?;
-        let schema = out.add_schema("CanFrame", "jsonschema", SCHEMA.as_bytes()).map_err(mcap_error)?;
-        let channel = out.add_channel(schema, TOPIC, "json", &BTreeMap::new()).map_err(mcap_error)?;
+        out.write_metadata(&Metadata { name: METADATA.into(), metadata })?;
+        let schema = out.add_schema("CanFrame", "jsonschema", SCHEMA.as_bytes())?;
+        let channel = out.add_channel(schema, TOPIC, "json", &BTreeMap::new())?;
         Ok(Self { out, channel, sequence: 0 })
     }
 
@@ -146,12 +148,12 @@ impl<W: Write + Seek> McapWriter<W> {
         };
         self.sequence = self.sequence.wrapping_add(1);
         let json = serde_json::to_vec(&Message::of(record, name)).map_err(|e| damaged(e.to_string()))?;
-        self.out.write_to_known_channel(&header, &json).map_err(mcap_error)
+        Ok(self.out.write_to_known_channel(&header, &json)?)
     }
 
     /// Writes index and end.
     pub fn finish(mut self) -> Result<W, RecordingError> {
-        self.out.finish().map_err(mcap_error)?;
+        self.out.finish()?;
         Ok(self.out.into_inner())
     }
 }
@@ -159,25 +161,53 @@ impl<W: Write + Seek> McapWriter<W> {
 /// Reads a whole file.
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
-    if let Some(summary) = Summary::read(file).map_err(mcap_error)? {
-        for index in &summary.metadata_indexes {
-            if index.name == METADATA {
-                // The library adds them without a look.
-                index.offset.checked_add(index.length).ok_or(McapError::BadIndex).map_err(mcap_error)?;
-                let metadata = mcap::read::metadata(file, index).map_err(mcap_error)?;
+    let mut channels = BTreeMap::new();
+    each_record(file, LinearReaderOptions::default(), |record| {
+        match record {
+            records::Record::Metadata(metadata) if metadata.name == METADATA => {
                 recording.profile = metadata.metadata.get("profile").cloned();
             }
+            records::Record::Channel(channel) => {
+                channels.insert(channel.id, channel.topic == TOPIC && channel.message_encoding == "json");
+            }
+            records::Record::Message { header, data } => {
+                let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
+                if !*channels.get(&header.channel_id).ok_or(unknown)? {
+                    return Ok(());
+                }
+                let message = serde_json::from_slice::<Message>(&data).map_err(|e| damaged(e.to_string()))?;
+                let bad = || damaged(format!("message {}: not a CAN frame", header.sequence));
+                recording.records.push(message.record(header.log_time).ok_or_else(bad)?);
+            }
+            _ => {}
         }
-    }
-    let options = LinearReaderOptions::default().with_record_length_limit(MAX_RECORD);
-    for message in MessageReader::new_with_options(file, options) {
-        let message = message.map_err(mcap_error)?;
-        if message.channel.topic != TOPIC || message.channel.message_encoding != "json" {
-            continue;
-        }
-        let record = serde_json::from_slice::<Message>(&message.data).map_err(|e| damaged(e.to_string()))?;
-        let bad = || damaged(format!("message {}: not a CAN frame", message.sequence));
-        recording.records.push(record.record(message.log_time).ok_or_else(bad)?);
-    }
+        Ok(())
+    })?;
     Ok(recording)
+}
+
+/// Shows the records of a file that we write, those in chunks too. Attachments and indices are passed over unread: the
+/// library panics at damaged ones.
+fn each_record(
+    file: &[u8],
+    options: LinearReaderOptions,
+    mut see: impl FnMut(records::Record) -> Result<(), RecordingError>,
+) -> Result<(), RecordingError> {
+    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(MAX_RECORD));
+    let mut rest = file;
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (piece, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(piece.len()).copy_from_slice(piece);
+                reader.notify_read(piece.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { opcode: opcode @ (op::CHANNEL | op::MESSAGE | op::METADATA), data } => {
+                see(mcap::parse_record(opcode, data)?)?;
+            }
+            LinearReadEvent::Record { .. } => {}
+        }
+    }
+    Ok(())
 }

@@ -12,7 +12,7 @@ mod tests;
 
 use std::fmt::Write;
 
-use super::edges::{BoardEdges, Edge};
+use super::edges::{BoardEdges, Edge, EdgeType};
 use crate::master::io::{IoDescription, Kind, short};
 use crate::{Endian, Function, Sender, Sequence, Status};
 use names::Names;
@@ -82,9 +82,14 @@ impl Signal {
         };
         let Self { name, multiplex, bits, edge, .. } = self;
         let (scale, offset, unit) = edge.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
+        // The shortest number that says the limit: what calculating loses is not written.
+        let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
         let (low, high) = match edge {
-            Some(edge) if edge.known => edge.range(),
-            _ => (low as f64, high as f64),
+            Some(edge) if edge.known && edge.kind != EdgeType::Hex => {
+                let (low, high) = edge.limits();
+                (limit(low), limit(high))
+            }
+            _ => (low.to_string(), high.to_string()),
         };
         format!(
             " SG_ {name}{multiplex} : {start}|{bits}@{order}{sign} ({scale},{offset}) [{low}|{high}] \"{unit}\" {receiver}\n"

@@ -109,6 +109,22 @@ fn d11_signals_carry_scale_offset_and_unit() {
     assert!(text.contains("(0.01,0) [-60|60] \"deg\""), "{text}");
 }
 
+/// Limits are written as short as they are: no digits that only calculating makes.
+#[test]
+fn d11_ranges_of_signals_are_short() {
+    let table = "[[program]]\nprogram_id = 1\nso.tenths = { scale = 0.1 }\nso.odd = { scale = 0.1, min = -0.125, max = 7.25 }\n\
+                 so.bits = { type = \"hex\" }\nso.switch = { type = \"bool\" }\n";
+    let table = crate::files::EdgeTable::parse(table).unwrap();
+    let names = ["tenths", "odd", "bits", "switch"].map(str::to_owned).to_vec();
+    let description = IoDescription { so: names, ..Default::default() };
+    let edges = BoardEdges::new(&description, table.program(1), &crate::Profile::default());
+    let text = dbc(&[DbcBoard::new(1, &description, &edges)], Endian::Little);
+    for range in ["(0.1,0) [-3276.8|3276.7]", "(0.1,0) [-0.125|7.25]", "(1,0) [0|65535]", "(1,0) [0|1]"] {
+        assert!(text.contains(range), "{range}: {text}");
+    }
+    Dbc::try_from(text.as_str()).expect("a DBC file");
+}
+
 /// The golden frame of a board's information, and a SETSTATUS.
 #[test]
 fn static_messages_decode() {

@@ -40,6 +40,8 @@ pub struct Edge {
     pub max: Option<f64>,
     /// A table says so; otherwise it is a bare word.
     pub known: bool,
+    /// There is a table, and it knows nothing of the program: only the word itself can be given.
+    pub raw_only: bool,
 }
 
 /// Why a value cannot be written to an edge.
@@ -77,6 +79,14 @@ pub enum ValueError {
         /// What was given.
         given: String,
     },
+    /// A number or a switch, and nobody knows what it means here.
+    #[error(
+        "{given}: the edge table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
+    )]
+    Meaning {
+        /// What was given.
+        given: String,
+    },
     /// On or off, but the edge is a number.
     #[error("{given}: it is a number")]
     NoSwitch {
@@ -84,6 +94,9 @@ pub enum ValueError {
         given: String,
     },
 }
+
+/// What calculating with fractions may lose, as a share.
+const SLACK: f64 = 1e-9;
 
 fn space(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
@@ -93,7 +106,16 @@ impl Edge {
     /// An edge that no table knows: a bare word, signed or not by the profile.
     pub fn bare(profile: &Profile) -> Self {
         let kind = if profile.pd_signed { EdgeType::Int16 } else { EdgeType::Uint16 };
-        Self { kind, scale: 1.0, offset: 0.0, unit: String::new(), min: None, max: None, known: false }
+        Self {
+            kind,
+            scale: 1.0,
+            offset: 0.0,
+            unit: String::new(),
+            min: None,
+            max: None,
+            known: false,
+            raw_only: false,
+        }
     }
 
     fn plain(&self) -> bool {
@@ -108,8 +130,6 @@ impl Edge {
     /// Range of the word as a number.
     fn words(&self) -> (i32, i32) {
         match self.kind {
-            // Whoever thinks of a bare word as unsigned is not sent away.
-            EdgeType::Int16 | EdgeType::Uint16 if !self.known => (-32768, 65535),
             EdgeType::Int16 => (-32768, 32767),
             EdgeType::Uint16 | EdgeType::Hex => (0, 65535),
             EdgeType::Bool => (0, 1),
@@ -175,16 +195,63 @@ impl Edge {
         if self.kind == EdgeType::Hex {
             return ("0x0000".into(), "0xFFFF".into());
         }
+        let text = |limit: f64, own: Option<f64>| {
+            let text = self.written(limit);
+            // A limit of the table between two words is told as it is.
+            let odd = own == Some(limit) && text.parse() != Ok(limit);
+            if odd { limit.to_string() } else { text }
+        };
         let (low, high) = self.range();
-        (self.written(low), self.written(high))
+        (text(low, self.min), text(high, self.max))
     }
 
-    /// The word for a value. Between two words the nearer one is taken where the edge has a scale.
+    /// Smallest and largest number of a word whose value is within the limits; the first is larger where there is none.
+    pub(super) fn allowed(&self) -> (i32, i32) {
+        let (low, high) = self.words();
+        let steps = |limit: f64| (limit - self.offset) / self.scale;
+        let slack = |steps: f64| SLACK * (1.0 + steps.abs());
+        let (min, max) = if self.scale < 0.0 { (self.max, self.min) } else { (self.min, self.max) };
+        let from = min.map(steps).map(|s| (s - slack(s)).ceil() as i32);
+        let to = max.map(steps).map(|s| (s + slack(s)).floor() as i32);
+        (from.map_or(low, |from| from.max(low)), to.map_or(high, |to| to.min(high)))
+    }
+
+    /// Whether a value keeps the limits, but for what calculation with fractions loses.
+    fn within(&self, value: f64) -> bool {
+        let slack = |limit: f64| SLACK * (limit.abs().max(value.abs()) + self.scale.abs());
+        let below = self.min.is_some_and(|min| value < min - slack(min));
+        let above = self.max.is_some_and(|max| value > max + slack(max));
+        !below && !above
+    }
+
+    /// What is sent instead of a value that lies between two words, with the unit; `None`: the value itself.
+    pub fn rounded(&self, given: &Given, word: u16) -> Option<String> {
+        let Given::Number { value, .. } = given else { return None };
+        let sent = self.scaled(self.number(word));
+        let same = (sent - value).abs() <= SLACK * (value.abs() + self.scale.abs());
+        (!same).then(|| self.text_with_unit(word))
+    }
+
+    /// The word for a value. Between two words the nearer one is taken where the edge has a scale, but never one beyond
+    /// the limits.
+    ///
+    /// # Errors
+    /// A value outside of the limits, in another unit, between two words of an edge without scale, or of another type.
     pub fn word(&self, given: &Given) -> Result<u16, ValueError> {
         let text = || given.to_string();
         let number = match (given, self.kind) {
-            // The word itself goes whatever the type is; limits hold for it, too.
-            (Given::Raw(word), _) => self.number(*word),
+            (Given::Raw(word), EdgeType::Bool) if *word > 1 => {
+                return Err(ValueError::Switch { given: text() });
+            }
+            // The word itself goes whatever the scale is; limits hold for it, too.
+            (Given::Raw(word), _) => {
+                let number = self.number(*word);
+                if !self.within(self.scaled(number)) {
+                    return Err(self.outside(given));
+                }
+                number
+            }
+            _ if self.raw_only => return Err(ValueError::Meaning { given: text() }),
             (Given::Switch(on), EdgeType::Bool) => i32::from(*on),
             (Given::Switch(_), _) => return Err(ValueError::NoSwitch { given: text() }),
             (Given::Number { value, unit }, kind) => {
@@ -200,20 +267,13 @@ impl Edge {
                 }
                 let (low, high) = self.words();
                 let nearest = steps.round();
-                if !(f64::from(low)..=f64::from(high)).contains(&nearest) {
+                if !(f64::from(low)..=f64::from(high)).contains(&nearest) || !self.within(*value) {
                     return Err(self.outside(given));
                 }
-                nearest as i32
+                let (from, to) = self.allowed();
+                (nearest as i32).max(from).min(to)
             }
         };
-        let value = self.scaled(number);
-        // What the nearest word misses is no violation.
-        let step = self.scale.abs() * 0.5 * (1.0 + 1e-9);
-        let below = self.min.is_some_and(|min| value < min - step);
-        let above = self.max.is_some_and(|max| value > max + step);
-        if (below || above) && !matches!(self.kind, EdgeType::Bool | EdgeType::Hex) {
-            return Err(self.outside(given));
-        }
         Ok(number as u16)
     }
 
@@ -244,11 +304,24 @@ mod tests {
         let unsigned = Edge::bare(&Profile { pd_signed: false, ..Profile::default() });
         assert_eq!(unsigned.text(0xFFEC), "65516");
         assert_eq!(
-            (word(&edge, "65535"), word(&edge, "-32768"), word(&edge, "0xFFEC")),
-            (Ok(65535), Ok(32768), Ok(65516))
+            (word(&edge, "32767"), word(&edge, "-32768"), word(&edge, "0xFFEC")),
+            (Ok(32767), Ok(32768), Ok(65516))
         );
-        for wrong in ["65536", "-32769", "1.5", "3 deg", "on"] {
+        // A number that would come back as another one is refused.
+        for wrong in ["32768", "40000", "65535", "-32769", "1.5", "3 deg", "on"] {
             assert!(word(&edge, wrong).is_err(), "{wrong}");
+        }
+        assert_eq!((word(&unsigned, "65535"), word(&unsigned, "0")), (Ok(65535), Ok(0)));
+        assert!(word(&unsigned, "-1").is_err() && word(&unsigned, "65536").is_err());
+    }
+
+    /// Where a table was given that does not know the program, numbers mean nothing.
+    #[test]
+    fn d11_without_meaning_only_the_word_itself_is_taken() {
+        let edge = Edge { raw_only: true, ..Edge::bare(&Profile::default()) };
+        assert_eq!(word(&edge, "0x9C40"), Ok(0x9C40));
+        for wrong in ["3", "on"] {
+            assert!(matches!(word(&edge, wrong), Err(ValueError::Meaning { .. })), "{wrong}");
         }
     }
 
@@ -278,11 +351,42 @@ mod tests {
         assert!(word(&edge, "0x03E9").is_err() && word(&edge, "-0.01").is_err());
     }
 
+    /// No value beyond a limit is taken, and no word beyond it is sent, whatever the steps are.
+    #[test]
+    fn d11_rounding_never_leaves_the_limits() {
+        let coarse = Edge { max: Some(150.0), ..edge(EdgeType::Int16, 100.0, 0.0, "mA") };
+        for wrong in ["199.9", "150.1", "0x0002"] {
+            let said = word(&coarse, wrong).unwrap_err().to_string();
+            assert_eq!(said, format!("{} is outside -3276800..150 mA", wrong.parse::<Given>().unwrap()));
+        }
+        assert_eq!((word(&coarse, "150"), word(&coarse, "149"), word(&coarse, "40")), (Ok(1), Ok(1), Ok(0)));
+        let down = Edge { min: Some(-150.0), ..edge(EdgeType::Int16, -100.0, 0.0, "") };
+        assert_eq!((word(&down, "-150"), word(&down, "-151").is_err()), (Ok(1), true));
+        // What fractions lose is no violation.
+        let tenths = Edge { max: Some(0.3), ..edge(EdgeType::Int16, 0.1, 0.0, "") };
+        assert_eq!((word(&tenths, "0.3"), word(&tenths, "0x0003")), (Ok(3), Ok(3)));
+        let odd = Edge { min: Some(-0.125), max: Some(3276.65), ..edge(EdgeType::Int16, 0.1, 0.0, "") };
+        assert_eq!(odd.limits(), ("-0.125".into(), "3276.65".into()));
+    }
+
+    #[test]
+    fn a_rounded_value_is_told() {
+        let tenths = edge(EdgeType::Int16, 0.1, 0.0, "A");
+        let told = |text: &str| {
+            let given = text.parse().unwrap();
+            tenths.rounded(&given, tenths.word(&given).unwrap())
+        };
+        assert_eq!((told("0.04"), told("0.3 A"), told("0x0003")), (Some("0.0 A".into()), None, None));
+        assert_eq!(told("-1234.56"), Some("-1234.6 A".into()));
+    }
+
     #[test]
     fn d11_switches_and_bits() {
         let switch = edge(EdgeType::Bool, 1.0, 0.0, "");
         assert_eq!((word(&switch, "on"), word(&switch, "0"), word(&switch, "1")), (Ok(1), Ok(0), Ok(1)));
-        assert!(word(&switch, "2").unwrap_err().to_string().contains("on or off"));
+        for wrong in ["2", "0x0007"] {
+            assert!(word(&switch, wrong).unwrap_err().to_string().contains("on or off"), "{wrong}");
+        }
         assert_eq!((switch.text(1), switch.json(0)), ("on".into(), json!(false)));
         let bits = edge(EdgeType::Hex, 1.0, 0.0, "");
         assert_eq!(
@@ -293,6 +397,26 @@ mod tests {
     }
 
     proptest! {
+        /// The word that is sent keeps the limits, and no allowed word is nearer.
+        #[test]
+        fn d11_the_sent_word_keeps_the_limits(scale in prop::sample::select(vec![-7.0, -0.3, 0.01, 0.3, 1.5, 100.0]), offset in -50..50_i32, a in -2000..2000_i32, b in -2000..2000_i32, value in -2500..2500_i32) {
+            let (min, max) = (f64::from(a.min(b)) / 8.0, f64::from(a.max(b)) / 8.0);
+            let edge = Edge { min: Some(min), max: Some(max), ..edge(EdgeType::Int16, scale, f64::from(offset), "") };
+            let value = f64::from(value) / 8.0;
+            let means = |w: i32| f64::from(w) * scale + f64::from(offset);
+            let inside = |x: f64| (min - 1e-6..=max + 1e-6).contains(&x);
+            let best = (-32768..=32767).map(means).filter(|x| inside(*x)).map(|x| (x - value).abs()).fold(f64::INFINITY, f64::min);
+            prop_assume!(best.is_finite());
+            match edge.word(&Given::Number { value, unit: String::new() }) {
+                Ok(word) => {
+                    let sent = means(i32::from(word as i16));
+                    prop_assert!(inside(value) && inside(sent), "{value} {sent}");
+                    prop_assert!((sent - value).abs() <= best + 1e-6, "{value} {sent}");
+                }
+                Err(_) => prop_assert!(!inside(value) || best > scale.abs() / 2.0),
+            }
+        }
+
         /// What is shown of a word gives that word again.
         #[test]
         fn d11_text_gives_the_word_again(w: u16, kind in 0..4_usize, exponent in -6..4_i32, mantissa in 1..100_u32, negative: bool, offset in -1000..1000_i32) {

@@ -59,11 +59,26 @@ impl FromStr for Given {
         let mut parts = ends.map(|end| text.split_at(end));
         let (value, unit) =
             parts.find_map(|(n, unit)| number(n).map(|n| (n, unit.trim()))).ok_or_else(wrong)?;
-        if unit.starts_with(|c: char| c.is_ascii_digit() || "+-.,_".contains(c)) {
+        if !may_follow(unit) {
+            return Err(wrong());
+        }
+        // 0o10 and -0x10 are numbers elsewhere, not 0 in a unit of that name.
+        let mut letters = unit.chars();
+        let joined = !text.contains(char::is_whitespace);
+        if joined
+            && letters.next().is_some_and(|c| c.is_ascii_alphabetic())
+            && letters.next().is_some_and(|c| c.is_ascii_hexdigit())
+            && unit.contains(|c: char| c.is_ascii_digit())
+        {
             return Err(wrong());
         }
         Ok(Self::Number { value, unit: unit.into() })
     }
+}
+
+/// Whether a unit can stand behind a number without becoming a part of it.
+pub(super) fn may_follow(unit: &str) -> bool {
+    !unit.starts_with(|c: char| c.is_ascii_digit() || "+-.,_:;'".contains(c))
 }
 
 fn number(text: &str) -> Option<f64> {
@@ -76,8 +91,16 @@ impl fmt::Display for Given {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Raw(word) => write!(f, "0x{word:04X}"),
-            Self::Number { value, unit } if unit.is_empty() => write!(f, "{value}"),
-            Self::Number { value, unit } => write!(f, "{value} {unit}"),
+            Self::Number { value, unit } => {
+                let size = value.abs();
+                // 1e300 is not told with 300 zeros.
+                if *value != 0.0 && !(1e-6..1e15).contains(&size) {
+                    write!(f, "{value:e}")?;
+                } else {
+                    write!(f, "{value}")?;
+                }
+                if unit.is_empty() { Ok(()) } else { write!(f, " {unit}") }
+            }
             Self::Switch(on) => f.write_str(if *on { "on" } else { "off" }),
         }
     }
@@ -105,9 +128,13 @@ mod tests {
         assert_eq!(given("Off"), Ok(Given::Switch(false)));
         for wrong in [
             "", "x", "0x10000", "0x", "0x-1", "0x+1", "nan", "inf", "-inf", "1e999", "--3", "1.2.3", "1,5",
-            "1 000",
+            "1 000", "0o10", "-0x10", "0b11", "1:30", "0xFFFFF", "1'000",
         ] {
             assert!(given(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
+        for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
+            assert_eq!(given(text).unwrap().to_string(), short);
         }
     }
 

@@ -36,6 +36,15 @@ impl BoardEdges {
         Self { ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
     }
 
+    /// For a program that the given table does not know: only words themselves can be given, as numbers may be meant in
+    /// units that nobody here knows.
+    pub fn raw_only(mut self) -> Self {
+        for edge in self.ci.iter_mut().chain(&mut self.so).chain(&mut self.par) {
+            edge.raw_only = true;
+        }
+        self
+    }
+
     /// All of one kind, in the order of the buffer.
     pub fn all(&self, kind: Kind) -> &[Edge] {
         match kind {

@@ -6,6 +6,7 @@ use std::prelude::v1::*;
 
 use serde::Deserialize;
 
+use super::given::may_follow;
 use super::{Edge, EdgeType};
 use crate::files::text::{TextError, quoted, read_text};
 use crate::master::io::{IoDescription, Kind, short};
@@ -20,6 +21,7 @@ const LARGEST: f64 = 1e9;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EdgeTable {
     programs: Vec<ProgramEdges>,
+    given: bool,
 }
 
 /// What is known of one program's edges.
@@ -167,10 +169,24 @@ impl FileEdge {
         if unit.chars().count() > 16 || unit.chars().any(|c| c.is_control() || c == '"') {
             return Err(format!("unit {unit:?}: at most 16 characters, no quotation mark"));
         }
-        if unit.starts_with(|c: char| c.is_ascii_digit() || "+-.,_ ".contains(c)) || unit.ends_with(' ') {
+        if !may_follow(&unit) || unit.trim() != unit {
             return Err(format!("unit {unit:?} cannot stand behind a number"));
         }
-        Ok(Edge { kind, scale, offset, unit, min, max, known: true })
+        let edge = Edge { kind, scale, offset, unit, min: None, max: None, known: true, raw_only: false };
+        let ((low, high), (least, most)) = (edge.range(), edge.limits());
+        let beyond = |x: &f64| !(low - 0.5 * scale.abs()..=high + 0.5 * scale.abs()).contains(x);
+        for (key, limit) in [("min", min), ("max", max)] {
+            if let Some(limit) = limit.filter(beyond) {
+                return Err(format!("{key} = {limit} is outside {least}..{most}, what the word can hold"));
+            }
+        }
+        let edge = Edge { min, max, ..edge };
+        let (from, to) = edge.allowed();
+        if from > to {
+            let (min, max) = edge.limits();
+            return Err(format!("no word lies between min = {min} and max = {max}"));
+        }
+        Ok(edge)
     }
 }
 
@@ -178,7 +194,7 @@ impl EdgeTable {
     /// Reads TOML.
     pub fn parse(text: &str) -> Result<Self, EdgeTableError> {
         let file: File = toml::from_str(text).map_err(|e| EdgeTableError::Form(e.to_string()))?;
-        let mut table = Self::default();
+        let mut table = Self { programs: Vec::new(), given: true };
         for (i, program) in file.program.into_iter().enumerate() {
             let Some(&id) = program.program_id.first() else {
                 return Err(EdgeTableError::NoId { number: i + 1 });
@@ -212,6 +228,11 @@ impl EdgeTable {
     pub fn read(path: &Path) -> Result<Self, EdgeTableError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| EdgeTableError::In { path: path.into(), source: Box::new(e) })
+    }
+
+    /// Whether it was read from anything; otherwise nobody has said what words mean.
+    pub fn is_given(&self) -> bool {
+        self.given
     }
 
     /// What is known of a program.
@@ -288,10 +309,19 @@ impl ProgramEdges {
         }
     }
 
-    /// What is known of an edge: by its whole text, its text without the unit in brackets, or its number.
+    /// What is known of an edge: by its whole text, its text without the unit in brackets, or its number. Small and
+    /// capital letters are the same where names stay distinct by that, as they are for names that people give.
     pub fn edge(&self, kind: Kind, index: usize, name: &str) -> Option<&Edge> {
         let all = self.of(kind);
-        all.get(name).or_else(|| all.get(short(name))).or_else(|| all.get(&format!("#{index}")))
+        let like = |wanted: &str| {
+            let mut found = all.iter().filter(|(key, _)| key.trim().eq_ignore_ascii_case(wanted.trim()));
+            found.next().filter(|_| found.next().is_none()).map(|(_, edge)| edge)
+        };
+        all.get(name)
+            .or_else(|| all.get(short(name)))
+            .or_else(|| like(name))
+            .or_else(|| like(short(name)))
+            .or_else(|| all.get(&format!("#{index}")))
     }
 
     /// Names of the table that the program has not: mistakes in writing, mostly.
@@ -300,7 +330,8 @@ impl ProgramEdges {
         for kind in [Kind::Ci, Kind::So, Kind::Par] {
             let names = description.names(kind);
             let fits = |key: &str| {
-                let by_name = names.iter().any(|n| n == key || short(n) == key);
+                let key_is = |n: &str| n.trim().eq_ignore_ascii_case(key.trim());
+                let by_name = names.iter().any(|n| key_is(n) || key_is(short(n)));
                 by_name || (0..names.len()).any(|i| key == format!("#{i}"))
             };
             strays.extend(
@@ -360,6 +391,10 @@ mod tests {
         assert!(refused("scale = nan").contains("NaN"));
         assert!(refused("offset = inf").contains("inf"));
         assert!(refused("min = 2, max = 1").contains("min = 2 is above max = 1"));
+        let said = refused("scale = 0.01, unit = \"deg\", min = -60, max = 400");
+        assert!(said.contains("max = 400 is outside -327.68..327.67, what the word can hold"), "{said}");
+        assert!(refused("type = \"uint16\", min = -1").contains("min = -1 is outside 0..65535"));
+        assert!(refused("scale = 100, min = 110, max = 150").contains("no word lies between"));
         assert!(refused("type = \"bool\", scale = 2").contains("have no scale"));
         assert!(refused("unit = \"2m\"").contains("behind a number"));
         assert!(refused("scales = 2").contains("line 4") && refused("type = \"int8\"").contains("line 4"));
@@ -368,6 +403,19 @@ mod tests {
         assert!(form("[[program]]\nprogram_id = [1, 1]").contains("0x0001 is given twice"));
         assert!(form("[[program]]\nprogram_id = 1\n[[program]]\nprogram_id = 1").contains("given twice"));
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
+    }
+
+    /// D-11: letters in another case are the same name, as where values are given.
+    #[test]
+    fn d11_names_of_the_table_are_found_in_any_case() {
+        let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\
+                    STIFFNES = {}\n";
+        let table = EdgeTable::parse(text).unwrap();
+        let program = table.program(1).unwrap();
+        let edges = BoardEdges::new(&description(), Some(program), &Profile::default());
+        assert_eq!(edges.get(Kind::Ci, 0).unwrap().unit, "deg");
+        assert_eq!(program.strays(&description()), ["CI `STIFFNES`"]);
+        assert!(table.is_given() && !EdgeTable::default().is_given());
     }
 
     /// A template is a table, and it names every edge.

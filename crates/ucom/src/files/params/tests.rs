@@ -82,7 +82,7 @@ fn another_board_or_program_is_a_problem_with_its_line() {
 /// Every mistake is told at once, with line and column.
 #[test]
 fn names_and_ranges_are_checked_with_their_place() {
-    let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 40000\n    kp: 70000\n    current_max: 3\n    mode: on\n  ci:\n    set_position: 61\n";
+    let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 4000\n    kp: 70000\n    current_max: 3\n    mode: on\n  ci:\n    set_position: 61\n";
     let file = ParamsFile::parse(text).unwrap();
     let problems = check_board(file.board(1).unwrap(), &description(), &edges()).unwrap_err();
     let said: Vec<String> = problems.iter().map(ToString::to_string).collect();

@@ -190,10 +190,24 @@ impl FileEdge {
     }
 }
 
+/// What the TOML library says, in words for whoever wrote the table.
+fn people(words: &str) -> String {
+    let terms = [
+        ("duplicate key", "the same key is given twice"),
+        ("expected f64", "expected a number, as 0.1"),
+        ("expected struct FileEdge", "expected an edge, as { scale = 0.1 }"),
+        ("expected struct FileProgram", "expected a program, as [[program]]"),
+        ("expected a map", "expected edges by their names"),
+        ("expected a sequence", "expected a list: [[program]] has two brackets"),
+        ("expected a string", "expected a text in quotation marks"),
+    ];
+    terms.iter().fold(words.to_owned(), |text, (theirs, ours)| text.replace(theirs, ours))
+}
+
 impl EdgeTable {
     /// Reads TOML.
     pub fn parse(text: &str) -> Result<Self, EdgeTableError> {
-        let file: File = toml::from_str(text).map_err(|e| EdgeTableError::Form(e.to_string()))?;
+        let file: File = toml::from_str(text).map_err(|e| EdgeTableError::Form(people(&e.to_string())))?;
         let mut table = Self { programs: Vec::new(), given: true };
         for (i, program) in file.program.into_iter().enumerate() {
             let Some(&id) = program.program_id.first() else {
@@ -398,6 +412,8 @@ mod tests {
         assert!(refused("type = \"bool\", scale = 2").contains("have no scale"));
         assert!(refused("unit = \"2m\"").contains("behind a number"));
         assert!(refused("scales = 2").contains("line 4") && refused("type = \"int8\"").contains("line 4"));
+        let said = refused("scale = \"x\"");
+        assert!(said.contains("expected a number") && !said.contains("f64"), "{said}");
         let form = |text: &str| EdgeTable::parse(text).unwrap_err().to_string();
         assert!(form("[[program]]\nname = \"x\"").contains("program 1 has no program_id"));
         assert!(form("[[program]]\nprogram_id = [1, 1]").contains("0x0001 is given twice"));

@@ -29,6 +29,8 @@ pub struct ParamsWord {
     pub word: u16,
     /// The value in the edge's unit, with the unit.
     pub text: String,
+    /// `0.04 → 0.0` where the value lies between two words.
+    pub rounded: Option<String>,
 }
 
 /// One mistake of a file.
@@ -178,6 +180,7 @@ fn check_entries(
                 name: description.names(kind).get(usize::from(index)).cloned().unwrap_or_default(),
                 word,
                 text: edge.text_with_unit(word),
+                rounded: edge.rounded(given, word).map(|sent| format!("{given} → {sent}")),
             }),
             Err(problem) => say(ParamsProblemKind::Value { kind: kind.name(), name: name.clone(), problem }),
         }

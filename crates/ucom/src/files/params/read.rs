@@ -120,6 +120,38 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
     Ok(ParamsBoard { number: number_of, place: at, flash_number, name, program_id, par, ci })
 }
 
+/// What the YAML library says, in words for whoever wrote the file.
+fn people(words: &str) -> String {
+    // The place is told by us.
+    let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');
+    if let Some(rest) = words.strip_prefix("duplicate mapping key") {
+        let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);
+        let key = if key.is_empty() { "a name".to_owned() } else { format!("`{key}`") };
+        return format!("{key} is given twice under the same heading");
+    }
+    if words.starts_with("multiple YAML documents") {
+        return "a second document begins (a line of ---); a parameter file is one".into();
+    }
+    if words.starts_with("unexpected end of input") {
+        return "there is nothing in it: the end of input comes before `boards:`".into();
+    }
+    let list = ["invalid type: sequence", "expected string scalar", "expected scalar"];
+    if list.iter().any(|start| words.starts_with(start)) {
+        return "here stands a list or a group of names where one value is expected, as `kp: 120`".into();
+    }
+    if words.starts_with("cannot deserialize null into string") {
+        return "a value is missing, as in `kp: 120`".into();
+    }
+    let terms = [
+        ("expected sequence start", "here a list is expected, each board with a hyphen, as `- board: 1`"),
+        ("expected mapping start", "here names with values are expected, as `kp: 120`"),
+        ("expected a sequence", "expected a list, as `- board: 1`"),
+        ("struct Board", "a board, as `- board: 1`"),
+        ("struct File", "`boards:` with a list"),
+    ];
+    terms.iter().fold(words.to_owned(), |text, (theirs, ours)| text.replace(theirs, ours))
+}
+
 impl ParamsFile {
     /// Reads YAML.
     pub fn parse(text: &str) -> Result<Self, ParamsError> {
@@ -130,13 +162,9 @@ impl ParamsFile {
         let file = serde_saphyr::from_str_with_options::<File>(text, options).map_err(|e| {
             let at = e.location().map(|l| Place { line: l.line() as u32, column: l.column() as u32 });
             let words = e.to_string();
-            let what = words.lines().next().unwrap_or("").to_owned();
+            let what = people(words.lines().next().unwrap_or(""));
             match at.filter(|at| at.line > 0) {
-                Some(place) => {
-                    // The library says the place itself, in its own words.
-                    let what = what.split(" at line ").next().unwrap_or(&what).to_owned();
-                    wrong(place, what)
-                }
+                Some(place) => wrong(place, what),
                 None => ParamsError::Nowhere(what),
             }
         })?;

@@ -123,6 +123,13 @@ fn what_is_no_parameter_file_is_refused_with_its_place() {
     assert!(of("kp: 0x10000").contains("no word of 16 bits"));
     assert!(of("kp: ~").contains("line 6") && of("kp:").contains("line 6"), "{}", of("kp:"));
     assert!(of("kp: 1\n      kp: 2").contains("line 7"), "{}", of("kp: 1\n      kp: 2"));
+    let said = of("kp: 1\n      kp: 2");
+    assert!(said.contains("`kp` is given twice") && !said.contains("Policy"), "{said}");
+    let said = of("kp: [1, 2]");
+    assert!(said.contains("line 6, column 11: ") && said.contains("one value"), "{said}");
+    let said = refused("boards: []\n---\nboards: []\n");
+    assert!(said.contains("line 2") || said.contains("line 3"), "{said}");
+    assert!(said.contains("second document") && !said.contains("from_"), "{said}");
     assert!(refused("boards:\n  - bord: 1\n").contains("line 2"));
     assert!(refused("boards: 3\n").contains("line 1"), "{}", refused("boards: 3\n"));
     assert!(refused("# nothing").contains("end of input"), "{}", refused("# nothing"));
@@ -157,7 +164,48 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert!(ci.is_empty());
     assert_eq!(par.iter().map(|w| (w.index, w.word)).collect::<Vec<_>>(), [(0, 120), (2, 0x8001)]);
     assert!(text.contains("# current_max:  # 0.000..2.000 A; once"), "{text}");
+    assert!(text.contains(" kp: 0x0078   # 120; -32768..32767; once"), "{text}");
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
+}
+
+/// D-11, D-35: with another edge table, or none, a saved file means the same word or is refused; never another word.
+#[test]
+fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
+    let description = IoDescription { par: texts(&["kd"]), ..Default::default() };
+    let profile = Profile::default();
+    let tables = [
+        "",
+        "{ scale = 0.1 }",
+        "{ scale = 0.01, unit = \"deg\" }",
+        "{ scale = 0.1, unit = \"A: #x\" }",
+        "{ type = \"hex\" }",
+        "{}",
+    ];
+    let edges = tables.map(|edge| {
+        let table = format!("[[program]]\nprogram_id = 7\npar.kd = {edge}\n");
+        let table = if edge.is_empty() { EdgeTable::default() } else { EdgeTable::parse(&table).unwrap() };
+        BoardEdges::new(&description, table.program(7), &profile)
+    });
+    for (i, saved) in edges.iter().enumerate() {
+        for word in [4_u16, 0xFFFE, 0x7FFF, 0x8000] {
+            let edge = saved.get(Kind::Par, 0).unwrap().clone();
+            let par = vec![SavedEdge { edge, word: Some(word), remark: String::new() }];
+            let description = description.clone();
+            let board = SavedBoard { number: 1, program_id: 7, description, par, ..Default::default() };
+            let text = params_text(&[board]);
+            let file = ParamsFile::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            for (k, edges) in edges.iter().enumerate() {
+                match check_board(&file.boards[0], &file_names(), edges) {
+                    Ok((_, par)) => assert_eq!(par[0].word, word, "{text}, table {k}"),
+                    Err(e) => assert!(i != k, "{e:?}: {text}"),
+                }
+            }
+        }
+    }
+}
+
+fn file_names() -> IoDescription {
+    IoDescription { par: texts(&["kd"]), ..Default::default() }
 }
 
 fn names() -> impl Strategy<Value = Vec<String>> {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::prelude::v1::*;
 
-use crate::files::edges::Edge;
+use crate::files::edges::{Edge, EdgeType, Given};
 use crate::files::text::quoted;
 use crate::master::io::{IoDescription, Kind, short};
 
@@ -77,11 +77,38 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     let (low, high) = saved.edge.limits();
     let unit = if saved.edge.unit.is_empty() { String::new() } else { format!(" {}", saved.edge.unit) };
     let remark = if saved.remark.is_empty() { String::new() } else { format!("; {}", saved.remark) };
-    let remark = comment(&format!("{low}..{high}{unit}{remark}"));
+    let limits = format!("{low}..{high}{unit}{remark}");
     let _ = match saved.word {
-        Some(word) => writeln!(text, "      {key}: {}{remark}", saved.edge.text(word)),
-        None => writeln!(text, "      # {key}:{}", remark.replacen("   #", "  #", 1)),
+        Some(word) => {
+            let value = value(&saved.edge, word);
+            let meaning = if value.starts_with("0x") && saved.edge.kind != EdgeType::Hex {
+                format!("{}; ", saved.edge.text_with_unit(word))
+            } else {
+                String::new()
+            };
+            writeln!(text, "      {key}: {value}{}", comment(&(meaning + &limits)))
+        }
+        None => writeln!(text, "      # {key}:{}", comment(&limits).replacen("   #", "  #", 1)),
     };
+}
+
+/// What a word is written as. A file is read again with another edge table, or with none; a bare number would then be another
+/// word. So there is a unit behind each number, which whoever does not know it refuses, or it is the word itself.
+fn value(edge: &Edge, word: u16) -> String {
+    let raw = format!("0x{word:04X}");
+    let text = match edge.kind {
+        EdgeType::Bool if edge.known && word <= 1 => return edge.text(word),
+        EdgeType::Int16 | EdgeType::Uint16 if edge.known && !edge.unit.is_empty() => {
+            edge.text_with_unit(word)
+        }
+        _ => return raw,
+    };
+    // A digit that rounding has lost, or a limit that the word does not keep.
+    if text.parse::<Given>().map(|given| edge.word(&given)) != Ok(Ok(word)) {
+        return raw;
+    }
+    let plain = |c: char| c.is_ascii_alphanumeric() || " .-/%^*_°µ²³Ω".contains(c);
+    if text.chars().all(plain) { text } else { quoted(&text) }
 }
 
 /// A remark at the end of a line. Texts of boards may hold anything: only what is one line stays.

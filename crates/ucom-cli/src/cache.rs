@@ -26,8 +26,8 @@ pub struct Known {
     pub names: IoDescription,
     /// Types, scales and units.
     pub edges: BoardEdges,
-    /// What the edge table names and the program has not.
-    pub strays: Vec<String>,
+    /// Where edge table and program do not fit.
+    strays: Vec<String>,
 }
 
 impl LinkArgs {
@@ -60,7 +60,7 @@ impl CacheArgs {
     pub fn known(&self, driver: &mut Driver, table: &EdgeTable, board: u8) -> Result<Known, Failure> {
         let info = seen(driver, board)?.info;
         if let Some(names) = self.kept(driver, &info) {
-            return Ok(with_edges(board, info, names, table, driver.master.profile()));
+            return Ok(with_edges(board, info, names, table, driver.master.profile()).told(driver));
         }
         self.described(driver, table, board)
     }
@@ -79,7 +79,7 @@ impl CacheArgs {
         {
             let _ = std::fs::create_dir_all(directory).and_then(|()| std::fs::write(file, text));
         }
-        Ok(with_edges(board, info, names, table, driver.master.profile()))
+        Ok(with_edges(board, info, names, table, driver.master.profile()).told(driver))
     }
 
     /// What is known of a program without asking for it.
@@ -98,6 +98,16 @@ impl CacheArgs {
     }
 }
 
+impl Known {
+    /// Says where edge table and program do not fit.
+    fn told(self, driver: &Driver) -> Self {
+        for stray in &self.strays {
+            driver.note(format!("edge table: {stray}"));
+        }
+        self
+    }
+}
+
 fn with_edges(
     board: u8,
     info: BoardInfo,
@@ -105,8 +115,15 @@ fn with_edges(
     table: &EdgeTable,
     profile: Profile,
 ) -> Known {
+    let who = format!("program 0x{:04X} (board {board})", info.program_id);
     let program = table.program(info.program_id).filter(|_| info.has_application());
     let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
-    let edges = BoardEdges::new(&names, program, &profile);
+    let mut strays: Vec<String> = strays.iter().map(|stray| format!("{who} has no {stray}")).collect();
+    let mut edges = BoardEdges::new(&names, program, &profile);
+    // Who gives a table thinks in its units: numbers for a program that is not in it would be sent as they are.
+    if table.is_given() && program.is_none() && info.has_application() {
+        strays.push(format!("it knows nothing of {who}"));
+        edges = edges.raw_only();
+    }
     Known { board, info, names, edges, strays }
 }

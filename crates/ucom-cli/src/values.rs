@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use ucom::files::EdgeTable;
+use ucom::files::edges::ValueError;
 use ucom::master::io::Kind;
 use ucom::master::{Outcome, Request, Setting, StopLevel};
 
 use crate::args::{Assignment, CacheArgs};
 use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
-use crate::failure::Failure;
+use crate::failure::{Failure, REFUSED};
 
 /// A word for an edge.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,8 @@ pub struct Word {
     pub word: u16,
     /// The value in the edge's unit, with the unit.
     pub text: String,
+    /// `0.04 → 0.0` where what was given lies between two words.
+    pub rounded: Option<String>,
 }
 
 impl Word {
@@ -43,12 +46,32 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
             return Err(Failure::usage(format!("board {} has no {} {index}", known.board, kind.name())));
         };
         let word = edge.word(&a.value).map_err(|e| {
-            Failure::usage(format!("board {}: {} `{}`: {e}", known.board, kind.name(), a.name))
-                .hint(format!("ucom io {} shows types, scales and units", known.board))
+            let hint = match e {
+                ValueError::Meaning { .. } => format!(
+                    "add program 0x{:04X} to the edge table (ucom help edges), or give the word as 0x0000",
+                    known.info.program_id
+                ),
+                _ => format!(
+                    "ucom io {} shows types, scales and units; a word as 0x05DC is sent as it is",
+                    known.board
+                ),
+            };
+            let said = format!("board {}: {} `{}`: {e}", known.board, kind.name(), a.name);
+            Failure::new(REFUSED, "value", said).hint(hint)
         })?;
-        Ok(Word { index, name, word, text: edge.text_with_unit(word) })
+        let rounded = edge.rounded(&a.value, word).map(|sent| format!("{} → {sent}", a.value));
+        Ok(Word { index, name, word, text: edge.text_with_unit(word), rounded })
     };
     values.iter().map(word).collect()
+}
+
+/// Says which values lie between two words and go as the nearer one.
+pub fn tell_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
+    for word in words {
+        if let Some(rounded) = &word.rounded {
+            driver.note(format!("board {board}: {} `{}`: {rounded}", kind.name(), word.name));
+        }
+    }
 }
 
 /// Values belong to the one board that is meant, or to all of them.

@@ -30,7 +30,7 @@ fn d11_values_have_the_units_of_the_edge_table() {
     let said = ucom(&["ci", "1", "set_position=-15.5deg"]).ends(0).json();
     assert_eq!(said["set"][0]["value"], json!(-15.5));
     assert!(peer.wait("341#").starts_with("341#0000F2F9"), "-1550");
-    let refused = ucom(&["ci", "1", "set_position=61"]).ends(2).json();
+    let refused = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
     assert_eq!(refused["error"]["message"], "board 1: CI `set_position`: 61 is outside -60.00..60.00 deg");
     let io = ucom(&["io", "1"]).ends(0);
     assert!(io.err.contains("has no SO `nobody`"), "{}", io.err);
@@ -43,11 +43,69 @@ fn d11_values_have_the_units_of_the_edge_table() {
     assert!((9.0..11.0).contains(&position), "{position} deg");
     ucom(&["par", "1", "kd=0x0102", "kp=3"]).ends(0);
     assert_eq!(peer.wait("3C1#"), "3C1#01000201");
-    let dbc = sim.ucom(&["--edges", &table, "dbc", "1"]).ends(0).out;
+    let rounded = ucom(&["par", "1", "kd=0.04"]).ends(0);
+    assert!(rounded.err.contains("0.04 → 0.0"), "{}", rounded.err);
+    for words in [["par", "1", "kd=2"], ["ci", "1", "set_position=1"]] {
+        assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
+    }
+    // A number that would wrap is refused as any other value.
+    assert!(sim.ucom(&["ci", "1", "set_position=40000"]).ends(4).err.contains("outside -32768..32767"));
+    let dbc = sim.ucom(&["--edges", &table, "dbc", "1"]).ends(0);
+    assert!(dbc.err.contains("has no SO `nobody`"), "{}", dbc.err);
+    let dbc = dbc.out;
     assert!(dbc.contains("set_position m0 : 16|16@1- (0.01,0) [-60|60] \"deg\""), "{dbc}");
     // A table that makes no sense is told with its place.
     let wrong = sim.file("wrong.toml", b"[[program]]\nprogram_id = 1\npar.kp = { scales = 1 }\n");
     assert!(sim.ucom(&["--edges", &wrong, "io", "1"]).ends(2).err.contains("line 3"));
+}
+
+/// D-11: who gives a table thinks in units; a program that is not in it takes only words themselves.
+#[test]
+fn d11_a_table_without_the_program_refuses_bare_numbers() {
+    let (sim, _) = started();
+    let table = sim.file("other.toml", b"[[program]]\nprogram_id = 1\npar.kp = { scale = 0.1 }\n");
+    let ucom = |words: &[&str]| sim.ucom(&[&["--edges", &table], words].concat());
+    let mut peer = sim.peer();
+    for words in
+        [["ci", "1", "set_position=15"], ["par", "1", "kp=12"], ["run", "1", "--ci=1.set_position=15"]]
+    {
+        let said = ucom(&words).ends(4).err;
+        assert!(said.contains("it knows nothing of program 0x") && said.contains("0x0000"), "{said}");
+    }
+    let file = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      kp: 12\n";
+    let said = ucom(&["par", "--apply", &sim.file("bare.yaml", file.as_bytes())]).ends(4).err;
+    assert!(said.contains("line 6"), "{said}");
+    assert!(!peer.all(100).iter().any(|f| f.starts_with("341#") || f.starts_with("3C1#")));
+    ucom(&["par", "1", "kp=0x000C"]).ends(0);
+    assert_eq!(peer.wait("3C1#"), "3C1#00000C00");
+}
+
+/// A file that is there is only written over when that is asked for.
+#[test]
+fn files_are_not_written_over() {
+    let (sim, _) = started();
+    let file = sim.file("mine", b"mine");
+    let mut peer = sim.peer();
+    for words in [&["par", "1", "kp=3", "--save", &file][..], &["io", "1", "--template", &file]] {
+        assert!(sim.ucom(words).ends(4).err.contains("is there already"), "{words:?}");
+        assert_eq!(std::fs::read(&file).unwrap(), b"mine");
+        assert!(!peer.all(50).iter().any(|f| f.starts_with("3C1#")));
+        sim.ucom(&[words, &["--force"]].concat()).ends(0);
+        peer.all(100);
+        assert_ne!(std::fs::read(&file).unwrap(), b"mine");
+        sim.file("mine", b"mine");
+    }
+}
+
+/// D-35: nothing answers to a parameter, so the application must still be there afterwards; else the value is unknown.
+#[test]
+fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
+    let (mut sim, _) = started();
+    sim.fault("crash board=2 on_id=0x3C2 on_count=1");
+    let said = sim.ucom(&["--json", "par", "all", "kp=3"]).ends(5).json();
+    let message = said["error"]["message"].as_str().unwrap_or_default();
+    assert!(message.contains("board 2") && message.contains("unknown"), "{said}");
+    assert!(message.contains("written before: board 1"), "{said}");
 }
 
 /// D-35: what was written before is remembered, and never taken for what is there.
@@ -60,7 +118,7 @@ fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     let later = first(sim.ucom(&["--json", "par", "1"]));
     assert_eq!((&later["assumed"], &later["last_written"]["value"]), (&json!(null), &json!(120)));
     let text = sim.ucom(&["par", "1", "--save", "-"]).ends(0).out;
-    assert!(text.contains("\n      kp: 120   #") && text.contains("\n      # kd:"), "{text}");
+    assert!(text.contains("\n      kp: 0x0078   # 120;") && text.contains("\n      # kd:"), "{text}");
 }
 
 /// A whole file is checked before anything is written; every mistake comes with its line.
@@ -76,8 +134,8 @@ fn a_file_is_applied_whole_or_not_at_all() {
     assert_eq!(checked["written"], false);
     let apply = |text: &str| sim.ucom(&["par", "--apply", &sim.file("bad.yaml", text.as_bytes())]);
     // The mistake is in the second board: the first gets nothing either.
-    let end = good.rfind("kp: 120").unwrap();
-    let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 7..]);
+    let end = good.rfind("kp: 0x0078").unwrap();
+    let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 10..]);
     let said = apply(&of_second("kq: 1")).ends(4);
     assert!(
         said.err.contains("bad.yaml: line 21") && said.err.contains("there is `kp [mA/deg]`"),
@@ -97,6 +155,9 @@ fn a_file_is_applied_whole_or_not_at_all() {
     assert!(apply(&good.replace("board: 2", "board: 7")).ends(4).err.contains("board 7: it does not answer"));
     assert!(apply(&of_second("kp: [1")).ends(2).err.contains("line"));
     assert!(apply(&of_second("kp: x")).ends(2).err.contains("board 2, `kp`"));
+    // An edge by number without quotation marks is a comment.
+    let empty = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      #0: 5\n";
+    assert!(apply(empty).ends(2).err.contains("no value in it"));
     sim.ucom(&["par", "3", "--apply", &file]).ends(2);
     sim.ucom(&["par", "1", "kp=1", "--apply", &file]).ends(2);
     sim.ucom(&["par", "1", "--dry-run"]).ends(2);

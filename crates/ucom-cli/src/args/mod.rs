@@ -62,7 +62,7 @@ pub struct LinkArgs {
 /// Go on where a check would refuse.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ForceArgs {
-    /// Go on where a check would refuse: another PC on the bus, a running board, bus load
+    /// Go on where a check would refuse: another PC on the bus, a running board, bus load, a file that is there
     #[arg(long, env = "UCOM_FORCE", value_parser = FalseyValueParser::new())]
     pub force: bool,
 }

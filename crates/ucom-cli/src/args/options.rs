@@ -114,6 +114,8 @@ pub struct IoArgs {
     pub template: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 /// Where descriptions are kept.

@@ -9,27 +9,24 @@ use ucom::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
 use ucom::master::io::{IoDescription, Kind};
 use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel};
 
-use super::params::{become_master, deliver, drain};
+use super::params::{arrived, become_master, deliver, not_there};
 use super::run::named;
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
-use crate::values::{Prepared, Word, only, words};
+use crate::values::{Prepared, Word, only, tell_rounded, words};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let edges = link.edges()?;
+    if let Some(file) = &args.template {
+        not_there(file, args.force.force, "`--template -` shows the table, to be added by hand")?;
+    }
     let mut driver = Driver::open(link, out)?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
         let known = args.cache.known(&mut driver, &edges, board)?;
-        for stray in &known.strays {
-            out.note(format!(
-                "edge table: program 0x{:04X} (board {board}) has no {stray}",
-                known.info.program_id
-            ));
-        }
         // Without a started application there is nobody to ask for them.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
@@ -144,6 +141,7 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         return Ok(());
     }
     let words = words(&known, Kind::Ci, &args.values)?;
+    tell_rounded(&driver, board, Kind::Ci, &words);
     let running = become_master(&mut driver, board, args.force.force)?;
     // Inputs go three at a time: what is beside the one that is set must not become 0.
     initial(&mut driver, board)?;
@@ -151,7 +149,7 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         let (now, setting) = (driver.now_us(), word.setting(&known, Kind::Ci));
         driver.master.set_input(now, board, &setting.name, setting.value)?;
     }
-    drain(&mut driver)?;
+    arrived(&mut driver, board)?;
     let value = |w: &Word| {
         let edge = known.edges.get(Kind::Ci, w.index.into());
         json!({ "name": w.name, "index": w.index, "value": edge.map(|e| e.json(w.word)) })
@@ -182,6 +180,7 @@ fn move_for(
     prepared.add(driver, &args.cache, edges, board, force)?;
     let Some(known) = prepared.known.get(&board) else { return Ok(()) };
     let words = words(known, Kind::Ci, &args.values).inspect_err(|_| prepared.undo(driver))?;
+    tell_rounded(driver, board, Kind::Ci, &words);
     let ci = words.iter().map(|w| w.setting(known, Kind::Ci)).collect();
     let plan = RunBoard { board, ci, par: Vec::new() };
     let options = RunOptions { boards: vec![plan], active: true, force };

@@ -1,10 +1,10 @@
 //! `ucom par`: parameters by name, and parameter files.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use cli_kit::{Output, table};
 use serde_json::{Value, json};
+use ucom::Status;
 use ucom::files::params::{
     ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, ParamsWord, SavedBoard,
     SavedEdge, check_board, check_identity, params_text,
@@ -17,8 +17,8 @@ use super::seen;
 use crate::args::{Boards, LinkArgs, ParArgs};
 use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
-use crate::failure::{Failure, REFUSED};
-use crate::values::{Word, for_board, only, words};
+use crate::failure::{FAULT, Failure, REFUSED};
+use crate::values::{Word, for_board, only, tell_rounded, words};
 use crate::written::History;
 
 /// Shows parameters, writes some, saves or applies a file.
@@ -30,6 +30,9 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         return Err(Failure::usage("--dry-run goes with --apply FILE"));
     }
     let edges = link.edges()?;
+    if let Some(file) = &args.save {
+        not_there(file, args.force.force, "take another name")?;
+    }
     let mut driver = Driver::open(link, out)?;
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.values, "set")?;
@@ -41,6 +44,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
             false => args.cache.described(&mut driver, &edges, *board)?,
         };
         let words = words(&known, Kind::Par, &values)?;
+        tell_rounded(&driver, *board, Kind::Par, &words);
         let history = History::of(&args.cache, &known.info);
         all.push(Parameters { known, words, history });
     }
@@ -64,12 +68,20 @@ fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(),
     for board in all.iter().filter(|p| !p.words.is_empty()) {
         become_master(driver, board.known.board, force)?;
     }
+    let mut before: Vec<String> = Vec::new();
     for board in all.iter_mut().filter(|p| !p.words.is_empty()) {
         for word in &board.words {
             let (now, setting) = (driver.now_us(), word.setting(&board.known, Kind::Par));
             driver.master.set_parameter(now, board.known.board, &setting.name, setting.value)?;
         }
-        drain(driver)?;
+        arrived(driver, board.known.board).map_err(|failure| {
+            let written = match before.is_empty() {
+                true => "no board was written to before".into(),
+                false => format!("written before: board {}", before.join(", ")),
+            };
+            Failure { message: format!("{}; {written}", failure.message), ..failure }
+        })?;
+        before.push(board.known.board.to_string());
         board.history.wrote(board.words.iter().map(|w| (w.index, w.word)));
     }
     Ok(())
@@ -84,13 +96,28 @@ pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool
     }
 }
 
-/// Lets what is queued leave.
-pub fn drain(driver: &mut Driver) -> Result<(), Failure> {
-    let end = Instant::now() + Duration::from_millis(30);
-    while Instant::now() < end {
-        driver.turn(Duration::from_millis(5))?;
+/// Lets what is queued leave, and sees that the application is still there to have taken it: nothing answers to inputs and
+/// parameters themselves (D-35). Frames leave in their order, so the answer to a question comes after all of them.
+pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), Failure> {
+    let unknown = |why: &str| {
+        let said = format!("board {board}: values were sent, but {why}: what it has now is unknown");
+        Failure::new(FAULT, "unknown", said)
+            .hint(format!("ucom status {board} shows its state; ucom start {board}, and write them again"))
+    };
+    match seen(driver, board) {
+        Ok(found) if found.info.status.has(Status::MSTART) => Ok(()),
+        Ok(_) => Err(unknown("its application does not run any more")),
+        Err(e) => Err(unknown(&format!("it does not answer since ({})", e.message))),
     }
-    Ok(())
+}
+
+/// A file is not written over without being asked to; told before anything is sent.
+pub fn not_there(file: &Path, force: bool, instead: &str) -> Result<(), Failure> {
+    if force || !file.is_file() {
+        return Ok(());
+    }
+    let said = format!("{} is there already; nothing was written", file.display());
+    Err(Failure::new(REFUSED, "exists", said).hint(format!("{instead}; --force writes over it")))
 }
 
 fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
@@ -218,6 +245,11 @@ impl Applied {
     pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, Failure> {
         let file =
             ParamsFile::read(path).map_err(|e| Failure::usage(e).hint("ucom help params shows the form"))?;
+        if file.boards.iter().all(|b| b.par.is_empty() && b.ci.is_empty()) {
+            return Err(Failure::usage(format!("{}: there is no value in it", path.display())).hint(
+                "a name without # before it and with a value behind it is one, as `kp: 120`; by number \"#0\": 120",
+            ));
+        }
         let boards = file.boards.into_iter().filter(|b| meant(b.number)).collect();
         Ok(Self { file: path.display().to_string(), boards, inventory: inventory(inventory_file)? })
     }
@@ -276,7 +308,7 @@ impl Applied {
 }
 
 fn word(w: ParamsWord) -> Word {
-    Word { index: w.index, name: w.name, word: w.word, text: w.text }
+    Word { index: w.index, name: w.name, word: w.word, text: w.text, rounded: w.rounded }
 }
 
 /// Checks a whole file, then writes its parameters.
@@ -305,6 +337,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     let mut inputs = 0;
     for (known, (_, (ci, words))) in known.into_iter().zip(checked) {
         inputs += ci.len();
+        tell_rounded(&driver, known.board, Kind::Par, &words);
         let history = History::of(&args.cache, &known.info);
         all.push(Parameters { known, words, history });
     }

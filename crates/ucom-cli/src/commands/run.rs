@@ -19,7 +19,7 @@ use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
 use crate::failure::{FAULT, Failure, NO_LINK};
 use crate::lines::Lines;
-use crate::values::{Prepared, Word, for_board, only, words};
+use crate::values::{Prepared, Word, for_board, only, tell_rounded, words};
 use crate::written::History;
 
 /// How often `run` says how things are.
@@ -99,7 +99,7 @@ fn start(
     for board in boards {
         prepared.add(driver, &args.cache, edges, *board, args.force.force)?;
     }
-    let plans = plans(args, prepared, file)?;
+    let plans = plans(driver, args, prepared, file)?;
     let options = RunOptions { boards: plans.clone(), active: args.active, force: args.force.force };
     match driver.run(Request::Run(options))? {
         Outcome::Running(report) => {
@@ -128,7 +128,12 @@ fn finish(stdout: &mut Lines, driver: &Driver) {
 }
 
 /// What each board is to get: the file's values, then those of the command line.
-fn plans(args: &RunArgs, prepared: &Prepared, file: Option<&Applied>) -> Result<Vec<RunBoard>, Failure> {
+fn plans(
+    driver: &Driver,
+    args: &RunArgs,
+    prepared: &Prepared,
+    file: Option<&Applied>,
+) -> Result<Vec<RunBoard>, Failure> {
     let from_file = file.map(|f| f.words(|n| prepared.known.get(&n))).transpose()?.unwrap_or_default();
     let plan = |known: &Known| {
         let board = known.board;
@@ -139,6 +144,7 @@ fn plans(args: &RunArgs, prepared: &Prepared, file: Option<&Applied>) -> Result<
                 all.retain(|w| w.index != word.index);
                 all.push(word);
             }
+            tell_rounded(driver, board, kind, &all);
             Ok::<_, Failure>(all.iter().map(|w| w.setting(known, kind)).collect())
         };
         let ci = settings(Kind::Ci, of_file.map(|(ci, _)| ci), &args.ci)?;
@@ -248,6 +254,7 @@ fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) ->
             only(&[board], &values, "set")?;
             let kind = if kind == "ci" { Kind::Ci } else { Kind::Par };
             let words = words(known, kind, &values)?;
+            tell_rounded(driver, board, kind, &words);
             for word in &words {
                 let (now, Setting { name, value }) = (driver.now_us(), word.setting(known, kind));
                 match kind {

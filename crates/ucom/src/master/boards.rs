@@ -51,6 +51,8 @@ pub struct Board {
     pub ready_count: u64,
     /// Since when its application is known to be stopped, and not to start by itself.
     pub(crate) stopped_at: Option<u64>,
+    /// When it was last told to start, until it shows that it has.
+    pub(crate) starting_since: Option<u64>,
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
 

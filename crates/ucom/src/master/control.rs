@@ -7,7 +7,7 @@ use super::request::{TRIES, admin, confirmed, info, numbers, set_status};
 use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
-use crate::{Admin, BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
+use crate::{Admin, BoardInfo, ErrorCode, FromBoard, Function, Sequence, Status, ToBoard};
 
 /// Changes to the flags of a board; `None` leaves one as it is (D-37).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -281,26 +281,40 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
         return Ok(before);
     }
     let since = link.now();
+    let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
+        // Before it leaves: whoever cancels this must know of it.
+        link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
         while let Some(heard) = link.next(until).await {
             match heard.message {
                 FromBoard::McaReady => break,
-                message => {
-                    if let Some(error) = Link::device(board, &message, "PC_START") {
-                        return Err(error);
-                    }
+                FromBoard::Error(ErrorCode::AutostartForbidden) => {
+                    link.with(|core| core.boards.of(board).starting_since = None);
+                    return Err(Error::Device {
+                        board,
+                        code: ErrorCode::AutostartForbidden,
+                        during: "PC_START",
+                    });
                 }
+                // Errors of a bad bus are only to be logged; told when nothing came of all tries.
+                message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }
         let now = info(link, board).await?;
         last = now.info.status;
         if last.has(Status::MSTART) {
-            link.with(|core| core.forget_parameters(board));
+            link.with(|core| {
+                core.boards.of(board).starting_since = None;
+                core.forget_parameters(board);
+            });
             return Ok(now);
         }
+    }
+    if let Some(error) = error {
+        return Err(error);
     }
     let waited_ms = link.now().saturating_sub(since) / MS;
     Err(Error::NotReached { board, what: "the application did not start", waited_ms, status: last })
@@ -356,13 +370,16 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
 /// Outputs off, then the loop, then the application: the start order in reverse. A step that gets no answer does not keep
 /// the next ones from being taken; the first that failed is told.
 pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
-    let known = match info(link, board).await {
+    let mut known = match info(link, board).await {
         Ok(seen) => seen.info,
         Err(error) => {
             stop_unheard(link, board, level).await?;
             return Err(error);
         }
     };
+    if !known.status.has(Status::MSTART) && level == StopLevel::Application {
+        known = stop_starting(link, board, known).await?;
+    }
     if !known.status.has(Status::MSTART) {
         return Ok(known);
     }
@@ -381,6 +398,20 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
+/// A board that was told to start and does not show it yet may do so any time until `start.timeout` has passed: told
+/// to stop whatever its status says, and read again then.
+async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
+    let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
+    let told = set_status(link, board, Status::MSTART, Status(0)).await;
+    let up = since + link.times().start;
+    if link.now() < up {
+        link.sleep_until(up).await;
+    }
+    let now = info(link, board).await.map(|seen| seen.info).or(told)?;
+    link.with(|core| core.boards.of(board).starting_since = None);
+    Ok(now)
+}
+
 /// The stop of a board that does not answer PC_INFO: it may run all the same. What it knows of flags is not read first.
 async fn stop_unheard(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
     let to = link.board(board)?;
@@ -390,6 +421,7 @@ async fn stop_unheard(link: &Link, board: u8, level: StopLevel) -> Result<(), Er
     // No answer is what is expected here.
     let _ = admin(link, board, Admin { run, active: false, ..told }).await;
     for _ in 0..TRIES {
+        link.send(to, ToBoard::Admin(Admin { run, active: false, ..told })).await;
         if level == StopLevel::Application {
             link.send(to, ToBoard::SetStatus { mask: Status::MSTART.0, value: 0 }).await;
         }

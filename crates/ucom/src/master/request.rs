@@ -223,6 +223,8 @@ pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
+/// A board's error does not end it: those of a bad bus are only to be logged, and come exactly where the request itself was
+/// lost. It is told when nothing came of all tries.
 async fn ask_admin(
     link: &Link,
     board: u8,
@@ -233,7 +235,7 @@ async fn ask_admin(
 ) -> Result<Admin, Error> {
     link.listen(1 << board, &[Function::Admin]);
     let since = link.now();
-    let mut other = None;
+    let (mut other, mut error) = (None, None);
     for _ in 0..TRIES {
         link.ask(to, ask).await;
         let until = link.now() + link.times().admin;
@@ -242,16 +244,13 @@ async fn ask_admin(
                 FromBoard::Admin(is) if taken(is) => return Ok(is),
                 // What the board told of its own accord before the request reached it.
                 FromBoard::Admin(is) => other = Some(is),
-                message => {
-                    if let Some(error) = Link::device(board, &message, "MCA_ADMIN_DATA") {
-                        return Err(error);
-                    }
-                }
+                message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
             }
         }
     }
-    match other {
-        Some(is) => Err(Error::AdminRefused { board, wanted, is }),
-        None => Err(link.no_answer(board, ask.function(), TRIES, since)),
+    match (error, other) {
+        (Some(error), _) => Err(error),
+        (None, Some(is)) => Err(Error::AdminRefused { board, wanted, is }),
+        (None, None) => Err(link.no_answer(board, ask.function(), TRIES, since)),
     }
 }

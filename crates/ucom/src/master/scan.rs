@@ -304,41 +304,43 @@ fn judge(report: &mut ScanReport) {
     findings.extend(reports.disagree.iter().map(|id| ScanFinding::Disagrees { ucom_id: *id }));
 }
 
-/// Status of every board that answers, all asked at once; a board that sends sensor outputs runs, whatever it says.
+/// Status of every board that answers, all asked at once, and twice, because one frame can be lost; a board that sends sensor outputs runs, whatever it says.
 pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());
     link.listen(mask, &[Function::DspInfo, Function::So]);
     let mut states: BTreeMap<u8, Status> = BTreeMap::new();
-    let mut collectors: BTreeMap<u8, InfoCollector> = BTreeMap::new();
     let mut outputs = BTreeSet::new();
     let asked = link.profile().everybody().map_or(numbers, |everybody| vec![everybody]);
-    for number in asked {
-        link.send(number, ToBoard::Info).await;
-    }
-    let times = link.times();
-    let until = link.now() + times.info.max(3 * times.so) + times.gap;
-    while let Some(heard) = link.next(until).await {
-        match heard.message {
-            FromBoard::So(_) => {
-                outputs.insert(heard.from);
-            }
-            FromBoard::Info(payload) => {
-                let collector = collectors.entry(heard.from).or_default();
-                let _ = collector.push(heard.at, &payload, link);
-            }
-            _ => {}
+    for _ in 0..2 {
+        let mut collectors: BTreeMap<u8, InfoCollector> = BTreeMap::new();
+        for number in &asked {
+            link.send(*number, ToBoard::Info).await;
         }
-        if link.now() >= until {
-            break;
+        let times = link.times();
+        let until = link.now() + times.info.max(3 * times.so) + times.gap;
+        while let Some(heard) = link.next(until).await {
+            match heard.message {
+                FromBoard::So(_) => {
+                    outputs.insert(heard.from);
+                }
+                FromBoard::Info(payload) => {
+                    let collector = collectors.entry(heard.from).or_default();
+                    let _ = collector.push(heard.at, &payload, link);
+                }
+                _ => {}
+            }
+            if link.now() >= until {
+                break;
+            }
         }
-    }
-    for (number, collector) in collectors {
-        if let Answer::Info(info, _) = collector.answer()
-            && info.sequence == number
-            && info.status.contradiction().is_none()
-        {
-            states.insert(number, info.status);
+        for (number, collector) in collectors {
+            if let Answer::Info(info, _) = collector.answer()
+                && info.sequence == number
+                && info.status.contradiction().is_none()
+            {
+                states.insert(number, info.status);
+            }
         }
     }
     for number in outputs {

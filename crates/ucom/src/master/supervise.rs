@@ -2,12 +2,13 @@
 
 use std::prelude::v1::*;
 
-use super::Event;
 use super::boards::Life;
 use super::event::Supervision;
 use super::io::{ProcessData, Snapshot};
+use super::link::lock;
 use super::load::frame_bits;
 use super::shared::{Core, Session};
+use super::{Event, Master};
 use crate::profile::{AliveMode, OnLost};
 use crate::{
     Admin, Assembled, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status,
@@ -20,6 +21,28 @@ const STOP_AGAIN: u64 = 30_000;
 const INPUTS_SHARE: u64 = 70;
 /// How far they may be behind that and catch up, µs.
 const INPUTS_CREDIT: u64 = 5_000;
+
+impl Master {
+    /// Stops control loops (ADMIN_DATA, all 0) before everything else that is to be sent, and twice again a moment later: those
+    /// of these boards, or of everybody. No answer is waited for; [`Request::Stop`](super::Request::Stop) sees to each
+    /// board.
+    pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
+        let mut core = lock(&self.core);
+        core.advance(now);
+        let profile = core.profile;
+        let valid = |number: u8| Sequence::new(number).filter(|n| profile.is_board(*n));
+        let to: Vec<Sequence> = match (boards, profile.everybody()) {
+            (Some(boards), _) => boards.iter().copied().filter_map(valid).collect(),
+            (None, Some(everybody)) => vec![everybody],
+            (None, None) => (0..32).filter_map(valid).collect(),
+        };
+        to.iter().for_each(|to| match profile.everybody() == Some(*to) {
+            true => core.stop_all_inputs(),
+            false => core.stop_inputs(to.number()),
+        });
+        to.into_iter().for_each(|to| core.stop_running(to));
+    }
+}
 
 impl Core {
     /// From now on life signs go out.
@@ -97,9 +120,13 @@ impl Core {
         };
         stopped.into_iter().for_each(|to| self.stop_running(to));
         if self.profile.on_lost == OnLost::StopAll {
-            let all: Vec<u8> = self.data.keys().copied().collect();
-            all.into_iter().for_each(|number| self.stop_inputs(number));
+            self.stop_all_inputs();
         }
+    }
+
+    fn stop_all_inputs(&mut self) {
+        let all: Vec<u8> = self.data.keys().copied().collect();
+        all.into_iter().for_each(|number| self.stop_inputs(number));
     }
 
     /// Run = 0 at once, and twice again: what stops motion must not hang on one frame. It has no further effect.

@@ -15,6 +15,7 @@ mod running;
 mod scripted;
 mod second_pc;
 mod starting;
+mod stopping;
 mod update;
 mod update_ends;
 mod update_group;

@@ -1,6 +1,6 @@
 //! Runs the PC side over a bus in wall-clock time: one loop; what it prints waits for no reader.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 use std::time::Duration;
 
 use cli_kit::{Output, Stop};
@@ -8,7 +8,7 @@ use ucom::Profile;
 use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request, StopLevel, Supervision};
 
 use crate::args::{Boards, LinkArgs};
-use crate::failure::{Failure, NO_LINK};
+use crate::failure::{FAULT, Failure, NO_LINK};
 use crate::lines::Lines;
 use crate::link::Link;
 use crate::pump::{LOOK, Pump};
@@ -23,7 +23,13 @@ pub struct Driver {
     stop: Stop,
     undone: Undone,
     notes: Lines,
-    lost: Cell<u32>,
+    lost: RefCell<Vec<Loss>>,
+}
+
+/// A board was lost, or has rebooted.
+struct Loss {
+    board: u8,
+    rebooted: bool,
 }
 
 impl Driver {
@@ -37,7 +43,7 @@ impl Driver {
         let undone = Undone::default();
         let (stop, notes) = (undone.listen()?, Lines::stderr()?);
         let (master, link, pump) = (Master::new(profile), args.open()?, Pump::default());
-        Ok(Self { master, link, pump, stop, undone, notes, lost: Cell::new(0) })
+        Ok(Self { master, link, pump, stop, undone, notes, lost: RefCell::default() })
     }
 
     /// µs since the bus was opened.
@@ -70,6 +76,11 @@ impl Driver {
         self.drive(request, true, see)
     }
 
+    /// Ends control loops before anything else is sent or asked: of these boards, or of everybody.
+    pub fn stop_at_once(&mut self, boards: Option<&[u8]>) {
+        self.master.stop_at_once(self.link.now_us(), boards);
+    }
+
     /// Stops a board, also after Ctrl-C: what was started is not left alone.
     pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), Failure> {
         let request = Request::Stop { board, level, force: true };
@@ -82,16 +93,12 @@ impl Driver {
         can_be_cancelled: bool,
         see: &mut dyn FnMut(&Event),
     ) -> Result<Outcome, Failure> {
-        let runs_on = matches!(request, Request::Run(_));
-        let before = self.undone.begin(&request);
-        let result = match self.master.start(self.link.now_us(), request) {
+        self.undone.begin(&request);
+        let result = match self.master.start(self.link.now_us(), request.clone()) {
             Ok(id) => self.finish(id, can_be_cancelled, see),
             Err(error) => Err(error.into()),
         };
-        // Boards that run are undone until somebody has stopped them.
-        if result.is_err() || !runs_on {
-            self.undone.set(before);
-        }
+        self.undone.end(&request, result.is_ok());
         result
     }
 
@@ -138,7 +145,7 @@ impl Driver {
 
     /// What was started has been stopped.
     pub fn nothing_is_left(&self) {
-        self.undone.set(None);
+        self.undone.forget();
     }
 
     /// A line on stderr.
@@ -146,15 +153,34 @@ impl Driver {
         self.notes.push(text);
     }
 
-    /// How often a board was lost, by what was told.
-    pub fn lost(&self) -> u32 {
-        self.lost.get()
+    /// How often a board was lost or one of these has rebooted, by what was told; a failure if that was so.
+    pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), Failure> {
+        let lost = self.lost.borrow();
+        let rebooted = lost.iter().filter(|l| l.rebooted && boards.contains(&l.board)).count();
+        let times = |n: usize| if n == 1 { "once".to_owned() } else { format!("{n} times") };
+        let mut what = Vec::new();
+        match lost.iter().filter(|l| !l.rebooted).count() {
+            0 => {}
+            n => what.push(format!("{} a board was lost", times(n))),
+        }
+        if rebooted > 0 {
+            what.push(format!("{} a board has rebooted", times(rebooted)));
+        }
+        if what.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::new(FAULT, "lost", what.join(", ")).hint("ucom doctor looks at bus and boards"))
     }
 
     /// Words for what happens beside a procedure.
     pub fn tell(&self, event: &Event, during: Option<ProcedureId>) {
-        if let Event::Supervision { change: Supervision::Lost, .. } = event {
-            self.lost.set(self.lost.get() + 1);
+        if let Event::Supervision {
+            board,
+            change: change @ (Supervision::Lost | Supervision::Rebooted { .. }),
+        } = event
+        {
+            let rebooted = *change != Supervision::Lost;
+            self.lost.borrow_mut().push(Loss { board: *board, rebooted });
         }
         if let Some(text) = words(event, during) {
             self.note(text);

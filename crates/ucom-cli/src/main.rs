@@ -16,11 +16,15 @@ mod words;
 mod written;
 
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Parser;
 use cli_kit::Output;
 
 use args::Cli;
+
+/// At the end, a reader that takes nothing for so long is not waited for.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 fn main() -> ExitCode {
     // clap itself ends wrong usage with exit code 2.
@@ -32,7 +36,11 @@ fn main() -> ExitCode {
             if !failure.printed {
                 // Nobody reads what stands in stdout already.
                 let out = if lines::stdout_is_stuck() { Output::new("ucom", false) } else { out };
-                out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
+                let exit = failure.exit;
+                signal::say_at_most(PATIENCE, move || {
+                    out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
+                });
+                return ExitCode::from(exit);
             }
             ExitCode::from(failure.exit)
         }

@@ -1,55 +1,136 @@
 //! Ctrl-C: the first one cancels, and what is begun is brought to an end; the second one ends the process at once, and says
 //! what is left undone.
 
+use std::collections::BTreeSet;
+use std::io::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use cli_kit::Stop;
 use cli_kit::exit::FAULT;
-use ucom::master::Request;
+use ucom::master::{Request, StopLevel};
 
 /// What is left undone if the process ends now: what, and the next command.
 type Left = (String, String);
 
-/// The same, as the thread that hears Ctrl-C sees it.
+/// Who does not read what is said is not waited for longer.
+const PATIENCE: Duration = Duration::from_millis(300);
+
+/// What a command has begun, as the thread that hears Ctrl-C sees it.
 #[derive(Clone, Debug, Default)]
-pub struct Undone(Arc<Mutex<Option<Left>>>);
+pub struct Undone(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    /// What the requests under way leave undone, the outermost first.
+    now: Vec<Option<Left>>,
+    /// Boards that run, by a request that has ended.
+    running: Vec<u8>,
+    /// Boards that were started by requests that have ended.
+    started: BTreeSet<u8>,
+    /// Something on the boards is not as it was.
+    changed: bool,
+}
+
+impl State {
+    fn words(&self) -> String {
+        // What is done with boards that run does not hide that they do.
+        let runs = (!self.running.is_empty()).then(|| left_running(&self.running));
+        let under_way = self.now.iter().flatten().next().cloned().filter(|_| runs.is_none());
+        let started: Vec<String> =
+            self.started.iter().filter(|b| !self.running.contains(b)).map(u8::to_string).collect();
+        let started = (!started.is_empty()).then(|| {
+            let what = format!("started before and not stopped: {}", started.join(", "));
+            (what, format!("ucom stop {}", started.join(",")))
+        });
+        let left: Vec<Left> = [runs, under_way, started].into_iter().flatten().collect();
+        if left.is_empty() {
+            let what = if self.changed { "what was begun is complete" } else { "nothing was changed" };
+            return format!("ucom: ended at once; {what}\n");
+        }
+        let lines =
+            left.iter().map(|(what, next)| format!("ucom: ended at once: {what}\n      next: {next}\n"));
+        lines.collect()
+    }
+}
 
 impl Undone {
     /// From now on Ctrl-C is heard.
     pub fn listen(&self) -> std::io::Result<Stop> {
         let undone = self.clone();
         Stop::listen_with(move || {
-            match undone.lock().take() {
-                Some((what, next)) => eprintln!("ucom: ended at once: {what}\n      next: {next}"),
-                None => eprintln!("ucom: ended at once; nothing was changed"),
-            }
+            let words = undone.lock().words();
+            say_at_most(PATIENCE, move || {
+                let _ = std::io::stderr().write_all(words.as_bytes());
+            });
             FAULT
         })
     }
 
-    /// A request begins; returns what was undone before, for [`Undone::set`] at its end. As long as something is undone, what
-    /// happens inside it does not hide it.
-    pub fn begin(&self, request: &Request) -> Option<Left> {
-        let mut left = self.lock();
-        let before = left.clone();
-        if before.is_none() {
-            *left = left_by(request);
+    /// A request begins.
+    pub fn begin(&self, request: &Request) {
+        let left = left_by(request);
+        let mut state = self.lock();
+        state.changed |= left.is_some();
+        state.now.push(left);
+    }
+
+    /// The request that began last has ended: boards that it started or that run are undone until they are stopped.
+    pub fn end(&self, request: &Request, done: bool) {
+        let mut state = self.lock();
+        state.now.pop();
+        match request {
+            _ if !done => {}
+            Request::Start { board, .. } => drop(state.started.insert(*board)),
+            Request::Run(options) => state.running.extend(options.boards.iter().map(|b| b.board)),
+            Request::Stop { board, level: StopLevel::Application, .. } => {
+                state.started.remove(board);
+                state.running.retain(|b| b != board);
+            }
+            _ => {}
         }
-        before
     }
 
-    /// What is undone from now on; `None`: nothing.
-    pub fn set(&self, left: Option<Left>) {
-        *self.lock() = left;
+    /// Nothing is undone any more.
+    pub fn forget(&self) {
+        let mut state = self.lock();
+        state.running.clear();
+        state.started.clear();
     }
 
-    fn lock(&self) -> MutexGuard<'_, Option<Left>> {
+    fn lock(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
+/// Prints in a thread of its own, and waits for that no longer than `patience`: a pipe that nobody reads (`2>&1 | less`)
+/// does not keep the process from ending.
+pub fn say_at_most(patience: Duration, say: impl FnOnce() + Send + 'static) {
+    let (said, heard) = std::sync::mpsc::channel();
+    let spawned = std::thread::Builder::new().name("last words".into()).spawn(move || {
+        say();
+        let _ = said.send(());
+    });
+    if spawned.is_ok() {
+        let _ = heard.recv_timeout(patience);
+    }
+}
+
+fn left_running(boards: &[u8]) -> Left {
+    let list = |separator: &str| boards.iter().map(u8::to_string).collect::<Vec<_>>().join(separator);
+    let what = match boards.len() {
+        1 => "may run; without life signs it becomes safe by itself",
+        _ => "may run; without life signs they become safe by themselves",
+    };
+    (format!("{} {what}", several(boards.len(), &list(", "))), format!("ucom stop {}", list(",")))
+}
+
+fn several(count: usize, list: &str) -> String {
+    format!("board{} {list}", if count == 1 { "" } else { "s" })
+}
+
+/// What a request may leave undone; `None`: it changes nothing.
 fn left_by(request: &Request) -> Option<Left> {
-    let list = |boards: &mut dyn Iterator<Item = u8>| boards.map(|b| b.to_string()).collect::<Vec<_>>();
     let (what, next) = match request {
         Request::Scan | Request::Info { .. } | Request::Describe { .. } | Request::InitialInputs { .. } => {
             return None;
@@ -68,19 +149,28 @@ fn left_by(request: &Request) -> Option<Left> {
             format!("ucom stop {board}"),
         ),
         Request::Run(options) => {
-            let boards = list(&mut options.boards.iter().map(|b| b.board));
-            let what = "may run; without life signs they become safe by themselves";
-            (format!("boards {} {what}", boards.join(", ")), format!("ucom stop {}", boards.join(",")))
+            return Some(left_running(&options.boards.iter().map(|b| b.board).collect::<Vec<_>>()));
         }
+        Request::Update(options) if options.dry_run => return None,
         Request::Update(options) => {
-            let boards = list(&mut options.targets.iter().map(|t| t.board)).join(", ");
+            let boards: Vec<String> = options.targets.iter().map(|t| t.board.to_string()).collect();
             let next = "the same ucom update again; boards that are done are passed over";
-            (format!("boards {boards} may be without a valid application"), next.into())
+            let boards = several(boards.len(), &boards.join(", "));
+            (format!("{boards} may be without a valid application"), next.into())
         }
         Request::SetStatus { board, .. } | Request::Admin { board, .. } => {
             (format!("what board {board} took of it is not known"), format!("ucom status {board}"))
         }
-        // A probe may have started a board or numbered the chain anew; and what is asked for in future.
+        Request::RawStatus { seen, .. } => {
+            let boards = seen.iter().map(u8::to_string).collect::<Vec<_>>();
+            let what = format!("what {} took of it is not known", several(boards.len(), &boards.join(", ")));
+            (what, format!("ucom status {}", boards.join(",")))
+        }
+        // These may have started a board or numbered the chain anew.
+        Request::Probe(_) | Request::Conformance(_) => {
+            ("what the boards do is not known".into(), "ucom scan".into())
+        }
+        // The list of requests may grow: until one is named above, nothing is claimed for it.
         _ => ("what the boards do is not known".into(), "ucom scan".into()),
     };
     Some((what, next))
@@ -91,19 +181,58 @@ mod tests {
     use super::*;
     use ucom::master::{RunBoard, RunOptions};
 
+    fn stop(board: u8) -> Request {
+        Request::Stop { board, level: StopLevel::Application, force: true }
+    }
+
     /// What was begun is undone until its end, also while something inside it goes on.
     #[test]
     fn what_is_left_undone() {
         let undone = Undone::default();
+        assert!(undone.lock().words().contains("nothing was changed"));
         let board = |board| RunBoard { board, ..Default::default() };
-        let run = RunOptions { boards: vec![board(1), board(3)], ..Default::default() };
-        assert_eq!(undone.begin(&Request::Run(run)), None);
-        let stop = Request::Stop { board: 1, level: ucom::master::StopLevel::Loop, force: true };
-        let before = undone.begin(&stop);
-        assert_eq!(before.as_ref().map(|(_, next)| next.as_str()), Some("ucom stop 1,3"));
-        undone.set(before);
-        assert!(undone.lock().as_ref().is_some_and(|(what, _)| what.starts_with("boards 1, 3 may run")));
-        undone.set(None);
-        assert_eq!(undone.begin(&Request::Scan), None);
+        let run = Request::Run(RunOptions { boards: vec![board(1), board(3)], ..Default::default() });
+        undone.begin(&run);
+        undone.end(&run, true);
+        undone.begin(&stop(1));
+        let words = undone.lock().words();
+        assert!(words.contains("boards 1, 3 may run") && words.contains("ucom stop 1,3"), "{words}");
+        undone.end(&stop(1), true);
+        let words = undone.lock().words();
+        assert!(words.contains("board 3 may run") && words.contains("ucom stop 3\n"), "{words}");
+        undone.forget();
+        undone.begin(&Request::Scan);
+        let words = undone.lock().words();
+        assert!(words.contains("what was begun is complete"), "{words}");
+    }
+
+    /// Boards that earlier requests of the same command have started are named, whatever is under way.
+    #[test]
+    fn boards_started_before_are_named() {
+        let undone = Undone::default();
+        for board in [1, 2] {
+            let start = Request::Start { board, force: false };
+            undone.begin(&start);
+            undone.end(&start, true);
+        }
+        undone.begin(&Request::Info { board: 3 });
+        let words = undone.lock().words();
+        assert!(words.contains(": 1, 2\n") && words.contains("ucom stop 1,2"), "{words}");
+        undone.end(&Request::Info { board: 3 }, false);
+        undone.begin(&stop(1));
+        undone.end(&stop(1), true);
+        assert!(undone.lock().words().contains("ucom stop 2\n"));
+    }
+
+    /// Words that nobody takes do not keep the process.
+    #[test]
+    fn words_that_nobody_takes_are_not_waited_for() {
+        let (never, reader) = std::sync::mpsc::channel::<()>();
+        let since = std::time::Instant::now();
+        say_at_most(Duration::from_millis(20), move || {
+            let _ = reader.recv();
+        });
+        assert!(since.elapsed() < Duration::from_secs(5));
+        drop(never);
     }
 }

@@ -1,5 +1,6 @@
 //! Values of the command line as words of the boards: names and ranges are checked before anything is sent.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use ucom::files::EdgeTable;
@@ -95,7 +96,7 @@ pub fn only(boards: &[u8], values: &[Assignment], to: &str) -> Result<(), Failur
 pub struct Prepared {
     /// By number.
     pub known: BTreeMap<u8, Known>,
-    started: Vec<u8>,
+    started: RefCell<Vec<u8>>,
 }
 
 impl Prepared {
@@ -110,11 +111,12 @@ impl Prepared {
     ) -> Result<(), Failure> {
         let known = match cache.known(driver, table, board) {
             Err(e) if e.code == "no-application" => {
-                match driver.run(Request::Start { board, force })? {
-                    Outcome::Started(_) => self.started.push(board),
-                    other => return Err(unexpected(&other)),
-                }
-                cache.described(driver, table, board)
+                // Before it is told to: a start that is cancelled may have reached it.
+                self.started.borrow_mut().push(board);
+                driver.run(Request::Start { board, force }).and_then(|outcome| match outcome {
+                    Outcome::Started(_) => cache.described(driver, table, board),
+                    other => Err(unexpected(&other)),
+                })
             }
             other => other,
         };
@@ -122,10 +124,12 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops what was started only to be asked: a refusal leaves the boards as they were.
+    /// Stops what was started only to be asked, once: a refusal leaves the boards as they were. What cannot be stopped is said.
     pub fn undo(&self, driver: &mut Driver) {
-        for board in self.started.iter().rev() {
-            let _ = driver.stop_board(*board, StopLevel::Application);
+        for board in self.started.take().into_iter().rev() {
+            if let Err(e) = driver.stop_board(board, StopLevel::Application) {
+                driver.note(format!("board {board} may still be started: {}", e.message));
+            }
         }
     }
 }

@@ -82,7 +82,7 @@ fn a_second_ctrl_c_ends_at_once_and_says_what_is_left() {
     sim.ucom(&["init"]).ends(0);
     let image = sim.file("image.bin", &vec![7; 60_000]);
     for (words, wait_for, what, next) in [
-        (&["update", "1", &image, "--force"][..], "2C1#", "boards 1 may be", "ucom update"),
+        (&["update", "1", &image, "--force"][..], "2C1#", "board 1 may be", "ucom update"),
         (&["run", "1,2", "--active"][..], "602#01010000", "boards 1, 2 may run", "ucom stop 1,2"),
     ] {
         let mut peer = sim.peer();
@@ -164,4 +164,147 @@ fn a_reset_of_nobody_is_refused() {
     assert_eq!(sim.ucom(&["--json", "reset", "2"]).ends(0).json()["reports"], json!([0x22]));
     sim.ucom(&["info", "2"]).ends(3);
     sim.ucom(&["info", "1"]).ends(0);
+}
+
+/// D-26, D-51: a board that has rebooted under way is one that was lost, and is not said to be stopped: 5, and its number.
+#[test]
+fn d26_a_board_that_reboots_under_way_fails_the_run() {
+    let mut sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let child = sim.spawn(&["--json", "run", "1,2", "--active", "--on-lost", "report"]);
+    sim.peer().wait("602#01010000");
+    // Until the start is over.
+    std::thread::sleep(Duration::from_millis(700));
+    sim.fault("crash board=2");
+    std::thread::sleep(Duration::from_millis(500));
+    signal(&child, "-INT");
+    let said = ended(child).ends(5);
+    let events: Vec<serde_json::Value> = said.out.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let stopped = events.iter().find(|e| e["event"] == "stopped").unwrap();
+    assert_eq!(stopped["not_stopped"], json!([2]), "{}", said.out);
+    assert!(said.err.contains("has rebooted"), "{}", said.err);
+    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+    assert_eq!(status["boards"][0]["status_byte"], 0x1B);
+}
+
+/// The same where every board answers in the end: a report that nobody asked for is no success.
+#[test]
+fn d26_a_reboot_counts_even_if_the_board_answers() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let child = sim.spawn(&["--json", "run", "1,2", "--on-lost", "report"]);
+    let mut peer = sim.peer();
+    peer.wait("382#");
+    // DSP_REPORT1 with the UCoM id of board 2.
+    peer.send("442#22");
+    std::thread::sleep(Duration::from_millis(300));
+    signal(&child, "-INT");
+    let said = ended(child).ends(5);
+    assert!(said.err.contains("a board has rebooted"), "{}", said.err);
+}
+
+/// A board that does not answer keeps no other one from being stopped: everybody is told before anything is asked.
+#[test]
+fn a_stop_of_all_does_not_hang_on_one_board() {
+    let mut sim = Sim::start(&["--boards", "3"]);
+    sim.ucom(&["init"]).ends(0);
+    let run = sim.spawn(&["run", "1,2,3", "--active", "--on-lost", "report"]);
+    sim.peer().wait("603#01010000");
+    let mut peer = sim.peer();
+    sim.fault("silent board=1");
+    let said = sim.ucom(&["--json", "stop", "1,2,3"]).ends(3);
+    let value = said.json();
+    assert_eq!(value["failed"][0]["board"], 1, "{}", said.out);
+    let stopped: Vec<_> = value["boards"].as_array().unwrap().iter().map(|b| b["number"].clone()).collect();
+    assert_eq!(stopped, [2, 3]);
+    let heard = peer.all(50);
+    let first = heard.iter().position(|f| f == "603#00000000").unwrap();
+    assert!(
+        heard.iter().position(|f| f == "201#").unwrap() > first,
+        "board 3 is told before board 1 is asked"
+    );
+
+    let mut peer = sim.peer();
+    sim.ucom(&["stop", "all"]).ends(0);
+    let heard = peer.all(50);
+    assert_eq!(heard.iter().filter(|f| *f == "600#00000000").count(), 3);
+    let told = heard.iter().position(|f| f == "600#00000000").unwrap();
+    assert!(heard.iter().position(|f| f == "240#").unwrap() > told, "before it asks who is there");
+    signal(&run, "-INT");
+    ended(run).ends(5);
+}
+
+/// Ctrl-C while a board is started only to be asked for its names: it is not left started.
+#[test]
+fn a_start_for_names_that_is_cancelled_is_undone() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    for words in [&["run", "1,2"][..], &["ci", "1", "--for", "1"]] {
+        let mut peer = sim.peer();
+        let child = sim.spawn(words);
+        peer.wait("301#");
+        signal(&child, "-INT");
+        let said = ended(child);
+        assert_ne!(said.code, 0);
+        let status = sim.ucom(&["--json", "status", "1,2"]).ends(0).json();
+        let bytes = [0, 1].map(|i| status["boards"][i]["status_byte"].as_u64());
+        assert_eq!(bytes, [Some(0x1B); 2], "{words:?}: {}", said.err);
+    }
+}
+
+/// Nobody reads stderr, whose pipe is full: the second Ctrl-C ends the process all the same, and so does a failure.
+#[test]
+fn a_blocked_stderr_does_not_keep_the_process() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    for (words, signals) in [(&["run", "1"][..], 2), (&["--json", "info", "9"], 0)] {
+        let (_reader, mut writer) = std::io::pipe().unwrap();
+        writer.write_all(&[b'\n'; 65_536]).unwrap();
+        let mut peer = sim.peer();
+        let mut command = sim.command();
+        command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(writer);
+        let mut child = command.spawn().unwrap();
+        drop(command);
+        peer.wait(if signals == 0 { "209#" } else { "381#" });
+        if signals > 0 {
+            sim.signal("-STOP");
+        }
+        for _ in 0..signals {
+            signal(&child, "-INT");
+            std::thread::sleep(Duration::from_millis(300));
+        }
+        let since = Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            assert!(since.elapsed() < Duration::from_secs(5), "{words:?} does not end");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        sim.signal("-CONT");
+        ended(child).ends(if signals > 0 { 5 } else { 3 });
+    }
+}
+
+/// The second Ctrl-C in a command that has started boards names them; in a dry run nothing was changed.
+#[test]
+fn a_second_ctrl_c_tells_the_truth() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let image = sim.file("image.bin", &vec![7; 60_000]);
+    for (words, wait_for, what) in [
+        (&["start", "1,2"][..], "302#", "ucom stop 1\n"),
+        (&["update", "1", &image, "--dry-run", "--force"], "201#", "nothing was changed"),
+    ] {
+        let mut peer = sim.peer();
+        let child = sim.spawn(words);
+        peer.wait(wait_for);
+        sim.signal("-STOP");
+        signal(&child, "-INT");
+        std::thread::sleep(Duration::from_millis(300));
+        signal(&child, "-INT");
+        let said = ended(child);
+        sim.signal("-CONT");
+        println!("{words:?}: {} {}", said.code, said.err);
+        if said.err.contains("ended at once") {
+            assert!(said.err.contains(what), "{words:?}: {}", said.err);
+        }
+    }
 }

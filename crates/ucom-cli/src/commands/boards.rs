@@ -243,13 +243,15 @@ fn numbers(outcome: Outcome) -> Result<(u8, BoardInfo), Failure> {
 fn print(all: &[(u8, BoardInfo)], profile: &Profile, out: &Output) {
     let value =
         json!({ "boards": all.iter().map(|(n, info)| info_value(*n, info, profile)).collect::<Vec<_>>() });
-    out.result(&value, || {
-        let line = |(n, info): &(u8, BoardInfo)| {
-            let (status, words) = (info.status, bits(info.status).join(" "));
-            format!("board {n:<3} 0x{:02X}  {:12} {words}\n", status.0, state(status))
-        };
-        all.iter().map(line).collect()
-    });
+    out.result(&value, || lines_of(all));
+}
+
+fn lines_of(all: &[(u8, BoardInfo)]) -> String {
+    let line = |(n, info): &(u8, BoardInfo)| {
+        let (status, words) = (info.status, bits(info.status).join(" "));
+        format!("board {n:<3} 0x{:02X}  {:12} {words}\n", status.0, state(status))
+    };
+    all.iter().map(line).collect()
 }
 
 /// PC_RESET, to all at once or one by one.
@@ -310,12 +312,50 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let mut driver = Driver::open(link, out)?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
-    let mut all = Vec::new();
-    for board in driver.numbers(&args.boards)? {
-        all.push(numbers(driver.run(Request::Stop { board, level, force: true })?)?);
+    // Before anything is asked: no board goes on because another one does not answer.
+    match &args.boards {
+        Boards::All => driver.stop_at_once(None),
+        Boards::Some(numbers) => driver.stop_at_once(Some(numbers)),
+        Boards::None => {}
     }
-    print(&all, &profile, out);
-    Ok(())
+    let (mut all, mut failures) = (Vec::new(), Vec::new());
+    for board in driver.numbers(&args.boards)? {
+        match driver.run(Request::Stop { board, level, force: true }).and_then(numbers) {
+            Ok(stopped) => all.push(stopped),
+            Err(failure) => {
+                driver.note(format!("board {board}: {}", failure.message));
+                failures.push((board, failure));
+            }
+        }
+        if driver.stop_asked() {
+            break;
+        }
+    }
+    let Some(worst) = failures.iter().map(|(_, failure)| failure.exit).max() else {
+        print(&all, &profile, out);
+        return Ok(());
+    };
+    if let [(_, failure)] = &mut failures[..]
+        && all.is_empty()
+    {
+        return Err(std::mem::replace(failure, Failure::printed(worst)));
+    }
+    let stopped = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
+    let error = |(board, f): &(u8, Failure)| {
+        json!({
+            "board": board,
+            "code": f.code,
+            "message": f.message,
+            "hint": f.hint,
+            "exit": f.exit,
+        })
+    };
+    let failed = failures.iter().map(error).collect::<Vec<_>>();
+    out.result(&json!({ "boards": stopped, "failed": failed }), || {
+        let numbers: Vec<String> = failures.iter().map(|(board, _)| board.to_string()).collect();
+        lines_of(&all) + &format!("not stopped for certain: {}\n", numbers.join(", "))
+    });
+    Err(Failure::printed(worst))
 }
 
 /// The boards of `info` for other commands.

@@ -199,8 +199,10 @@ fn move_for(
         }
     }
     // Not as a procedure that Ctrl-C cancels: it is what Ctrl-C asks for.
+    driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();
+    driver.nobody_lost(&[board])?;
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
         return Err(Failure::new(

@@ -1,6 +1,6 @@
 //! `ucom run` and `ucom so`: control loops under supervision, and what they send.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -76,15 +76,25 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     }));
     let result = want_texts(&mut driver, args, &boards)
         .and_then(|()| supervise(&mut driver, args, &prepared, &stdout, out));
-    halt(&mut driver, &boards);
-    stdout.push_always(out.words(&json!({ "event": "stopped" }), || "stopped".into()));
+    let running = halt(&mut driver, &boards);
+    let list = || running.iter().map(u8::to_string).collect::<Vec<_>>();
+    let stopped = match running.is_empty() {
+        true => json!({ "event": "stopped" }),
+        false => json!({ "event": "stopped", "not_stopped": running }),
+    };
+    stdout.push_always(out.words(&stopped, || match running.is_empty() {
+        true => "stopped".into(),
+        false => format!("not stopped for certain: {}", list().join(", ")),
+    }));
     finish(&mut stdout, &driver);
     result?;
-    match driver.lost() {
-        0 => Ok(()),
-        n => Err(Failure::new(FAULT, "lost", format!("{n} times a board was lost"))
-            .hint("ucom doctor looks at bus and boards")),
+    if !running.is_empty() {
+        let what = format!("not stopped for certain: {}", list().join(", "));
+        let next =
+            format!("without life signs they become safe by themselves; ucom stop {}", list().join(","));
+        return Err(Failure::new(FAULT, "not-stopped", what).hint(next));
     }
+    driver.nobody_lost(&boards)
 }
 
 /// Names, plans, and the start of all boards.
@@ -272,17 +282,26 @@ fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) ->
     }
 }
 
-/// Control loops and applications end; what fails is said, and the others are stopped all the same.
-fn halt(driver: &mut Driver, boards: &[u8]) {
+/// Control loops and applications end: all loops at once, then each board in turn. Returns those whose end is not certain;
+/// why is said.
+fn halt(driver: &mut Driver, boards: &[u8]) -> Vec<u8> {
+    driver.stop_at_once(Some(boards));
+    let mut running = BTreeSet::new();
     for level in [StopLevel::Loop, StopLevel::Application] {
         for board in boards.iter().rev() {
             if let Err(e) = driver.stop_board(*board, level) {
                 driver.note(format!("board {board}: {}", e.message));
+                running.insert(*board);
+            } else if level == StopLevel::Application {
+                running.remove(board);
             }
         }
     }
     driver.master.end_session();
-    driver.nothing_is_left();
+    if running.is_empty() {
+        driver.nothing_is_left();
+    }
+    running.into_iter().collect()
 }
 
 /// Outputs of boards as they come; only listens once their names are known.

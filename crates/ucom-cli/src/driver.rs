@@ -8,6 +8,7 @@ use ucom::Profile;
 use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request, StopLevel, Supervision};
 
 use crate::args::{Boards, LinkArgs};
+use crate::commands::conformance::told;
 use crate::failure::{FAULT, Failure, NO_LINK};
 use crate::lines::Lines;
 use crate::link::Link;
@@ -218,6 +219,7 @@ impl Driver {
 pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     Some(match event {
         Event::Note { text, .. } => text.clone(),
+        Event::Tested { test, .. } => told(test),
         Event::BoardError { board, code, during: at } if *at != during || during.is_none() => {
             format!("board {board} reports {code}: {} {}", code.meaning(), code.reaction())
         }

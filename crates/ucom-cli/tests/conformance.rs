@@ -30,6 +30,14 @@ fn simulated_boards_conform() {
         assert_eq!(said["passed"], 2, "{said}");
         ucom(&["conformance", "--only", "D-T99"]).ends(2);
         ucom(&["conformance", "1", "--init"]).ends(2);
+        // One board that is named, and the one that is meant.
+        let image = dir.path().join("image.bin");
+        std::fs::write(&image, [0x5A; 256]).unwrap();
+        let image = image.to_str().unwrap();
+        ucom(&["conformance", "--program", image]).ends(2);
+        ucom(&["conformance", "1,2", "--program", image]).ends(2);
+        let said = ucom(&["conformance", "2", "--program", image, "--flash-id", "0xEEEE"]).ends(4).json();
+        assert_eq!(said["error"]["code"], "wrong-board", "{said}");
     }
 }
 

@@ -189,11 +189,14 @@ pub enum Command {
     Probe(ProbeArgs),
     /// Test whether boards do what the protocol page says; by default only asks
     #[command(
-        after_help = "Examples:\n  ucom conformance\n  ucom conformance 1 --run\n  ucom conformance 1 --program firmware.hex\n  \
+        after_help = "Examples:\n  ucom conformance\n  ucom conformance 1 --run\n  ucom conformance 1 --flash-id 0x21 --program firmware.hex\n  \
                             ucom --json conformance all --init --only D-T1,D-T4\n\n\
                             Without options only harmless requests leave, and applications that run are left alone. Each test is\n\
                             one of the project's acceptance tests; it says what was sent, what was expected and what came.\n\
-                            Exit codes: 0 all passed or were skipped, 1 some failed."
+                            With --init, --run and --program boards are put back as they were found, also after Ctrl-C or an error:\n\
+                            numbers, ASTART, applications (with the parameters of a start). --run takes about 80 s a board.\n\
+                            Exit codes: 0 all passed or were skipped, 1 some failed or a board is not as it was found,\n\
+                            3 a board does not answer, 4 refused, 5 cancelled."
     )]
     Conformance(ConformanceArgs),
     /// What is wrong with bus, chain and boards, with the next command

@@ -316,19 +316,26 @@ pub struct ConformanceArgs {
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// Also tests that reset and number the chain anew, and that set and clear status bits
-    #[arg(long, env = "UCOM_INIT", value_parser = FalseyValueParser::new())]
+    #[arg(long, env = "UCOM_CONFORMANCE_INIT", value_parser = FalseyValueParser::new())]
     pub init: bool,
-    /// Also tests that start applications and control loops; outputs stay safe, nothing moves
-    #[arg(long, env = "UCOM_RUN", value_parser = FalseyValueParser::new())]
+    /// Also tests that start applications and control loops; outputs stay safe; more than a minute a board
+    #[arg(long, env = "UCOM_CONFORMANCE_RUN", value_parser = FalseyValueParser::new())]
     pub run: bool,
-    /// Also tests that program boards with this image
-    #[arg(long, env = "UCOM_PROGRAM", value_name = "IMAGE")]
+    /// Also tests that program the one board that is named with this image
+    #[arg(long, env = "UCOM_CONFORMANCE_PROGRAM", value_name = "IMAGE")]
     pub program: Option<PathBuf>,
+    /// With --program: the flash number that the board must have; default: as the inventory has it
+    #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = super::boards::flash_id)]
+    pub flash_id: Option<u16>,
+    /// Flash numbers of the boards, as `ucom init` wrote them
+    #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
+    pub inventory: PathBuf,
     /// Only these tests, as D-T10,D-T11
     #[arg(long, env = "UCOM_ONLY", value_name = "TESTS", value_delimiter = ',')]
     pub only: Vec<String>,
-    #[command(flatten)]
-    pub force: ForceArgs,
+    /// Also when another PC is on the bus; boards that run are never tested with --init, --run or --program
+    #[arg(long, env = "UCOM_FORCE", value_parser = FalseyValueParser::new())]
+    pub force: bool,
 }
 
 /// Options of `ucom dbc`.

@@ -1,17 +1,26 @@
 //! `ucom conformance`: the acceptance tests of the board side, against boards that are there.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 use cli_kit::Output;
 use serde_json::json;
-use ucom::files::{Image, ImageOptions};
-use ucom::master::conformance::{ConformanceOptions, ConformanceTest, Verdict, test_names};
+use ucom::Profile;
+use ucom::files::{Image, ImageOptions, Inventory};
+use ucom::master::conformance::{
+    ConformanceOptions, ConformanceProgram, ConformanceReport, ConformanceTest, Verdict, test_names,
+};
 use ucom::master::{Outcome, Request};
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
 use crate::driver::{Driver, unexpected};
-use crate::failure::{DEVICE, Failure};
+use crate::failure::{Failure, REFUSED};
 
-/// 2026-01-01 as a FAT date: what a test programs has a date of its own, and none of the boards' own time.
-const DATE: u16 = 0x5C21;
+/// 2026-01-01: what a test programs has a date of its own, and none of the boards' own time.
+fn date(profile: &Profile) -> u16 {
+    // Where the date is a number without a meaning, any will do.
+    profile.prog_date.encode(2026, 1, 1).unwrap_or(0x5C21)
+}
 
 /// Runs the tests that are allowed and says how each ended.
 pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -19,45 +28,135 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
         let all: Vec<&str> = test_names().collect();
         return Err(Failure::usage(format!("there is no test {wrong}; there are {}", all.join(" "))));
     }
-    let program = match &args.program {
-        Some(path) => {
-            let image = Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?;
-            Some((image.bytes().to_vec(), DATE))
-        }
-        None => None,
-    };
-    let mut driver = Driver::open(link, out)?;
-    let boards = driver.numbers(&args.boards)?;
-    let all = args.boards == Boards::All;
-    if args.init && !all {
+    if args.init && args.boards != Boards::All {
         return Err(Failure::usage("--init numbers the whole chain: it goes with all boards only"));
     }
+    let profile = link.profile()?;
+    let program = match &args.program {
+        Some(path) => Some(program(args, path, date(&profile), out)?),
+        None => None,
+    };
+    let mut driver = Driver::with_profile(link, profile, out)?;
+    let boards = driver.numbers(&args.boards)?;
     let options = ConformanceOptions {
         boards,
         init: args.init,
         run: args.run,
         program,
         only: args.only.clone(),
-        force: args.force.force,
+        force: args.force,
     };
-    let report = match driver.run(Request::Conformance(options))? {
+    let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e.code.as_str() {
+        "running" => e.hint("`ucom stop all` first; --force does not cover this"),
+        _ => e,
+    });
+    let report = match outcome? {
         Outcome::Conformance(report) => report,
         other => return Err(unexpected(&other)),
     };
     driver.master.end_session();
+    print(&report, out);
+    match report.exit_code() {
+        0 => Ok(()),
+        code => Err(Failure::printed(code)),
+    }
+}
+
+/// The image for one board, which must be the one that is meant.
+fn program(
+    args: &ConformanceArgs,
+    path: &Path,
+    date: u16,
+    out: &Output,
+) -> Result<ConformanceProgram, Failure> {
+    let board = match &args.boards {
+        Boards::Some(numbers) if numbers.len() == 1 => numbers.first().copied().unwrap_or_default(),
+        _ => {
+            return Err(Failure::usage("--program IMAGE programs one board: name it")
+                .hint("ucom conformance 1 --flash-id 0x21 --program IMAGE"));
+        }
+    };
+    let flash_number = match args.flash_id {
+        Some(flash) => flash,
+        None => listed(&args.inventory, board)?,
+    };
+    let image = Image::read(path, &ImageOptions::default())
+        .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+    for note in image.notes() {
+        out.note(format!("note: {}: {note}", path.display()));
+    }
+    let (address, image) = (image.address_words(), image.bytes().to_vec());
+    Ok(ConformanceProgram { board, flash_number, image, address, date })
+}
+
+/// The board's flash number by the inventory.
+fn listed(inventory: &Path, board: u8) -> Result<u16, Failure> {
+    let hint = "name its --flash-id; ucom init writes the inventory";
+    if !inventory.exists() {
+        let text = format!("which board is board {board}? there is no inventory {}", inventory.display());
+        return Err(Failure::new(REFUSED, "no-inventory", text).hint(hint));
+    }
+    let known = Inventory::read(inventory).map_err(Failure::usage)?;
+    known.get(board).map(|b| b.flash_number).ok_or_else(|| {
+        let text = format!("board {board} is not in the inventory {}", inventory.display());
+        Failure::new(REFUSED, "not-in-inventory", text).hint(hint)
+    })
+}
+
+fn print(report: &ConformanceReport, out: &Output) {
     let (passed, failed) = (report.passed(), report.failed());
     let skipped = report.tests.len() - passed - failed;
-    let value = json!({ "passed": passed, "failed": failed, "skipped": skipped, "tests": report.tests });
-    out.result(&value, || {
-        let lines: String = report.tests.iter().map(line).collect();
-        format!("{lines}{passed} passed, {failed} failed, {skipped} skipped\n")
+    let ended = report.error.as_ref().map(|e| json!({ "code": e.code(), "message": e.to_string() }));
+    let value = json!({
+        "passed": passed, "failed": failed, "skipped": skipped,
+        "ended": ended, "left": report.left, "tests": report.tests,
     });
-    if failed > 0 { Err(Failure::printed(DEVICE)) } else { Ok(()) }
+    out.result(&value, || {
+        let mut text: String = report.tests.iter().filter(|t| t.needs.is_none()).map(line).collect();
+        text += &not_allowed(report);
+        if let Some(error) = &report.error {
+            text += &format!("ended before the last test: {error}\n");
+        }
+        for left in &report.left {
+            text += &format!("not as it was found: {left}\n");
+        }
+        text + &format!("{passed} passed, {failed} failed, {skipped} skipped\n")
+    });
+}
+
+/// What would need an option: one line each, however many boards there are.
+fn not_allowed(report: &ConformanceReport) -> String {
+    let mut by_option: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for test in &report.tests {
+        if let Some(option) = test.needs {
+            let ids = by_option.entry(option).or_default();
+            if !ids.contains(&test.id) {
+                ids.push(test.id);
+            }
+        }
+    }
+    by_option
+        .iter()
+        .map(|(option, ids)| format!("- not allowed without {option}: {}\n", ids.join(", ")))
+        .collect()
+}
+
+fn who(test: &ConformanceTest) -> String {
+    test.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
+}
+
+/// One short line while the tests go on.
+pub fn told(test: &ConformanceTest) -> String {
+    let how = match &test.verdict {
+        Verdict::Pass => "passed",
+        Verdict::Fail(_) => "failed",
+        Verdict::Skipped(_) => "skipped",
+    };
+    format!("{} {}: {how}", test.id, who(test))
 }
 
 fn line(test: &ConformanceTest) -> String {
-    let who = test.board.map_or_else(|| "chain".into(), |n| format!("board {n}"));
-    let head = |mark: &str| format!("{mark} {:6} {who:9} {}\n", test.id, test.expected);
+    let head = |mark: &str| format!("{mark} {:6} {:9} {}\n", test.id, who(test), test.expected);
     match &test.verdict {
         Verdict::Pass => head("✓"),
         Verdict::Skipped(why) => head("-") + &format!("    skipped: {why}\n"),

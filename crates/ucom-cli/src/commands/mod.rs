@@ -1,7 +1,7 @@
 //! The commands, one file each or one file a family.
 
 mod boards;
-mod conformance;
+pub mod conformance;
 mod decode;
 mod doctor;
 mod help;

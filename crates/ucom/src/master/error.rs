@@ -170,6 +170,16 @@ pub enum Error {
         /// Their numbers.
         boards: Vec<u8>,
     },
+    /// Who reports is not who has a number: numbering anew would mean other boards than before.
+    #[error(
+        "{reports} boards report, {boards} have a number, or two share a flash id: not as `ucom init` leaves a chain"
+    )]
+    NotNumbered {
+        /// Different reports.
+        reports: u32,
+        /// Boards with a number.
+        boards: u32,
+    },
     /// The bus would be too busy.
     #[error("{0}")]
     Load(LoadForecast),
@@ -318,6 +328,7 @@ impl Error {
             | Self::ForeignMaster { .. }
             | Self::Running { .. }
             | Self::LoopRuns { .. }
+            | Self::NotNumbered { .. }
             | Self::Load(_)
             | Self::Busy { .. }
             | Self::NoApplication { .. } => 4,
@@ -341,6 +352,7 @@ impl Error {
             Self::AdminRefused { .. } => "admin-refused",
             Self::ForeignMaster { .. } => "foreign-master",
             Self::Running { .. } | Self::LoopRuns { .. } => "running",
+            Self::NotNumbered { .. } => "not-numbered",
             Self::Load(_) => "load",
             Self::Busy { .. } => "busy",
             Self::NoBoard { .. } => "no-board",
@@ -387,6 +399,7 @@ impl Error {
                 "end the other program, or force this one if you know that it does not matter".into()
             }
             Self::Running { .. } | Self::LoopRuns { .. } => "`ucom stop all` first, or force it".into(),
+            Self::NotNumbered { .. } => "`ucom init`, then again".into(),
             Self::Load(_) => "fewer boards, longer `so.period` or `ci.period`, or force it".into(),
             Self::Busy { .. } => "wait for it, or cancel it".into(),
             Self::NoBoard { .. } => "`ucom scan` lists the boards".into(),

@@ -2,6 +2,7 @@
 
 use std::prelude::v1::*;
 
+use super::conformance::ConformanceTest;
 use super::io::Snapshot;
 use super::update::Progress;
 use super::{Error, Outcome, ProcedureId};
@@ -24,6 +25,13 @@ pub enum Event {
         id: ProcedureId,
         /// How far.
         progress: Progress,
+    },
+    /// A conformance test was done.
+    Tested {
+        /// Which procedure.
+        id: ProcedureId,
+        /// How it ended.
+        test: ConformanceTest,
     },
     /// A procedure has something to say on its way.
     Note {

@@ -135,7 +135,7 @@ impl Master {
     }
 
     /// The bus is gone: ends a procedure without another frame. [`Event::Done`] comes at once: an update's with what
-    /// is known of each board, any other's with [`Error::Bus`].
+    /// is known of each board, the conformance tests' with those that were done, any other's with [`Error::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(inbox) = lock(&self.core).inboxes.get_mut(&id) {
             inbox.bus_gone = Some(reason.into());

@@ -221,7 +221,7 @@ pub enum Outcome {
     Probe(probe::ProbeReport),
     /// Of [`Request::RawStatus`].
     RawStatus(Vec<RawStatus>),
-    /// Of [`Request::Conformance`]; look at each verdict.
+    /// Of [`Request::Conformance`]; look at each verdict, and at what ended the tests.
     Conformance(conformance::ConformanceReport),
 }
 
@@ -235,6 +235,7 @@ pub(super) fn work(link: Link, request: Request) -> Work {
         // These have something to undo when they are cancelled.
         Request::Update(options) => return Box::pin(update::update(link, options)),
         Request::Run(options) => return Box::pin(run::run(link, options)),
+        Request::Conformance(options) => return Box::pin(conformance::conformance(link, options)),
         Request::Scan => Box::pin(scan::scan(link)),
         Request::Init(options) => Box::pin(init::init(link, options)),
         Request::Repair { board, flash_number, force } => {
@@ -257,7 +258,6 @@ pub(super) fn work(link: Link, request: Request) -> Work {
         Request::RawStatus { board, seen, mask, value, force } => {
             Box::pin(raw_status::raw_status(link, board, seen, (mask, value), force))
         }
-        Request::Conformance(options) => Box::pin(conformance::conformance(link, options)),
     };
     Box::pin(async move { outer.or_cancel(inner).await })
 }

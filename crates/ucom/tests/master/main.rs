@@ -4,6 +4,7 @@
 mod bench;
 mod chain;
 mod conformance;
+mod conformance_ends;
 mod faults;
 mod kept;
 mod loader;

@@ -58,15 +58,6 @@ pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Resu
     Ok(Verdict::Pass)
 }
 
-/// Reports of boards beyond those that have a number.
-pub(super) async fn strangers(bench: &mut Bench<'_>, numbered: usize) -> bool {
-    let window = bench.link.times().report_ask;
-    bench.send(Function::AskReport, bench.link.everybody().number(), &[]).await;
-    let mut reports = only_reports(&bench.hear(window).await);
-    reports.dedup();
-    bench.profile().report_mode == ReportMode::All4 || reports.len() != numbered
-}
-
 pub(super) async fn init_again(
     bench: &mut Bench<'_>,
     board: u8,
@@ -77,9 +68,13 @@ pub(super) async fn init_again(
         let why = "a board that is not tested, or has no number, could take this one";
         return Ok(Verdict::Skipped(why.into()));
     }
-    match bench.link.become_master(force).await {
+    match bench.link.look_for_master(force).await {
         Err(e @ Error::ForeignMaster { .. }) => return Ok(Verdict::Skipped(e.to_string())),
         other => other?,
+    }
+    // A board that has rebooted since would take any number.
+    if bench.info(board).await.is_none() {
+        return Ok(Verdict::Fail("PC_INFO is not answered: has it rebooted? `ucom scan`".into()));
     }
     bench.send(Function::Init, board, &[]).await;
     let came = bench.hear(bench.link.times().init_ack).await;

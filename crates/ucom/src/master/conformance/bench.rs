@@ -10,7 +10,6 @@ use crate::master::Error;
 use crate::master::control::start_application;
 use crate::master::link::Link;
 use crate::master::procedures::ProcedureId;
-use crate::master::request::set_status;
 use crate::master::shared::{Core, Forget, Session};
 use crate::master::times::MS;
 use crate::{BoardInfo, Frame, Function, Profile, Sequence, Status};
@@ -178,18 +177,6 @@ fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
             Ok(Err(Verdict::Skipped(format!("its application does not start: {e}"))))
         }
         e => Err(e),
-    }
-}
-
-/// The application is up or not, as it was.
-pub(super) async fn restore(link: &Link, board: u8, before: Status) -> Result<(), Error> {
-    if before.has(Status::MSTART) {
-        match start_application(link, board).await {
-            Ok(_) | Err(Error::Device { .. }) => Ok(()),
-            Err(e) => Err(e),
-        }
-    } else {
-        set_status(link, board, Status::MSTART | Status::PROG, Status(0)).await.map(|_| ())
     }
 }
 

@@ -136,12 +136,17 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-pub(super) async fn autostart(bench: &mut Bench<'_>, first: &BoardSeen) -> Result<Verdict, Error> {
+/// The numbers must be new: the reset in it gives `first.number` to whoever is first on the wire.
+pub(super) async fn autostart(bench: &mut Bench<'_>, first: &BoardSeen) -> Verdict {
     if !first.info.has_application() {
-        return Ok(Verdict::Skipped("there is no application that could start".into()));
+        return Verdict::Skipped("there is no application that could start".into());
     }
-    let board = first.number;
+    let (board, flash) = (first.number, first.info.flash_number);
     let kept = first.info.status.has(Status::ASTART);
+    match bench.info(board).await {
+        Some(info) if info.flash_number == flash => {}
+        other => return Verdict::Fail(format!("it is not 0x{flash:04X} that has its number: {other:?}")),
+    }
     set(bench, board, 0x40, 0x40).await;
     reset_all(bench).await;
     bench.send(Function::Init, board, &[]).await;
@@ -151,10 +156,14 @@ pub(super) async fn autostart(bench: &mut Bench<'_>, first: &BoardSeen) -> Resul
     // The hold-off, and the time that an application needs.
     let holdoff = u64::from(bench.profile().autostart_holdoff) * MS;
     let came = bench.hear(holdoff + bench.link.times().start).await;
-    let status = bench.info(board).await.map(|info| info.status);
-    set(bench, board, 0x44, if kept { 0x40 } else { 0 }).await;
-    Ok(match status {
-        Some(s) if !s.has(Status::MSTART) && acknowledged => Verdict::Pass,
-        other => Verdict::Fail(format!("acknowledged: {acknowledged}, status {other:?}, {}", list(&came))),
-    })
+    let now = bench.info(board).await;
+    if now.is_some_and(|info| info.flash_number == flash) {
+        set(bench, board, 0x44, if kept { 0x40 } else { 0 }).await;
+    }
+    match now {
+        Some(i) if i.flash_number == flash && !i.status.has(Status::MSTART) && acknowledged => Verdict::Pass,
+        other => {
+            Verdict::Fail(format!("acknowledged: {acknowledged}, afterwards {other:?}, {}", list(&came)))
+        }
+    }
 }

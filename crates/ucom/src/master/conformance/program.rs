@@ -2,8 +2,8 @@
 
 use std::prelude::v1::*;
 
-use super::Verdict;
 use super::bench::{Bench, list};
+use super::{ConformanceProgram, Verdict};
 use crate::master::Error;
 use crate::master::control::enter_exloader;
 use crate::master::times::MS;
@@ -17,16 +17,16 @@ fn unfit(bench: &Bench<'_>) -> Option<Verdict> {
     (!fits).then(|| Verdict::Skipped("only with prog.plan = verify-write and prog.header = v1".into()))
 }
 
-fn header(bench: &Bench<'_>, (image, date): &(Vec<u8>, u16), cycle: u16) -> Header {
+fn header(bench: &Bench<'_>, program: &ConformanceProgram, cycle: u16) -> Header {
     let profile = bench.profile();
     Header {
         cycle,
         memory: 0,
-        address: 0,
-        length: (image.len() / 2) as u32,
-        program_id: checksum(profile.prog_checksum, profile.prog_endian, image),
-        date: *date,
-        target: Header::ANY_BOARD,
+        address: program.address,
+        length: (program.image.len() / 2) as u32,
+        program_id: checksum(profile.prog_checksum, profile.prog_endian, &program.image),
+        date: program.date,
+        target: program.flash_number,
     }
 }
 
@@ -53,20 +53,17 @@ async fn answer(bench: &mut Bench<'_>, us: u64) -> Option<Frame> {
     }
 }
 
-pub(super) async fn update(
-    bench: &mut Bench<'_>,
-    board: u8,
-    image: &(Vec<u8>, u16),
-) -> Result<Verdict, Error> {
+pub(super) async fn update(bench: &mut Bench<'_>, program: &ConformanceProgram) -> Result<Verdict, Error> {
+    let (board, flash) = (program.board, Some(program.flash_number));
     if let Some(verdict) = unfit(bench) {
         return Ok(verdict);
     }
-    enter_exloader(bench.link, board, None).await?;
+    enter_exloader(bench.link, board, flash).await?;
     let times = bench.link.times();
     let endian = bench.profile().prog_endian;
-    let data: Vec<[u8; BLOCK_LEN]> = (0..).map_while(|i| data_block(&image.0, i)).collect();
+    let data: Vec<[u8; BLOCK_LEN]> = (0..).map_while(|i| data_block(&program.image, i)).collect();
     for cycle in 1..=2 {
-        let head = header(bench, image, cycle).build(endian);
+        let head = header(bench, program, cycle).build(endian);
         for (i, next) in core::iter::once(&head).chain(&data).enumerate() {
             block(bench, board, next).await;
             let last = cycle == 2 && i == data.len();
@@ -82,7 +79,7 @@ pub(super) async fn update(
             }
         }
     }
-    let wanted = header(bench, image, 2);
+    let wanted = header(bench, program, 2);
     Ok(match bench.info(board).await {
         Some(info) if (info.program_id, info.date) == (wanted.program_id, wanted.date) => Verdict::Pass,
         other => Verdict::Fail(format!(
@@ -92,16 +89,13 @@ pub(super) async fn update(
     })
 }
 
-pub(super) async fn refusals(
-    bench: &mut Bench<'_>,
-    board: u8,
-    image: &(Vec<u8>, u16),
-) -> Result<Verdict, Error> {
+pub(super) async fn refusals(bench: &mut Bench<'_>, program: &ConformanceProgram) -> Result<Verdict, Error> {
+    let (board, flash) = (program.board, Some(program.flash_number));
     if let Some(verdict) = unfit(bench) {
         return Ok(verdict);
     }
-    let before = enter_exloader(bench.link, board, None).await?;
-    let good = header(bench, image, 1);
+    let before = enter_exloader(bench.link, board, flash).await?;
+    let good = header(bench, program, 1);
     let endian = bench.profile().prog_endian;
     let mut sum = good.build(endian);
     if let Some(byte) = sum.last_mut() {
@@ -118,7 +112,7 @@ pub(super) async fn refusals(
         ("a second cycle with another length", 10, Case::Cycle),
     ];
     for (what, code, case) in cases {
-        enter_exloader(bench.link, board, None).await?;
+        enter_exloader(bench.link, board, flash).await?;
         // A transfer that was given up is forgotten.
         bench.send(Function::SetStatus, board, &[4, 0]).await;
         bench.send(Function::SetStatus, board, &[4, 4]).await;
@@ -140,7 +134,7 @@ pub(super) async fn refusals(
             }
             Case::Block(bytes) => block(bench, board, &bytes).await,
             Case::Cycle => {
-                let data: Vec<[u8; BLOCK_LEN]> = (0..).map_while(|i| data_block(&image.0, i)).collect();
+                let data: Vec<[u8; BLOCK_LEN]> = (0..).map_while(|i| data_block(&program.image, i)).collect();
                 for next in core::iter::once(&good.build(endian)).chain(&data) {
                     block(bench, board, next).await;
                     answer(bench, bench.link.times().ready).await;

@@ -55,7 +55,8 @@ pub struct RunReport {
     pub load: LoadForecast,
 }
 
-/// A run ends with every board running, or with every board as it was found.
+/// A run ends with every board running, or with every board as far as it was found: idle, started, or running. A board that
+/// was found running goes on with what it was given until then: inputs and parameters of the user, none but these.
 pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Error> {
     let mut begun = Vec::new();
     let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
@@ -76,12 +77,14 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
 /// What a run has begun on a board, and takes back when it fails.
 struct Begun {
     board: u8,
-    /// How far it is stopped then, so that it is as it was found.
+    /// How far it is stopped then, so that it is as far as it was found.
     back: Option<StopLevel>,
+    /// Its loop ran already.
+    ran: bool,
 }
 
 async fn undo(link: &Link, begun: &[Begun]) {
-    for Begun { board, back } in begun.iter().rev() {
+    for Begun { board, back, .. } in begun.iter().rev() {
         if let Some(level) = back
             && let Err(error) = stop_board(link, *board, *level).await
         {
@@ -113,7 +116,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
             (true, false) => Some(StopLevel::Loop),
             (true, true) => None,
         };
-        begun.push(Begun { board: plan.board, back });
+        begun.push(Begun { board: plan.board, back, ran: back.is_none() });
         let seen = start_from(link, seen).await?;
         let description = describe(link, plan.board, &seen.info).await?;
         add(link, options, plan, description, &mut described)?;
@@ -161,7 +164,12 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    let mut ci = read_initial_inputs(link, board, description.dimensions().ci).await?;
+    // Only this PC itself can know what a board that runs was told; what another one told it is not overwritten by initial
+    // values unasked.
+    let told = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
+    let give = !begun.ran || told.is_some() || !plan.ci.is_empty();
+    let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;
+    let mut ci = told.filter(|_| begun.ran).unwrap_or(initial);
     for setting in &plan.ci {
         let index = description.find(board, Kind::Ci, &setting.name)?;
         if let Some(place) = ci.get_mut(usize::from(index)) {
@@ -172,7 +180,9 @@ async fn start_loop(
         if let Some(data) = core.data.get_mut(&board) {
             data.ci = ci;
         }
-        core.send_inputs(board);
+        if give {
+            core.send_inputs(board);
+        }
     });
     for setting in &plan.par {
         let index = description.find(board, Kind::Par, &setting.name)?;
@@ -184,7 +194,9 @@ async fn start_loop(
     if begun.back.is_none() && !told.active && options.active {
         begun.back = Some(StopLevel::Outputs);
     }
-    repeat_inputs(link, board);
+    if give {
+        repeat_inputs(link, board);
+    }
     let running = AdminChange { run: Some(true), ..Default::default() };
     let admin = change_flags(link, board, running).await?;
     if !options.active {

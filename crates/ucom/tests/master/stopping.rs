@@ -1,10 +1,10 @@
 //! What is to stop stops: on a bus that loses frames and reports errors, and when a board has only been told to start.
 
-use ucom::master::{Error, Outcome, Request, RunBoard, RunOptions, StopLevel};
+use ucom::master::{Error, Master, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel};
 use ucom::node::Phase;
 use ucom::{ErrorCode, Profile};
 
-use crate::bench::{Bench, MS, Script};
+use crate::bench::{Bench, CI, MS, Script};
 use crate::chain::initialised;
 use crate::update::{options, update};
 
@@ -154,4 +154,27 @@ fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     let report = update(&mut bench, options(&[1], 128));
     assert_eq!(report.exit_code(), 4, "{report:?}");
     assert_eq!(bench.count("041#"), 0);
+}
+
+/// A board that runs keeps the inputs that another PC gave it, unless the user gives it some.
+#[test]
+fn a_board_that_runs_is_not_given_initial_inputs() {
+    for given in [false, true] {
+        let mut bench = initialised(&[0x21]);
+        bench.go(run(&[1]), 30).unwrap();
+        let now = bench.now;
+        bench.master.set_input(now, 1, CI[0], 1234).unwrap();
+        bench.run(100);
+        assert_eq!(bench.board(0).application.ci, [1234, 9]);
+        // Another PC takes over.
+        bench.master = Master::new(Profile::default());
+        let ci = given.then(|| Setting { name: CI[1].into(), value: 5 });
+        let board = RunBoard { board: 1, ci: ci.into_iter().collect(), par: Vec::new() };
+        let options = RunOptions { boards: vec![board], active: true, force: true };
+        bench.go(Request::Run(options), 30).unwrap();
+        bench.run(500);
+        let expected = if given { [7, 5] } else { [1234, 9] };
+        assert_eq!(bench.board(0).application.ci, expected, "given {given}");
+        assert!(bench.board(0).application.active);
+    }
 }

@@ -197,6 +197,8 @@ impl Driver {
                 let Outcome::Scan(report) = self.run(Request::Scan)? else { return Ok(Vec::new()) };
                 let numbers: Vec<u8> = report.boards.iter().map(|b| b.number).collect();
                 if !numbers.is_empty() {
+                    // Who is there and is not among these numbers is not left out silently.
+                    report.findings.iter().for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);
                 }
                 let found = report.reports.ids.len();

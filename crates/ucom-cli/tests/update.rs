@@ -338,15 +338,15 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     };
     let (first, second) = (sim.file("1.bin", &cycle(1, 0x3AC1)), sim.file("2.bin", &cycle(2, 0x3AC1)));
     let words = ["--profile", profile, "update", "1", &first, "--second", &second];
-    let said = sim.ucom(&words).ends(0);
-    for word in ["written", "NOT verified", "0x4B3F, 2009-06-01", "--expect-program-id"] {
+    let said = sim.ucom(&words).ends(5);
+    for word in ["written", "NOT verified", "0x4B3F, 2009-06-01", "--expect-program-id", "--unverified"] {
         assert!(said.out.contains(word), "{word}: {}", said.out);
     }
     let with = |more: &[&'static str]| {
         let words: Vec<&str> = ["--json"].iter().chain(&words).chain(more).copied().collect();
         sim.ucom(&words)
     };
-    let report = with(&["--start"]).ends(0).json();
+    let report = with(&["--start", "--unverified"]).ends(0).json();
     assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"running".into(), &false.into()));
     assert_eq!(
         (&report["boards"][0]["changed"], &report["program_id"]),
@@ -359,6 +359,41 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"verified".into(), &true.into()));
     let report = with(&["--expect-program-id", "0x4B40"]).ends(5).json();
     assert_eq!(report["boards"][0]["error"]["code"], "not-verified", "{report}");
+}
+
+/// `all` is also who is in the inventory: boards that have lost their numbers are missing, not left out.
+#[test]
+fn all_is_the_inventory_too() {
+    let sim = chain("4");
+    for board in ["2", "4"] {
+        sim.ucom(&["reset", board]).ends(0);
+    }
+    let said = sim.ucom(&["--json", "update", "all", &file_in(&sim)]).ends(3);
+    let report = said.json();
+    let outcomes: Vec<&str> =
+        report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
+    assert_eq!(outcomes, ["verified", "not-started", "verified", "not-started"], "{report}");
+    assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
+    assert!(said.err.contains("has no number"), "{}", said.err);
+    // Those who only act on who is there say who is not.
+    let said = sim.ucom(&["start", "all"]).ends(0);
+    assert!(said.err.contains("0x42") || said.err.matches("has no number").count() == 2, "{}", said.err);
+}
+
+/// Ctrl-C while it is still asked who is there: nothing was erased, exit code 4, outcome `cancelled`.
+#[test]
+fn p12_cancelled_while_it_scans() {
+    let sim = chain("2");
+    let file = file_in(&sim);
+    let mut peer = sim.peer();
+    let update = sim.spawn(&["--json", "update", "all", &file]);
+    peer.wait("240#");
+    signal(&update, "-INT");
+    let report = ended(update).ends(4).json();
+    for board in report["boards"].as_array().unwrap() {
+        assert_eq!((&board["outcome"], &board["error"]["code"]), (&"cancelled".into(), &"cancelled".into()));
+    }
+    assert_eq!(report["boards"].as_array().unwrap().len(), 2, "{report}");
 }
 
 /// An image whose Program ID is known must have the one that is named: refused before anything is sent.

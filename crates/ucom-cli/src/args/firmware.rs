@@ -47,6 +47,9 @@ pub struct UpdateArgs {
     /// Program ID that the board must show at the end, where the image does not tell it
     #[arg(long, env = "UCOM_EXPECT_PROGRAM_ID", value_name = "ID", value_parser = program_id)]
     pub expect_program_id: Option<u16>,
+    /// Accept an image that cannot be verified as done: exit code 0 where the profile leaves nothing to compare
+    #[arg(long, env = "UCOM_UNVERIFIED", value_parser = FalseyValueParser::new())]
+    pub unverified: bool,
     /// Flash numbers of the boards, as `ucom init` wrote them
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,

@@ -119,8 +119,9 @@ pub enum Command {
                             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
                             Image formats: raw binary, Intel HEX, Motorola S-record, told apart by their content. Whether two\n\
                             files are sent is the profile's matter: `prog.plan`, see `ucom help profile`.\n\
-                            Exit codes: 0 verified, or already up to date (or written, where the profile leaves nothing to\n\
-                            verify: the report says so); 1 the board reported an error before anything was erased; 3 no answer;\n\
+                            `all` are the boards that answer and those of the inventory: one that is missing is reported.\n\
+                            Exit codes: 0 verified, or already up to date (or written where the profile leaves nothing to verify,\n\
+                            with --unverified; 5 without it); 1 the board reported an error before anything was erased; 3 no answer;\n\
                             4 refused, or cancelled before anything was erased; 5 failed or cancelled after something was erased.\n\
                             A bus that fails is 3 before and 5 after that. The outcome of each board is in the report:\n\
                             not-started, cancelled, up-to-date, incomplete, unknown, written, verified or running."
@@ -128,9 +129,10 @@ pub enum Command {
     Update(UpdateArgs),
     /// Give one board its number back when it no longer answers, without a reset of the others
     #[command(after_help = "Examples:\n  ucom repair 3\n  ucom repair 3 --flash-id 0x63\n\n\
-                            The pin of the board is lowered first, so that its neighbour cannot take the number; the flash number\n\
-                            must be the one that is named or that the inventory has.\n\
-                            Exit codes: 0 done; 2 which board is meant is not known; 3 no answer; 4 another board stands there.")]
+                            The pins of all other boards are low meanwhile, so that none of them can take the number; the flash\n\
+                            number must be the one that is named or that the inventory has.\n\
+                            Exit codes: 0 done; 2 which board is meant is not known; 3 no answer; 4 another board stands there,\n\
+                            could take the number or has taken it.")]
     Repair(RepairArgs),
     /// Names of inputs, outputs and parameters, and initial inputs
     #[command(

@@ -14,6 +14,7 @@ mod repair;
 mod run;
 mod sim;
 mod update;
+mod update_bar;
 mod update_files;
 mod update_report;
 

@@ -1,10 +1,14 @@
 //! `ucom update`: firmware onto boards, checked, written, verified.
 
-use cli_kit::{Output, ProgressBar};
+use cli_kit::Output;
+use ucom::Profile;
 use ucom::files::Inventory;
-use ucom::master::update::{Progress, UpdateMode, UpdateOptions, UpdateTarget};
-use ucom::master::{Event, Outcome, Request};
+use ucom::master::update::{
+    UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult, UpdateTarget,
+};
+use ucom::master::{Outcome, Request};
 
+use super::update_bar::Bar;
 use super::update_files::{Files, day};
 use super::update_report::print;
 use crate::args::{Boards, LinkArgs, UpdateArgs};
@@ -17,13 +21,17 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let files = Files::read(args, &profile, out)?;
     let day = day(args.date.as_deref(), &profile)?;
     let mut driver = Driver::with_profile(link, profile, out)?;
-    let numbers = driver.numbers(&args.boards)?;
+    let numbers = match numbers(&mut driver, args) {
+        Err(failure) if driver.stop_asked() => return Err(cancelled(failure, args, &profile, out)),
+        numbers => numbers?,
+    };
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
     let options = UpdateOptions {
         dry_run: args.dry_run,
         force: args.force.force,
         start: args.start,
+        accept_unverified: args.unverified,
         mode: if args.group { UpdateMode::Group } else { UpdateMode::OneByOne },
         second: files.second,
         expect_program_id: args.expect_program_id,
@@ -32,7 +40,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         keep_going: several,
         ..UpdateOptions::new(targets, files.image, day)
     };
-    let mut bar = Bar { bar: None, out };
+    let mut bar = Bar::new(out)?;
     let outcome = driver.run_with(Request::Update(options), &mut |event| bar.see(event));
     bar.end();
     let report = match outcome? {
@@ -44,6 +52,48 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         0 => Ok(()),
         code => Err(Failure::printed(code)),
     }
+}
+
+/// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is told.
+fn numbers(driver: &mut Driver, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
+    let mut numbers = driver.numbers(&args.boards)?;
+    if args.boards == Boards::All && args.inventory.exists() {
+        let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
+        numbers.extend(inventory_numbers(&inventory));
+        numbers.sort_unstable();
+        numbers.dedup();
+    }
+    Ok(numbers)
+}
+
+fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
+    (0..32).filter(|board| inventory.get(*board).is_some())
+}
+
+/// Ctrl-C while it was still asked who is there: nothing was sent that changes a board, and the report says so.
+fn cancelled(failure: Failure, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
+    if failure.code != "cancelled" {
+        return failure;
+    }
+    let inventory = Inventory::read(&args.inventory).ok();
+    let left = UpdateOutcome::Cancelled;
+    let board = |board| UpdateResult {
+        board,
+        flash_number: inventory.as_ref().and_then(|i| i.get(board)).map(|known| known.flash_number),
+        before: None,
+        after: None,
+        outcome: left,
+        attempts: 0,
+        failure: Some(UpdateFailure::Cancelled { left }),
+        time_us: 0,
+    };
+    let boards = inventory.as_ref().map_or_else(Vec::new, |i| inventory_numbers(i).map(board).collect());
+    if boards.is_empty() {
+        return Failure { exit: REFUSED, ..failure };
+    }
+    let report = UpdateReport { dry_run: args.dry_run, boards, ..UpdateReport::default() };
+    print(&report, &[], profile, out);
+    Failure::printed(report.exit_code())
 }
 
 /// Which flash number each board must have: named, else as the inventory has it.
@@ -78,39 +128,4 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
         .hint("ucom init --renew writes it anew; or name the board's --flash-id")),
     };
     numbers.iter().map(target).collect()
-}
-
-/// The bar on stderr.
-struct Bar<'a> {
-    bar: Option<(Vec<u8>, ProgressBar)>,
-    out: &'a Output,
-}
-
-impl Bar<'_> {
-    fn see(&mut self, event: &Event) {
-        let Event::Progress { progress, .. } = event else { return };
-        if self.bar.as_ref().is_none_or(|(boards, _)| *boards != progress.boards) {
-            self.end();
-            let list: Vec<String> = progress.boards.iter().map(u8::to_string).collect();
-            let bar = self.out.bytes_bar(progress.total, &format!("board {}", list.join(", ")));
-            self.bar = Some((progress.boards.clone(), bar));
-        }
-        if let Some((_, bar)) = &self.bar {
-            bar.set_position(progress.bytes);
-            bar.set_message(said(progress));
-        }
-    }
-
-    fn end(&mut self) {
-        if let Some((_, bar)) = self.bar.take() {
-            bar.finish_and_clear();
-        }
-    }
-}
-
-fn said(p: &Progress) -> String {
-    let cycle = if p.cycle == 1 { "checking" } else { "writing" };
-    let attempt = if p.attempt > 1 { format!(", attempt {}", p.attempt) } else { String::new() };
-    let (rate, left) = (p.rate as f64 / 1000.0, p.remaining_us as f64 * 1e-6);
-    format!("{cycle}{attempt}, {rate:.1} kB/s, {left:.0} s left")
 }

@@ -80,7 +80,11 @@ fn unverified(report: &UpdateReport, profile: &Profile) -> String {
         format!("board {}: written, NOT verified; PC_INFO before: {before}; now: {after}{same}\n", b.board)
     };
     let lines: String = report.boards.iter().filter(|b| taken_on_trust(b, report)).map(line).collect();
-    if lines.is_empty() { lines } else { format!("{lines}{why};\n{}\n", why.hint()) }
+    if lines.is_empty() {
+        return lines;
+    }
+    let accept = if report.accept_unverified { "" } else { "; or accept it: --unverified" };
+    format!("{lines}{why};\n{}{accept}\n", why.hint())
 }
 
 /// Whether PC_INFO shows another program than before.

@@ -107,6 +107,28 @@ pub enum Error {
         /// The one it has.
         found: u16,
     },
+    /// Boards that took a number that is not, or not only, theirs.
+    #[error(
+        "number {board} was taken by {}{}",
+        Flashes(found),
+        if *given_back { " and taken back from all of them" } else { ", and it is not given back" }
+    )]
+    NumberShared {
+        /// The number.
+        board: u8,
+        /// The flash numbers of those that answered to it.
+        found: Vec<u16>,
+        /// Nobody answers to it any more.
+        given_back: bool,
+    },
+    /// Giving a number could give it to the first board of the chain.
+    #[error("board {other} does not answer: without a number it would take number {board}")]
+    MayTakeNumber {
+        /// The number that was to be given.
+        board: u8,
+        /// The first board.
+        other: u8,
+    },
     /// A status was set and is not what was set.
     #[error(
         "board {board}: status is {} after {tries} tries, wanted {} of the bits {}",
@@ -304,6 +326,17 @@ impl fmt::Display for Boards<'_> {
     }
 }
 
+/// `flash number 0x0021`, `flash numbers 0x0021, 0x0042`.
+struct Flashes<'a>(&'a [u16]);
+
+impl fmt::Display for Flashes<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list: Vec<String> = self.0.iter().map(|n| format!("0x{n:04X}")).collect();
+        let s = if self.0.len() == 1 { "" } else { "s" };
+        write!(f, "flash number{s} {}", list.join(", "))
+    }
+}
+
 struct Near<'a>(&'a [String]);
 
 impl fmt::Display for Near<'_> {
@@ -325,6 +358,8 @@ impl Error {
             | Self::AckMismatch { .. }
             | Self::WrongSequence { .. }
             | Self::WrongBoard { .. }
+            | Self::NumberShared { .. }
+            | Self::MayTakeNumber { .. }
             | Self::ForeignMaster { .. }
             | Self::Running { .. }
             | Self::LoopRuns { .. }
@@ -347,6 +382,8 @@ impl Error {
             Self::AckMismatch { .. } => "ack-mismatch",
             Self::WrongSequence { .. } => "wrong-sequence",
             Self::WrongBoard { .. } => "wrong-board",
+            Self::NumberShared { .. } => "number-shared",
+            Self::MayTakeNumber { .. } => "may-take-number",
             Self::StatusNotTaken { .. } => "status-not-taken",
             Self::NotReached { .. } => "not-reached",
             Self::AdminRefused { .. } => "admin-refused",
@@ -381,7 +418,10 @@ impl Error {
             Self::Incomplete { .. } => {
                 "frames get lost: `ucom doctor` looks at bus load, error counters and termination".into()
             }
-            Self::Contradiction { .. } => "number the boards anew: `ucom init`".into(),
+            Self::Contradiction { .. } | Self::NumberShared { .. } => "number the boards anew: `ucom init`".into(),
+            Self::MayTakeNumber { other, .. } => {
+                format!("`ucom repair {other}` first, or number all boards anew: `ucom init`")
+            }
             Self::Device { code, .. } => code.reaction().into(),
             Self::AckMismatch { .. } | Self::WrongSequence { .. } => {
                 "two boards may share a number, or the board reads the protocol otherwise: `ucom reset`, `ucom probe`"

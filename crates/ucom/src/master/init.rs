@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use std::prelude::v1::*;
 
 use super::link::Link;
-use super::request::{Answer, TRIES, ask_info, confirmed, info, numbers, set_status};
+pub(crate) use super::repair::{repair, repair_procedure};
+use super::request::{Answer, TRIES, ask_info, confirmed, info, set_status};
 use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
@@ -182,7 +183,7 @@ async fn reset_all(link: &Link, reports: &mut Reports) {
 
 /// Gives a number to the next board of the chain; `None`: nobody took it.
 async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error> {
-    if !take_number(link, number).await? {
+    if !take_number(link, number, false).await? {
         return Ok(None);
     }
     let seen = info(link, number).await?;
@@ -195,11 +196,16 @@ async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error>
     Ok(Some(BoardSeen { info: raised, ..seen }))
 }
 
-/// PC_INIT until the board acknowledges or answers PC_INFO, at most three times.
-async fn take_number(link: &Link, number: u8) -> Result<bool, Error> {
+/// PC_INIT until the board acknowledges or answers PC_INFO, at most three times. `lower`: the board's own pin goes down
+/// before it is repeated, as a board that raises it by itself would let its neighbour take the number as well.
+pub(super) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<bool, Error> {
     let to = link.board(number)?;
     let nobody = link.profile().unnumbered().number();
-    for _ in 0..TRIES {
+    for tried in 0..TRIES {
+        if lower && tried > 0 {
+            link.send(to, ToBoard::SetStatus { mask: Status::OPINIT.0, value: 0 }).await;
+            link.sleep(20 * MS).await;
+        }
         link.listen(u32::MAX, &[Function::InitAck, Function::DspInfo]);
         link.ask(to, ToBoard::Init).await;
         let mut until = link.now() + link.times().init_ack;
@@ -285,51 +291,4 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
         report.reports.ambiguous().into_iter().map(|(low, high)| InitFinding::Ambiguous { low, high }),
     );
     report.findings.extend(findings);
-}
-
-/// Gives board `number` its number back when it no longer answers.
-///
-/// It may have rebooted, or it may be alive with its answers lost while the next board has rebooted and, with its pin
-/// still on, would take the number, too. So its pin is lowered first, and the flash number must be the expected one.
-pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
-    let to = link.board(number)?;
-    let since = link.now();
-    for _ in 0..3 {
-        link.send(to, ToBoard::SetStatus { mask: Status::OPINIT.0, value: 0 }).await;
-        link.sleep(20 * MS).await;
-    }
-    if !take_number(link, number).await? {
-        return Err(link.no_answer(number, Function::Init, TRIES, since));
-    }
-    let seen = confirmed(link, number).await?;
-    if seen.info.flash_number != flash_number {
-        // Another board took the number just now: it must not keep it, or the next command means the wrong one.
-        link.send(to, ToBoard::SetStatus { mask: Status::INIT.0, value: 0 }).await;
-        link.with(|core| *core.boards.of(number) = Default::default());
-        let (wanted, found) = (flash_number, seen.info.flash_number);
-        return Err(Error::WrongBoard { board: number, wanted, found });
-    }
-    let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
-    Ok(BoardSeen { info: raised, ..seen })
-}
-
-/// Repair as a procedure of its own.
-pub(crate) async fn repair_procedure(
-    link: Link,
-    number: u8,
-    flash_number: u16,
-    force: bool,
-) -> Result<Outcome, Error> {
-    link.become_master(force).await?;
-    // It may be well: then nothing is changed but its pin, which must be on.
-    if let Ok(found) = numbers(&link, number).await
-        && found.flash_number != flash_number
-    {
-        // One damaged answer is not another board.
-        let found = confirmed(&link, number).await?.info.flash_number;
-        if found != flash_number {
-            return Err(Error::WrongBoard { board: number, wanted: flash_number, found });
-        }
-    }
-    repair(&link, number, flash_number).await.map(Outcome::Repaired)
 }

@@ -49,6 +49,7 @@ mod load;
 pub mod probe;
 mod procedures;
 mod raw_status;
+mod repair;
 mod request;
 mod run;
 mod scan;

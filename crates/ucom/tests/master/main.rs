@@ -11,6 +11,7 @@ mod loader;
 mod losses;
 mod overload;
 mod probing;
+mod repairing;
 mod robust;
 mod running;
 mod scripted;

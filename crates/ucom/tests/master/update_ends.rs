@@ -144,6 +144,53 @@ fn p12_cancelled_while_it_starts() {
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
     assert_eq!((report.boards[0].outcome, report.exit_code()), (left, 5));
     assert_eq!(check_program(&mut bench, 0, 128).1, DATE);
+    // It was stopped again; where its answers are lost nobody knows, and that is what is said.
+    assert!(!bench.board(0).status().has(ucom::Status::MSTART));
+    let mut bench = initialised(&[0x21]);
+    let start = UpdateOptions { start: true, ..options(&[1], 128) };
+    let begun = |b: &Bench| count(b, "301#") >= 1;
+    let report = ended(&mut bench, start, begun, |b, id| {
+        b.lose = vec![("> 141#", u32::MAX)];
+        b.master.cancel(id);
+    });
+    let left = UpdateOutcome::Running;
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Verified, 5));
+    assert!(report.boards[0].failure.as_ref().unwrap().to_string().contains("may be started"));
+}
+
+/// `--start` also starts a board that has the image already; a cancel before that says so.
+#[test]
+fn a_board_that_is_up_to_date_is_started() {
+    let mut bench = initialised(&[0x21, 0x42]);
+    update(&mut bench, options(&[1], 128));
+    let start = UpdateOptions { start: true, keep_going: true, ..options(&[1, 2], 128) };
+    let mut cancelled = initialised(&[0x21, 0x42]);
+    update(&mut cancelled, options(&[1], 128));
+    let begun = |b: &Bench| count(b, "2C2#") >= 3;
+    let report = ended(&mut cancelled, start.clone(), begun, |b, id| b.master.cancel(id));
+    let left = UpdateOutcome::UpToDate;
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
+    assert_eq!((report.exit_code(), count(&cancelled, "301#")), (4, 0));
+    let blocks = count(&bench, "2C1#");
+    let report = update(&mut bench, start.clone());
+    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
+    assert_eq!((outcomes, report.exit_code()), (vec!["running", "running"], 0), "{report:?}");
+    assert_eq!(count(&bench, "2C1#"), blocks);
+    // All are up to date and run: nothing is left to do.
+    let sent = count(&bench, "301#");
+    assert_eq!((update(&mut bench, start).exit_code(), count(&bench, "301#")), (0, sent));
+}
+
+/// A board that answers and does not enable programming has reported, not gone silent: exit code 1.
+#[test]
+fn a_board_that_does_not_enable_programming_answers() {
+    let info = ["141#2100011B34126E38", "141#0000"];
+    let mut bench = Bench::script(Script::default().on("201#", &info));
+    let report = update(&mut bench, options(&[1], 128));
+    let Some(UpdateFailure::Reported(e)) = &report.boards[0].failure else { panic!("{report:?}") };
+    assert!(matches!(**e, Error::StatusNotTaken { board: 1, .. }), "{e}");
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::NotStarted, 1));
 }
 
 /// U-1 before every attempt: a board that was swapped since the last one gets no XRESET and no program data.
@@ -204,6 +251,7 @@ impl Member for Impostor {
         let mut say = |text: &str| self.out.push((now + 300, crate::bench::frame(text)));
         match frame.to_string().as_str() {
             "041#" => self.silent = true,
+            "1C1#0800" => self.other = false,
             "281#" => {
                 self.other = true;
                 say("0C1#01");
@@ -230,7 +278,7 @@ fn u4_repair_that_finds_another_board_is_refused() {
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
     assert_eq!((report.exit_code(), count(&bench, "2C1#")), (4, 0));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
-    assert_eq!(bench.count("1C1#0800"), 1);
+    assert_eq!(bench.count("1C1#0800"), 3);
     // Pin off before the number is given (5.4).
     let sent = bench.sent();
     let place = |text: &str| sent.iter().position(|t| t == text).unwrap();

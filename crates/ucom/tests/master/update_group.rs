@@ -176,6 +176,76 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     assert_eq!(check_program(&mut bench, 1, 128), OLD);
 }
 
+/// A board that says what the published list has for its CAN controller goes on listening: it is erased with the others
+/// and that is said, or it is asked and has the program.
+#[test]
+fn d43_not_every_error_ends_a_transfer() {
+    for code in ["06", "08", "09", "0B", "2A"] {
+        for heard in [true, false] {
+            let mut bench = initialised(&[0x21, 0x42]);
+            let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
+            while broadcasts(&bench) < 10 {
+                bench.run(1);
+            }
+            let now = bench.now;
+            bench.master.handle(now, Ok(crate::bench::frame(&format!("082#{code}"))));
+            if !heard {
+                bench.lose = vec![("> 142#", u32::MAX), ("> 182#", u32::MAX), ("> 102#", u32::MAX)];
+            }
+            let Ok(ucom::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+            assert_ne!(check_program(&mut bench, 1, 128), OLD, "{code}: it was erased");
+            let expected = if heard { (UpdateOutcome::Verified, 0) } else { (UpdateOutcome::Unknown, 5) };
+            assert_eq!((report.boards[1].outcome, report.exit_code()), expected, "{code}: {report:?}");
+        }
+    }
+}
+
+/// U-3 forced: a board that fell behind and had the same program before proves nothing by showing it.
+#[test]
+fn u3_what_was_there_before_proves_nothing() {
+    let mut bench = initialised(&[0x21, 0x42]);
+    assert_eq!(update(&mut bench, group(&[1, 2])).exit_code(), 0);
+    let forced = UpdateOptions { force: true, ..group(&[1, 2]) };
+    let start = bench.log.len();
+    let id = bench.master.start(bench.now, Request::Update(forced)).unwrap();
+    while broadcasts(&bench) < 48 + 4 {
+        bench.run(1);
+    }
+    bench.cut = vec![1];
+    while broadcasts(&bench) < 2 * 48 {
+        bench.run(1);
+    }
+    bench.cut.clear();
+    let Ok(ucom::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+    assert_eq!(
+        (report.boards[1].outcome, report.boards[1].attempts),
+        (UpdateOutcome::Verified, 2),
+        "{report:?}"
+    );
+    let own = bench.log[start..].iter().filter(|(.., f)| f.id() == 0x2C2).count();
+    assert_eq!(own, 48, "it was programmed by itself");
+}
+
+/// A cancel while one board of the group gets its own attempt takes the others out of programming, too.
+#[test]
+fn p12_a_cancel_reaches_every_board_of_the_group() {
+    let mut bench = initialised(&[0x21, 0x42, 0x63]);
+    let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
+    while bench.count("043#") == 0 {
+        bench.run(1);
+    }
+    // Board 3 listens unheard: no broadcast, one by one; board 2 waits with PROG = 1.
+    bench.lose = vec![("> 143#", u32::MAX)];
+    while bench.log.iter().filter(|(.., f)| f.id() == 0x2C1).count() < 4 {
+        bench.run(1);
+    }
+    assert!(bench.board(1).status().has(ucom::Status::PROG));
+    bench.master.cancel(id);
+    let Ok(ucom::master::Outcome::Update(report)) = bench.wait(id, 60) else { panic!() };
+    assert_ne!(report.exit_code(), 0);
+    assert!(!bench.board(1).status().has(ucom::Status::PROG), "{report:?}");
+}
+
 /// Where no number reaches everybody a group is updated one by one.
 #[test]
 fn d04_no_broadcast_no_group() {

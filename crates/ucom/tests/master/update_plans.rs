@@ -94,7 +94,9 @@ fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> 
 fn u10_what_cannot_be_verified_says_so() {
     let report = raw("3F4BC13A", 0x1B, None);
     let board = &report.boards[0];
-    assert_eq!((board.outcome, &board.failure, report.exit_code()), (UpdateOutcome::Written, &None, 0));
+    assert_eq!((board.outcome, &board.failure, report.exit_code()), (UpdateOutcome::Written, &None, 5));
+    // As good as verified to whoever says so.
+    assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit_code(), 0);
     assert_eq!((report.unverifiable, report.program_id), (Some(Unverifiable::RawPlan), None));
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
     let shown = [board.before, board.after].map(|info| info.map(|i| (i.program_id, i.date)));
@@ -152,7 +154,8 @@ fn boards_without_checksum_or_header() {
     {
         let mut bench = Bench::chain_with(&[0x21], profile);
         assert!(bench.go(Request::Init(InitOptions::default()), 60).is_ok());
-        let report = update(&mut bench, UpdateOptions { start: true, ..options(&[1], bytes) });
+        let unverified = UpdateOptions { start: true, accept_unverified: true, ..options(&[1], bytes) };
+        let report = update(&mut bench, unverified);
         assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Running, 0), "{report:?}");
         assert_eq!(report.unverifiable, Some(why));
         assert_eq!(bench.board(0).flash.bytes(Memory::Program)[..bytes], image(bytes));

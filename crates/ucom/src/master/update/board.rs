@@ -28,7 +28,7 @@ pub(super) async fn one(link: &Link, run: &mut Campaign, board: u8, first: u32) 
     let mut gap_us = u64::from(profile.prog_frame_gap_us);
     let since = link.now();
     for number in first..=profile.prog_attempts.max(first) {
-        run.active = vec![board];
+        run.begin(board);
         if let Some(result) = run.result(board) {
             result.attempts = number;
         }
@@ -48,7 +48,7 @@ pub(super) async fn one(link: &Link, run: &mut Campaign, board: u8, first: u32) 
             link.note(format!("board {board}: attempt {number} failed, once more"));
         }
     }
-    run.active.clear();
+    run.active.retain(|b| *b != board);
     Ok(())
 }
 
@@ -132,9 +132,10 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    run.fail(board, failure);
-    // The board must not take what comes next for the rest of this transfer.
+    // The board must not take what comes next for the rest of this transfer. It is told while it still counts as at
+    // work: a cancel in this moment tells it, too.
     leave_programming(link, board).await;
+    run.fail(board, failure);
     // U-7: the image or the board is wrong, another attempt would end the same.
     let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
     broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
@@ -167,16 +168,21 @@ pub(super) async fn verify(link: &Link, run: &mut Campaign, board: u8, plan: &Up
         None => return run.fail(board, UpdateFailure::NotValid { program_id, date, status }),
     };
     run.end(board, outcome, None);
-    if !run.options.start {
-        return;
+    if run.options.start {
+        start(link, run, board, &known).await;
     }
-    run.active.push(board);
+}
+
+/// Starts the application of a board that shows `known`, and sees that it runs.
+pub(super) async fn start(link: &Link, run: &mut Campaign, board: u8, known: &BoardInfo) {
+    run.begin(board);
+    run.starting = Some(board);
     let started = match start_application(link, board).await {
         Ok(_) => info(link, board).await,
         Err(e) => Err(e),
     };
     match started {
-        Ok(seen) if identity(&seen.info) == identity(&known) && seen.info.status.has(Status::MSTART) => {
+        Ok(seen) if identity(&seen.info) == identity(known) && seen.info.status.has(Status::MSTART) => {
             run.end(board, UpdateOutcome::Running, None);
         }
         Ok(seen) => {
@@ -186,4 +192,5 @@ pub(super) async fn verify(link: &Link, run: &mut Campaign, board: u8, plan: &Up
         }
         Err(e) => run.fail(board, UpdateFailure::NotRunning(Box::new(e))),
     }
+    run.starting = None;
 }

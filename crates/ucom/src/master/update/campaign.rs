@@ -31,17 +31,29 @@ pub(super) struct Campaign {
     pub results: Vec<UpdateResult>,
     /// Boards between XRESET and their end.
     pub active: Vec<u8>,
+    /// The board that is told to start its application.
+    pub starting: Option<u8>,
+    /// Boards that have the image already and are still to be started.
+    pub to_start: Vec<u8>,
     stages: BTreeMap<u8, Stage>,
 }
 
 impl Campaign {
     pub fn new(options: UpdateOptions) -> Self {
         let results = options.targets.iter().map(|t| UpdateResult::new(t.board)).collect();
-        Self { options, results, active: Vec::new(), stages: BTreeMap::new() }
+        let (active, to_start, stages) = (Vec::new(), Vec::new(), BTreeMap::new());
+        Self { options, results, active, starting: None, to_start, stages }
     }
 
     pub fn result(&mut self, board: u8) -> Option<&mut UpdateResult> {
         self.results.iter_mut().find(|r| r.board == board)
+    }
+
+    /// The board is at work, beside others of its group.
+    pub fn begin(&mut self, board: u8) {
+        if !self.active.contains(&board) {
+            self.active.push(board);
+        }
     }
 
     pub fn stage(&self, board: u8) -> Stage {
@@ -94,6 +106,7 @@ impl Campaign {
         let error = Box::new(error);
         let failure = match self.stage(board) {
             Stage::Untouched if refused => UpdateFailure::Refused(error),
+            Stage::Untouched if error.exit_code() == 1 => UpdateFailure::Reported(error),
             Stage::Untouched => UpdateFailure::NoAnswer(error),
             Stage::MaybeErased => UpdateFailure::MayBeErased(error),
             _ => UpdateFailure::After(error),
@@ -101,11 +114,21 @@ impl Campaign {
         self.fail(board, failure);
     }
 
-    /// The user ended it.
+    /// The user ended it. A board that was told to start, and is not known to be stopped, may run.
     pub fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
+        let started = self.starting == Some(board);
         if let Some(result) = self.result(board) {
-            result.failure = Some(UpdateFailure::Cancelled { left: result.outcome });
+            let left = if started { UpdateOutcome::Running } else { result.outcome };
+            result.failure = Some(UpdateFailure::Cancelled { left });
+        }
+    }
+
+    /// Boards that were done but for their start.
+    pub fn cancel_starts(&mut self) {
+        let left = UpdateOutcome::UpToDate;
+        for board in core::mem::take(&mut self.to_start) {
+            self.end(board, left, Some(UpdateFailure::Cancelled { left }));
         }
     }
 

@@ -15,6 +15,9 @@ pub enum UpdateFailure {
     /// No answer before anything was erased.
     #[error("{0}")]
     NoAnswer(Box<Error>),
+    /// The board answered, but did not do what was asked, before anything was erased.
+    #[error("{0}")]
+    Reported(Box<Error>),
     /// The board reported an error.
     #[error("{code} in cycle {cycle}, block {block}, after {attempts} attempts: {}", code.meaning())]
     Device {
@@ -106,8 +109,9 @@ impl UpdateFailure {
                 _ => 4,
             },
             Self::NoAnswer(_) | Self::Timeout { erased: false, .. } => 3,
-            Self::Device { erased: false, .. } => 1,
-            Self::Skipped { .. } | Self::Cancelled { left: UpdateOutcome::Cancelled } => 4,
+            Self::Device { erased: false, .. } | Self::Reported(_) => 1,
+            Self::Skipped { .. }
+            | Self::Cancelled { left: UpdateOutcome::Cancelled | UpdateOutcome::UpToDate } => 4,
             Self::Device { .. }
             | Self::Timeout { .. }
             | Self::NotVerified { .. }
@@ -122,7 +126,7 @@ impl UpdateFailure {
     /// A short name for programs.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Refused(e) | Self::NoAnswer(e) | Self::After(e) => e.code(),
+            Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::After(e) => e.code(),
             Self::MayBeErased(_) => "may-be-erased",
             Self::NotValid { .. } => "not-valid",
             Self::Device { .. } => "device-error",
@@ -137,7 +141,7 @@ impl UpdateFailure {
     /// The likely cause and what helps.
     pub fn hint(&self) -> String {
         match self {
-            Self::Refused(e) | Self::NoAnswer(e) | Self::NotRunning(e) => e.hint(),
+            Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::NotRunning(e) => e.hint(),
             Self::After(e) => format!("{}; then run the update again to get an application back", e.hint()),
             Self::MayBeErased(_) => {
                 "when the board answers again (`ucom repair`, `ucom init`): run the update again".into()
@@ -152,6 +156,7 @@ impl UpdateFailure {
             Self::NotVerified { .. } => {
                 "the board may compute its Program ID otherwise (`prog.checksum`): `ucom probe --image FILE`".into()
             }
+            Self::Cancelled { left: UpdateOutcome::Running } => "`ucom stop` stops it".into(),
             Self::Cancelled { left: UpdateOutcome::Incomplete } => {
                 "run the update again to get an application back".into()
             }
@@ -168,6 +173,8 @@ fn left_behind(outcome: UpdateOutcome) -> &'static str {
         UpdateOutcome::Incomplete => "the old application is erased, the board waits in its exloader",
         UpdateOutcome::Unknown => "the old application may be erased",
         UpdateOutcome::Written => "the board said that it is done, nobody has read it back",
+        UpdateOutcome::UpToDate => "the image was there already, its application was not started",
+        UpdateOutcome::Running => "the new application is on the board, and it may be started",
         UpdateOutcome::Verified => "the new application is on the board, but not started",
         _ => "nothing was erased, the board has what it had",
     }

@@ -31,7 +31,7 @@ pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> 
     let (boards, stray) = gather(link, run, &selected).await;
     if stray {
         link.note("a board that does not answer may listen: no broadcast, the others one by one".into());
-        run.active.clear();
+        // Those that came up stay at work: a cancel takes them out of programming.
         return Ok(());
     }
     for board in &boards {
@@ -45,9 +45,8 @@ pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> 
         Attempt { link, plan: &plan, to: everybody, boards, number: 1, gap_us, since: since_transfer };
     let erasing = |boards: &[u8], left: &[(u8, Broken)]| {
         boards.iter().for_each(|board| run.reach(*board, Stage::Erased));
-        // A board that complained drops what follows (D-43); one that was silent may have gone on listening.
-        let silent = left.iter().filter(|(_, why)| !matches!(why, Broken::Device { .. }));
-        silent.for_each(|(board, _)| run.reach(*board, Stage::MaybeErased));
+        let listening = left.iter().filter(|(_, why)| !why.ended_transfer());
+        listening.for_each(|(board, _)| run.reach(*board, Stage::MaybeErased));
     };
     let Transferred { finished, broken } = attempt.run(erasing).await;
     for board in finished {
@@ -57,10 +56,13 @@ pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> 
         }
     }
     for (board, why) in broken {
-        let silent = !matches!(why, Broken::Device { .. });
-        if silent && let Ok(seen) = confirmed(link, board).await {
-            if has(&seen.info, &plan) {
-                // A board whose READY was lost may have gone on with the others and be done.
+        if !why.ended_transfer()
+            && let Ok(seen) = confirmed(link, board).await
+        {
+            let had = run.before(board).is_some_and(|before| has(&before, &plan));
+            if has(&seen.info, &plan) && !had {
+                // A board whose READY was lost may have gone on with the others and be done. One that had this program
+                // before proves nothing by it.
                 verify(link, run, board, &plan).await;
                 continue;
             }

@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 use std::prelude::v1::*;
 
-use super::board::{has, one};
-use super::campaign::Campaign;
+use super::board::{has, one, start};
+use super::campaign::{Campaign, Stage};
 use super::group::group;
 use super::{PlanError, UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
 use crate::Status;
 use crate::master::link::Link;
-use crate::master::request::{confirmed, set_status};
+use crate::master::request::{confirmed, numbers, set_status};
 use crate::master::scan::board_states;
 use crate::master::{Error, Outcome};
 
@@ -34,10 +34,14 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     match end {
         Ok(()) => {}
         // Asked once more: what was still to be undone is not.
-        Err(Error::Cancelled) => run.unfinished().into_iter().for_each(|board| run.cancel(board)),
+        Err(Error::Cancelled) => {
+            run.unfinished().into_iter().for_each(|board| run.cancel(board));
+            run.cancel_starts();
+        }
         // Nothing can be sent any more, but what is known of the boards is still worth telling.
         Err(error @ Error::Bus { .. }) => {
-            for board in run.unfinished() {
+            let waiting = core::mem::take(&mut run.to_start);
+            for board in run.unfinished().into_iter().chain(waiting) {
                 run.fail_with(board, error.clone());
             }
         }
@@ -50,6 +54,7 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
         bytes: plan.total_bytes(),
         images: plan.images,
         unverifiable: plan.unverifiable,
+        accept_unverified: run.options.accept_unverified,
         boards: run.results,
     };
     Ok(Outcome::Update(report))
@@ -58,6 +63,10 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
 /// The boards at work are told to forget the transfer; nothing half written is ever valid.
 async fn cancelled(link: &Link, run: &mut Campaign) -> Result<(), Error> {
     for board in run.active.clone() {
+        // PC_START may have been taken already: what this update has started it stops again.
+        if run.starting == Some(board) && set_status(link, board, Status::MSTART, Status(0)).await.is_ok() {
+            run.starting = None;
+        }
         // Best effort: what the board does not take now, its own time limit and the next XRESET undo.
         if set_status(link, board, Status::PROG, Status(0)).await.is_err() {
             link.note(format!("board {board} did not confirm that it left programming"));
@@ -65,6 +74,7 @@ async fn cancelled(link: &Link, run: &mut Campaign) -> Result<(), Error> {
         run.cancel(board);
     }
     run.open().into_iter().for_each(|board| run.cancel(board));
+    run.cancel_starts();
     Ok(())
 }
 
@@ -75,7 +85,11 @@ async fn all(link: &Link, run: &mut Campaign) -> Result<(), Error> {
         skip_open(run, after);
     }
     if run.open().is_empty() {
-        return Ok(());
+        if run.to_start.is_empty() || failed.is_some_and(|_| !run.options.keep_going) {
+            return Ok(());
+        }
+        link.become_master(run.options.force).await?;
+        return start_rest(link, run).await;
     }
     // U-2: program data outrank the process data of a running board.
     let states = board_states(link).await;
@@ -101,7 +115,22 @@ async fn all(link: &Link, run: &mut Campaign) -> Result<(), Error> {
         let failed = run.results.iter().any(|r| r.board == board && r.failure.is_some());
         if failed && !run.options.keep_going {
             skip_open(run, board);
-            break;
+            return Ok(());
+        }
+    }
+    start_rest(link, run).await
+}
+
+/// Starts the boards that had the image already.
+async fn start_rest(link: &Link, run: &mut Campaign) -> Result<(), Error> {
+    while let Some(board) = run.to_start.first().copied() {
+        // PC_INFO has shown the program.
+        run.reach(board, Stage::Verified);
+        run.begin(board);
+        run.to_start.retain(|b| *b != board);
+        match numbers(link, board).await {
+            Ok(known) => start(link, run, board, &known).await,
+            Err(error) => run.fail(board, UpdateFailure::NotRunning(Box::new(error))),
         }
     }
     Ok(())
@@ -144,6 +173,9 @@ async fn check(link: &Link, run: &mut Campaign) {
         let there = run.plan(link, Some(board)).is_ok_and(|plan| has(&known, &plan));
         if there && !run.options.force {
             run.end(board, UpdateOutcome::UpToDate, None);
+            if run.options.start && !run.options.dry_run {
+                run.to_start.push(board);
+            }
         }
     }
 }

@@ -28,6 +28,16 @@ pub(super) enum Broken {
     },
 }
 
+impl Broken {
+    /// The board drops what follows (D-43): it reported an error of programming. After any other one, as after silence, it
+    /// may go on listening.
+    pub(super) fn ended_transfer(self) -> bool {
+        use ErrorCode::{CanReceive, Checksum, Data, ExloadCycle, Flash, MemProtected, Overrun};
+        let Self::Device { code, .. } = self else { return false };
+        matches!(code, Checksum | MemProtected | Flash | Overrun | Data | CanReceive | ExloadCycle)
+    }
+}
+
 /// Boards that take part in an attempt, and what became of them.
 pub(super) struct Attempt<'a> {
     pub link: &'a Link,

@@ -1,0 +1,98 @@
+//! The bar of an update on stderr. A thread of its own draws it: a terminal that is held (Ctrl-S) must not stop a block.
+
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
+use std::time::Duration;
+
+use cli_kit::{Output, ProgressBar};
+use ucom::master::Event;
+use ucom::master::update::Progress;
+
+use crate::failure::{FAULT, Failure};
+
+/// Steps that wait to be drawn; more are left out.
+const WAITING: usize = 4;
+/// At the end, a terminal that takes nothing for so long is not waited for.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What is drawn next.
+struct Step {
+    bar: ProgressBar,
+    /// Which bar it is: another one takes the place of the one before.
+    serial: usize,
+    bytes: u64,
+    message: String,
+}
+
+/// The bar of the boards that are at work.
+pub struct Bar<'a> {
+    out: &'a Output,
+    bar: Option<(Vec<u8>, ProgressBar)>,
+    serial: usize,
+    steps: SyncSender<Step>,
+    /// Ends with the thread.
+    ended: Receiver<()>,
+}
+
+impl<'a> Bar<'a> {
+    /// None is shown before the first progress.
+    pub fn new(out: &'a Output) -> Result<Self, Failure> {
+        let (steps, drawn) = sync_channel(WAITING);
+        let (end, ended) = channel::<()>();
+        let draw = move || {
+            draw(&drawn);
+            drop(end);
+        };
+        std::thread::Builder::new()
+            .name("progress".into())
+            .spawn(draw)
+            .map_err(|e| Failure::new(FAULT, "thread", format!("no thread for the progress bar: {e}")))?;
+        Ok(Self { out, bar: None, serial: 0, steps, ended })
+    }
+
+    /// Draws what an event tells of progress, when the terminal takes it.
+    pub fn see(&mut self, event: &Event) {
+        let Event::Progress { progress, .. } = event else { return };
+        if self.bar.as_ref().is_none_or(|(boards, _)| *boards != progress.boards) {
+            let list: Vec<String> = progress.boards.iter().map(u8::to_string).collect();
+            let bar = self.out.bytes_bar(progress.total, &format!("board {}", list.join(", ")));
+            self.serial += 1;
+            self.bar = Some((progress.boards.clone(), bar));
+        }
+        if let Some((_, bar)) = &self.bar {
+            let (bar, serial) = (bar.clone(), self.serial);
+            let step = Step { bar, serial, bytes: progress.bytes, message: said(progress) };
+            // Too many wait: the next step says the same, and more.
+            let _ = self.steps.try_send(step);
+        }
+    }
+
+    /// Takes the bar away, before anything else is printed.
+    pub fn end(self) {
+        let Self { steps, ended, .. } = self;
+        drop(steps);
+        // The thread never sends; it ends.
+        let _ = ended.recv_timeout(PATIENCE);
+    }
+}
+
+fn draw(steps: &Receiver<Step>) {
+    let mut shown: Option<(usize, ProgressBar)> = None;
+    for Step { bar, serial, bytes, message } in steps {
+        if let Some((_, old)) = shown.take_if(|(old, _)| *old != serial) {
+            old.finish_and_clear();
+        }
+        bar.set_position(bytes);
+        bar.set_message(message);
+        shown = Some((serial, bar));
+    }
+    if let Some((_, bar)) = shown {
+        bar.finish_and_clear();
+    }
+}
+
+fn said(p: &Progress) -> String {
+    let cycle = if p.cycle == 1 { "checking" } else { "writing" };
+    let attempt = if p.attempt > 1 { format!(", attempt {}", p.attempt) } else { String::new() };
+    let (rate, left) = (p.rate as f64 / 1000.0, p.remaining_us as f64 * 1e-6);
+    format!("{cycle}{attempt}, {rate:.1} kB/s, {left:.0} s left")
+}

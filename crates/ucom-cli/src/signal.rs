@@ -179,6 +179,7 @@ fn left_by(request: &Request) -> Option<Left> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ucom::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
     use ucom::master::{RunBoard, RunOptions};
 
     fn stop(board: u8) -> Request {
@@ -222,6 +223,21 @@ mod tests {
         undone.begin(&stop(1));
         undone.end(&stop(1), true);
         assert!(undone.lock().words().contains("ucom stop 2\n"));
+    }
+
+    /// A dry run changes nothing, and says so.
+    #[test]
+    fn a_dry_run_leaves_nothing_undone() {
+        for dry_run in [true, false] {
+            let undone = Undone::default();
+            let image = UpdateImage { bytes: vec![7; 64], address_words: 0 };
+            let targets = vec![UpdateTarget { board: 4, flash_number: None }];
+            let options = UpdateOptions { dry_run, ..UpdateOptions::new(targets, image, 0) };
+            undone.begin(&Request::Update(options));
+            let words = undone.lock().words();
+            assert_eq!(words.contains("nothing was changed"), dry_run, "{words}");
+            assert_eq!(words.contains("board 4 may be without a valid application"), !dry_run, "{words}");
+        }
     }
 
     /// Words that nobody takes do not keep the process.

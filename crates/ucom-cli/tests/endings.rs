@@ -282,29 +282,3 @@ fn a_blocked_stderr_does_not_keep_the_process() {
         ended(child).ends(if signals > 0 { 5 } else { 3 });
     }
 }
-
-/// The second Ctrl-C in a command that has started boards names them; in a dry run nothing was changed.
-#[test]
-fn a_second_ctrl_c_tells_the_truth() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
-    let image = sim.file("image.bin", &vec![7; 60_000]);
-    for (words, wait_for, what) in [
-        (&["start", "1,2"][..], "302#", "ucom stop 1\n"),
-        (&["update", "1", &image, "--dry-run", "--force"], "201#", "nothing was changed"),
-    ] {
-        let mut peer = sim.peer();
-        let child = sim.spawn(words);
-        peer.wait(wait_for);
-        sim.signal("-STOP");
-        signal(&child, "-INT");
-        std::thread::sleep(Duration::from_millis(300));
-        signal(&child, "-INT");
-        let said = ended(child);
-        sim.signal("-CONT");
-        println!("{words:?}: {} {}", said.code, said.err);
-        if said.err.contains("ended at once") {
-            assert!(said.err.contains(what), "{words:?}: {}", said.err);
-        }
-    }
-}

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use ucom::files::{BoardEdges, EdgeTable};
-use ucom::master::io::IoDescription;
+use ucom::master::io::{DescriptionKey, IoDescription};
 use ucom::master::{Outcome, Request};
 use ucom::{BoardInfo, Profile};
 
-use crate::args::{CacheArgs, LinkArgs};
+use crate::args::{Boards, CacheArgs, LinkArgs};
 use crate::commands::seen;
 use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
@@ -28,6 +28,21 @@ pub struct Known {
     pub edges: BoardEdges,
     /// Where edge table and program do not fit.
     strays: Vec<String>,
+}
+
+/// A board of several whose application is not started is seldom the only one.
+pub fn of_several(failure: Failure, boards: &Boards) -> Failure {
+    let list = match boards {
+        Boards::Some(numbers) if numbers.len() > 1 => {
+            numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(",")
+        }
+        Boards::All => "all".into(),
+        _ => return failure,
+    };
+    match failure.code.as_str() {
+        "no-application" if !failure.hint.contains("update") => failure.hint(format!("`ucom start {list}`")),
+        _ => failure,
+    }
 }
 
 impl LinkArgs {
@@ -51,8 +66,9 @@ impl CacheArgs {
         self.cache.clone().or_else(|| of_user().map(|dir| dir.join("ucom")))
     }
 
-    fn file(&self, (program_id, date): (u16, u16)) -> Option<PathBuf> {
-        Some(self.directory()?.join(format!("io-{program_id:04X}-{date:04X}.json")))
+    fn file(&self, key: DescriptionKey) -> Option<PathBuf> {
+        let DescriptionKey { program_id, date, flash_number } = key;
+        Some(self.directory()?.join(format!("io-{program_id:04X}-{date:04X}-{flash_number:04X}.json")))
     }
 
     /// A board with its names. They are known from before, or its application runs and is asked; what cannot be kept is
@@ -65,17 +81,15 @@ impl CacheArgs {
         self.described(driver, table, board)
     }
 
-    /// The same for a board whose application must run.
+    /// The same for a board whose application must run: it is asked, for what is kept may be of another application.
     pub fn described(&self, driver: &mut Driver, table: &EdgeTable, board: u8) -> Result<Known, Failure> {
         let info = seen(driver, board)?.info;
-        let key = (info.program_id, info.date);
-        self.kept(driver, &info);
         let names = match driver.run(Request::Describe { board, fresh: self.fresh })? {
             Outcome::Description { description, .. } => description,
             other => return Err(unexpected(&other)),
         };
         if let (Some(directory), Some(file), Ok(text)) =
-            (self.directory(), self.file(key), serde_json::to_string_pretty(&names))
+            (self.directory(), self.file(DescriptionKey::of(&info)), serde_json::to_string_pretty(&names))
         {
             let _ = std::fs::create_dir_all(directory).and_then(|()| std::fs::write(file, text));
         }
@@ -84,7 +98,7 @@ impl CacheArgs {
 
     /// What is known of a program without asking for it.
     fn kept(&self, driver: &mut Driver, info: &BoardInfo) -> Option<IoDescription> {
-        let key = (info.program_id, info.date);
+        let key = DescriptionKey::of(info);
         if self.fresh || !info.has_application() {
             return None;
         }
@@ -95,6 +109,13 @@ impl CacheArgs {
         let names: IoDescription = serde_json::from_str(&text).ok()?;
         driver.master.know_description(key, names.clone());
         Some(names)
+    }
+}
+
+impl Known {
+    /// The same board by the names that it has told since.
+    pub fn renamed(self, names: IoDescription, table: &EdgeTable, profile: Profile) -> Self {
+        if self.names == names { self } else { with_edges(self.board, self.info, names, table, profile) }
     }
 }
 

@@ -91,6 +91,19 @@ pub fn only(boards: &[u8], values: &[Assignment], to: &str) -> Result<(), Failur
     }
 }
 
+/// Does something by names that may be kept from before; when a board turns out to have others, once more by those it tells.
+pub fn with_names<T>(
+    cache: &CacheArgs,
+    mut act: impl FnMut(&CacheArgs) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    match act(cache) {
+        Err(e) if !cache.fresh && ["stale-names", "no-edge"].contains(&e.code.as_str()) => {
+            act(&CacheArgs { fresh: true, ..cache.clone() })
+        }
+        other => other,
+    }
+}
+
 /// Boards with their names, whose applications were started where only they could tell the names.
 #[derive(Default)]
 pub struct Prepared {

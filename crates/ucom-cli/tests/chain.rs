@@ -262,7 +262,7 @@ fn an_interrupted_motion_is_stopped() {
     assert_eq!(said.code, 0, "{}", said.err);
 }
 
-/// D-34: three inputs share a frame; those that were not named keep their initial values.
+/// D-15, D-34: an input that is set without a running loop of ours goes alone; those beside it are not written.
 #[test]
 fn d34_an_input_leaves_its_neighbours_alone() {
     let sim = Sim::start(&["--boards", "1"]);
@@ -270,6 +270,61 @@ fn d34_an_input_leaves_its_neighbours_alone() {
     sim.ucom(&["start", "1"]).ends(0);
     let mut peer = sim.peer();
     sim.ucom(&["ci", "1", "set_position=1500"]).ends(0);
-    // 1500, and the initial 1000 and 900.
-    assert_eq!(peer.wait("341#"), "341#0000DC05E8038403");
+    assert_eq!(peer.wait("341#"), "341#0000DC05");
+}
+
+/// D-36: boards with one image, and so one Program ID and date, are not moved by each other's names.
+#[test]
+fn d36_one_image_on_boards_that_differ() {
+    let sim = Sim::start(&[]);
+    sim.ucom(&["init"]).ends(0);
+    let image = sim.file("same.bin", &common::image(500, 3));
+    sim.ucom(&["update", "1,7", &image, "--group"]).ends(0);
+    sim.ucom(&["start", "1,7"]).ends(0);
+    let io = |words: &[&str]| sim.ucom(words).ends(0).json()["boards"][0].clone();
+    let first = io(&["--json", "io", "1"]);
+    let other = io(&["--json", "io", "7"]);
+    assert_ne!(first["ci"], other["ci"], "the simulator's boards differ");
+    assert_eq!(other, io(&["--json", "io", "7", "--fresh"]));
+    // What another chain has left under the same program, date and board.
+    let kept = |board: &str| {
+        let info = sim.ucom(&["--json", "info", board]).ends(0).json()["boards"][0].clone();
+        let end = format!("-{:04X}.json", info["flash_number"].as_u64().unwrap());
+        let start = format!("io-{:04X}-", info["program_id"].as_u64().unwrap());
+        let mut files = std::fs::read_dir(sim.path("cache")).unwrap().map(|f| f.unwrap().path());
+        let fits = |name: &str| name.starts_with(&start) && name.ends_with(&end);
+        files.find(|f| fits(f.file_name().unwrap().to_str().unwrap())).expect("it is kept")
+    };
+    std::fs::copy(kept("1"), kept("7")).unwrap();
+    assert_eq!(other, io(&["--json", "io", "7"]), "a board that can be asked is asked");
+    sim.ucom(&["stop", "7"]).ends(0);
+    let name = other["ci"][0].as_str().unwrap().split(" [").next().unwrap().to_owned();
+    sim.ucom(&["ci", "7", &format!("{name}=1"), "--for", "0.5"]).ends(0);
+}
+
+/// Nothing is half done because one of several boards is not there, and what was done is said.
+#[test]
+fn several_boards_are_changed_only_when_all_answer() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let mut peer = sim.peer();
+    for words in [
+        &["status", "1,31", "--set", "ASTART"][..],
+        &["status", "1,31", "--raw", "40:40"],
+        &["xreset", "1,31"],
+        &["start", "1,31"],
+    ] {
+        sim.ucom(words).ends(3);
+    }
+    let heard = peer.all(100);
+    assert!(!heard.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{heard:?}");
+    // The number goes, and no status that nobody has sent is shown.
+    let said = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
+    assert!(said.out.contains("forgotten its number") && !said.out.contains("0x"), "{}", said.out);
+    sim.ucom(&["init"]).ends(0);
+    let said = sim.ucom(&["--json", "status", "1", "--clear", "INIT"]).ends(0).json();
+    assert_eq!(said["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
+    // The next board has lost its start signal by that.
+    let said = sim.ucom(&["--json", "io", "all"]).ends(4).json();
+    assert!(said["error"]["hint"].as_str().unwrap().contains("start all"), "{said}");
 }

@@ -214,3 +214,19 @@ fn pages_and_templates() {
     let io = sim.ucom(&["--json", "--edges", &table, "io", "2"]).ends(0).json();
     assert_eq!(io["boards"][0]["edges"]["so"][0]["scale"], 0.01);
 }
+
+/// A board of the file that does not answer is no board to be left out, whichever boards are meant.
+#[test]
+fn a_run_of_all_boards_misses_those_of_the_file() {
+    let (sim, _) = started();
+    let board = |n: u8| {
+        format!("  - board: {n}\n    flash_number: 0x21\n    program_id: any\n    par:\n      kp: 7\n")
+    };
+    let file = sim.file("absent.yaml", format!("boards:\n{}{}", board(1), board(31)).as_bytes());
+    let mut peer = sim.peer();
+    let said = sim.ucom(&["--json", "run", "all", "--params", &file, "--for", "0.2"]).ends(4).json();
+    assert!(said["error"]["message"].as_str().unwrap().contains("31"), "{said}");
+    assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
+    // Named boards are those of the command line.
+    sim.ucom(&["run", "1", "--params", &file, "--for", "0.2"]).ends(0);
+}

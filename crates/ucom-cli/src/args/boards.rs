@@ -33,7 +33,13 @@ impl FromStr for Boards {
         let mut boards: Vec<u8> = Vec::new();
         for word in text.split(',') {
             match word.split_once('-') {
-                Some((first, last)) => boards.extend(number(first)?..=number(last)?),
+                Some((first, last)) => {
+                    let (first, last) = (number(first)?, number(last)?);
+                    if first > last {
+                        return Err(format!("{word} is backwards: {last}-{first}"));
+                    }
+                    boards.extend(first..=last);
+                }
                 None => boards.push(number(word)?),
             }
         }
@@ -124,6 +130,7 @@ mod tests {
         for wrong in ["32", "", "1,,2", "3-1", "-1", "x", "0x1"] {
             assert!(wrong.parse::<Boards>().is_err(), "{wrong}");
         }
+        assert_eq!("1,4-2".parse::<Boards>(), Err("4-2 is backwards: 2-4".into()));
     }
 
     #[test]

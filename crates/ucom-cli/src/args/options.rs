@@ -135,7 +135,7 @@ pub struct CiArgs {
     /// Board number
     #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub board: u8,
-    /// NAME=VALUE; a name is the start of a description, or an index
+    /// NAME=VALUE; a name as `ucom io` shows it, in any case, with or without its unit, or an index
     #[arg(value_name = "NAME=VALUE")]
     pub values: Vec<Assignment>,
     /// Run the board under supervision for so many seconds, outputs active
@@ -153,7 +153,7 @@ pub struct ParArgs {
     /// Board number, list, range, or all; with --apply those of the file
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// NAME=VALUE; a name is the start of a description, or an index
+    /// NAME=VALUE; a name as `ucom io` shows it, in any case, with or without its unit, or an index
     #[arg(value_name = "NAME=VALUE", conflicts_with = "apply")]
     pub values: Vec<Assignment>,
     /// Write a parameter file, YAML: what was written last, and all other names as comments; - is stdout

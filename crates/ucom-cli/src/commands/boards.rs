@@ -160,14 +160,17 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     let mut driver = Driver::open(link, out)?;
     let profile = driver.master.profile();
-    let mut all = Vec::new();
-    for board in driver.numbers(&args.boards)? {
-        let request = match set | clear {
-            Status(0) => Request::Info { board },
-            mask => Request::SetStatus { board, mask, value: set, force: args.force.force },
-        };
-        all.push(numbers(driver.run(request)?)?);
-    }
+    let boards = driver.numbers(&args.boards)?;
+    let all = match set | clear {
+        Status(0) => boards
+            .into_iter()
+            .map(|board| numbers(driver.run(Request::Info { board })?))
+            .collect::<Result<_, _>>()?,
+        mask => {
+            let force = args.force.force;
+            change_each(&mut driver, &boards, |board| Request::SetStatus { board, mask, value: set, force })?
+        }
+    };
     print(&all, &profile, out);
     Ok(())
 }
@@ -181,6 +184,7 @@ fn raw_status(
 ) -> Result<(), Failure> {
     let mut driver = Driver::open(link, out)?;
     let numbers = driver.numbers(&args.boards)?;
+    all_there(&mut driver, &numbers)?;
     let targets: Vec<(Option<u8>, Vec<u8>)> = match args.boards {
         Boards::All if driver.master.profile().everybody().is_some() => vec![(None, numbers)],
         _ => numbers.into_iter().map(|n| (Some(n), vec![n])).collect(),
@@ -188,7 +192,8 @@ fn raw_status(
     let mut all = Vec::new();
     for (board, seen) in targets {
         let request = Request::RawStatus { board, seen, mask, value, force: args.force.force };
-        match driver.run(request)? {
+        let done: Vec<u8> = all.iter().map(|b: &RawStatus| b.board).collect();
+        match driver.run(request).map_err(|e| after(e, &done))? {
             Outcome::RawStatus(boards) => all.extend(boards),
             other => return Err(unexpected(&other)),
         }
@@ -249,6 +254,9 @@ fn print(all: &[(u8, BoardInfo)], profile: &Profile, out: &Output) {
 fn lines_of(all: &[(u8, BoardInfo)]) -> String {
     let line = |(n, info): &(u8, BoardInfo)| {
         let (status, words) = (info.status, bits(info.status).join(" "));
+        if !status.has(Status::INIT) {
+            return format!("board {n:<3} has forgotten its number; `ucom init` gives one\n");
+        }
         format!("board {n:<3} 0x{:02X}  {:12} {words}\n", status.0, state(status))
     };
     all.iter().map(line).collect()
@@ -299,12 +307,45 @@ fn act(
 ) -> Result<(), Failure> {
     let mut driver = Driver::open(link, out)?;
     let profile = driver.master.profile();
-    let mut all = Vec::new();
-    for board in driver.numbers(&args.boards)? {
-        all.push(numbers(driver.run(request(board, args.force.force))?)?);
-    }
+    let boards = driver.numbers(&args.boards)?;
+    let all = change_each(&mut driver, &boards, |board| request(board, args.force.force))?;
     print(&all, &profile, out);
     Ok(())
+}
+
+/// Changes one board after the other; none before all of them answer.
+fn change_each(
+    driver: &mut Driver,
+    boards: &[u8],
+    request: impl Fn(u8) -> Request,
+) -> Result<Vec<(u8, BoardInfo)>, Failure> {
+    all_there(driver, boards)?;
+    let mut all = Vec::new();
+    for board in boards {
+        match driver.run(request(*board)).and_then(numbers) {
+            Ok(changed) => all.push(changed),
+            Err(e) => return Err(after(e, &all.iter().map(|(n, _)| *n).collect::<Vec<_>>())),
+        }
+    }
+    Ok(all)
+}
+
+/// Of several boards each must answer before the first one is changed.
+fn all_there(driver: &mut Driver, boards: &[u8]) -> Result<(), Failure> {
+    let several = boards.iter().filter(|_| boards.len() > 1);
+    several.map(|board| seen(driver, *board).map(drop)).collect()
+}
+
+/// What has been done already when one of several boards fails.
+fn after(failure: Failure, done: &[u8]) -> Failure {
+    let list: Vec<String> = done.iter().map(u8::to_string).collect();
+    match done {
+        [] => failure,
+        _ => Failure {
+            message: format!("{}; changed already: board {}", failure.message, list.join(", ")),
+            ..failure
+        },
+    }
 }
 
 /// Outputs, control and application, as far as asked. Stopping is always allowed: no other PC can forbid it.

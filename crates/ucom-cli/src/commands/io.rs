@@ -10,12 +10,12 @@ use ucom::master::io::{IoDescription, Kind};
 use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel};
 
 use super::params::{arrived, become_master, deliver, not_there};
-use super::run::named;
+use super::run::{named, units};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
-use crate::cache::Known;
+use crate::cache::{Known, of_several};
 use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
-use crate::values::{Prepared, Word, only, tell_rounded, words};
+use crate::values::{Prepared, Word, only, tell_rounded, with_names, words};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -26,11 +26,17 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = Driver::open(link, out)?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
-        let known = args.cache.known(&mut driver, &edges, board)?;
+        let known = args.cache.known(&mut driver, &edges, board);
+        let known = known.map_err(|e| of_several(e, &args.boards))?;
         // Without a started application there is nobody to ask for them.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
             Some(_) => None,
+        };
+        // Whoever tells its inputs has told its names before.
+        let known = match driver.master.description(board) {
+            Some(names) if initial.is_some() => known.renamed(names, &edges, driver.master.profile()),
+            _ => known,
         };
         boards.push((known, initial));
     }
@@ -70,6 +76,7 @@ fn io_value((known, initial): &Described) -> Value {
         "so": d.so,
         "par": d.par,
         "initial_ci": initial,
+        "units": units(&d.ci, inputs),
         "edges": { "ci": edges(Kind::Ci), "so": edges(Kind::So), "par": edges(Kind::Par) },
     })
 }
@@ -143,8 +150,6 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let words = words(&known, Kind::Ci, &args.values)?;
     tell_rounded(&driver, board, Kind::Ci, &words);
     let running = become_master(&mut driver, board, args.force.force)?;
-    // Inputs go three at a time: what is beside the one that is set must not become 0.
-    initial(&mut driver, board)?;
     for word in &words {
         let (now, setting) = (driver.now_us(), word.setting(&known, Kind::Ci));
         driver.master.set_input(now, board, &setting.name, setting.value)?;
@@ -176,17 +181,21 @@ fn move_for(
     out: &Output,
 ) -> Result<(), Failure> {
     let (board, force) = (args.board, args.force.force);
-    let mut prepared = Prepared::default();
-    prepared.add(driver, &args.cache, edges, board, force)?;
+    let prepared = with_names(&args.cache, |cache| {
+        let mut prepared = Prepared::default();
+        prepared.add(driver, cache, edges, board, force)?;
+        let Some(known) = prepared.known.get(&board) else { return Ok(prepared) };
+        let words = words(known, Kind::Ci, &args.values).inspect_err(|_| prepared.undo(driver))?;
+        tell_rounded(driver, board, Kind::Ci, &words);
+        let ci = words.iter().map(|w| w.setting(known, Kind::Ci)).collect();
+        let plan = RunBoard { board, ci, par: Vec::new() };
+        let options = RunOptions { boards: vec![plan], active: true, force };
+        driver.master.watch(board, None, true);
+        // What it began it has taken back when it fails.
+        driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
+        Ok(prepared)
+    })?;
     let Some(known) = prepared.known.get(&board) else { return Ok(()) };
-    let words = words(known, Kind::Ci, &args.values).inspect_err(|_| prepared.undo(driver))?;
-    tell_rounded(driver, board, Kind::Ci, &words);
-    let ci = words.iter().map(|w| w.setting(known, Kind::Ci)).collect();
-    let plan = RunBoard { board, ci, par: Vec::new() };
-    let options = RunOptions { boards: vec![plan], active: true, force };
-    driver.master.watch(board, None, true);
-    // What it began it has taken back when it fails.
-    driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
     let mut last = None;
     let end = Instant::now() + duration;
     while Instant::now() < end && !driver.stop_asked() {
@@ -218,7 +227,9 @@ fn move_for(
 
 fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output) {
     let (names, edges) = (known.names.names(kind), known.edges.all(kind));
-    out.result(&json!({ "board": known.board, key: named(names, edges, words) }), || {
+    let value =
+        json!({ "board": known.board, key: named(names, edges, words), "units": units(names, edges) });
+    out.result(&value, || {
         let row = |(i, word): (usize, &u16)| {
             let name = names.get(i).cloned().unwrap_or_default();
             let edge = edges.get(i);

@@ -15,7 +15,7 @@ use ucom::master::{AdminChange, Outcome, Request};
 
 use super::seen;
 use crate::args::{Boards, LinkArgs, ParArgs};
-use crate::cache::Known;
+use crate::cache::{Known, of_several};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{FAULT, Failure, REFUSED};
 use crate::values::{Word, for_board, only, tell_rounded, words};
@@ -40,9 +40,10 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     for board in &boards {
         let values = for_board(&args.values, *board);
         let known = match values.is_empty() {
-            true => args.cache.known(&mut driver, &edges, *board)?,
-            false => args.cache.described(&mut driver, &edges, *board)?,
+            true => args.cache.known(&mut driver, &edges, *board),
+            false => args.cache.described(&mut driver, &edges, *board),
         };
+        let known = known.map_err(|e| of_several(e, &args.boards))?;
         let words = words(&known, Kind::Par, &values)?;
         tell_rounded(&driver, *board, Kind::Par, &words);
         let history = History::of(&args.cache, &known.info);

@@ -1,7 +1,7 @@
 //! `ucom run` and `ucom so`: control loops under supervision, and what they send.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::BufRead;
+use std::io::{BufRead, ErrorKind};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
@@ -14,23 +14,42 @@ use ucom::master::{
 };
 
 use super::params::Applied;
-use crate::args::{Assignment, LinkArgs, OnLost, RunArgs, SoArgs};
+use crate::args::{Assignment, Boards, CacheArgs, LinkArgs, OnLost, RunArgs, SoArgs};
 use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
 use crate::failure::{FAULT, Failure, NO_LINK};
 use crate::lines::Lines;
-use crate::values::{Prepared, Word, for_board, only, tell_rounded, words};
+use crate::values::{Prepared, Word, for_board, only, tell_rounded, with_names, words};
 use crate::written::History;
 
 /// How often `run` says how things are.
 const SAY: Duration = Duration::from_secs(1);
 
+/// Keys for so many values: the short names; the whole text where another edge has the same one, with its place where
+/// that does not help either.
+fn keys(names: &[String], count: usize) -> Vec<String> {
+    let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
+    let key = |i: usize| match names.get(i) {
+        None => format!("#{i}"),
+        Some(name) if once(&mut names.iter().map(|n| short(n)), short(name)) => short(name).to_owned(),
+        Some(name) if once(&mut names.iter().map(String::as_str), name) => name.clone(),
+        Some(name) => format!("{name}#{i}"),
+    };
+    (0..count).map(key).collect()
+}
+
 /// Values by the names of their edges, in their units where an edge table knows them (D-11).
 pub fn named(names: &[String], edges: &[Edge], words: &[u16]) -> Value {
-    let key = |i: usize| names.get(i).map_or_else(|| format!("#{i}"), |name| short(name).to_owned());
     let value = |i: usize, word: u16| edges.get(i).map_or_else(|| json!(word as i16), |edge| edge.json(word));
-    let pairs = words.iter().enumerate().map(|(i, word)| (key(i), value(i, *word)));
-    Value::Object(pairs.collect::<Map<_, _>>())
+    let values = words.iter().enumerate().map(|(i, word)| value(i, *word));
+    Value::Object(keys(names, words.len()).into_iter().zip(values).collect::<Map<_, _>>())
+}
+
+/// The units of such values, by the same keys, as far as an edge table tells them.
+pub fn units(names: &[String], edges: &[Edge]) -> Value {
+    let pairs = keys(names, names.len()).into_iter().zip(edges);
+    let told = pairs.filter(|(_, edge)| edge.known && !edge.unit.is_empty());
+    Value::Object(told.map(|(key, edge)| (key, json!(edge.unit))).collect::<Map<_, _>>())
 }
 
 /// Starts boards and keeps them running until Ctrl-C.
@@ -48,7 +67,10 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     only(&boards, &args.ci, "run")?;
     only(&boards, &args.par, "run")?;
     let file = match &args.params {
-        Some(path) => Some(Applied::read(path, &args.inventory, |n| boards.contains(&n))?),
+        // Of all boards none may be missing that the file has something for.
+        Some(path) => {
+            Some(Applied::read(path, &args.inventory, |n| args.boards == Boards::All || boards.contains(&n))?)
+        }
         None => None,
     };
     // Who is there comes first: it needs no started application.
@@ -56,15 +78,14 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         file.identities(&mut driver)?;
     }
     let edges = link.edges()?;
-    let (mut prepared, mut stdout) = (Prepared::default(), Lines::stdout()?);
-    let report = match start(&mut driver, args, &boards, &edges, file.as_ref(), &mut prepared) {
-        Ok(report) => report,
-        Err(failure) => {
-            // What the procedure began it has taken back itself.
-            prepared.undo(&mut driver);
-            return Err(failure);
-        }
-    };
+    let mut stdout = Lines::stdout()?;
+    let (report, prepared) = with_names(&args.cache, |cache| {
+        let mut prepared = Prepared::default();
+        let report = start(&mut driver, args, cache, &boards, &edges, file.as_ref(), &mut prepared);
+        // What the procedure began it has taken back itself.
+        let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
+        Ok((report, prepared))
+    })?;
     let running = json!({
         "event": "running",
         "boards": report.boards.iter().map(|(n, a)| json!({ "board": n, "flags": a.to_string() })).collect::<Vec<_>>(),
@@ -101,13 +122,14 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
 fn start(
     driver: &mut Driver,
     args: &RunArgs,
+    cache: &CacheArgs,
     boards: &[u8],
     edges: &EdgeTable,
     file: Option<&Applied>,
     prepared: &mut Prepared,
 ) -> Result<RunReport, Failure> {
     for board in boards {
-        prepared.add(driver, &args.cache, edges, *board, args.force.force)?;
+        prepared.add(driver, cache, edges, *board, args.force.force)?;
     }
     let plans = plans(driver, args, prepared, file)?;
     let options = RunOptions { boards: plans.clone(), active: args.active, force: args.force.force };
@@ -212,8 +234,10 @@ fn supervise(
             for (board, snapshot) in &last {
                 let Some(known) = prepared.known.get(board) else { continue };
                 let so = named(&known.names.so, known.edges.all(Kind::So), &snapshot.words);
+                let units = units(&known.names.so, known.edges.all(Kind::So));
                 let time_s = snapshot.time_us as f64 * 1e-6;
-                let value = json!({ "event": "so", "board": board, "time_s": time_s, "so": so });
+                let value =
+                    json!({ "event": "so", "board": board, "time_s": time_s, "so": so, "units": units });
                 stdout.push(out.words(&value, String::new));
             }
         }
@@ -223,14 +247,38 @@ fn supervise(
 /// Lines on stdin, read beside the bus.
 fn typed() -> Receiver<String> {
     let (sender, receiver) = channel();
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if sender.send(line).is_err() {
-                return;
+    std::thread::spawn(move || each_line(std::io::stdin().lock(), |line| sender.send(line).is_ok()));
+    receiver
+}
+
+/// Hands over every line until the end, or until `take` wants no more. A byte that is no text makes a line that nothing
+/// obeys, and that is said; it does not keep a later `stop` from being read.
+fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        match from.read_until(b'\n', &mut line) {
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Ok(0) | Err(_) => return,
+            Ok(_) => {
+                if !take(String::from_utf8_lossy(&line).into_owned()) {
+                    return;
+                }
             }
         }
-    });
-    receiver
+    }
+}
+
+/// The assignments of a line: a word without `=` is the unit of the value before it, `current_max=1500 mA`.
+fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignment>, Failure> {
+    let mut values: Vec<String> = Vec::new();
+    for word in words {
+        match values.last_mut() {
+            Some(last) if !word.contains('=') => *last += &format!(" {word}"),
+            _ => values.push(word.to_owned()),
+        }
+    }
+    values.iter().map(|word| word.parse().map_err(Failure::usage)).collect()
 }
 
 /// `ci 1 set_position=1500`, `par 1 kp=80`, `active on`, `active off`.
@@ -259,8 +307,7 @@ fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) ->
             let board: u8 = parts.next().and_then(|n| n.parse().ok()).ok_or_else(form)?;
             let not_run = || Failure::usage(format!("board {board} is not among those that run"));
             let known = prepared.known.get(&board).ok_or_else(not_run)?;
-            let values: Vec<Assignment> =
-                parts.map(|word| word.parse().map_err(Failure::usage)).collect::<Result<_, _>>()?;
+            let values = assignments(parts)?;
             only(&[board], &values, "set")?;
             let kind = if kind == "ci" { Kind::Ci } else { Kind::Par };
             let words = words(known, kind, &values)?;
@@ -393,11 +440,42 @@ fn row(
         let list: Vec<String> = snapshot.words.iter().zip(edges).map(|(w, e)| e.text(*w)).collect();
         return format!("{time_s:.6},{board},{}", list.join(","));
     }
-    let value = json!({ "time_s": time_s, "board": board, "so": named(names, edges, &snapshot.words) });
+    let so = named(names, edges, &snapshot.words);
+    let value = json!({ "time_s": time_s, "board": board, "so": so, "units": units(names, edges) });
     out.words(&value, || {
         let pairs = names.iter().zip(edges).zip(&snapshot.words);
         let pairs: Vec<String> =
             pairs.map(|((n, e), w)| format!("{} {:>6}", short(n), e.text_with_unit(*w))).collect();
         format!("{time_s:9.3} s  board {board}  {}", pairs.join("  "))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_is_no_text_does_not_end_the_input() {
+        let mut heard = Vec::new();
+        each_line(&b"ci 1 \xFF=3\nstop\nlast"[..], |line| {
+            heard.push(line.trim().to_owned());
+            true
+        });
+        assert_eq!(heard, ["ci 1 \u{FFFD}=3", "stop", "last"]);
+    }
+
+    #[test]
+    fn units_may_stand_apart_from_their_values() {
+        let typed = |line: &str| assignments(line.split_whitespace()).unwrap();
+        assert_eq!(typed("current_max=1500 mA kp=3"), typed("current_max=1500mA kp=3"));
+        assert!(assignments("mA".split_whitespace()).is_err());
+    }
+
+    #[test]
+    fn values_of_equal_names_are_all_there() {
+        let names = ["pos [deg]", "pos [rad]", "x", "x", "current [mA]"].map(String::from);
+        let all = named(&names, &[], &[1, 2, 3, 4, 5, 6]);
+        let keys = json!({ "pos [deg]": 1, "pos [rad]": 2, "x#2": 3, "x#3": 4, "current": 5, "#5": 6 });
+        assert_eq!(all, keys);
+    }
 }

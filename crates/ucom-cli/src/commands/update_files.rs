@@ -40,7 +40,9 @@ impl Files {
 
 fn image(file: &Path, out: &Output) -> Result<UpdateImage, Failure> {
     let image = Image::read(file, &ImageOptions::default()).map_err(|e| {
-        Failure::usage(format!("{}: {e}", file.display()))
+        // Some mistakes name the file themselves.
+        let (path, text) = (file.display().to_string(), e.to_string());
+        Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") })
             .hint("formats are raw binary, Intel HEX and S-record")
     })?;
     for note in image.notes() {

@@ -3,6 +3,7 @@
 use std::prelude::v1::*;
 
 use super::link::Link;
+use super::raw_status::expected_status;
 use super::request::{TRIES, admin, confirmed, info, numbers, set_status};
 use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
 use super::times::MS;
@@ -88,7 +89,8 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         match numbers(link, board).await {
             Err(Error::NoAnswer { .. }) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
-                let status = before.status.with(Status::INIT, false);
+                // It cannot tell any more: what the rules say (D-22).
+                let status = expected_status(&before, mask.0, value.0);
                 return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
             }
             Err(e) => return Err(e),

@@ -241,6 +241,14 @@ pub enum Error {
         /// Names like it.
         near: Vec<String>,
     },
+    /// A board describes itself otherwise than was known when values for it were chosen (D-36).
+    #[error(
+        "board {board}: its inputs, outputs and parameters are not those that were known under its program"
+    )]
+    StaleNames {
+        /// Its number.
+        board: u8,
+    },
     /// The board's image or plan cannot be sent.
     #[error("{0}")]
     Plan(#[from] super::update::PlanError),
@@ -366,6 +374,7 @@ impl Error {
             | Self::NotNumbered { .. }
             | Self::Load(_)
             | Self::Busy { .. }
+            | Self::StaleNames { .. }
             | Self::NoApplication { .. } => 4,
             Self::Update { failure, .. } => failure.exit_code(),
             Self::Lost { .. } | Self::Cancelled => 5,
@@ -395,6 +404,7 @@ impl Error {
             Self::NoBoard { .. } => "no-board",
             Self::NoApplication { .. } => "no-application",
             Self::NoEdge { .. } => "no-edge",
+            Self::StaleNames { .. } => "stale-names",
             Self::Plan(_) => "plan",
             Self::Update { .. } => "update",
             Self::Lost { .. } => "lost",
@@ -446,6 +456,7 @@ impl Error {
             Self::NoApplication { board, valid: true } => format!("`ucom start {board}`"),
             Self::NoApplication { board, valid: false } => format!("`ucom update {board} IMAGE`"),
             Self::NoEdge { board, .. } => format!("`ucom io {board}` lists the names"),
+            Self::StaleNames { board } => format!("`ucom io {board} --fresh` reads them anew"),
             Self::Plan(e) => e.hint().into(),
             Self::Update { failure, .. } => failure.hint(),
             Self::Lost { board } => {

@@ -78,7 +78,7 @@ pub use scan::{Reports, ScanFinding, ScanReport};
 pub use statistics::{Rate, Statistics, WINDOW_US};
 
 use crate::{BoardInfo, Foreign, Frame, Profile};
-use io::{IoDescription, Kind, ParValue};
+use io::{DescriptionKey, IoDescription, Kind, ParValue};
 use link::{Link, lock};
 use procedures::{Work, work};
 use shared::{Core, Inbox, Session};
@@ -268,13 +268,13 @@ impl Master {
         core.descriptions.get(&key).cloned()
     }
 
-    /// All known descriptions by Program ID and flash date, to be kept for the next time.
-    pub fn descriptions(&self) -> BTreeMap<(u16, u16), IoDescription> {
+    /// All known descriptions, to be kept for the next time.
+    pub fn descriptions(&self) -> BTreeMap<DescriptionKey, IoDescription> {
         lock(&self.core).descriptions.clone()
     }
 
     /// Descriptions from the last time (D-36).
-    pub fn know_description(&mut self, key: (u16, u16), description: IoDescription) {
+    pub fn know_description(&mut self, key: DescriptionKey, description: IoDescription) {
         lock(&self.core).descriptions.insert(key, description);
     }
 

@@ -6,7 +6,7 @@ use std::prelude::v1::*;
 
 use super::boards::Life;
 use super::control::{AdminChange, StopLevel, change_flags, start_from, stop_board};
-use super::io::{IoDescription, Kind, describe, read_initial_inputs};
+use super::io::{DescriptionKey, IoDescription, Kind, describe, read_initial_inputs};
 use super::link::Link;
 use super::load::LoadForecast;
 use super::request::{info, mca_start};
@@ -119,6 +119,10 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         begun.push(Begun { board: plan.board, back, ran: back.is_none() });
         let seen = start_from(link, seen).await?;
         let description = describe(link, plan.board, &seen.info).await?;
+        // What is to be written was chosen by the names that were known.
+        if described.get(&plan.board).is_some_and(|known| *known != description) {
+            return Err(Error::StaleNames { board: plan.board });
+        }
         add(link, options, plan, description, &mut described)?;
     }
     let mut boards = Vec::new();
@@ -133,7 +137,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
 
 /// The description of the program on a board, if it is known already.
 fn known_description(link: &Link, info: &BoardInfo) -> Option<IoDescription> {
-    let key = (info.program_id, info.date);
+    let key = DescriptionKey::of(info);
     link.with(|core| core.descriptions.get(&key).filter(|_| info.has_application()).cloned())
 }
 

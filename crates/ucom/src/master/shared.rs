@@ -5,7 +5,7 @@ use std::prelude::v1::*;
 
 use super::boards::Boards;
 use super::error::LastHeard;
-use super::io::{IoDescription, ProcessData};
+use super::io::{DescriptionKey, IoDescription, ProcessData};
 use super::statistics::Statistics;
 use super::times::Times;
 use super::{Event, ProcedureId};
@@ -124,7 +124,7 @@ pub(crate) struct Core {
     pub inputs_from: u64,
     pub boards: Boards,
     pub data: BTreeMap<u8, ProcessData>,
-    pub descriptions: BTreeMap<(u16, u16), IoDescription>,
+    pub descriptions: BTreeMap<DescriptionKey, IoDescription>,
     pub statistics: Statistics,
     pub inboxes: BTreeMap<ProcedureId, Inbox>,
     urgent: VecDeque<Frame>,

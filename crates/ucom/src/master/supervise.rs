@@ -185,9 +185,18 @@ impl Core {
         offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
     }
 
-    /// The package of CI with one word (it is atomic, D-34), at once.
+    /// An input that has changed, at once. Where all inputs are this PC's its whole package goes (it is atomic, D-34); else
+    /// the word alone (DLC 4, D-15), for those beside it are not known here.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
-        self.queue_inputs(board, index - index % 3);
+        let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
+        if data.repeat.is_some() {
+            return self.queue_inputs(board, index - index % 3);
+        }
+        let Some(word) = data.ci.get(usize::from(index)) else { return };
+        let package = crate::BufferPackage { offset: index, count: 1, words: [*word, 0, 0] };
+        let payload = package.payload(self.profile.endian, true);
+        let frame = Frame::of(ToBoard::Ci(package).function(), to, payload);
+        self.queue_frame(None, frame, super::shared::Forget::Nothing);
     }
 
     /// When duties are due next.
@@ -356,6 +365,8 @@ impl Core {
         self.stop_inputs(board);
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
+            // Another application may have started.
+            data.told = false;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Descriptions, inputs, parameters, flags, supervision.
 
-use ucom::master::io::ParValue;
+use ucom::master::io::{IoDescription, ParValue};
 use ucom::master::{
     AdminChange, Error, Event, InitOptions, Life, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel,
     Supervision,
@@ -75,7 +75,7 @@ fn d34_d35_inputs_and_parameters() {
     assert_eq!(bench.master.parameters(1), [ParValue::Unknown; 3]);
 }
 
-/// D-36: the description is read once for a program, P-14: with life signs meanwhile.
+/// D-36: the description is read once from each board since its application started, P-14: with life signs meanwhile.
 #[test]
 fn d36_p14_descriptions_are_cached() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -91,9 +91,11 @@ fn d36_p14_descriptions_are_cached() {
             ("head pan control", &SO.map(String::from)[..])
         );
     }
-    assert_eq!((bench.count("581#"), bench.count("582#")), (1, 0));
+    bench.go(Request::Describe { board: 2, fresh: false }, 10).unwrap();
+    bench.go(Request::InitialInputs { board: 2 }, 10).unwrap();
+    assert_eq!((bench.count("581#"), bench.count("582#")), (1, 1));
     bench.go(Request::Describe { board: 2, fresh: true }, 10).unwrap();
-    assert_eq!(bench.count("582#"), 1);
+    assert_eq!(bench.count("582#"), 2);
     let alive = bench.times_of("680#");
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))));
     // A board without a running application: refused with the command that helps.
@@ -101,6 +103,27 @@ fn d36_p14_descriptions_are_cached() {
     let error = bench.go(Request::Describe { board: 1, fresh: false }, 10).unwrap_err();
     assert_eq!(error, Error::NoApplication { board: 1, valid: true });
     assert!(error.hint().contains("ucom start 1"));
+}
+
+/// D-36: names that were kept under a board's program and are of another application are found out before the loop runs.
+#[test]
+fn d36_kept_names_of_another_application_start_nothing() {
+    let mut bench = initialised(&[0x21]);
+    bench.go(Request::Start { board: 1, force: false }, 10).unwrap();
+    bench.go(Request::Describe { board: 1, fresh: false }, 10).unwrap();
+    let kept = bench.master.descriptions();
+    bench.go(Request::Stop { board: 1, level: StopLevel::Application, force: false }, 10).unwrap();
+    for (key, names) in kept {
+        bench.master.know_description(key, IoDescription { ci: vec![CI[0].into()], ..names });
+    }
+    let ci = vec![Setting { name: CI[0].into(), value: 5 }];
+    let boards = vec![RunBoard { board: 1, ci, par: Vec::new() }];
+    let options = RunOptions { boards, active: true, force: false };
+    let error = bench.go(Request::Run(options.clone()), 10).unwrap_err();
+    assert_eq!(error, Error::StaleNames { board: 1 });
+    assert_eq!((bench.count("341#"), bench.count("541#")), (0, 0), "no inputs, no loop");
+    // Now they are the board's own.
+    assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
 /// D-14: a dump whose totals do not fit is read again, at most three times.

@@ -4,8 +4,8 @@ use std::prelude::v1::*;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Dimensions;
 use crate::master::Error;
+use crate::{BoardInfo, Dimensions};
 
 /// Which of the three buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,26 @@ impl Kind {
     }
 }
 
-/// The application's description of itself and of every edge; cached by Program ID and flash date.
+/// What a description is kept under: Program ID and flash date (D-36), and the board, because one image can serve boards
+/// whose applications differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct DescriptionKey {
+    /// Of the board.
+    pub flash_number: u16,
+    /// Checksum of its program.
+    pub program_id: u16,
+    /// When that was written, encoded.
+    pub date: u16,
+}
+
+impl DescriptionKey {
+    /// Of a board's answer to PC_INFO.
+    pub const fn of(info: &BoardInfo) -> Self {
+        Self { flash_number: info.flash_number, program_id: info.program_id, date: info.date }
+    }
+}
+
+/// The application's description of itself and of every edge; kept under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
     /// The application; may differ from the board's own description in DSP_INFO.

@@ -2,7 +2,7 @@
 
 use std::prelude::v1::*;
 
-use super::{IoDescription, SnapshotAssembler};
+use super::{DescriptionKey, IoDescription, SnapshotAssembler};
 use crate::master::error::Incomplete;
 use crate::master::link::Link;
 use crate::master::request::{TRIES, info};
@@ -124,28 +124,32 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
 }
 
-/// The description of a board whose application runs, from the cache when it is the same program (D-36).
+/// The description of a board whose application runs, as it told it since it started.
+///
+/// A description that is only kept under Program ID and date (D-36) may be of another application: nothing is written by
+/// its names.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
-    let key = (known.program_id, known.date);
-    let cacheable = known.has_application();
-    if let Some(description) = link.with(|core| core.descriptions.get(&key).filter(|_| cacheable).cloned()) {
-        take_over(link, board, key, &description);
+    let key = DescriptionKey::of(known);
+    let told = link.with(|core| {
+        let told = core.data.get(&board).is_some_and(|data| data.told && data.description == Some(key));
+        core.descriptions.get(&key).filter(|_| told).cloned()
+    });
+    if let Some(description) = told {
         return Ok(description);
     }
     let description = read_description(link, board).await?;
-    if cacheable {
-        link.with(|core| core.descriptions.insert(key, description.clone()));
-    }
+    link.with(|core| core.descriptions.insert(key, description.clone()));
     take_over(link, board, key, &description);
     Ok(description)
 }
 
 /// Buffers of the right size for what is described.
-fn take_over(link: &Link, board: u8, key: (u16, u16), description: &IoDescription) {
+fn take_over(link: &Link, board: u8, key: DescriptionKey, description: &IoDescription) {
     let d = description.dimensions();
     link.with(|core| {
         let data = core.data.entry(board).or_default();
         data.description = Some(key);
+        data.told = true;
         data.ci.resize(d.ci.into(), 0);
         data.par.resize(d.par);
         if data.so.dimension() != usize::from(d.so) {
@@ -225,7 +229,7 @@ async fn described(link: &Link, board: u8) -> Result<(BoardInfo, IoDescription),
 pub(crate) async fn describe_procedure(link: Link, board: u8, fresh: bool) -> Result<Outcome, Error> {
     if fresh {
         let known = info(&link, board).await?.info;
-        link.with(|core| core.descriptions.remove(&(known.program_id, known.date)));
+        link.with(|core| core.descriptions.remove(&DescriptionKey::of(&known)));
     }
     let (_, description) = described(&link, board).await?;
     Ok(Outcome::Description { board, description })

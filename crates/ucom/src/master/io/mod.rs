@@ -5,7 +5,7 @@ mod dump;
 mod shadow;
 mod snapshot;
 
-pub use description::{IoDescription, Kind, short};
+pub use description::{DescriptionKey, IoDescription, Kind, short};
 pub(crate) use dump::{describe, describe_procedure, initial_inputs_procedure, read_initial_inputs};
 pub use shadow::{ParValue, Shadow};
 pub use snapshot::{Snapshot, SnapshotAssembler};
@@ -16,7 +16,9 @@ use std::prelude::v1::*;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ProcessData {
     /// Key of its description.
-    pub description: Option<(u16, u16)>,
+    pub description: Option<DescriptionKey>,
+    /// The board told that description itself since its application started.
+    pub told: bool,
     /// Inputs as last set.
     pub ci: Vec<u16>,
     /// When they are sent again; `None`: not at all.

@@ -332,8 +332,8 @@ fn change_each(
 
 /// Of several boards each must answer before the first one is changed.
 fn all_there(driver: &mut Driver, boards: &[u8]) -> Result<(), Failure> {
-    let several = boards.iter().filter(|_| boards.len() > 1);
-    several.map(|board| seen(driver, *board).map(drop)).collect()
+    let mut several = boards.iter().filter(|_| boards.len() > 1);
+    several.try_for_each(|board| seen(driver, *board).map(drop))
 }
 
 /// What has been done already when one of several boards fails.

@@ -5,6 +5,9 @@ use std::prelude::v1::*;
 use core::fmt;
 use core::str::FromStr;
 
+/// Longest unit, in bytes.
+const UNIT_MAX: usize = 32;
+
 /// A value before it is known which edge it is for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Given {
@@ -59,7 +62,7 @@ impl FromStr for Given {
         let mut parts = ends.map(|end| text.split_at(end));
         let (value, unit) =
             parts.find_map(|(n, unit)| number(n).map(|n| (n, unit.trim()))).ok_or_else(wrong)?;
-        if !may_follow(unit) {
+        if !may_follow(unit) || unit.len() > UNIT_MAX {
             return Err(wrong());
         }
         // 0o10 and -0x10 are numbers elsewhere, not 0 in a unit of that name.
@@ -133,6 +136,8 @@ mod tests {
             assert!(given(wrong).is_err(), "{wrong}");
         }
         assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
+        // What is taken is taken again as it is shown, with a blank more.
+        assert!(given(&format!("0{}", "µ".repeat(31))).is_err());
         for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
             assert_eq!(given(text).unwrap().to_string(), short);
         }

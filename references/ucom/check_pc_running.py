@@ -148,6 +148,8 @@ def second_master(bench: Bench) -> None:
         path = chain.write("image.bin", image)
         commands = [("start", "1"), ("update", "1", path), ("init", "--renew"), ("run", "1", "--for", "1")]
         for words, frame in zip(commands, foreign):
+            # The other PC's last frame for the command before may still be on its way.
+            time.sleep(0.2)
             del played.heard[:]
             command = chain.start(*words)
             while command.process.poll() is None:

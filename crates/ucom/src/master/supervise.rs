@@ -24,7 +24,7 @@ const INPUTS_CREDIT: u64 = 5_000;
 
 impl Master {
     /// Stops control loops (ADMIN_DATA, all 0) before everything else that is to be sent, and twice again a moment later: those
-    /// of these boards, or of everybody. No answer is waited for; [`Request::Stop`](super::Request::Stop) sees to each
+    /// of these boards, the last one first, or of everybody. No answer is waited for; [`Request::Stop`](super::Request::Stop) sees to each
     /// board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
@@ -32,7 +32,7 @@ impl Master {
         let profile = core.profile;
         let valid = |number: u8| Sequence::new(number).filter(|n| profile.is_board(*n));
         let to: Vec<Sequence> = match (boards, profile.everybody()) {
-            (Some(boards), _) => boards.iter().copied().filter_map(valid).collect(),
+            (Some(boards), _) => boards.iter().rev().copied().filter_map(valid).collect(),
             (None, Some(everybody)) => vec![everybody],
             (None, None) => (0..32).filter_map(valid).collect(),
         };

@@ -126,7 +126,13 @@ impl Prepared {
             Err(e) if e.code == "no-application" => {
                 // Before it is told to: a start that is cancelled may have reached it.
                 self.started.borrow_mut().push(board);
-                driver.run(Request::Start { board, force }).and_then(|outcome| match outcome {
+                let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
+                    // Refused means that nothing was sent; taking that back would speak on another PC's bus.
+                    if e.exit == REFUSED {
+                        self.started.borrow_mut().pop();
+                    }
+                });
+                started.and_then(|outcome| match outcome {
                     Outcome::Started(_) => cache.described(driver, table, board),
                     other => Err(unexpected(&other)),
                 })

@@ -70,7 +70,8 @@ impl Node {
 
     fn faulty(&self, joint: bool) -> bool {
         let r = &self.report;
-        let safety_line = if joint { r.warnings & warning::SAFETY_LINE } else { 0 };
+        // Drives set this warning also before they are configured, whatever the line is.
+        let safety_line = if joint && self.valid { r.warnings & warning::SAFETY_LINE } else { 0 };
         self.seen && (fsm::is_fault(r.fsm) || (r.errors | r.mc_current | safety_line) != 0)
     }
 

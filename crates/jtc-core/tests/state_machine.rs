@@ -322,6 +322,29 @@ fn j16_faults_show_even_without_error_bytes() {
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
 }
 
+/// Real drives report their safety line as active until they are configured.
+#[test]
+fn j16_the_safety_line_counts_once_a_joint_is_configured() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.run(10);
+    for _ in 0..400 {
+        for node in &mut rig.nodes[..6] {
+            node.report.warnings = if node.configured { 0 } else { warning::SAFETY_LINE };
+        }
+        rig.tick();
+        assert_eq!(rig.errors(), 0);
+    }
+    assert_eq!(rig.state(), State::HoldPos);
+    // In Init too, it is an error of a joint that is configured.
+    let mut rig = Rig::new(Config::avena());
+    rig.run(300);
+    assert_eq!((rig.state(), rig.nodes[2].configured), (State::Init, true));
+    rig.nodes[2].report.warnings = warning::SAFETY_LINE;
+    rig.run(2);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+}
+
 #[test]
 fn j16_leaving_operation_enable_unasked_is_an_error() {
     let mut rig = Rig::holding();

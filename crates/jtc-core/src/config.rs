@@ -3,6 +3,11 @@ use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
 
+/// Configuration bit of a joint's drive: it keeps to its working area (J-11).
+const KEEPS_WORKING_AREA: u8 = 0x01;
+/// Half of the drives' working area, rad either way from zero (J-43).
+pub const WORKING_AREA: f64 = 2.9905;
+
 /// Settings of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointConfig {
@@ -67,6 +72,20 @@ pub struct Config {
     pub friction_sign_width: f64,
 }
 
+impl Config {
+    /// Lowest and highest position (rad) that the joint with index `joint` may be commanded: its limits, inside the working
+    /// area of the drives while these are configured to keep to it (J-43). Nothing for an index that no joint has.
+    pub fn position_range(&self, joint: usize) -> (f64, f64) {
+        let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
+        let (low, high) = (limit.position_min, limit.position_max);
+        if self.joint_config_bits & KEEPS_WORKING_AREA == 0 {
+            (low, high)
+        } else {
+            (low.max(-WORKING_AREA), high.min(WORKING_AREA))
+        }
+    }
+}
+
 /// Gains of one joint (J-41).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PidGains {
@@ -112,4 +131,21 @@ pub struct Parameters {
     pub pid: [PidGains; JOINTS],
     /// Friction compensation.
     pub friction: Friction,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j43_positions_stay_inside_the_working_area_while_the_drives_keep_to_it() {
+        let mut config = Config::avena();
+        config.joints[0].position_min = -3.05;
+        config.joints[0].position_max = 1.2;
+        assert_eq!(config.position_range(0), (-WORKING_AREA, 1.2));
+        config.joint_config_bits &= !KEEPS_WORKING_AREA;
+        assert_eq!(config.position_range(0), (-3.05, 1.2));
+        let (low, high) = config.position_range(JOINTS);
+        assert!(low > high, "no such joint: no position");
+    }
 }

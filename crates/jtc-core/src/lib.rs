@@ -18,7 +18,7 @@ mod pid;
 mod store;
 mod telemetry;
 
-pub use config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf};
+pub use config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf, WORKING_AREA};
 pub use controller::Controller;
 pub use interpolation::{SetPoint, interpolate};
 pub use io::{BusState, Inputs, Outputs};

@@ -40,6 +40,9 @@ pub struct Config {
     pub pump_off_on_error: bool,
     /// Full scale of the drives' velocity, rad/s (J-11).
     pub velocity_full_scale: f64,
+    /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, far coarser than the bus. At rest the integral is
+    /// held within one such step (J-41).
+    pub encoder_step: f64,
     /// Configuration bits sent to every joint (J-11).
     pub joint_config_bits: u8,
     /// Configuration bits sent to the gripper (J-11).

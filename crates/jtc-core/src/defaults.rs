@@ -27,6 +27,7 @@ impl Config {
             gripper: true,
             pump_off_on_error: true,
             velocity_full_scale: 2.0,
+            encoder_step: core::f64::consts::TAU / 65_536.0,
             joint_config_bits: 0x17,
             gripper_config_bits: 0x04,
             status_period_ms: 40,

@@ -273,7 +273,10 @@ impl Motion {
                 JointTorque { model: model[j] + limit.rotor_inertia * qdd[j], ..JointTorque::default() };
             if law != Law::Teach {
                 let error = self.set.position[j] - q[j];
-                torque.pid = self.pid[j].step(&gains.pid[j], error, self.saturation[j].saturated);
+                let at_rest = self.set.velocity[j] == 0.0 && self.set.acceleration[j] == 0.0;
+                let encoder_step = at_rest.then_some(config.encoder_step);
+                let saturated = self.saturation[j].saturated;
+                torque.pid = self.pid[j].step(&gains.pid[j], error, saturated, encoder_step);
             }
             if law == Law::Follow {
                 let t = celsius(nodes.node(j).report.temperature);

@@ -8,6 +8,11 @@ const WINDOW: usize = 5;
 /// 1/s: one over the length of the window.
 const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
+/// Encoder steps of error at rest beyond which a held integral acts again: a joint that slips settles within that many.
+const RELEASE_STEPS: f64 = 4.0;
+/// Part of an encoder step that positions may be off by, being rounded on the bus.
+const ROUNDING: f64 = 0.01;
+
 /// What the controller remembers.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pid {
@@ -15,6 +20,8 @@ pub struct Pid {
     integral: f64,
     /// The last errors, rad, oldest first.
     errors: [f64; WINDOW],
+    /// At rest and so near to the commanded position that the integral is held.
+    settled: bool,
 }
 
 /// The three parts, N·m.
@@ -38,13 +45,26 @@ impl PidTorque {
 impl Pid {
     /// Forget everything; `error` is taken as having stood for long, so that the derivative starts at 0.
     pub fn reset(&mut self, error: f64) {
-        *self = Self { integral: 0.0, errors: [error; WINDOW] };
+        *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
-    /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held.
-    pub fn step(&mut self, gains: &PidGains, error: f64, saturated: bool) -> PidTorque {
+    /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held. `encoder_step`
+    /// (rad): the joint is commanded at rest, and this is what its encoder can tell; `None` in motion.
+    ///
+    /// At rest the integral is held from where the error is within one step until it exceeds [`RELEASE_STEPS`]. An integral
+    /// that goes on below what the encoder can tell breaks a joint with stiction away for ever again, and so does one that
+    /// begins anew at each toggle of the last bit.
+    pub fn step(
+        &mut self,
+        gains: &PidGains,
+        error: f64,
+        saturated: bool,
+        encoder_step: Option<f64>,
+    ) -> PidTorque {
+        let settled_within = if self.settled { RELEASE_STEPS } else { 1.0 } + ROUNDING;
+        self.settled = encoder_step.is_some_and(|step| error.abs() <= settled_within * step);
         let grown = self.integral + error * DT;
-        let integral = if saturated { self.integral } else { grown };
+        let integral = if saturated || self.settled { self.integral } else { grown };
         // Also while held: new gains may have brought narrower bounds.
         self.integral = integral.max(gains.int_min).min(gains.int_max);
         let [oldest, a, b, c, d] = self.errors;
@@ -66,7 +86,7 @@ mod tests {
         let mut pid = Pid::default();
         pid.reset(0.05);
         for _ in 0..20 {
-            assert_eq!(pid.step(&GAINS, 0.05, false).d, 0.0);
+            assert_eq!(pid.step(&GAINS, 0.05, false, None).d, 0.0);
         }
     }
 
@@ -78,12 +98,12 @@ mod tests {
         let mut d = 0.0;
         // Longer than the window: what is older than five ticks is forgotten.
         for k in 1..=12 {
-            d = pid.step(&GAINS, slope * f64::from(k) * DT, false).d;
+            d = pid.step(&GAINS, slope * f64::from(k) * DT, false, None).d;
         }
         assert!((d - GAINS.kd * slope).abs() < 1e-12);
         // A step is spread over five ticks, none of them larger than Kd·step/(5 ms).
         pid.reset(0.0);
-        let first = pid.step(&GAINS, 0.01, false).d;
+        let first = pid.step(&GAINS, 0.01, false, None).d;
         assert!((first - GAINS.kd * 0.01 / 0.005).abs() < 1e-12);
     }
 
@@ -91,10 +111,35 @@ mod tests {
     fn j41_integral_is_held_while_saturated() {
         let mut pid = Pid::default();
         pid.reset(0.0);
-        let before = pid.step(&GAINS, 0.01, false).i;
+        let before = pid.step(&GAINS, 0.01, false, None).i;
         for _ in 0..100 {
-            assert_eq!(pid.step(&GAINS, 0.01, true).i, before);
+            assert_eq!(pid.step(&GAINS, 0.01, true, None).i, before);
         }
+    }
+
+    #[test]
+    fn j41_at_rest_the_integral_is_held_within_one_encoder_step_until_four() {
+        const STEP: f64 = 1e-4;
+        let mut pid = Pid::default();
+        pid.reset(0.0);
+        let run = |pid: &mut Pid, steps: f64, at_rest: bool| {
+            let before = pid.integral;
+            for _ in 0..10 {
+                pid.step(&GAINS, steps * STEP, false, at_rest.then_some(STEP));
+            }
+            pid.integral - before
+        };
+        // In motion every error counts, at rest those beyond what the encoder can tell.
+        assert!(run(&mut pid, 0.5, false) > 0.0);
+        assert!(run(&mut pid, 2.0, true) > 0.0);
+        assert_eq!(run(&mut pid, 1.0, true), 0.0);
+        for toggled in [2.0, 0.0, -1.0, 2.0, -2.0, 4.0, 1.0] {
+            assert_eq!(run(&mut pid, toggled, true), 0.0, "{toggled}");
+        }
+        assert!(run(&mut pid, 5.0, true) > 0.0);
+        assert!(run(&mut pid, 2.0, true) > 0.0, "until it is within one step again");
+        assert_eq!(run(&mut pid, -1.0, true), 0.0);
+        assert!(run(&mut pid, -1.0, false) < 0.0);
     }
 
     proptest! {
@@ -103,7 +148,7 @@ mod tests {
             let mut pid = Pid::default();
             pid.reset(0.0);
             for e in errors {
-                let i = pid.step(&GAINS, e, false).i / GAINS.ki;
+                let i = pid.step(&GAINS, e, false, None).i / GAINS.ki;
                 prop_assert!((GAINS.int_min..=GAINS.int_max).contains(&i));
             }
         }

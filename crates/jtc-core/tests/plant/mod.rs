@@ -1,0 +1,212 @@
+//! An arm of metal behind the [`Rig`]: rigid bodies, rotors, LuGre friction, and drives with a coarse encoder and a late speed.
+#![allow(dead_code)]
+
+use jtc_core::{Config, Parameters};
+use jtc_dynamics::{ArmModel, Dynamics};
+
+use crate::rig::Rig;
+
+/// rad of one step of the drives' 16-bit encoder.
+pub const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
+/// rad of one step of the motor's encoder behind the gear, from which the drives take the speed.
+const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
+/// Integration steps in a millisecond: the bristles are stiff.
+const SUBSTEPS: usize = 20;
+const DT: f64 = 1e-3 / SUBSTEPS as f64;
+
+/// LuGre friction of a joint (Canudas de Wit et al. 1995): bristles that stick, then slip along Stribeck's curve.
+#[derive(Clone, Copy, Debug)]
+pub struct LuGre {
+    /// N·m while sliding slowly.
+    pub coulomb: f64,
+    /// N·m at which it breaks away.
+    pub stiction: f64,
+    /// rad/s around which stiction has gone.
+    pub stribeck: f64,
+    /// N·m/rad of the bristles.
+    pub stiffness: f64,
+    /// N·m·s/rad of the bristles.
+    pub damping: f64,
+    /// N·m·s/rad of the grease.
+    pub viscous: f64,
+}
+
+impl LuGre {
+    pub const NONE: Self =
+        Self { coulomb: 0.0, stiction: 0.0, stribeck: 1.0, stiffness: 0.0, damping: 0.0, viscous: 0.0 };
+
+    /// The default arm's joints at the temperature of the rig, with this ratio of stiction to Coulomb friction.
+    pub fn avena(j: usize, stiction: f64) -> Self {
+        let jtc_core::Friction::Polynomial(polynomial) = Parameters::avena().friction else { panic!() };
+        let c = polynomial[j];
+        let factor = (1.0 + c[4] * (25.0 - c[5])).clamp(0.2, 2.0);
+        let coulomb = factor * c[0];
+        Self {
+            coulomb,
+            stiction: stiction * coulomb,
+            stribeck: 0.02,
+            stiffness: 100_000.0,
+            damping: 20.0,
+            viscous: factor * c[1],
+        }
+    }
+
+    /// Torque against the motion at speed `v`; moves the bristles `z` on by `dt`.
+    fn step(&self, z: &mut f64, v: f64, dt: f64) -> f64 {
+        if self.stiffness == 0.0 {
+            return self.viscous * v;
+        }
+        let x = v / self.stribeck;
+        let level = self.coulomb + (self.stiction - self.coulomb) * (-x * x).exp();
+        let rate = self.stiffness * v.abs() / level;
+        // Implicit in z, which is stiff at high speed.
+        let next = (*z + v * dt) / (1.0 + rate * dt);
+        let slope = (next - *z) / dt;
+        *z = next;
+        self.stiffness * next + self.damping * slope + self.viscous * v
+    }
+}
+
+/// The arm as it really is.
+pub struct Plant {
+    dynamics: Dynamics,
+    rotor: [f64; 6],
+    pub friction: [LuGre; 6],
+    bristles: [f64; 6],
+    pub q: [f64; 6],
+    pub v: [f64; 6],
+    /// Torque of a hand or a collision, N·m.
+    pub push: [f64; 6],
+    /// Nothing moves before that many more milliseconds: a stand.
+    pub speeds: [[f64; 10]; 6],
+    /// Joints that a brake holds while their drive is not enabled.
+    pub brakes: bool,
+    ticks: usize,
+}
+
+/// `model` with `mass` kg at the flange.
+pub fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
+    let flange = model.joints[6].xyz;
+    let link = &mut model.links[6];
+    let total = link.mass + mass;
+    for (x, f) in link.origin.xyz.iter_mut().zip(flange) {
+        *x = (link.mass * *x + mass * f) / total;
+    }
+    link.mass = total;
+    model
+}
+
+/// `model` with every mass times `factor`.
+pub fn heavier(mut model: ArmModel, factor: f64) -> ArmModel {
+    for link in &mut model.links {
+        link.mass *= factor;
+        link.inertia = link.inertia.map(|i| i * factor);
+    }
+    model
+}
+
+impl Plant {
+    pub fn new(model: &ArmModel, friction: [LuGre; 6], q: [f64; 6]) -> Self {
+        let config = Config::avena();
+        Self {
+            dynamics: Dynamics::new(model, config.gravity),
+            rotor: config.joints.map(|j| j.rotor_inertia),
+            friction,
+            bristles: [0.0; 6],
+            q,
+            v: [0.0; 6],
+            push: [0.0; 6],
+            speeds: [[0.0; 10]; 6],
+            brakes: true,
+            ticks: 0,
+        }
+    }
+
+    /// One millisecond of both. What the controller measures is two ticks older than the command that answers it.
+    pub fn tick(&mut self, rig: &mut Rig) {
+        rig.tick();
+        self.step(rig);
+        self.report(rig);
+    }
+
+    pub fn run(&mut self, rig: &mut Rig, ticks: usize) {
+        for _ in 0..ticks {
+            self.tick(rig);
+        }
+    }
+
+    /// A rig that holds this arm.
+    pub fn holding(&mut self, config: Config) -> Rig {
+        let mut rig = Rig::new(config);
+        rig.follow = false;
+        self.report(&mut rig);
+        rig.defaults();
+        self.run(&mut rig, 300);
+        assert_eq!(rig.state(), jtc_core::State::HoldPos, "{:?}", rig.controller.telemetry());
+        rig
+    }
+
+    fn step(&mut self, rig: &Rig) {
+        let before = self.q;
+        let mut mass = self.dynamics.mass_matrix(&self.q);
+        let bias = self.dynamics.inverse(&self.q, &self.v, &[0.0; 6]);
+        let free: [bool; 6] =
+            core::array::from_fn(|j| !self.brakes || rig.nodes[j].report.fsm == jtc_bus::fsm::ENABLED);
+        for j in 0..6 {
+            mass[j][j] += if free[j] { self.rotor[j] } else { 1e9 };
+            if !free[j] {
+                self.v[j] = 0.0;
+            }
+        }
+        let inverse = inverted(mass);
+        let drive = rig.torque;
+        for _ in 0..SUBSTEPS {
+            let mut torque = [0.0; 6];
+            for j in 0..6 {
+                let on = if rig.nodes[j].report.fsm == jtc_bus::fsm::ENABLED { drive[j] } else { 0.0 };
+                torque[j] =
+                    on + self.push[j] - bias[j] - self.friction[j].step(&mut self.bristles[j], self.v[j], DT);
+            }
+            for j in 0..6 {
+                let a: f64 = (0..6).map(|k| inverse[j][k] * torque[k]).sum();
+                self.v[j] += a * DT;
+            }
+            for j in 0..6 {
+                self.q[j] += self.v[j] * DT;
+            }
+        }
+        for j in 0..6 {
+            let counts = |q: f64| (q / MOTOR_STEP).floor();
+            self.speeds[j][self.ticks % 10] = (counts(self.q[j]) - counts(before[j])) * MOTOR_STEP / 0.001;
+        }
+        self.ticks += 1;
+    }
+
+    fn report(&self, rig: &mut Rig) {
+        for j in 0..6 {
+            let report = &mut rig.nodes[j].report;
+            report.position = (self.q[j] / ENCODER_STEP).floor() * ENCODER_STEP;
+            report.velocity = (self.speeds[j].iter().sum::<f64>() / 10.0).clamp(-2.0, 2.0);
+        }
+    }
+}
+
+/// Inverse of a symmetric positive definite matrix, by Gauss and Jordan.
+fn inverted(mut a: [[f64; 6]; 6]) -> [[f64; 6]; 6] {
+    let mut b = [[0.0; 6]; 6];
+    for (k, row) in b.iter_mut().enumerate() {
+        row[k] = 1.0;
+    }
+    for k in 0..6 {
+        let pivot = 1.0 / a[k][k];
+        (a[k], b[k]) = (a[k].map(|x| x * pivot), b[k].map(|x| x * pivot));
+        for i in (0..6).filter(|&i| i != k) {
+            let factor = a[i][k];
+            for c in 0..6 {
+                a[i][c] -= factor * a[k][c];
+                b[i][c] -= factor * b[k][c];
+            }
+        }
+    }
+    b
+}

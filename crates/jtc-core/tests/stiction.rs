@@ -1,0 +1,134 @@
+//! Holding joints with stiction, which an integral can make hunt for ever (J-41).
+mod plant;
+mod rig;
+
+use jtc_core::{Config, Parameters, Tes};
+use jtc_wire::{FrameType, RawPoint};
+use plant::{ENCODER_STEP, LuGre, Plant, heavier};
+use rig::{Rig, segment_body};
+
+const POSE: [f64; 6] = [0.3, 0.8, -0.9, 0.4, 0.7, 0.2];
+
+/// The range of what was seen of one joint while it was held.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    low: f64,
+    high: f64,
+}
+
+impl Seen {
+    const NOTHING: Self = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
+
+    fn take(&mut self, x: f64) {
+        (self.low, self.high) = (self.low.min(x), self.high.max(x));
+    }
+
+    fn width(self) -> f64 {
+        self.high - self.low
+    }
+}
+
+/// Correction torque (N·m) and true position (rad) of each joint over `ticks`.
+fn watch(arm: &mut Plant, rig: &mut Rig, ticks: usize) -> [(Seen, Seen); 6] {
+    let mut seen = [(Seen::NOTHING, Seen::NOTHING); 6];
+    for _ in 0..ticks {
+        arm.tick(rig);
+        for (j, (torque, position)) in seen.iter_mut().enumerate() {
+            let t = &rig.controller.telemetry().joints[j];
+            torque.take(t.torque - t.torque_model);
+            position.take(arm.q[j]);
+        }
+    }
+    seen
+}
+
+/// The default arm's friction with this ratio of stiction to Coulomb friction and these bristles.
+fn sticky(ratio: f64, stribeck: f64, stiffness: f64, damping: f64) -> [LuGre; 6] {
+    core::array::from_fn(|j| LuGre { stribeck, stiffness, damping, ..LuGre::avena(j, ratio) })
+}
+
+/// Everything is quiet: at most a toggle of the encoder's last bit, which is 3.8 N·m of P and D on the large joints, and the
+/// joint stands where the integral lets it settle.
+fn assert_quiet(arm: &mut Plant, rig: &mut Rig, what: &str) {
+    for (j, (torque, position)) in watch(arm, rig, 6000).iter().enumerate() {
+        let joint = j + 1;
+        assert!(torque.width() < 4.0, "{what}: joint {joint}: {:.1} N·m peak to peak", torque.width());
+        let steps = position.width() / ENCODER_STEP;
+        assert!(steps < 0.3, "{what}: joint {joint} moves by {steps:.1} encoder steps");
+        let error = rig.controller.telemetry().joints[j].position_error().abs() / ENCODER_STEP;
+        assert!(error < 4.1, "{what}: joint {joint} stands {error:.1} encoder steps off");
+    }
+    assert_eq!(rig.errors(), 0);
+}
+
+#[test]
+fn j41_no_joint_hunts_or_buzzes_in_stiction() {
+    for ratio in [1.2, 1.5, 2.0] {
+        for stribeck in [0.005, 0.02] {
+            for stiffness in [20_000.0, 100_000.0, 300_000.0] {
+                for damping in [0.5, 20.0, 300.0] {
+                    let friction = sticky(ratio, stribeck, stiffness, damping);
+                    let mut arm = Plant::new(&heavier(Parameters::avena().model, 1.1), friction, POSE);
+                    let mut rig = arm.holding(Config::avena());
+                    arm.run(&mut rig, 12_000);
+                    let what = format!("{:?}", friction[0]);
+                    assert_quiet(&mut arm, &mut rig, &what);
+                }
+            }
+        }
+    }
+}
+
+/// What the encoder cannot tell, an integral that is never held turns into a limit cycle: the plant of these tests shows it.
+#[test]
+fn j41_an_integral_that_is_never_held_hunts() {
+    let mut arm =
+        Plant::new(&heavier(Parameters::avena().model, 1.1), sticky(1.5, 0.02, 300_000.0, 20.0), POSE);
+    let mut rig = arm.holding(Config { encoder_step: 0.0, ..Config::avena() });
+    arm.run(&mut rig, 12_000);
+    let seen = watch(&mut arm, &mut rig, 20_000);
+    let most = seen.iter().map(|(torque, _)| torque.width()).fold(0.0, f64::max);
+    assert!(most > 8.0, "{most} N·m peak to peak");
+}
+
+#[test]
+fn j41_a_motion_ends_without_hunting() {
+    for (ratio, stiffness, damping) in
+        [(1.2, 100_000.0, 300.0), (1.5, 100_000.0, 20.0), (1.5, 300_000.0, 20.0)]
+    {
+        let friction = sticky(ratio, 0.02, stiffness, damping);
+        let mut arm = Plant::new(&heavier(Parameters::avena().model, 1.1), friction, POSE);
+        let mut rig = arm.holding(Config::avena());
+        arm.run(&mut rig, 3000);
+        // 0.3 rad in 2 s, there and back.
+        let points: Vec<_> = (0..=400).map(|i| point(&rig, f64::from(i) / 200.0)).collect();
+        rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
+        rig.send(FrameType::TrajSetExecStatus, &[3]);
+        let mut worst = 0.0f64;
+        for _ in 0..4400 {
+            arm.tick(&mut rig);
+            for t in &rig.controller.telemetry().joints {
+                worst = worst.max(t.position_error().abs());
+            }
+        }
+        assert_eq!((rig.tes(), rig.errors()), (Tes::Finish, 0));
+        assert!(worst < 0.003, "{:.2} mrad while moving", 1e3 * worst);
+        arm.run(&mut rig, 12_000);
+        assert_quiet(&mut arm, &mut rig, &format!("stiction {ratio}, bristles {stiffness}"));
+    }
+}
+
+/// A point of a motion of 0.3 rad there (`u` 0 to 1) and back (1 to 2), 2 s each, from where the joints are held.
+fn point(rig: &Rig, u: f64) -> RawPoint {
+    let (u, back) = if u > 1.0 { (2.0 - u, -1.0) } else { (u, 1.0) };
+    let way = 0.3 * u * u * u * (10.0 + u * (6.0 * u - 15.0));
+    let speed = back * 0.3 * 30.0 * u * u * (1.0 - u) * (1.0 - u) / 2.0;
+    let acceleration = 0.3 * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / 4.0;
+    let raw = |x: f64, scale: f64| (x / scale * 32767.0).round() as i16;
+    let held = rig.controller.telemetry().joints.map(|j| j.set_position);
+    RawPoint {
+        position: held.map(|q| raw(q + way, 3.141592)),
+        velocity: [raw(speed, 6.283185); 6],
+        acceleration: [raw(acceleration, 12.566370); 6],
+    }
+}

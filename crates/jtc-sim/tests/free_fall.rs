@@ -1,10 +1,11 @@
 //! The arm's integration is as exact at 1 ms as the design asks.
-use jtc_sim::{Arm, SimArm, SimFriction};
+use jtc_sim::{Arm, FrictionModel, LuGre, SimArm, SimFriction};
 
-fn fall(q: [f64; 6], steps: u32, friction: bool) -> [f64; 6] {
+fn fall(q: [f64; 6], steps: u32, friction: Option<FrictionModel>) -> [f64; 6] {
     let mut parts = SimArm { stops: [(f64::NEG_INFINITY, f64::INFINITY); 6], ..SimArm::default() };
-    if !friction {
-        parts.friction = std::array::from_fn(|_| SimFriction::Frictionless);
+    match friction {
+        Some(model) => parts.friction_model = model,
+        None => parts.friction = std::array::from_fn(|_| SimFriction::Frictionless),
     }
     let mut arm = Arm::new(parts, [1.0; 6], q);
     for _ in 0..steps {
@@ -16,7 +17,7 @@ fn fall(q: [f64; 6], steps: u32, friction: bool) -> [f64; 6] {
 #[test]
 fn a_second_of_free_fall_at_1_ms_is_within_1_5_microradians() {
     for q in [[0.3, 0.5, -0.7, 0.4, 0.6, -0.2], [-1.0, 1.2, 0.4, -0.8, 1.5, 2.0]] {
-        let (coarse, fine) = (fall(q, 1_000, false), fall(q, 100_000, false));
+        let (coarse, fine) = (fall(q, 1_000, None), fall(q, 100_000, None));
         let worst = coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         println!("{q:?}: {worst:.2e} rad");
         assert!(worst <= 1.5e-6, "{worst} rad");
@@ -27,10 +28,12 @@ fn a_second_of_free_fall_at_1_ms_is_within_1_5_microradians() {
 #[test]
 fn friction_is_integrated_stably_at_1_ms() {
     let q = [0.3, 0.5, -0.7, 0.4, 0.6, -0.2];
-    let (coarse, fine) = (fall(q, 1_000, true), fall(q, 20_000, true));
-    let worst = coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    println!("{worst:.2e} rad");
-    assert!(worst <= 1e-4, "{worst} rad");
+    for model in [FrictionModel::Smooth { width: 0.01 }, FrictionModel::LuGre(LuGre::default())] {
+        let (coarse, fine) = (fall(q, 1_000, Some(model)), fall(q, 20_000, Some(model)));
+        let worst = coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        println!("{model:?}: {worst:.2e} rad");
+        assert!(worst <= 1e-4, "{model:?}: {worst} rad");
+    }
 }
 
 #[test]

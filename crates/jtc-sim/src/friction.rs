@@ -1,0 +1,274 @@
+//! Friction of the simulated joints: how it depends on speed and temperature, and what happens around standstill.
+//!
+//! At speed both models follow the same measured curve (polynomial or table). They differ around zero: [`FrictionModel::LuGre`]
+//! sticks, breaks away and slips as real gears do; [`FrictionModel::Smooth`] lets friction change its sign over a small speed and
+//! can neither stick nor hunt.
+use jtc_core::TableOf;
+use jtc_dynamics::{JOINTS, JointVec};
+
+/// Largest natural frequency of a rotor on its bristles, rad/s: what a step of 1 ms still integrates well.
+const STIFFEST: f64 = 800.0;
+/// Smallest level that bristles are divided by, N·m.
+const LEAST_LEVEL: f64 = 1e-9;
+
+/// True friction of a joint as a function of speed, without what happens around standstill.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)]
+pub enum SimFriction {
+    /// None.
+    Frictionless,
+    /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = sign(v).
+    Polynomial([f64; 6]),
+    /// A measured table; beyond its velocities it goes on in a straight line.
+    Table(TableOf<f32>),
+}
+
+/// What friction does around standstill.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FrictionModel {
+    /// The sign of the velocity is v/√(v² + width²): no stiction. Below a width of 0.005 rad/s Runge-Kutta at 1 ms becomes unstable.
+    Smooth {
+        /// Speed around zero in which friction changes its sign, rad/s.
+        width: f64,
+    },
+    /// Bristles: stiction, presliding, Stribeck curve.
+    LuGre(LuGre),
+}
+
+impl Default for FrictionModel {
+    fn default() -> Self {
+        Self::LuGre(LuGre::default())
+    }
+}
+
+/// The LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995): surfaces touch at bristles of mean deflection z (rad), with
+///
+/// - dz/dt = v − σ0·|v|/g(v)·z,
+/// - friction torque = σ0·z + σ1(v)·dz/dt + viscous part,
+/// - g(v) = Coulomb level·(1 + (`stiction_ratio` − 1)/(1 + (v/`stribeck_speed`)²)).
+///
+/// Coulomb level (c0) and viscous part (c1..c3) are those of the joint's curve. The Stribeck curve has the rational form of Hess
+/// and Soom (1990), and σ1 falls off with speed alike, which keeps the model dissipative (Olsson 1996, section 3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LuGre {
+    /// Break-away torque over Coulomb torque. The paper's example has 1.5; harmonic drives are reported between 1.1 and 1.6.
+    pub stiction_ratio: f64,
+    /// Speed at which half of the excess of stiction is gone, rad/s.
+    pub stribeck_speed: f64,
+    /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one
+    /// step of the joint's encoder. Stiffer ones are softened until a rotor on its bristles swings below 800 rad/s.
+    pub presliding: f64,
+    /// Damping ratio of the rotor on its bristles: σ1 = 2·ratio·√(σ0·rotor inertia).
+    pub damping_ratio: f64,
+}
+
+impl Default for LuGre {
+    fn default() -> Self {
+        Self { stiction_ratio: 1.4, stribeck_speed: 0.01, presliding: 1e-4, damping_ratio: 0.7 }
+    }
+}
+
+/// Friction of all joints at their present temperatures; a joint's arrays are columns, so that the compiler can do six at once.
+#[derive(Clone, Debug)]
+pub(crate) struct FrictionTorques {
+    model: FrictionModel,
+    curves: [SimFriction; JOINTS],
+    /// Polynomial coefficients, a row per power; zero for joints with a table.
+    k: [JointVec; 4],
+    /// Velocities and torques of joints with a table.
+    tables: [Option<Box<Points>>; JOINTS],
+    any_table: bool,
+    /// Temperature that the tables hold for, °C.
+    table_temperature: JointVec,
+    /// σ0, N·m/rad.
+    stiffness: JointVec,
+    /// σ1 at standstill, N·m·s/rad.
+    damping: JointVec,
+}
+
+impl FrictionTorques {
+    /// `rotor`: inertia of the rotors at the joints, kg·m².
+    pub fn new(model: FrictionModel, curves: [SimFriction; JOINTS], rotor: &JointVec) -> Self {
+        let mut new = Self {
+            model,
+            curves,
+            k: [[0.0; JOINTS]; 4],
+            tables: [const { None }; JOINTS],
+            any_table: false,
+            table_temperature: [f64::NAN; JOINTS],
+            stiffness: [0.0; JOINTS],
+            damping: [0.0; JOINTS],
+        };
+        if let FrictionModel::LuGre(lugre) = model {
+            for j in 0..JOINTS {
+                let coulomb = match &new.curves[j] {
+                    SimFriction::Frictionless => 0.0,
+                    SimFriction::Polynomial(c) => c[0].max(0.0),
+                    SimFriction::Table(table) => {
+                        Points::cut(table, table.temperature[9].into(), 1.0).coulomb()
+                    }
+                };
+                let stiffness = (coulomb / lugre.presliding).min(STIFFEST * STIFFEST * rotor[j]);
+                new.stiffness[j] = stiffness;
+                new.damping[j] = 2.0 * lugre.damping_ratio * (stiffness * rotor[j]).sqrt();
+            }
+        }
+        new
+    }
+
+    /// Make the curves those of these bearing temperatures (°C), times `scale`.
+    pub fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
+        for j in 0..JOINTS {
+            let t = temperature[j];
+            match &self.curves[j] {
+                SimFriction::Frictionless => {}
+                SimFriction::Polynomial(c) => {
+                    let k = scale[j] * (1.0 + c[4] * (t - c[5])).clamp(0.2, 2.0);
+                    for (row, c) in self.k.iter_mut().zip(c) {
+                        row[j] = k * c;
+                    }
+                }
+                SimFriction::Table(table) => {
+                    // Also from NaN at the start.
+                    if (t - self.table_temperature[j]).abs() < 0.02 {
+                        continue;
+                    }
+                    self.table_temperature[j] = t;
+                    let mut points = Points::cut(table, t, scale[j]);
+                    if matches!(self.model, FrictionModel::LuGre(_)) {
+                        self.k[0][j] = points.take_coulomb();
+                    }
+                    self.tables[j] = Some(Box::new(points));
+                    self.any_table = true;
+                }
+            }
+        }
+    }
+
+    /// Make the next [`warm`](Self::warm) act on tables too: a scale has changed.
+    pub fn forget_tables(&mut self) {
+        self.table_temperature = [f64::NAN; JOINTS];
+    }
+
+    /// Torque against the motion at velocities `v` (rad/s) and bristle deflections `z` (rad), N·m.
+    #[inline]
+    pub fn at(&self, v: &JointVec, z: &JointVec) -> JointVec {
+        let [k0, k1, k2, k3] = &self.k;
+        let mut out: JointVec = match self.model {
+            FrictionModel::Smooth { width } => core::array::from_fn(|j| {
+                let v = v[j];
+                let s = v / (v * v + width * width).sqrt();
+                k0[j] * s + v * (k1[j] + v * (k2[j] * s + k3[j] * v))
+            }),
+            FrictionModel::LuGre(lugre) => {
+                let inverse = 1.0 / lugre.stribeck_speed;
+                core::array::from_fn(|j| {
+                    let (v, load) = (v[j], self.stiffness[j] * z[j]);
+                    let (b, level) = lugre.stribeck(v * inverse, k0[j]);
+                    // σ1(v)·dz/dt over one denominator: divisions are what this function costs.
+                    let bending = (v * level - v.abs() * load * b) / (b * level);
+                    load + self.damping[j] * bending + v * (k1[j] + k2[j] * v.abs() + k3[j] * v * v)
+                })
+            }
+        };
+        if self.any_table {
+            for (j, table) in self.tables.iter().enumerate() {
+                if let Some(table) = table {
+                    out[j] += table.at(v[j]);
+                }
+            }
+        }
+        out
+    }
+
+    /// Bristle deflections `dt` seconds after `z` at velocities `v`.
+    ///
+    /// dz/dt = v − rate·z with rate up to 10⁴/s at speed: far too stiff for Runge-Kutta at 1 ms. For a constant velocity the exact
+    /// solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). With 1/(1 + x + x²/2) for e it is of second order, needs no
+    /// exponential, and goes to the exact end g/σ0 for any x.
+    #[inline]
+    pub fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {
+        let FrictionModel::LuGre(lugre) = self.model else { return *z };
+        let inverse = 1.0 / lugre.stribeck_speed;
+        core::array::from_fn(|j| {
+            let v = v[j];
+            let (b, level) = lugre.stribeck(v * inverse, self.k[0][j]);
+            // x = a/level, numerator and denominator times level².
+            let a = dt * self.stiffness[j] * v.abs() * b;
+            let half = level + 0.5 * a;
+            level * (z[j] * level + v * dt * half) / (level * level + a * half)
+        })
+    }
+}
+
+impl LuGre {
+    /// For the velocity in Stribeck speeds `r` and a Coulomb torque (N·m): b = 1 + r², whose inverse falls from 1 at standstill to 0
+    /// far above the Stribeck speed, and b·g(v), N·m.
+    #[inline]
+    fn stribeck(&self, r: f64, coulomb: f64) -> (f64, f64) {
+        let b = 1.0 + r * r;
+        (b, coulomb.max(LEAST_LEVEL) * (b + (self.stiction_ratio - 1.0)))
+    }
+}
+
+/// A friction table at one temperature.
+#[derive(Clone, Debug)]
+struct Points {
+    /// rad/s.
+    velocity: [f64; 20],
+    /// N·m.
+    torque: [f64; 20],
+}
+
+impl Points {
+    /// Velocities and torques of the table at one temperature (°C), which is kept within its axis.
+    fn cut(table: &TableOf<f32>, temperature: f64, scale: f64) -> Self {
+        let axis = table.temperature.map(f64::from);
+        let t = temperature.clamp(axis[0], axis[19]);
+        let i = axis[1..19].iter().filter(|&&start| t >= start).count();
+        let u = (t - axis[i]) / (axis[i + 1] - axis[i]);
+        let torque = table.torque.map(|row| {
+            let (a, b) = (f64::from(row[i]), f64::from(row[i + 1]));
+            scale * (a + u * (b - a))
+        });
+        Self { velocity: table.velocity.map(f64::from), torque }
+    }
+
+    /// Straight lines between the points, and on beyond the ends.
+    fn at(&self, v: f64) -> f64 {
+        let (x, y) = (&self.velocity, &self.torque);
+        let i = x[1..19].iter().filter(|&&start| v >= start).count();
+        y[i] + (v - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i])
+    }
+
+    /// Coulomb torque: where the lines through the two slowest points of each direction meet standstill, the mean of both, N·m.
+    fn coulomb(&self) -> f64 {
+        let (x, y) = (&self.velocity, &self.torque);
+        let start = |near: usize, far: usize, sign: f64| {
+            let slope = (y[far] - y[near]) / (x[far] - x[near]);
+            // No more than the slowest point itself: a curve that falls at first has its Coulomb torque there.
+            (sign * (y[near] - slope * x[near])).clamp(0.0, (sign * y[near]).max(0.0))
+        };
+        let above = x.iter().position(|&v| v > 0.0).filter(|&i| i + 1 < x.len());
+        let below = x.iter().rposition(|&v| v < 0.0).filter(|&i| i > 0);
+        match (below, above) {
+            (Some(b), Some(a)) => 0.5 * (start(b, b - 1, -1.0) + start(a, a + 1, 1.0)),
+            _ => 0.0,
+        }
+    }
+
+    /// Take the Coulomb torque out of the points: what is left is the viscous part.
+    fn take_coulomb(&mut self) -> f64 {
+        let coulomb = self.coulomb();
+        for (v, torque) in self.velocity.iter().zip(&mut self.torque) {
+            if *v != 0.0 {
+                *torque -= coulomb.copysign(*v);
+            }
+        }
+        coulomb
+    }
+}
+
+#[cfg(test)]
+#[path = "friction_tests.rs"]
+mod tests;

@@ -1,119 +1,21 @@
 //! The seven nodes on the joint bus: what they report, how they are brought up (J-20), what of them is an error (J-14, J-16), and
 //! which frame each tick sends (J-12).
-use jtc_bus::{Answer, Frame, JointReport, Request, Scale, Target, fsm, warning};
+use jtc_bus::{Answer, JointReport, Scale, fsm, warning};
 
 use crate::config::Config;
 use crate::io::Inputs;
 use crate::{JOINTS, NODES};
 
+mod bring_up;
+mod node;
+
+use node::starting;
+pub(crate) use node::{Goal, Node};
+
 /// Node number of the gripper.
 pub(crate) const GRIPPER: usize = 6;
 /// Frames looked at in one tick.
 const FRAMES_MAX: usize = 32;
-/// Ticks between two frames that take the place of Move (J-12: at most one tick of four).
-const MOVES_BETWEEN: u8 = 3;
-/// Ticks after a reset in which a late answer does not count as sign of life.
-const DEAF_AFTER_RESET: u8 = 20;
-
-/// Where the nodes are wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Goal {
-    /// Configured and ready to operate: Init.
-    Ready,
-    /// Operation enabled: HoldPos, Operate, Teaching.
-    Enabled,
-    /// Not enabled, otherwise left alone: Error.
-    Down,
-}
-
-/// One node.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Node {
-    pub report: JointReport,
-    /// Answered a Move since boot or reset.
-    seen: bool,
-    /// Accepted its configuration.
-    configured: bool,
-    /// Answered a Move after that: position and velocity count.
-    valid: bool,
-    /// Refused its configuration in the state it is in.
-    refused: bool,
-    /// Consecutive Moves left unanswered.
-    missed: u8,
-    /// Ticks of silence that are no error yet.
-    boot_left: u32,
-    deaf_left: u8,
-    /// The node is commanded to Init to clear its errors, until it has followed (J-21).
-    clear: bool,
-    /// A reset frame is to be sent.
-    reset: bool,
-    /// Reported OperationEnable while that was wanted.
-    enabled: bool,
-    enable_wait: u32,
-    /// Misbehaved in this tick: left OperationEnable, did not enable in time, or its position jumped.
-    misbehaved: bool,
-}
-
-impl Node {
-    pub fn enabled(&self) -> bool {
-        self.valid && self.report.fsm == fsm::ENABLED
-    }
-
-    fn starting(&self) -> bool {
-        starting(self.report.fsm)
-    }
-
-    /// Lost its configuration, or back in Start or Init (J-20).
-    fn fallen_back(&self) -> bool {
-        !self.valid || self.starting()
-    }
-
-    fn faulty(&self, joint: bool) -> bool {
-        let r = &self.report;
-        // Drives set this warning also before they are configured, whatever the line is.
-        let safety_line = if joint && self.valid { r.warnings & warning::SAFETY_LINE } else { 0 };
-        self.seen && (fsm::is_fault(r.fsm) || (r.errors | r.mc_current | safety_line) != 0)
-    }
-
-    /// The node has restarted: nothing of what was known of it holds.
-    fn restart(&mut self, config: &Config) {
-        *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
-    }
-
-    /// State that the node is asked for (J-16).
-    fn request(&self, goal: Goal) -> Target {
-        let state = self.report.fsm;
-        if !self.seen {
-            return Target::NoChange;
-        }
-        if self.clear {
-            // A drive ignores Init while it is enabled.
-            return if state == fsm::ENABLED { Target::Ready } else { Target::Init };
-        }
-        let moving = fsm::is_transition(state);
-        match goal {
-            Goal::Down if state == fsm::ENABLED || moving || (state == fsm::INIT && self.configured) => {
-                Target::Ready
-            }
-            Goal::Ready if state == fsm::START => Target::Init,
-            Goal::Ready if state == fsm::READY && !self.configured && self.refused => Target::Init,
-            Goal::Ready if state == fsm::ENABLED || ((state == fsm::INIT || moving) && self.configured) => {
-                Target::Ready
-            }
-            Goal::Enabled if state == fsm::READY || moving => Target::Enable,
-            _ => Target::NoChange,
-        }
-    }
-
-    fn wants_configuration(&self) -> bool {
-        self.seen && !self.configured && !self.clear && matches!(self.report.fsm, fsm::INIT | fsm::READY)
-    }
-}
-
-fn starting(state: u8) -> bool {
-    // 10 is the transition from Start to Init.
-    matches!(state, fsm::START | fsm::INIT | 10)
-}
 
 /// All nodes and the order of frames to them.
 #[derive(Clone, Debug)]
@@ -371,56 +273,5 @@ impl Nodes {
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
             node.reset |= mask & (1 << n) != 0;
         }
-    }
-
-    /// The frame of this tick (J-12). `must_move`: the first frame after an error, or after power is taken away, is Move.
-    pub fn frame(
-        &mut self,
-        config: &Config,
-        goal: Goal,
-        torque: [f64; JOINTS],
-        pump: bool,
-        must_move: bool,
-    ) -> Frame {
-        let instead =
-            if must_move || self.moves < MOVES_BETWEEN { None } else { self.instead_of_move(config, goal) };
-        self.sent_move = instead.is_none();
-        self.moves = if self.sent_move { self.moves.saturating_add(1) } else { 0 };
-        instead.unwrap_or(Request::Move { torque, pump }).emit()
-    }
-
-    fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
-        let present = self.present();
-        let to_reset = self.all().iter().filter(|node| node.reset).count();
-        if to_reset == present {
-            for node in &mut self.nodes {
-                node.restart(config);
-            }
-            return Some(Request::ResetAll);
-        }
-        if let Some((n, node)) = self.nodes.iter_mut().enumerate().take(present).find(|(_, node)| node.reset)
-        {
-            node.restart(config);
-            return Some(Request::Reset(n as u8));
-        }
-        let mut target = [Target::NoChange; NODES];
-        let mut change = false;
-        for (node, target) in self.all().iter().zip(&mut target) {
-            *target = node.request(goal);
-            change |= *target != Target::NoChange;
-        }
-        let configure = goal == Goal::Ready && self.all().iter().any(Node::wants_configuration);
-        // Nodes that are enabled refuse their configuration and should not be: they come first.
-        let enabled = self.all().iter().any(|node| node.report.fsm == fsm::ENABLED);
-        if configure && !(change && (self.configured_last || enabled)) {
-            self.configured_last = true;
-            return Some(Request::ChangeMode {
-                mode: [1; JOINTS],
-                config: [config.joint_config_bits; JOINTS],
-                gripper: config.gripper_config_bits,
-            });
-        }
-        self.configured_last = false;
-        change.then_some(Request::ChangeFsm { target })
     }
 }

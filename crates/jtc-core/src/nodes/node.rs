@@ -1,0 +1,108 @@
+//! One node: what it last reported, how far its bring-up is, and which state it is asked for (J-16, J-20).
+use jtc_bus::{JointReport, Target, fsm, warning};
+
+use crate::config::Config;
+
+/// Ticks after a reset in which a late answer of the node does not count.
+const DEAF_AFTER_RESET: u8 = 20;
+
+/// Where the nodes are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Goal {
+    /// Configured and ready to operate: Init.
+    Ready,
+    /// Operation enabled: HoldPos, Operate, Teaching.
+    Enabled,
+    /// Not enabled, otherwise left alone: Error.
+    Down,
+}
+
+/// One node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Node {
+    pub report: JointReport,
+    /// Answered a Move since boot or reset.
+    pub(super) seen: bool,
+    /// Accepted its configuration.
+    pub(super) configured: bool,
+    /// Answered a Move after that: position and velocity count.
+    pub(super) valid: bool,
+    /// Refused its configuration in the state it is in.
+    pub(super) refused: bool,
+    /// Consecutive Moves left unanswered.
+    pub(super) missed: u8,
+    /// Ticks of silence that are no error yet.
+    pub(super) boot_left: u32,
+    pub(super) deaf_left: u8,
+    /// The node is commanded to Init to clear its errors, until it has followed (J-21).
+    pub(super) clear: bool,
+    /// A reset frame is to be sent.
+    pub(super) reset: bool,
+    /// Reported OperationEnable while that was wanted.
+    pub(super) enabled: bool,
+    pub(super) enable_wait: u32,
+    /// Misbehaved in this tick: left OperationEnable, did not enable in time, or its position jumped.
+    pub(super) misbehaved: bool,
+}
+
+impl Node {
+    pub fn enabled(&self) -> bool {
+        self.valid && self.report.fsm == fsm::ENABLED
+    }
+
+    pub fn starting(&self) -> bool {
+        starting(self.report.fsm)
+    }
+
+    /// Lost its configuration, or back in Start or Init (J-20).
+    pub fn fallen_back(&self) -> bool {
+        !self.valid || self.starting()
+    }
+
+    pub fn faulty(&self, joint: bool) -> bool {
+        let r = &self.report;
+        // Drives set this warning also before they are configured, whatever the line is.
+        let safety_line = if joint && self.valid { r.warnings & warning::SAFETY_LINE } else { 0 };
+        self.seen && (fsm::is_fault(r.fsm) || (r.errors | r.mc_current | safety_line) != 0)
+    }
+
+    /// The node has restarted: nothing of what was known of it holds.
+    pub fn restart(&mut self, config: &Config) {
+        *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
+    }
+
+    /// State that the node is asked for (J-16).
+    pub fn request(&self, goal: Goal) -> Target {
+        let state = self.report.fsm;
+        if !self.seen {
+            return Target::NoChange;
+        }
+        if self.clear {
+            // A drive ignores Init while it is enabled.
+            return if state == fsm::ENABLED { Target::Ready } else { Target::Init };
+        }
+        let moving = fsm::is_transition(state);
+        match goal {
+            Goal::Down if state == fsm::ENABLED || moving || (state == fsm::INIT && self.configured) => {
+                Target::Ready
+            }
+            Goal::Ready if state == fsm::START => Target::Init,
+            Goal::Ready if state == fsm::READY && !self.configured && self.refused => Target::Init,
+            Goal::Ready if state == fsm::ENABLED || ((state == fsm::INIT || moving) && self.configured) => {
+                Target::Ready
+            }
+            Goal::Enabled if state == fsm::READY || moving => Target::Enable,
+            _ => Target::NoChange,
+        }
+    }
+
+    pub fn wants_configuration(&self) -> bool {
+        self.seen && !self.configured && !self.clear && matches!(self.report.fsm, fsm::INIT | fsm::READY)
+    }
+}
+
+/// The node is in Start, in Init, or between them.
+pub(crate) fn starting(state: u8) -> bool {
+    // 10 is the transition from Start to Init.
+    matches!(state, fsm::START | fsm::INIT | 10)
+}

@@ -119,10 +119,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // What has come in.
         let before = self.state;
         self.nodes.take(inputs, &self.config, self.goal());
+        // A fault is known before a command that may clear it: a clear in this very tick does not hide it.
+        self.check_errors(inputs);
+        if self.errors.any() {
+            self.enter(State::Error);
+        }
         // In Start nothing is executed yet; the event is offered again.
-        let host_done = self.state != State::Start && self.serve_host(inputs.host);
+        let host_done = before != State::Start && self.serve_host(inputs.host);
 
-        // What state that makes.
+        // What state that makes. What persists is raised again, where it was cleared.
         self.check_errors(inputs);
         self.select_state();
 
@@ -201,7 +206,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if flags != 0 {
             self.errors.raise_can(flags);
         }
-        if self.nodes.external_error() {
+        if self.nodes.external_error(self.powered()) {
             self.errors.raise_external_joints();
         }
     }
@@ -210,6 +215,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn select_state(&mut self) {
         // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
         let initialised = self.given.missing() == 0
+            && !self.nodes.clearing()
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready() };
         let next = if self.errors.any() || (self.state == State::Error && self.nodes.clearing()) {
             State::Error

@@ -148,6 +148,53 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     assert_eq!(rig.nodes[1].report.errors, 0);
 }
 
+/// A clear that arrives in the very tick in which a fault shows does not hide it.
+#[test]
+fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
+    type Fault = fn(&mut Rig);
+    let faults: [(&str, Fault); 4] = [
+        ("error bit", |rig| rig.nodes[1].report.errors = 8),
+        ("motor control", |rig| rig.nodes[1].report.mc_current = 4),
+        ("fault state", |rig| rig.nodes[1].report.fsm = fsm::FAULT),
+        ("left OperationEnable", |rig| rig.nodes[1].report.fsm = fsm::READY),
+    ];
+    for (name, fault) in faults {
+        for occurred in [false, true] {
+            for teaching in [false, true] {
+                let mut rig = Rig::holding();
+                if teaching {
+                    rig.ask(FrameType::TeachingModeEnable, &[]);
+                }
+                rig.tick();
+                fault(&mut rig);
+                // The answer to the Move of this tick shows it in the next one, which serves the clear.
+                rig.tick();
+                if occurred {
+                    rig.send(FrameType::ClearOccurredErrors, &[]);
+                }
+                rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
+                for _ in 0..30 {
+                    let faulty = rig.nodes[1].report.errors | rig.nodes[1].report.mc_current != 0;
+                    rig.tick();
+                    assert_eq!(rig.state(), State::Error, "{name}");
+                    assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6], "{name}");
+                    if !faulty {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    // The safety input is low for this tick only.
+    let mut rig = Rig::holding();
+    rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
+    rig.safety_input = false;
+    rig.tick();
+    rig.safety_input = true;
+    rig.run(100);
+    assert_eq!((rig.state(), rig.errors()), (State::Error, error::EMERGENCY_INPUT | error::EXTERNAL));
+}
+
 #[test]
 fn j21_healthy_nodes_are_left_alone_by_a_clear() {
     let mut rig = Rig::holding();

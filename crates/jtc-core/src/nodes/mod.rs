@@ -221,12 +221,12 @@ impl Nodes {
         flags
     }
 
-    /// A node has an error that is not being cleared, or misbehaved in this tick.
-    pub fn external_error(&self) -> bool {
+    /// A node has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared do not count.
+    pub fn external_error(&self, powered: bool) -> bool {
         self.all()
             .iter()
             .enumerate()
-            .any(|(n, node)| node.misbehaved || (!node.clear && node.faulty(n < JOINTS)))
+            .any(|(n, node)| node.misbehaved || ((powered || !node.clear) && node.faulty(n < JOINTS)))
     }
 
     /// A node is still being cleared: the cause of its error is not gone.

@@ -119,6 +119,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // What has come in.
         let before = self.state;
         self.nodes.take(inputs, &self.config, self.goal());
+        self.pump &= !self.nodes.gripper_lost();
         // A fault is known before a command that may clear it: a clear in this very tick does not hide it.
         self.check_errors(inputs);
         if self.errors.any() {
@@ -206,6 +207,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if flags != 0 {
             self.errors.raise_can(flags);
         }
+        self.errors.show_can(self.nodes.gripper_flags(&self.config));
         if self.nodes.external_error(self.powered()) {
             self.errors.raise_external_joints();
         }
@@ -216,7 +218,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
         let initialised = self.given.missing() == 0
             && !self.nodes.clearing()
-            && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready() };
+            && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
         let next = if self.errors.any() || (self.state == State::Error && self.nodes.clearing()) {
             State::Error
         } else if !initialised {
@@ -245,7 +247,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             State::Error | State::Init | State::Start => {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
-                self.pump &= !(next == State::Error && self.config.pump_off_on_error);
+                // A pump that does not run on is off until it is commanded again.
+                self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
             State::HoldPos if last == State::Teaching => self.motion.hold_measured(&self.nodes, &self.config),
             State::HoldPos | State::Operate | State::Teaching => {}
@@ -473,11 +476,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             errors: self.errors.word(),
             occurred: self.errors.occurred(),
             jtc_init: self.given.missing(),
-            node_init: self.nodes.init_word(),
+            node_init: self.nodes.init_word(&self.config),
             tes: self.tes as u8,
             point: self.telemetry.point,
             friction_type: u8::from(self.friction_is_table),
-            can_error: u8::from(can_current != 0),
+            can_error: u8::from(self.errors.can_error()),
             can_current,
             can_occurred,
             joints,

@@ -13,8 +13,10 @@ pub(crate) struct Errors {
     /// Internal error word per joint.
     joints: [u16; JOINTS],
     joints_occurred: [u16; JOINTS],
-    /// CAN flags.
+    /// CAN flags that are errors.
     can: u32,
+    /// CAN flags that are shown only, as they are now.
+    can_shown: u32,
     can_occurred: u32,
     occurred: u16,
 }
@@ -51,6 +53,12 @@ impl Errors {
         self.can |= flags;
         self.can_occurred |= flags;
         self.occurred |= self.word();
+    }
+
+    /// CAN flags of this tick that are no error: those of the gripper (J-14). They are gone when their cause is.
+    pub fn show_can(&mut self, flags: u32) {
+        self.can_shown = flags;
+        self.can_occurred |= flags;
     }
 
     /// ClearCurrentErrors: what still persists is raised again in the same tick.
@@ -98,7 +106,12 @@ impl Errors {
 
     /// Current and occurred CAN flags.
     pub fn can(&self) -> (u32, u32) {
-        (self.can, self.can_occurred)
+        (self.can | self.can_shown, self.can_occurred)
+    }
+
+    /// A CAN flag is an error.
+    pub fn can_error(&self) -> bool {
+        self.can != 0
     }
 }
 

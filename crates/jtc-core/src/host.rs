@@ -7,12 +7,17 @@ use jtc_wire::{
 use crate::config::{PidGains, TableOf};
 use crate::controller::{Controller, Given};
 use crate::defaults;
+use crate::nodes::GRIPPER;
 use crate::{JOINTS, State, Tes};
 
 /// Trajectory points copied in one tick.
 const POINTS_PER_TICK: usize = 64;
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
+
+/// Joints and gripper in a mask of nodes.
+const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
+const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
 /// How far a long frame is worked off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -121,8 +126,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.teaching = false;
                 Progress::Done
             }
+            // J-23: torque would be taken from a moving arm.
+            Command::ResetCanDevices { nodes }
+                if nodes & JOINTS_MASK != 0 && matches!(self.state, State::Operate | State::Teaching) =>
+            {
+                Progress::Refused(DataStatus::NotAllowed)
+            }
             Command::ResetCanDevices { nodes } => {
                 self.nodes.reset(nodes);
+                // It is not to start by itself when the gripper is back.
+                self.pump &= nodes & GRIPPER_MASK == 0;
                 Progress::Done
             }
             Command::GripperControl { pump }

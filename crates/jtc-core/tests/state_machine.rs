@@ -91,13 +91,6 @@ fn j20_the_gripper_can_be_absent() {
     rig.defaults();
     rig.run(3000);
     assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
-    // With a gripper configured its silence is an error.
-    let mut rig = Rig::new(Config::avena());
-    rig.nodes[6].silent = true;
-    rig.defaults();
-    rig.run(3000);
-    assert_eq!(rig.state(), State::Error);
-    assert_eq!(rig.status().can_current, 1 << 14);
 }
 
 #[test]
@@ -291,7 +284,7 @@ fn j12_one_broadcast_a_tick_and_other_frames_in_one_tick_of_four() {
 
 #[test]
 fn j14_five_unanswered_moves_are_a_receive_timeout() {
-    for node in 0..7 {
+    for node in 0..6 {
         let mut rig = Rig::holding();
         rig.nodes[node].silent = true;
         let from = rig.sent.len();
@@ -478,22 +471,6 @@ fn j25_teaching_is_refused_outside_holdpos() {
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     rig.run(2);
     assert_eq!(rig.state(), State::HoldPos);
-}
-
-#[test]
-fn the_pump_follows_the_host_and_stops_on_error() {
-    let mut rig = Rig::holding();
-    rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]);
-    rig.run(5);
-    assert!(rig.pump);
-    rig.safety_input = false;
-    rig.run(5);
-    assert!(!rig.pump);
-    assert_eq!(rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]), DataStatus::NotAllowed);
-    rig.safety_input = true;
-    rig.clear(true, 0);
-    rig.run(200);
-    assert!(!rig.pump, "it does not start again by itself");
 }
 
 #[test]

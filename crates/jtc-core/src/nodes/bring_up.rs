@@ -1,12 +1,14 @@
 //! The frame of each tick: Move, or what brings a node up in its place (J-12, J-20).
 use jtc_bus::{Frame, Request, Target, fsm};
 
-use super::{Goal, Node, Nodes};
+use super::{GRIPPER, Goal, Node, Nodes};
 use crate::config::Config;
 use crate::{JOINTS, NODES};
 
 /// Ticks between two frames that take the place of Move (J-12: at most one tick of four).
 const MOVES_BETWEEN: u8 = 3;
+/// The same while torque is on and only the gripper is in want of such a frame.
+const MOVES_ASIDE: u8 = 19;
 
 impl Nodes {
     /// The frame of this tick (J-12). `must_move`: the first frame after an error, or after power is taken away, is Move.
@@ -39,16 +41,23 @@ impl Nodes {
             node.restart(config);
             return Some(Request::Reset(n as u8));
         }
-        let mut target = [Target::NoChange; NODES];
-        let mut change = false;
-        for (node, target) in self.all().iter().zip(&mut target) {
-            *target = node.request(goal);
-            change |= *target != Target::NoChange;
+        let target = self.targets(goal, config);
+        let change = target.iter().any(|&t| t != Target::NoChange);
+        let joints_wait = goal == Goal::Ready && self.joints().iter().any(Node::wants_configuration);
+        let gripper_waits = goal != Goal::Down
+            && self.gripper_answers(config)
+            && self.gripper_node().is_some_and(Node::wants_configuration);
+        if goal == Goal::Enabled && self.moves < MOVES_ASIDE && all_unchanged(&target[..JOINTS]) {
+            // What the gripper alone is in want of leaves the arm its torque in nearly every tick (J-23).
+            return None;
         }
-        let configure = goal == Goal::Ready && self.all().iter().any(Node::wants_configuration);
         // Nodes that are enabled refuse their configuration and should not be: they come first.
-        let enabled = self.all().iter().any(|node| node.report.fsm == fsm::ENABLED);
-        if configure && !(change && (self.configured_last || enabled)) {
+        let to_disable = self
+            .nodes
+            .iter()
+            .zip(&target)
+            .any(|(node, &target)| target == Target::Ready && node.report.fsm == fsm::ENABLED);
+        if (joints_wait || gripper_waits) && !(change && (self.configured_last || to_disable)) {
             self.configured_last = true;
             return Some(Request::ChangeMode {
                 mode: [1; JOINTS],
@@ -59,4 +68,30 @@ impl Nodes {
         self.configured_last = false;
         change.then_some(Request::ChangeFsm { target })
     }
+
+    /// What each node is asked for.
+    fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
+        let mut target = [Target::NoChange; NODES];
+        for (node, target) in self.joints().iter().zip(&mut target) {
+            *target = node.request(goal);
+        }
+        target[GRIPPER] = self.gripper_target(goal, config);
+        target
+    }
+
+    /// What the gripper is asked for: it is brought up in any state with torque as well, on the side (J-23).
+    fn gripper_target(&self, goal: Goal, config: &Config) -> Target {
+        let Some(node) = self.gripper_node().filter(|_| self.gripper_answers(config)) else {
+            return Target::NoChange;
+        };
+        if goal != Goal::Enabled && self.gripper_keeps_part(config) && !node.clear {
+            return Target::NoChange;
+        }
+        let brought_up = node.configured && !node.starting();
+        node.request(if goal == Goal::Enabled && !brought_up { Goal::Ready } else { goal })
+    }
+}
+
+fn all_unchanged(target: &[Target]) -> bool {
+    target.iter().all(|&t| t == Target::NoChange)
 }

@@ -14,6 +14,8 @@ pub(crate) use node::{Goal, Node};
 
 /// Node number of the gripper.
 pub(crate) const GRIPPER: usize = 6;
+/// CAN flag of the gripper's receive timeout.
+const GRIPPER_FLAG: u32 = 1 << (8 + GRIPPER);
 /// Frames looked at in one tick.
 const FRAMES_MAX: usize = 32;
 
@@ -25,6 +27,7 @@ pub(crate) struct Nodes {
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
     gripper: bool,
+    gripper_lost: bool,
     /// Measured state of the gripper.
     pub pump: bool,
     pub pressure: [bool; 2],
@@ -49,6 +52,7 @@ impl Nodes {
             position: [0.0; JOINTS],
             velocity: [0.0; JOINTS],
             gripper: config.gripper,
+            gripper_lost: false,
             pump: false,
             pressure: [false; 2],
             ignored: 0,
@@ -67,6 +71,35 @@ impl Nodes {
     /// Those nodes.
     fn all(&self) -> &[Node] {
         if self.gripper { &self.nodes } else { &self.nodes[..JOINTS] }
+    }
+
+    fn joints(&self) -> &[Node] {
+        &self.nodes[..JOINTS]
+    }
+
+    /// The gripper, if there is one.
+    fn gripper_node(&self) -> Option<&Node> {
+        self.nodes.get(GRIPPER).filter(|_| self.gripper)
+    }
+
+    fn gripper_answers(&self, config: &Config) -> bool {
+        self.gripper_node().is_some_and(|node| node.missed < config.missed_moves_max)
+    }
+
+    /// The gripper is enabled, and the configuration has it keep its part when the arm loses its torque.
+    pub fn gripper_keeps_part(&self, config: &Config) -> bool {
+        !config.pump_off_on_error && self.gripper_node().is_some_and(|node| node.report.fsm == fsm::ENABLED)
+    }
+
+    /// The gripper left OperationEnable or lost its configuration in this tick: a pump that was commanded before does not
+    /// start again by itself (J-23).
+    pub fn gripper_lost(&self) -> bool {
+        self.gripper_lost
+    }
+
+    /// CAN flags of a gripper that does not answer: they are shown, and no error (J-14, J-23).
+    pub fn gripper_flags(&self, config: &Config) -> u32 {
+        if self.gripper && !self.gripper_answers(config) { GRIPPER_FLAG } else { 0 }
     }
 
     pub fn node(&self, n: usize) -> &Node {
@@ -88,6 +121,7 @@ impl Nodes {
     pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal) {
         // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
         let (mut answered, mut configured_before) = (0u8, 0u8);
+        let gripper_before = self.nodes[GRIPPER];
         for (n, node) in self.nodes.iter_mut().enumerate() {
             node.misbehaved = false;
             node.deaf_left = node.deaf_left.saturating_sub(1);
@@ -128,6 +162,9 @@ impl Nodes {
                 if node.valid { (node.report.position, node.report.velocity) } else { (0.0, 0.0) };
         }
         self.count_silence(inputs, config, answered);
+        let gripper = &self.nodes[GRIPPER];
+        self.gripper_lost = (gripper_before.report.fsm == fsm::ENABLED && gripper.report.fsm != fsm::ENABLED)
+            || (gripper_before.configured && !gripper.configured);
         self.watch(config, goal);
     }
 
@@ -179,22 +216,24 @@ impl Nodes {
                 node.boot_left = 0;
             } else if self.sent_move && on_the_bus && node.boot_left == 0 {
                 node.missed = node.missed.saturating_add(1).min(config.missed_moves_max);
-                if node.missed == config.missed_moves_max {
-                    // It may have lost its supply, and its configuration with it, in any state.
+                let enabled_gripper = n == GRIPPER && node.report.fsm == fsm::ENABLED;
+                if node.missed == config.missed_moves_max && !enabled_gripper {
+                    // It may have lost its supply, and its configuration with it, in any state. An enabled gripper shows
+                    // that by its state when it answers again; if it is enabled still, it has held its part meanwhile.
                     (node.configured, node.valid, node.refused) = (false, false, false);
                 }
             }
         }
     }
 
-    /// Sees nodes that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
+    /// Sees joints that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
     fn watch(&mut self, config: &Config, goal: Goal) {
-        for (n, node) in self.nodes.iter_mut().enumerate() {
+        for node in self.nodes.iter_mut().take(JOINTS) {
             if goal != Goal::Enabled {
                 (node.enabled, node.enable_wait) = (false, 0);
                 continue;
             }
-            if n < JOINTS && node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
+            if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
                 node.misbehaved = true;
             }
             if node.report.fsm == fsm::ENABLED {
@@ -212,48 +251,49 @@ impl Nodes {
         }
     }
 
-    /// CAN flags of this tick: bit 0 transmit timeout or bus-off, bit 8+n receive timeout of node n.
+    /// CAN flags of this tick that are errors: bit 0 transmit timeout or bus-off, bit 8+n receive timeout of joint n.
     pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
         let mut flags = u32::from(inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max);
-        for (n, node) in self.all().iter().enumerate() {
+        for (n, node) in self.joints().iter().enumerate() {
             flags |= u32::from(node.missed >= config.missed_moves_max) << (8 + n);
         }
         flags
     }
 
-    /// A node has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared do not count.
+    /// A joint has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared do not count.
     pub fn external_error(&self, powered: bool) -> bool {
-        self.all()
-            .iter()
-            .enumerate()
-            .any(|(n, node)| node.misbehaved || ((powered || !node.clear) && node.faulty(n < JOINTS)))
+        self.joints().iter().any(|node| node.misbehaved || ((powered || !node.clear) && node.faulty()))
     }
 
-    /// A node is still being cleared: the cause of its error is not gone.
+    /// A joint is still being cleared: the cause of its error is not gone.
     pub fn clearing(&self) -> bool {
-        self.all().iter().any(|node| node.clear)
+        self.joints().iter().any(|node| node.clear)
     }
 
-    /// Node init word: bit n set while node n is not initialised.
-    pub fn init_word(&self) -> u8 {
+    /// Node init word: bit n set while node n is not initialised, or the gripper does not answer.
+    pub fn init_word(&self, config: &Config) -> u8 {
         let mut word = 0;
         for (n, node) in self.all().iter().enumerate() {
             let accurate = n == GRIPPER || node.report.warnings & warning::POSITION_NOT_ACCURATE == 0;
-            if node.fallen_back() || !accurate {
+            let answers = n != GRIPPER || self.gripper_answers(config);
+            if node.fallen_back() || !accurate || !answers {
                 word |= 1 << n;
             }
         }
         word
     }
 
-    /// A node has lost its configuration or fallen back to Start or Init (J-20).
+    /// A joint has lost its configuration or fallen back to Start or Init (J-20).
     pub fn fallen_back(&self) -> bool {
-        self.all().iter().any(Node::fallen_back)
+        self.joints().iter().any(Node::fallen_back)
     }
 
-    /// Init is done: every node is initialised and reports ReadyToOperate.
-    pub fn all_ready(&self) -> bool {
-        self.init_word() == 0 && self.all().iter().all(|node| node.report.fsm == fsm::READY)
+    /// Init is done: every node is initialised and reports ReadyToOperate. A gripper that keeps its part stays enabled.
+    pub fn all_ready(&self, config: &Config) -> bool {
+        let ready = |node: &Node| node.report.fsm == fsm::READY;
+        self.init_word(config) == 0
+            && self.joints().iter().all(ready)
+            && (self.gripper_keeps_part(config) || self.gripper_node().is_none_or(ready))
     }
 
     /// ClearCurrentErrors for the nodes in `mask`: those that have something to clear are commanded to Init until they follow.
@@ -262,7 +302,7 @@ impl Nodes {
         let present = self.present();
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
             let joint = n < JOINTS;
-            let to_clear = node.faulty(joint) || (limp && joint && node.report.mc_occurred != 0);
+            let to_clear = node.faulty() || (limp && joint && node.report.mc_occurred != 0);
             node.clear |= mask & (1 << n) != 0 && to_clear;
         }
     }

@@ -59,10 +59,11 @@ impl Node {
         !self.valid || self.starting()
     }
 
-    pub fn faulty(&self, joint: bool) -> bool {
+    /// Reports an error. A gripper knows no warnings.
+    pub fn faulty(&self) -> bool {
         let r = &self.report;
         // Drives set this warning also before they are configured, whatever the line is.
-        let safety_line = if joint && self.valid { r.warnings & warning::SAFETY_LINE } else { 0 };
+        let safety_line = if self.valid { r.warnings & warning::SAFETY_LINE } else { 0 };
         self.seen && (fsm::is_fault(r.fsm) || (r.errors | r.mc_current | safety_line) != 0)
     }
 

@@ -1,0 +1,227 @@
+//! The gripper: it is brought up beside the arm, never takes its torque away, and never starts its pump by itself (J-14, J-23).
+mod rig;
+
+use jtc_bus::{Request, fsm};
+use jtc_core::{Config, State, Tes};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use rig::{Rig, rest};
+
+const GRIPPER: usize = 6;
+const FLAG: u32 = 1 << 14;
+const POWERED: [State; 3] = [State::HoldPos, State::Operate, State::Teaching];
+
+/// In a state with torque, the pump on.
+fn powered(state: State) -> Rig {
+    powered_with(Config::avena(), state)
+}
+
+fn powered_with(config: Config, state: State) -> Rig {
+    let mut rig = Rig::holding_with(config);
+    pump(&mut rig, true);
+    match state {
+        State::Operate => {
+            let points: Vec<RawPoint> = (0..400).map(|_| rest(0)).collect();
+            rig.upload(&points, 10);
+            rig.exec(ExecCommand::Execute);
+            rig.until(500, |r| r.controller.telemetry().point > 5);
+        }
+        State::Teaching => {
+            rig.ask(FrameType::TeachingModeEnable, &[]);
+            rig.run(200);
+        }
+        _ => {}
+    }
+    rig.run(3);
+    assert_eq!((rig.state(), rig.pump), (state, true));
+    rig
+}
+
+fn pump(rig: &mut Rig, on: bool) {
+    assert_eq!(rig.ask(FrameType::GripperControl, &[u8::from(on), 0, 0, 0]), DataStatus::NoError);
+    rig.run(2);
+}
+
+/// Runs, and sees that the arm is left alone: no error, no other state, nothing but Move in 19 of 20 ticks.
+fn undisturbed(rig: &mut Rig, ticks: usize, state: State) {
+    let from = rig.sent.len();
+    for _ in 0..ticks {
+        rig.tick();
+        assert_eq!((rig.state(), rig.errors()), (state, 0));
+        assert!(rig.last.safety_output);
+    }
+    let others = rig.sent[from..].iter().filter(|r| !matches!(r, Request::Move { .. })).count();
+    assert!(others <= ticks / 20 + 1, "{others} frames of {ticks} take the place of Move");
+    assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED && n.resets == 1));
+}
+
+#[test]
+fn j23_a_gripper_that_falls_silent_is_shown_and_nothing_more() {
+    for state in POWERED {
+        let mut rig = powered(state);
+        rig.nodes[GRIPPER].silent = true;
+        undisturbed(&mut rig, 300, state);
+        let status = rig.status();
+        assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, FLAG, FLAG));
+        assert_eq!((status.errors, status.occurred, status.node_init), (0, 0, 1 << GRIPPER));
+        // It has been enabled all the time, its pump too: it keeps its part.
+        rig.nodes[GRIPPER].silent = false;
+        undisturbed(&mut rig, 300, state);
+        let status = rig.status();
+        assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, 0, FLAG));
+        assert_eq!((status.node_init, rig.nodes[GRIPPER].report.fsm), (0, fsm::ENABLED));
+        assert!(rig.pump);
+    }
+}
+
+#[test]
+fn j23_a_gripper_that_resets_is_configured_again_on_the_side() {
+    for state in POWERED {
+        for boot_ticks in [3, 300] {
+            let mut rig = powered(state);
+            rig.nodes[GRIPPER].restart();
+            rig.nodes[GRIPPER].booting = boot_ticks;
+            rig.statuses.clear();
+            undisturbed(&mut rig, boot_ticks as usize + 200, state);
+            assert!(boot_ticks == 3 || rig.statuses.iter().any(|s| s.node_init == 1 << GRIPPER));
+            assert_eq!(rig.nodes[GRIPPER].report.fsm, fsm::ENABLED);
+            assert!(rig.nodes[GRIPPER].configured && rig.status().node_init == 0);
+            assert!(!rig.pump, "J-23: the pump waits for a command");
+            pump(&mut rig, true);
+            assert!(rig.pump);
+        }
+    }
+}
+
+#[test]
+fn j23_a_gripper_that_leaves_operation_enable_is_enabled_again_without_its_pump() {
+    for state in POWERED {
+        let mut rig = powered(state);
+        rig.nodes[GRIPPER].report.fsm = fsm::READY;
+        undisturbed(&mut rig, 100, state);
+        assert_eq!((rig.nodes[GRIPPER].report.fsm, rig.pump), (fsm::ENABLED, false));
+        // A fault of it is shown, and is cleared as any node's.
+        rig.nodes[GRIPPER].fault();
+        undisturbed(&mut rig, 100, state);
+        assert_eq!(rig.status().gripper.unwrap().fsm, fsm::FAULT);
+        rig.clear(false, 1 << GRIPPER);
+        undisturbed(&mut rig, 300, state);
+        assert_eq!((rig.nodes[GRIPPER].report.fsm, rig.pump), (fsm::ENABLED, false));
+    }
+}
+
+#[test]
+fn j23_joints_are_not_reset_while_the_arm_may_move() {
+    for state in [State::Operate, State::Teaching] {
+        let mut rig = powered(state);
+        for mask in [0x01, 0x20, 0x3F, 0x7F, 0xFF] {
+            assert_eq!(rig.ask(FrameType::ResetCanDevices, &[mask, 0, 0, 0]), DataStatus::NotAllowed);
+        }
+        undisturbed(&mut rig, 100, state);
+        assert_eq!(rig.nodes[GRIPPER].resets, 1, "a refused frame changes nothing at all");
+        assert!(rig.pump);
+        // The gripper alone is another matter.
+        assert_eq!(rig.ask(FrameType::ResetCanDevices, &[0x40, 0, 0, 0]), DataStatus::NoError);
+        undisturbed(&mut rig, 400, state);
+        assert_eq!((rig.nodes[GRIPPER].resets, rig.nodes[GRIPPER].report.fsm), (2, fsm::ENABLED));
+        assert!(!rig.pump, "the pump does not start again by itself");
+    }
+}
+
+#[test]
+fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
+    for mask in [0x40, 0x7F] {
+        let mut rig = powered(State::HoldPos);
+        rig.ask(FrameType::ResetCanDevices, &[mask, 0, 0, 0]);
+        let from = rig.sent.len();
+        rig.run(800);
+        assert!(rig.sent[from..].iter().all(|r| !matches!(r, Request::Move { pump: true, .. })));
+        assert_eq!(rig.nodes[GRIPPER].resets, 2);
+        assert_eq!((rig.state(), rig.nodes[GRIPPER].report.fsm), (State::HoldPos, fsm::ENABLED));
+        pump(&mut rig, true);
+        assert!(rig.pump);
+    }
+    // Nor after a joint took the controller back to Init.
+    let mut rig = powered(State::HoldPos);
+    rig.nodes[2].configured = false;
+    rig.nodes[2].report.fsm = fsm::INIT;
+    rig.run(400);
+    assert_eq!((rig.state(), rig.pump), (State::HoldPos, false));
+}
+
+#[test]
+fn j14_a_gripper_that_is_not_there_is_no_error_and_keeps_the_controller_in_init() {
+    let mut rig = Rig::new(Config::avena());
+    rig.nodes[GRIPPER].silent = true;
+    rig.defaults();
+    rig.run(3000);
+    assert_eq!((rig.state(), rig.errors()), (State::Init, 0));
+    let status = rig.status();
+    assert_eq!((status.can_error, status.can_current, status.node_init), (0, FLAG, 1 << GRIPPER));
+    // When it comes, it is brought up like the others.
+    rig.nodes[GRIPPER].silent = false;
+    rig.run(200);
+    assert_eq!((rig.state(), rig.status().can_current), (State::HoldPos, 0));
+}
+
+/// An error and the way back to HoldPos.
+fn error_and_clear(rig: &mut Rig) {
+    rig.safety_input = false;
+    rig.run(100);
+    assert_eq!(rig.state(), State::Error);
+    rig.safety_input = true;
+}
+
+#[test]
+fn the_pump_is_switched_off_by_an_error_where_the_setting_says_so() {
+    for state in POWERED {
+        let mut rig = powered(state);
+        error_and_clear(&mut rig);
+        assert_eq!((rig.nodes[GRIPPER].report.fsm, rig.pump), (fsm::READY, false));
+        assert_eq!(rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]), DataStatus::NotAllowed);
+        rig.clear(true, 0x7F);
+        rig.run(400);
+        assert_eq!((rig.state(), rig.tes(), rig.pump), (State::HoldPos, Tes::Null, false));
+    }
+}
+
+#[test]
+fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
+    let config = Config { pump_off_on_error: false, ..Config::avena() };
+    for state in POWERED {
+        let mut rig = powered_with(config.clone(), state);
+        let held = |rig: &Rig| rig.pump && rig.nodes[GRIPPER].report.fsm == fsm::ENABLED;
+        let from = rig.sent.len();
+        error_and_clear(&mut rig);
+        assert!(held(&rig), "{:?}", rig.nodes[GRIPPER]);
+        assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY));
+        rig.clear(true, 0x7F);
+        rig.run(400);
+        assert_eq!(rig.state(), State::HoldPos);
+        assert!(held(&rig));
+        // Through Init as well.
+        rig.nodes[2].configured = false;
+        rig.nodes[2].report.fsm = fsm::INIT;
+        rig.run(400);
+        assert_eq!(rig.state(), State::HoldPos);
+        assert!(held(&rig));
+        assert!(rig.sent[from..].iter().all(|r| !matches!(r, Request::Move { pump: false, .. })));
+        // The host can let go of it in Error.
+        error_and_clear(&mut rig);
+        pump(&mut rig, false);
+        assert!(!rig.pump);
+        rig.clear(true, 0x7F);
+        rig.run(400);
+        assert!(!rig.pump, "it does not start by itself");
+    }
+    // A pump that did not run when the error came does not start after it.
+    let mut rig = Rig::holding_with(config);
+    rig.nodes[GRIPPER].report.fsm = 12;
+    rig.nodes[GRIPPER].slow_enable = true;
+    pump(&mut rig, true);
+    error_and_clear(&mut rig);
+    rig.nodes[GRIPPER].report.fsm = fsm::READY;
+    rig.nodes[GRIPPER].slow_enable = false;
+    rig.clear(true, 0x7F);
+    rig.run(400);
+    assert_eq!((rig.state(), rig.nodes[GRIPPER].report.fsm, rig.pump), (State::HoldPos, fsm::ENABLED, false));
+}

@@ -51,14 +51,13 @@ pub struct Config {
     pub gripper_config_bits: u8,
     /// Ticks between statuses without a response (J-04).
     pub status_period_ms: u16,
-    /// Consecutive Moves that may stay unanswered or unacknowledged (J-14).
+    /// Consecutive Moves that stay unanswered or unacknowledged until that is an error (J-14), and that stay without a
+    /// usable answer of a joint (J-35). Until then the joint's motion is predicted (J-63).
     pub missed_moves_max: u8,
     /// Silence of a node after its reset that is no error yet, ms.
     pub node_boot_ms: u32,
     /// Longest READY→ENABLE, ms (J-16).
     pub enable_timeout_ms: u32,
-    /// Change of a measured position in one tick that no arm can make, rad: an external joint error.
-    pub position_jump_max: f64,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
     /// Time scale ramp for pause, stop and resume, ms (J-33); made longer where acceleration or torque limits ask for it.

@@ -118,7 +118,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         // What has come in.
         let before = self.state;
-        self.nodes.take(inputs, &self.config, self.goal());
+        self.nodes.take(inputs, &self.config, self.goal(), &self.motion.set.velocity);
         self.pump &= !self.nodes.gripper_lost();
         // A fault is known before a command that may clear it: a clear in this very tick does not hide it.
         self.check_errors(inputs);

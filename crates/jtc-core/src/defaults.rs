@@ -34,7 +34,6 @@ impl Config {
             missed_moves_max: 5,
             node_boot_ms: 2_000,
             enable_timeout_ms: 10_000,
-            position_jump_max: 0.1,
             start_tolerance_rad: 0.02,
             ramp_ms: 200,
             torque_over_ms: 10,

@@ -100,7 +100,7 @@ enum Rebase {
 }
 
 /// Rises from 0 to 1 without a corner.
-fn smooth(u: f64) -> f64 {
+pub(crate) fn smooth(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u * u * (3.0 - 2.0 * u)
 }

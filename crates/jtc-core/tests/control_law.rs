@@ -125,8 +125,7 @@ fn j43_position_error_and_torque_zero_the_torque_of_the_same_tick() {
     let mut config = Config::avena();
     config.joints[3].torque_max = 1e6;
     let mut rig = Rig::holding_with(config);
-    rig.follow = false;
-    rig.nodes[3].report.position = 0.095;
+    rig.push(3, 0.095);
     rig.run(2);
     assert_eq!(rig.state(), State::Error);
     assert_eq!(rig.status().joints[3].internal, joint_error::POSITION_ERROR);
@@ -139,8 +138,7 @@ fn j43_position_error_and_torque_zero_the_torque_of_the_same_tick() {
     );
 
     let mut rig = Rig::holding_with(Config { torque_over_ms: 0, ..Config::avena() });
-    rig.follow = false;
-    rig.nodes[5].report.position = 0.02; // 80 N·m wanted, 40 N·m allowed
+    rig.push(5, 0.02); // 80 N·m wanted, 40 N·m allowed
     rig.run(2);
     assert_eq!(rig.status().joints[5].internal, joint_error::TORQUE);
     assert_eq!(rig.torque, [0.0; 6]);
@@ -149,9 +147,8 @@ fn j43_position_error_and_torque_zero_the_torque_of_the_same_tick() {
 #[test]
 fn j43_the_torque_saturates_at_its_limit_for_a_while_at_most_and_j41_holds_the_integral() {
     let mut rig = Rig::holding();
-    rig.follow = false;
-    rig.nodes[5].report.position = -0.02;
-    rig.run(4);
+    rig.push(5, -0.012);
+    rig.run(1);
     assert_eq!(rig.state(), State::HoldPos);
     assert_eq!(rig.controller.telemetry().joints[5].torque, 40.0);
     let integral = rig.controller.telemetry().joints[5].torque_i;
@@ -238,8 +235,7 @@ fn j25_teaching_compensates_gravity_and_brakes_above_the_speed_limit() {
     let mut rig = Rig::holding();
     rig.ask(FrameType::TeachingModeEnable, &[]);
     rig.run(150);
-    rig.nodes[1].report.position = 0.05;
-    rig.follow = false;
+    rig.push(1, 0.05);
     rig.run(3);
     assert_eq!(torques(&rig), model(&rig), "nothing but the model");
     rig.nodes[2].report.velocity = 1.5;

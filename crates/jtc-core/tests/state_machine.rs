@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_bus::{Frame, Request, Target, fsm, warning};
-use jtc_core::{Config, State, Tes, error, joint_error};
+use jtc_core::{Config, State, Tes, error};
 use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response};
 use rig::{Rig, rest};
 
@@ -471,18 +471,6 @@ fn j25_teaching_is_refused_outside_holdpos() {
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     rig.run(2);
     assert_eq!(rig.state(), State::HoldPos);
-}
-
-#[test]
-fn an_impossible_jump_of_a_measured_position_is_an_error() {
-    let mut rig = Rig::holding();
-    rig.ask(FrameType::TeachingModeEnable, &[]);
-    rig.run(5);
-    rig.follow = false;
-    rig.nodes[1].report.position += 0.5;
-    rig.run(2);
-    assert_eq!(rig.errors() & error::EXTERNAL_JOINTS, error::EXTERNAL_JOINTS);
-    assert_eq!(rig.status().joints[1].internal & joint_error::POSITION, 0);
 }
 
 #[test]

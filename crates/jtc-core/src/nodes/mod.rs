@@ -7,8 +7,10 @@ use crate::io::Inputs;
 use crate::{JOINTS, NODES};
 
 mod bring_up;
+mod measure;
 mod node;
 
+use measure::{Reading, Tick};
 use node::starting;
 pub(crate) use node::{Goal, Node};
 
@@ -83,7 +85,7 @@ impl Nodes {
     }
 
     fn gripper_answers(&self, config: &Config) -> bool {
-        self.gripper_node().is_some_and(|node| node.missed < config.missed_moves_max)
+        self.gripper_node().is_some_and(|node| node.silent < config.missed_moves_max)
     }
 
     /// The gripper is enabled, and the configuration has it keep its part when the arm loses its torque.
@@ -107,18 +109,18 @@ impl Nodes {
         self.nodes.get(n).unwrap_or(&self.nodes[0])
     }
 
-    /// Measured positions, rad; those that do not count yet are 0.
+    /// Measured positions, rad, predicted where answers are missing (J-63); those that do not count yet are 0.
     pub fn positions(&self) -> &[f64; JOINTS] {
         &self.position
     }
 
-    /// Measured velocities, rad/s; those that do not count yet are 0.
+    /// Measured velocities, rad/s, alike.
     pub fn velocities(&self) -> &[f64; JOINTS] {
         &self.velocity
     }
 
-    /// Takes in what came over the bus since the last tick.
-    pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal) {
+    /// Takes in what came over the bus since the last tick. `commanded`: velocities, rad/s.
+    pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &[f64; JOINTS]) {
         // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         let gripper_before = self.nodes[GRIPPER];
@@ -131,7 +133,7 @@ impl Nodes {
         for frame in inputs.bus.iter().take(FRAMES_MAX) {
             match Answer::parse(frame, scale) {
                 Ok(Answer::Joint { node, report }) => {
-                    self.report(node.into(), &report, config, configured_before, &mut answered)
+                    self.report(node.into(), &report, configured_before, &mut answered)
                 }
                 Ok(Answer::Gripper(g)) => {
                     (self.pump, self.pressure) = (g.pump, [g.pressure1, g.pressure2]);
@@ -141,7 +143,7 @@ impl Nodes {
                         warnings: g.warnings,
                         ..JointReport::default()
                     };
-                    self.report(GRIPPER, &report, config, configured_before, &mut answered);
+                    self.report(GRIPPER, &report, configured_before, &mut answered);
                 }
                 Ok(Answer::Mode { node, accepted }) => {
                     if let Some(node) =
@@ -156,39 +158,28 @@ impl Nodes {
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
         }
-        for j in 0..JOINTS {
-            let node = &self.nodes[j];
-            (self.position[j], self.velocity[j]) =
-                if node.valid { (node.report.position, node.report.velocity) } else { (0.0, 0.0) };
-        }
-        self.count_silence(inputs, config, answered);
+        let usable = self.measure(answered, commanded, config);
+        self.count_missing(inputs, config, answered, usable);
         let gripper = &self.nodes[GRIPPER];
         self.gripper_lost = (gripper_before.report.fsm == fsm::ENABLED && gripper.report.fsm != fsm::ENABLED)
             || (gripper_before.configured && !gripper.configured);
         self.watch(config, goal);
     }
 
-    fn report(
-        &mut self,
-        n: usize,
-        report: &JointReport,
-        config: &Config,
-        configured_before: u8,
-        answered: &mut u8,
-    ) {
+    fn report(&mut self, n: usize, report: &JointReport, configured_before: u8, answered: &mut u8) {
         let Some(node) = self.nodes.get_mut(n).filter(|node| node.deaf_left == 0) else { return };
         *answered |= 1 << n;
         let before = node.report.fsm;
-        let jump = (report.position - node.report.position).abs();
-        if node.valid && jump > config.position_jump_max {
-            node.misbehaved = true;
+        if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
+            // It may go anywhere when it becomes accurate.
+            node.measured.forget();
         }
         node.report = *report;
         node.seen = true;
         if node.starting() {
             if !starting(before) || report.fsm == fsm::START {
                 // Fallen back: the configuration is lost and has to be accepted again.
-                (node.configured, node.valid, node.refused) = (false, false, false);
+                node.lose_configuration();
             }
             if report.fsm != 10 {
                 node.clear = false;
@@ -199,8 +190,29 @@ impl Nodes {
         }
     }
 
-    /// Counts Moves without answer and without acknowledge (J-14).
-    fn count_silence(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8) {
+    /// Positions and velocities from the nodes that `answered`; returns those whose answers are usable.
+    fn measure(&mut self, answered: u8, commanded: &[f64; JOINTS], config: &Config) -> u8 {
+        let mut usable = answered;
+        for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
+            let reading = Reading { position: node.report.position, velocity: node.report.velocity };
+            let tick = Tick {
+                answer: (answered & (1 << j) != 0).then_some(reading),
+                expected: self.sent_move,
+                commanded: commanded[j],
+                elapsed_ms: 1,
+                velocity_max: config.joints[j].velocity_max,
+            };
+            if node.valid && !node.measured.step(&tick, config) {
+                usable &= !(1 << j);
+            }
+            let Reading { position, velocity } = node.measured.used();
+            (self.position[j], self.velocity[j]) = (position, velocity);
+        }
+        usable
+    }
+
+    /// Counts Moves without answer, without usable answer, and without acknowledge (J-14, J-35).
+    fn count_missing(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8, usable: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
         // While every node boots there is nobody to acknowledge.
         let somebody = self.all().iter().any(|node| node.boot_left == 0);
@@ -210,18 +222,30 @@ impl Nodes {
             self.unacknowledged = self.unacknowledged.saturating_add(1);
         }
         for (n, node) in self.nodes.iter_mut().enumerate() {
-            node.boot_left = node.boot_left.saturating_sub(1);
-            if answered & (1 << n) != 0 {
+            let (answered, usable) = (answered & (1 << n) != 0, usable & (1 << n) != 0);
+            node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
+            let unanswered = !answered && self.sent_move && on_the_bus && node.boot_left == 0;
+            let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
+            if answered {
+                node.silent = 0;
+            } else if unanswered {
+                node.silent = more(node.silent);
+            }
+            if usable {
                 node.missed = 0;
-                node.boot_left = 0;
-            } else if self.sent_move && on_the_bus && node.boot_left == 0 {
-                node.missed = node.missed.saturating_add(1).min(config.missed_moves_max);
-                let enabled_gripper = n == GRIPPER && node.report.fsm == fsm::ENABLED;
-                if node.missed == config.missed_moves_max && !enabled_gripper {
-                    // It may have lost its supply, and its configuration with it, in any state. An enabled gripper shows
-                    // that by its state when it answers again; if it is enabled still, it has held its part meanwhile.
-                    (node.configured, node.valid, node.refused) = (false, false, false);
-                }
+            } else if answered || unanswered {
+                node.missed = more(node.missed);
+            }
+            let enabled_gripper = n == GRIPPER && node.report.fsm == fsm::ENABLED;
+            if node.silent == config.missed_moves_max && !enabled_gripper {
+                // It may have lost its supply, and its configuration with it, in any state. An enabled gripper shows that
+                // by its state when it answers again; if it is enabled still, it has held its part meanwhile.
+                node.lose_configuration();
+            } else if node.missed == config.missed_moves_max && n < JOINTS {
+                // J-35: it answers, but not with positions that it can have.
+                node.misbehaved = true;
+                node.missed = 0;
+                node.measured.forget();
             }
         }
     }
@@ -255,7 +279,7 @@ impl Nodes {
     pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
         let mut flags = u32::from(inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max);
         for (n, node) in self.joints().iter().enumerate() {
-            flags |= u32::from(node.missed >= config.missed_moves_max) << (8 + n);
+            flags |= u32::from(node.silent >= config.missed_moves_max) << (8 + n);
         }
         flags
     }

@@ -1,6 +1,7 @@
 //! One node: what it last reported, how far its bring-up is, and which state it is asked for (J-16, J-20).
 use jtc_bus::{JointReport, Target, fsm, warning};
 
+use super::measure::Measurement;
 use crate::config::Config;
 
 /// Ticks after a reset in which a late answer of the node does not count.
@@ -30,7 +31,11 @@ pub(crate) struct Node {
     /// Refused its configuration in the state it is in.
     pub(super) refused: bool,
     /// Consecutive Moves left unanswered.
+    pub(super) silent: u8,
+    /// Consecutive Moves without a usable answer.
     pub(super) missed: u8,
+    /// Position and velocity, once they count.
+    pub(super) measured: Measurement,
     /// Ticks of silence that are no error yet.
     pub(super) boot_left: u32,
     pub(super) deaf_left: u8,
@@ -41,7 +46,7 @@ pub(crate) struct Node {
     /// Reported OperationEnable while that was wanted.
     pub(super) enabled: bool,
     pub(super) enable_wait: u32,
-    /// Misbehaved in this tick: left OperationEnable, did not enable in time, or its position jumped.
+    /// Misbehaved in this tick: left OperationEnable, did not enable in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }
 
@@ -70,6 +75,12 @@ impl Node {
     /// The node has restarted: nothing of what was known of it holds.
     pub fn restart(&mut self, config: &Config) {
         *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
+    }
+
+    /// The configuration has to be accepted again, and until then position and velocity do not count.
+    pub fn lose_configuration(&mut self) {
+        (self.configured, self.valid, self.refused) = (false, false, false);
+        self.measured = Measurement::default();
     }
 
     /// State that the node is asked for (J-16).

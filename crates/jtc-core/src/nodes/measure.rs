@@ -1,0 +1,197 @@
+//! Measured position and velocity of a joint, and what stands for them while its answers are missing (J-35, J-63).
+//!
+//! Terms: an answer is *usable* when its position is one that the joint can have reached since the last usable one. A tick
+//! without a usable answer takes the *prediction*: the last one, carried on at the rate at which the joint moved, and the
+//! change of the commanded velocity since. The first usable answer after missing ones differs from the prediction by an
+//! *offset*, which fades, so that neither the loss nor the return makes a step of position, nor of the derivative of its error.
+use crate::config::Config;
+use crate::motion::smooth;
+
+/// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
+const IMPLAUSIBLE: f64 = 3.0;
+/// Ticks over which the rate of a joint is taken.
+const WINDOW: usize = 5;
+/// Length of a tick, s.
+const DT: f64 = 0.001;
+
+/// Position and velocity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Reading {
+    /// rad.
+    pub position: f64,
+    /// rad/s.
+    pub velocity: f64,
+}
+
+/// What a tick says about a joint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tick {
+    /// What the joint answered, if it did.
+    pub answer: Option<Reading>,
+    /// A Move asked for an answer.
+    pub expected: bool,
+    /// Commanded velocity, rad/s.
+    pub commanded: f64,
+    /// Milliseconds since the last tick.
+    pub elapsed_ms: u32,
+    /// Velocity limit of the joint, rad/s.
+    pub velocity_max: f64,
+}
+
+/// What is known of a joint's motion.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Measurement {
+    /// What the control law uses.
+    used: Reading,
+    /// There is a last usable answer.
+    known: bool,
+    /// The last usable answer, its position carried on since.
+    answer: Reading,
+    /// Milliseconds since then.
+    age_ms: u32,
+    /// Commanded velocity then, rad/s.
+    commanded: f64,
+    /// Rate of the used position then, rad/s.
+    rate: f64,
+    /// Used positions of the last ticks, oldest first, rad.
+    history: [f64; WINDOW],
+    /// An answer has been missing since then.
+    missing: bool,
+    /// Prediction less answer at the last return, and how long ago that was.
+    offset: Reading,
+    offset_ms: u32,
+}
+
+impl Measurement {
+    /// Position and velocity that the control law uses.
+    pub fn used(&self) -> Reading {
+        self.used
+    }
+
+    /// The next answer is taken as it is.
+    pub fn forget(&mut self) {
+        self.known = false;
+    }
+
+    /// One tick; false when the answer is not usable, or there is none.
+    pub fn step(&mut self, tick: &Tick, config: &Config) -> bool {
+        let change = tick.commanded - self.commanded;
+        self.age_ms = self.age_ms.saturating_add(tick.elapsed_ms);
+        self.offset_ms = self.offset_ms.saturating_add(tick.elapsed_ms);
+        self.answer.position += (self.rate + change) * f64::from(tick.elapsed_ms) * DT;
+        let mut left = 1.0 - smooth(f64::from(self.offset_ms) / f64::from(config.blend_ms.max(1)));
+
+        let reach = IMPLAUSIBLE * tick.velocity_max * f64::from(self.age_ms) * DT;
+        let usable = tick
+            .answer
+            .filter(|answer| !self.known || (answer.position - self.answer.position).abs() <= reach);
+        if let Some(answer) = usable {
+            if !self.known {
+                *self = Self { known: true, history: [answer.position; WINDOW], ..Self::default() };
+            } else if self.missing {
+                self.offset = Reading {
+                    position: self.answer.position + self.offset.position * left - answer.position,
+                    velocity: self.answer.velocity + change + self.offset.velocity * left - answer.velocity,
+                };
+                (self.offset_ms, left) = (0, 1.0);
+            }
+            self.answer = answer;
+            (self.age_ms, self.commanded, self.missing) = (0, tick.commanded, false);
+        } else {
+            self.missing |= tick.expected || tick.answer.is_some();
+        }
+
+        let change = tick.commanded - self.commanded;
+        self.used = Reading {
+            position: self.answer.position + self.offset.position * left,
+            velocity: self.answer.velocity + change + self.offset.velocity * left,
+        };
+        let [oldest, a, b, c, d] = self.history;
+        self.history = [a, b, c, d, self.used.position];
+        if usable.is_some() {
+            self.rate = (self.used.position - oldest) / (WINDOW as f64 * DT);
+        }
+        usable.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VELOCITY_MAX: f64 = 1.5;
+
+    fn tick(answer: Option<f64>, velocity: f64) -> Tick {
+        let answer = answer.map(|position| Reading { position, velocity });
+        Tick { answer, expected: true, commanded: velocity, elapsed_ms: 1, velocity_max: VELOCITY_MAX }
+    }
+
+    /// A joint that has moved at this velocity for a while; it is at 0 now.
+    fn moving(velocity: f64) -> Measurement {
+        let mut joint = Measurement::default();
+        for k in -20..=0 {
+            assert!(joint.step(&tick(Some(velocity * f64::from(k) * DT), velocity), &Config::avena()));
+        }
+        joint
+    }
+
+    #[test]
+    fn j63_a_missing_answer_is_predicted_from_the_motion() {
+        for velocity in [0.0, 0.4, -1.5] {
+            let mut joint = moving(velocity);
+            for k in 1..=4 {
+                assert!(!joint.step(&tick(None, velocity), &Config::avena()));
+                assert!((joint.used().position - velocity * f64::from(k) * DT).abs() < 1e-12);
+                assert_eq!(joint.used().velocity, velocity);
+            }
+        }
+        // The change of the commanded velocity is followed.
+        let mut joint = moving(0.4);
+        let slower = Tick { commanded: 0.1, ..tick(None, 0.4) };
+        joint.step(&slower, &Config::avena());
+        assert!((joint.used().position - 0.1 * DT).abs() < 1e-12);
+        assert!((joint.used().velocity - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn j35_the_reach_grows_with_the_time_since_the_last_usable_answer() {
+        for silent in 0..4 {
+            let reach = 3.0 * VELOCITY_MAX * f64::from(silent + 1) * DT;
+            for (distance, usable) in [(0.99 * reach, true), (1.01 * reach, false), (-1.01 * reach, false)] {
+                let mut joint = moving(0.0);
+                for _ in 0..silent {
+                    joint.step(&tick(None, 0.0), &Config::avena());
+                }
+                assert_eq!(joint.step(&tick(Some(distance), 0.0), &Config::avena()), usable);
+            }
+        }
+    }
+
+    #[test]
+    fn j35_neither_position_nor_velocity_of_an_unusable_answer_is_used() {
+        let mut joint = moving(0.2);
+        let glitch = Tick { commanded: 0.2, ..tick(Some(0.05), 1.9) };
+        assert!(!joint.step(&glitch, &Config::avena()));
+        assert!((joint.used().position - 0.2 * DT).abs() < 1e-12 && joint.used().velocity == 0.2);
+        joint.forget();
+        assert!(joint.step(&glitch, &Config::avena()), "after the error the next answer is taken as it is");
+        assert_eq!(joint.used(), Reading { position: 0.05, velocity: 1.9 });
+    }
+
+    #[test]
+    fn j63_the_return_of_the_answers_makes_no_step_and_ends_at_the_answer() {
+        let mut joint = moving(0.0);
+        for _ in 0..4 {
+            joint.step(&tick(None, 0.0), &Config::avena());
+        }
+        let mut last = joint.used();
+        for k in 0..200 {
+            joint.step(&Tick { commanded: 0.0, ..tick(Some(0.01), 0.5) }, &Config::avena());
+            let now = joint.used();
+            assert!((now.position - last.position).abs() < 1.6 * 0.01 / 100.0, "{k}: {last:?} {now:?}");
+            assert!((now.velocity - last.velocity).abs() < 1.6 * 0.5 / 100.0, "{k}: {last:?} {now:?}");
+            last = now;
+        }
+        assert_eq!(last, Reading { position: 0.01, velocity: 0.5 });
+    }
+}

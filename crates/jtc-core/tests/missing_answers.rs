@@ -1,0 +1,238 @@
+//! Answers that are missing, or that no arm can have given: no torque step when they go, none when they come back (J-35, J-63).
+mod rig;
+
+use jtc_core::{Config, JointTelemetry, State, error};
+use jtc_wire::{ExecCommand, FrameType, RawPoint};
+use rig::Rig;
+
+const JOINT: usize = 1;
+const NODE_ERROR: u16 = error::EXTERNAL | error::EXTERNAL_JOINTS;
+
+/// How fast the arm moves, rad/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Motion {
+    /// HoldPos, pushed at this velocity.
+    Held(f64),
+    Operate(f64),
+    /// Teaching, led at this velocity.
+    Led(f64),
+}
+
+const MOTIONS: [Motion; 7] = [
+    Motion::Held(0.0),
+    Motion::Held(0.3),
+    Motion::Operate(0.0),
+    Motion::Operate(1.0),
+    Motion::Operate(-1.0),
+    Motion::Led(0.0),
+    Motion::Led(-0.9),
+];
+
+/// What is wrong with the joint's answers.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    None,
+    Glitch { rad: f64, ms: usize },
+    Lost { ms: usize },
+}
+
+/// Up to a velocity and down again.
+fn trajectory(velocity: f64) -> Vec<RawPoint> {
+    let (mut position, mut points) = (0.0, Vec::new());
+    for k in 0..120 {
+        let share: f64 = match k {
+            0..20 => f64::from(k) / 20.0,
+            20..80 => 1.0,
+            80..100 => f64::from(100 - k) / 20.0,
+            _ => 0.0,
+        };
+        let acceleration = match k {
+            1..20 => velocity / 0.2,
+            81..100 => -velocity / 0.2,
+            _ => 0.0,
+        };
+        let mut point = RawPoint::default();
+        point.position[JOINT] = (position / 3.141592 * 32767.0) as i16;
+        point.velocity[JOINT] = (velocity * share / 6.283185 * 32767.0) as i16;
+        point.acceleration[JOINT] = (acceleration / 12.566370 * 32767.0) as i16;
+        points.push(point);
+        let next = if k < 20 { (f64::from(k) + 0.5) / 20.0 } else { share };
+        position += velocity * if (80..100).contains(&k) { share - 0.025 } else { next } * 0.01;
+    }
+    points
+}
+
+fn roomy() -> Config {
+    let mut config = Config::avena();
+    for joint in &mut config.joints {
+        joint.torque_max = 360.0;
+    }
+    config
+}
+
+/// The joint's telemetry over 400 ticks, the fault in the middle of a motion.
+fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
+    let mut rig = Rig::holding_with(roomy());
+    let state = match motion {
+        Motion::Held(_) => State::HoldPos,
+        Motion::Operate(velocity) => {
+            rig.upload(&trajectory(velocity), 10);
+            rig.exec(ExecCommand::Execute);
+            rig.until(500, |r| r.controller.telemetry().point >= 2);
+            State::Operate
+        }
+        Motion::Led(_) => {
+            rig.follow = false;
+            rig.ask(FrameType::TeachingModeEnable, &[]);
+            rig.run(150);
+            State::Teaching
+        }
+    };
+    let mut all = Vec::new();
+    for tick in 0..400 {
+        let velocity = match motion {
+            Motion::Operate(_) => rig.controller.telemetry().joints[JOINT].set_velocity,
+            // Pushed away, and let go.
+            Motion::Held(velocity) => {
+                if (170..220).contains(&tick) {
+                    velocity
+                } else {
+                    0.0
+                }
+            }
+            Motion::Led(velocity) => velocity,
+        };
+        match motion {
+            Motion::Operate(_) => {}
+            // Pushed away, and let go.
+            Motion::Held(_) => {
+                rig.follow = velocity == 0.0;
+                rig.nodes[JOINT].report.position += if tick < 220 { velocity * 0.001 } else { 0.0 };
+            }
+            Motion::Led(_) => rig.nodes[JOINT].report.position += velocity * 0.001,
+        }
+        rig.nodes[JOINT].report.velocity =
+            if tick >= 220 && state == State::HoldPos { 0.0 } else { velocity };
+        let within = |ms: usize| (200..200 + ms).contains(&tick);
+        match fault {
+            Fault::None => {}
+            Fault::Glitch { rad, ms } => rig.nodes[JOINT].glitch = if within(ms) { rad } else { 0.0 },
+            Fault::Lost { ms } => rig.nodes[JOINT].silent = within(ms),
+        }
+        rig.tick();
+        assert_eq!((rig.state(), rig.errors()), (state, 0), "{motion:?} {fault:?} in tick {tick}");
+        all.push(rig.controller.telemetry().joints[JOINT]);
+    }
+    all
+}
+
+/// What the controller adds to the torque of the model, N·m.
+fn correction(joint: &JointTelemetry) -> f64 {
+    joint.torque - joint.torque_model
+}
+
+/// The largest step of the correction in a tick that the run without the fault has not, N·m.
+fn worst_step(clean: &[JointTelemetry], faulty: &[JointTelemetry]) -> f64 {
+    let steps = |run: &[JointTelemetry]| -> Vec<f64> {
+        run.windows(2).map(|pair| correction(&pair[1]) - correction(&pair[0])).collect()
+    };
+    let (clean, faulty) = (steps(clean), steps(faulty));
+    clean.iter().zip(&faulty).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn j35_a_glitch_of_an_encoder_makes_no_torque_step() {
+    for motion in MOTIONS {
+        let clean = run(motion, Fault::None);
+        for rad in [0.01, -0.01, 0.02, 0.05, -0.05, 0.3, -0.3] {
+            for ms in [1, 2, 3, 4] {
+                let worst = worst_step(&clean, &run(motion, Fault::Glitch { rad, ms }));
+                assert!(worst < 1.0, "{motion:?}, {rad} rad for {ms} ms: {worst} N·m");
+            }
+        }
+    }
+}
+
+#[test]
+fn j63_lost_answers_make_no_torque_step() {
+    for motion in MOTIONS {
+        let clean = run(motion, Fault::None);
+        for ms in 1..=4 {
+            let faulty = run(motion, Fault::Lost { ms });
+            let worst = worst_step(&clean, &faulty);
+            assert!(worst < 1.0, "{motion:?}, {ms} answers lost: {worst} N·m");
+            // And the position was right all the time.
+            for (clean, faulty) in clean.iter().zip(&faulty) {
+                let off = (clean.position - faulty.position).abs();
+                assert!(off < 2e-4, "{motion:?}, {ms} answers lost: {off} rad");
+            }
+        }
+    }
+}
+
+#[test]
+fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_taken() {
+    for state in [State::HoldPos, State::Teaching] {
+        let mut rig = Rig::holding();
+        rig.follow = false;
+        if state == State::Teaching {
+            rig.ask(FrameType::TeachingModeEnable, &[]);
+        }
+        rig.run(3);
+        rig.nodes[JOINT].glitch = 0.3;
+        // One tick on the bus, then five answers.
+        rig.run(5);
+        assert_eq!((rig.state(), rig.errors()), (state, 0));
+        assert!(rig.controller.telemetry().joints[JOINT].position.abs() < 1e-9);
+        rig.tick();
+        assert_eq!((rig.state(), rig.errors()), (State::Error, NODE_ERROR));
+        assert_eq!(rig.torque, [0.0; 6]);
+        let status = rig.status();
+        assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, 0, 0), "no CAN timeout");
+        assert!((status.joints[JOINT].position - 0.3).abs() < 1e-6, "taken as it is");
+        rig.clear(true, 0x7F);
+        rig.run(300);
+        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        assert!((rig.controller.telemetry().joints[JOINT].set_position - 0.3).abs() < 1e-6);
+    }
+}
+
+/// How long a joint may go on without usable answers is the setting, whatever they lack.
+#[test]
+fn j63_silence_and_implausible_answers_count_together() {
+    for max in [3, 5, 20] {
+        let mut rig = Rig::holding_with(Config { missed_moves_max: max, ..Config::avena() });
+        rig.run(3);
+        for tick in 0..max {
+            assert_eq!(rig.errors(), 0, "{tick} of {max}");
+            rig.nodes[JOINT].silent = tick % 2 == 0;
+            rig.nodes[JOINT].glitch = 0.8;
+            rig.tick();
+        }
+        rig.tick();
+        assert_eq!(rig.errors(), NODE_ERROR, "{max}");
+        // A good answer begins the count anew.
+        let mut rig = Rig::holding_with(Config { missed_moves_max: max, ..Config::avena() });
+        for tick in 0..500 {
+            rig.nodes[JOINT].silent = tick % u32::from(max) != 0;
+            rig.tick();
+        }
+        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    }
+}
+
+/// A drive that does not know its position yet corrects it by a sector when it does.
+#[test]
+fn j35_a_position_that_becomes_accurate_may_jump() {
+    let mut rig = Rig::new(Config::avena());
+    rig.follow = false;
+    rig.defaults();
+    rig.run(30);
+    rig.nodes[JOINT].report.warnings = jtc_bus::warning::POSITION_NOT_ACCURATE;
+    rig.run(300);
+    rig.nodes[JOINT].report.position = 0.037;
+    rig.nodes[JOINT].report.warnings = 0;
+    rig.run(300);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert!((rig.controller.telemetry().joints[JOINT].position - 0.037).abs() < 1e-6);
+}

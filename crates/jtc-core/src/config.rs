@@ -62,8 +62,12 @@ pub struct Config {
     pub start_tolerance_rad: f64,
     /// Time scale ramp for pause, stop and resume, ms (J-33); made longer where acceleration or torque limits ask for it.
     pub ramp_ms: u16,
-    /// How long a computed torque may ask for more than its limit before it is an error, ms (J-43). Meanwhile the limit is
-    /// commanded and the integral held; 0: an error in the tick that finds it. A single point missing in a recorded
+    /// Longest pause or stop, ms, wherever the torque limits allow it (J-33).
+    pub stop_ms: u16,
+    /// How long a pause or stop may brake with all the torque there is, ms; an arm that still moves then is an error (J-33).
+    pub braking_ms_max: u16,
+    /// In how many of any 100 ms a computed torque may ask for more than its limit before it is an error (J-43). Meanwhile the
+    /// limit is commanded and the integral held; 0: an error in the tick that finds it. A single point missing in a recorded
     /// trajectory makes a peak of a few milliseconds, for which a loaded arm should not be dropped.
     pub torque_over_ms: u16,
     /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).

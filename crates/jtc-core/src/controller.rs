@@ -12,7 +12,7 @@ use crate::nodes::{GRIPPER, Goal, Nodes};
 use crate::path::PathClock;
 use crate::store::Store;
 use crate::telemetry::{JointTelemetry, Telemetry};
-use crate::{JOINTS, State, Tes};
+use crate::{JOINTS, State, Tes, joint_error};
 
 /// Which parameters the host has given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,6 +70,8 @@ pub struct Controller<M> {
     pub(crate) tes: Tes,
     clock: PathClock,
     path: Path,
+    /// Ticks since a pause or stop was asked for on the path, until the arm stands (J-33).
+    braking_ms: Option<u16>,
     pub(crate) motion: Motion,
     // The link to the host.
     pub(crate) work: Work,
@@ -98,6 +100,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             tes: Tes::Null,
             clock: PathClock::default(),
             path: Path::Waiting,
+            braking_ms: None,
             motion: Motion::default(),
             work: Work::Begin,
             records: Records::default(),
@@ -247,6 +250,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             State::Error | State::Init | State::Start => {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
+                self.braking_ms = None;
                 // A pump that does not run on is off until it is commanded again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
@@ -271,6 +275,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         self.clock = PathClock::default();
         self.path = Path::Waiting;
+        self.braking_ms = None;
         self.set_tes(Tes::Execute);
         Ok(())
     }
@@ -281,8 +286,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (0..JOINTS).all(|j| (self.nodes.positions()[j] - position[j]).abs() <= tolerance)
     }
 
-    /// Execute from Pause.
-    pub(crate) fn resume_path(&mut self) {
+    /// Execute from Pause: at the paused point only.
+    pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
+        if !self.near(&self.motion.set.position) {
+            return Err(DataStatus::StartPositionMismatch);
+        }
+        self.braking_ms = None;
         if self.clock.time > 0.0 {
             self.clock.go();
             self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
@@ -291,6 +300,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.path = Path::Waiting;
         }
         self.set_tes(Tes::Execute);
+        Ok(())
     }
 
     /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
@@ -300,6 +310,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Path::Running { leave } => {
                 if leave.replace(to).is_none() {
                     self.clock.halt();
+                    self.braking_ms = Some(0);
                     self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
                 }
             }
@@ -366,8 +377,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.clock.advance(f64::from(self.store.duration_ms()));
                 self.follow();
                 match leave {
-                    Some(tes) if self.clock.standing() => self.set_tes(tes),
-                    _ => self.finish_at_end(),
+                    // The last point is at rest: there the arm stands whatever the ramp says.
+                    Some(tes) if self.clock.standing() || self.at_end() || self.crawls() => {
+                        self.clock.rest();
+                        self.set_tes(tes);
+                    }
+                    Some(_) => {}
+                    None => self.finish_at_end(),
                 }
             }
         }
@@ -378,7 +394,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let Some(at) = self.store.at(self.clock.time) else { return };
         if self.clock.ramping() {
             let bounds = self.motion.slope_bounds(&at, self.clock.rate, self.clock.slope, &self.config);
-            self.clock.change_rate(f64::from(self.config.ramp_ms), bounds);
+            let ramp_ms = f64::from(self.config.ramp_ms);
+            if self.clock.halting() {
+                self.clock.slow_down(ramp_ms, f64::from(self.config.stop_ms), &bounds);
+            } else {
+                self.clock.speed_up(ramp_ms, bounds.easy);
+            }
         } else {
             self.clock.slope = 0.0;
         }
@@ -391,21 +412,46 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// The last point was commanded in this tick (J-31).
+    fn at_end(&self) -> bool {
+        self.clock.time >= f64::from(self.store.duration_ms())
+    }
+
     fn finish_at_end(&mut self) {
-        if self.clock.time >= f64::from(self.store.duration_ms()) {
+        if self.at_end() {
             self.set_tes(Tes::Finish);
         }
     }
 
+    /// A pause or stop has taken its time, and what is left of the motion is too slow to be one.
+    fn crawls(&self) -> bool {
+        self.braking_ms.is_some_and(|ms| ms >= self.config.stop_ms)
+            && self.motion.moving_joints(&self.nodes, joint_error::TORQUE) == [0; JOINTS]
+    }
+
+    /// One more tick of a pause or stop, until the arm stands. Returns whether it goes on: meanwhile all the torque there is may
+    /// brake. An arm that still moves when its time is over cannot be stopped by torque: an error of the joints that move.
+    fn brake(&mut self) -> bool {
+        let Some(ms) = self.braking_ms else { return false };
+        let moving = self.motion.moving_joints(&self.nodes, joint_error::TORQUE);
+        let still = self.tes != Tes::Execute && moving == [0; JOINTS];
+        let over = ms >= self.config.braking_ms_max;
+        if over {
+            self.errors.raise_joints(&moving);
+        }
+        self.braking_ms = if over || still { None } else { Some(ms + 1) };
+        self.braking_ms.is_some()
+    }
+
     /// The control law; returns the torque to command, and raises the errors of the joints.
     fn control(&mut self, law: Law) -> [f64; JOINTS] {
+        let braking = self.brake();
         let gains = Gains {
             dynamics: &self.dynamics,
             pid: &self.pid,
             polynomial: &self.polynomial,
             table: self.friction_is_table.then_some(&self.tables),
         };
-        let (torque, errors) = self.motion.control(law, &self.nodes, &self.config, &gains);
+        let (torque, errors) = self.motion.control(law, braking, &self.nodes, &self.config, &gains);
         self.errors.raise_joints(&errors);
         torque
     }

@@ -36,6 +36,8 @@ impl Config {
             enable_timeout_ms: 10_000,
             start_tolerance_rad: 0.02,
             ramp_ms: 200,
+            stop_ms: 500,
+            braking_ms_max: 1_000,
             torque_over_ms: 10,
             blend_ms: 100,
             teach_velocity_max: 1.0,

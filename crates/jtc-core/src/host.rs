@@ -203,10 +203,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         match (self.tes, command) {
             (Tes::Stop | Tes::Finish, ExecCommand::Execute) => self.start_path(),
-            (Tes::Pause, ExecCommand::Execute) => {
-                self.resume_path();
-                Ok(())
-            }
+            (Tes::Pause, ExecCommand::Execute) => self.resume_path(),
             (Tes::Execute, ExecCommand::Pause | ExecCommand::Stop) => {
                 self.leave_path(command);
                 Ok(())

@@ -2,25 +2,40 @@
 use crate::config::JointConfig;
 use crate::joint_error;
 
-/// Whether a joint's torque is at its limit, and for how long it has been.
+/// Ticks in which torque at its limit is counted.
+const WINDOW: u16 = 100;
+
+/// Whether a joint's torque is at its limit, and how often it has been of late.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Saturation {
     /// The last torque was beyond the limit: the integral is held (J-41).
     pub saturated: bool,
-    /// Consecutive ticks of that.
+    /// Which of the last [`WINDOW`] ticks that was the case in; the last tick is bit 0.
+    history: u128,
+    /// How many of them.
     over_ms: u16,
 }
 
 impl Saturation {
-    /// The torque to command, within its limit, and the joint error of a computed `torque` beyond it: at once or, if the
-    /// configuration allows it some time, after `over_ms_max`. With the error, and for NaN, no torque is commanded.
-    pub fn limit(&mut self, torque: f64, limits: &JointConfig, over_ms_max: u16) -> (f64, u16) {
+    /// The torque to command, within its limit, and the joint error of computed torques beyond it: in more than `over_ms_max`
+    /// of the last 100 ticks, whichever sign they had. With the error, and for NaN, no torque is commanded. While the arm is
+    /// `braking` with all the torque there is (J-33), nothing is counted.
+    pub fn limit(
+        &mut self,
+        torque: f64,
+        limits: &JointConfig,
+        over_ms_max: u16,
+        braking: bool,
+    ) -> (f64, u16) {
         let limit = limits.torque_max;
         // Written so that NaN is beyond. Choices without branches: the same work in every tick.
         let within = torque.abs() <= limit;
         self.saturated = !within;
-        self.over_ms = if self.saturated { self.over_ms.saturating_add(1) } else { 0 };
-        let error = torque.is_nan() | (self.over_ms > over_ms_max);
+        let counted = self.saturated & !braking;
+        let oldest = (self.history >> (WINDOW - 1)) as u16 & 1;
+        self.history = self.history << 1 | u128::from(counted);
+        self.over_ms = self.over_ms + u16::from(counted) - oldest;
+        let error = torque.is_nan() | (counted & (self.over_ms > over_ms_max));
         let limited = torque.max(-limit).min(limit);
         (if error { 0.0 } else { limited }, bit(!error, joint_error::TORQUE))
     }
@@ -63,7 +78,7 @@ mod tests {
             | joint_error::POSITION_ERROR;
         assert_eq!(check_set((nan, nan, nan), 0.0, &limits(), true), all);
         assert_eq!(check_set((0.0, 0.0, 0.0), nan, &limits(), true), joint_error::POSITION_ERROR);
-        assert_eq!(Saturation::default().limit(nan, &limits(), 10), (0.0, joint_error::TORQUE));
+        assert_eq!(Saturation::default().limit(nan, &limits(), 10, false), (0.0, joint_error::TORQUE));
     }
 
     #[test]
@@ -80,7 +95,7 @@ mod tests {
             let three = joint_error::POSITION | joint_error::VELOCITY | joint_error::ACCELERATION;
             assert_eq!(check_set(set, position, &l, true), three);
             assert_eq!(check_set(set, position, &l, false), three & !joint_error::POSITION);
-            assert_eq!(Saturation::default().limit(s * l.torque_max, &l, 0), (s * l.torque_max, 0));
+            assert_eq!(Saturation::default().limit(s * l.torque_max, &l, 0, false), (s * l.torque_max, 0));
         }
     }
 
@@ -88,15 +103,49 @@ mod tests {
     fn j43_too_much_torque_is_an_error_after_its_time() {
         let (l, mut saturation) = (limits(), Saturation::default());
         for _ in 0..3 {
-            assert_eq!(saturation.limit(-INF, &l, 3), (-l.torque_max, 0));
+            assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, 0));
             assert!(saturation.saturated);
         }
-        assert_eq!(saturation.limit(-INF, &l, 3), (0.0, joint_error::TORQUE));
-        // One tick within the limit starts the time anew.
-        assert_eq!(saturation.limit(1.0, &l, 3), (1.0, 0));
+        // A tick within the limit is none, but does not start the time anew.
+        assert_eq!(saturation.limit(1.0, &l, 3, false), (1.0, 0));
         assert!(!saturation.saturated);
-        assert_eq!(saturation.limit(INF, &l, 3), (l.torque_max, 0));
-        assert_eq!(Saturation::default().limit(INF, &l, 0), (0.0, joint_error::TORQUE));
+        assert_eq!(saturation.limit(-INF, &l, 3, false), (0.0, joint_error::TORQUE));
+        assert_eq!(Saturation::default().limit(INF, &l, 0, false), (0.0, joint_error::TORQUE));
+    }
+
+    #[test]
+    fn j43_torque_at_its_limit_counts_within_any_100_ms_whichever_sign() {
+        // Ten in 100 ms are allowed, in any pattern and for ever; eleven are not.
+        for (period, allowed) in [(10, true), (9, false)] {
+            let (l, mut saturation) = (limits(), Saturation::default());
+            let mut good = true;
+            for k in 0..1_000 {
+                let torque = if k % period == 0 { if k % 2 == 0 { INF } else { -INF } } else { 0.0 };
+                good &= saturation.limit(torque, &l, 10, false).1 == 0;
+            }
+            assert_eq!(good, allowed, "one tick of {period}");
+        }
+        // In one go, then a pause.
+        let (l, mut saturation) = (limits(), Saturation::default());
+        for k in 0..1_000 {
+            let torque = if k % 100 < 10 { INF } else { 0.0 };
+            assert_eq!(saturation.limit(torque, &l, 10, false).1, 0, "tick {k}");
+        }
+    }
+
+    #[test]
+    fn j33_torque_at_its_limit_is_no_error_while_braking() {
+        let (l, mut saturation) = (limits(), Saturation::default());
+        for _ in 0..1_000 {
+            assert_eq!(saturation.limit(INF, &l, 10, true), (l.torque_max, 0));
+            assert!(saturation.saturated);
+        }
+        assert_eq!(saturation.limit(f64::NAN, &l, 10, true), (0.0, joint_error::TORQUE));
+        // What it did then is not held against it later.
+        for _ in 0..10 {
+            assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, 0));
+        }
+        assert_eq!(saturation.limit(INF, &l, 10, false), (0.0, joint_error::TORQUE));
     }
 
     proptest! {
@@ -104,12 +153,12 @@ mod tests {
         fn j43_no_torque_beyond_the_limit_is_commanded(torques in prop::collection::vec(prop::num::f64::ANY, 1..50)) {
             let (l, mut saturation) = (limits(), Saturation::default());
             for torque in torques {
-                let (commanded, error) = saturation.limit(torque, &l, 10);
+                let (commanded, error) = saturation.limit(torque, &l, 10, false);
                 prop_assert!(commanded.abs() <= l.torque_max);
                 prop_assert!(commanded == torque || commanded == 0.0 || commanded.abs() == l.torque_max);
                 prop_assert!(error == 0 || commanded == 0.0);
-                // Never against what was computed.
-                prop_assert!(torque.is_nan() || commanded * torque >= 0.0);
+                // Never against what was computed: compared by sign, because 0·∞ is no number.
+                prop_assert!(torque.is_nan() || commanded == 0.0 || (commanded > 0.0) == (torque > 0.0));
             }
         }
     }

@@ -6,6 +6,7 @@ use crate::friction;
 use crate::interpolation::SetPoint;
 use crate::limits::{self, Saturation};
 use crate::nodes::Nodes;
+use crate::path::{Bounds, SlopeBounds};
 use crate::pid::{Pid, PidTorque};
 use crate::{JOINTS, joint_error};
 
@@ -105,6 +106,19 @@ pub(crate) fn smooth(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
+/// Slopes with |`offset` + `factor`·slope| ≤ `limit`.
+fn within(offset: f64, factor: f64, limit: f64) -> Bounds {
+    if factor.abs() <= 1e-9 {
+        return (f64::NEG_INFINITY, f64::INFINITY);
+    }
+    let (a, b) = ((-limit - offset) / factor, (limit - offset) / factor);
+    (a.min(b), a.max(b))
+}
+
+fn narrow(bounds: &mut Bounds, to: Bounds) {
+    *bounds = (bounds.0.max(to.0), bounds.1.min(to.1));
+}
+
 impl Motion {
     /// Limp: nothing is held, no torque is remembered.
     pub fn release(&mut self, nodes: &Nodes) {
@@ -133,6 +147,14 @@ impl Motion {
         }
         let moves = velocity.iter().any(|v| v.abs() > STANDING);
         self.coast = moves.then_some(Coast { joints: self.holding, from, velocity, elapsed_ms: 0.0 });
+    }
+
+    /// Joints that move, by their set values or as measured: `bit` in each.
+    pub fn moving_joints(&self, nodes: &Nodes, bit: u16) -> [u16; JOINTS] {
+        core::array::from_fn(|j| {
+            let moves = self.set.velocity[j].abs() > STANDING || nodes.velocities()[j].abs() > STANDING;
+            if moves { bit } else { 0 }
+        })
     }
 
     /// Every joint is enabled and held at rest.
@@ -209,40 +231,41 @@ impl Motion {
         }
     }
 
-    /// Slopes of path time (1/s) that keep every joint within its acceleration and torque limits, at `at` and at the present
-    /// `rate` and `slope`. Empty (lower bound above upper) where no slope does.
-    pub fn slope_bounds(&self, at: &SetPoint, rate: f64, slope: f64, config: &Config) -> (f64, f64) {
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        let mut narrow = |offset: f64, factor: f64, limit: f64| {
-            // |offset + factor·slope| ≤ limit
-            if factor.abs() > 1e-9 {
-                let (a, b) = ((-limit - offset) / factor, (limit - offset) / factor);
-                (low, high) = (low.max(a.min(b)), high.min(a.max(b)));
-            }
-        };
+    /// Slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The torque that each joint
+    /// has left is counted from the last one computed, with all its parts: a joint that already falls behind has less.
+    pub fn slope_bounds(&self, at: &SetPoint, rate: f64, slope: f64, config: &Config) -> SlopeBounds {
+        const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
+        let (mut easy, mut full) = (FREE, FREE);
         for j in 0..JOINTS {
             let limit = &config.joints[j];
+            let acceleration = at.acceleration[j] * rate * rate;
             narrow(
-                at.acceleration[j] * rate * rate,
-                at.velocity[j],
-                RAMP_ACCELERATION * limit.acceleration_max,
+                &mut easy,
+                within(acceleration, at.velocity[j], RAMP_ACCELERATION * limit.acceleration_max),
             );
             let push: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * at.velocity[k]).sum();
-            narrow(self.torque[j].sum() - push * slope, push, RAMP_TORQUE * limit.torque_max);
+            let torque = self.torque[j].sum() - push * slope;
+            narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
+            let (low, high) = within(torque, push, limit.torque_max);
+            // No pace of the path helps a joint that does not move along it.
+            let moves = at.velocity[j].abs() > STANDING;
+            narrow(&mut full, if moves { (low, high) } else { (low.min(0.0), high.max(0.0)) });
         }
-        (low, high)
+        SlopeBounds { easy, full }
     }
 
-    /// The control law and its limits: torques to command, and joint errors found on the way.
+    /// The control law and its limits: torques to command, and joint errors found on the way. `braking`: with all the torque
+    /// there is, so that what this does to torque, position error and acceleration is none (J-33).
     pub fn control(
         &mut self,
         law: Law,
+        braking: bool,
         nodes: &Nodes,
         config: &Config,
         gains: &Gains<'_>,
     ) -> ([f64; JOINTS], [u16; JOINTS]) {
         let missing = self.compute(law, nodes, config, gains);
-        let (torque, mut errors) = self.limit(law, nodes, config);
+        let (torque, mut errors) = self.limit(law, braking, nodes, config);
         for (j, error) in errors.iter_mut().enumerate() {
             if nodes.node(j).enabled() {
                 *error |= missing[j];
@@ -329,16 +352,24 @@ impl Motion {
     }
 
     /// The torques to command and the joint errors found, both per joint (J-43).
-    fn limit(&mut self, law: Law, nodes: &Nodes, config: &Config) -> ([f64; JOINTS], [u16; JOINTS]) {
+    fn limit(
+        &mut self,
+        law: Law,
+        braking: bool,
+        nodes: &Nodes,
+        config: &Config,
+    ) -> ([f64; JOINTS], [u16; JOINTS]) {
         let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
+        let excused = if braking { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         for j in 0..JOINTS {
             let limits = &config.joints[j];
             let (limited, torque_error) =
-                self.saturation[j].limit(self.torque[j].sum(), limits, config.torque_over_ms);
+                self.saturation[j].limit(self.torque[j].sum(), limits, config.torque_over_ms, braking);
             let joint = (self.set.position[j], self.set.velocity[j], self.set.acceleration[j]);
             let set_error = limits::check_set(joint, nodes.positions()[j], limits, law == Law::Follow);
             torque[j] = limited;
-            errors[j] = torque_error | if law != Law::Teach && self.holding[j] { set_error } else { 0 };
+            errors[j] =
+                torque_error | if law != Law::Teach && self.holding[j] { set_error & !excused } else { 0 };
         }
         (torque, errors)
     }

@@ -366,3 +366,25 @@ fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
     }
     assert!((last - 1.2 * before).abs() < 0.02 * before.abs(), "{before} to {last}");
 }
+
+/// A controller that hits its limits to and fro never stays long at one of them.
+#[test]
+fn j43_torque_that_swings_between_its_limits_is_an_error() {
+    let mut config = Config::avena();
+    config.joints[0].torque_max = 10.0;
+    let mut rig = Rig::holding_with(config);
+    rig.follow = false;
+    let mut swung = 0;
+    for k in 0..200 {
+        // 4 mrad at Kp 8000: 32 N·m, the sign changes every 8 ms.
+        rig.nodes[0].report.position = if (k / 8) % 2 == 0 { 4e-3 } else { -4e-3 };
+        rig.tick();
+        if rig.state() == State::Error {
+            break;
+        }
+        swung += 1;
+    }
+    assert!((10..=40).contains(&swung), "{swung}");
+    assert_ne!(rig.errors() & error::INTERNAL_JOINTS, 0);
+    assert_eq!(rig.controller.telemetry().joints[0].internal, jtc_core::joint_error::TORQUE);
+}

@@ -211,6 +211,31 @@ fn j33_pause_and_resume_follow_the_path() {
     assert_eq!(last.joints[2].set_position, rad(points[300].position[2]));
 }
 
+/// Also in the last milliseconds, where the ramp would reach beyond the last point.
+#[test]
+fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
+    let points = motion(101, 10);
+    for (command, to) in [(ExecCommand::Pause, Tes::Pause), (ExecCommand::Stop, Tes::Stop)] {
+        for before_the_end in [1, 2, 5, 20, 50, 99, 150, 199, 250] {
+            let mut rig = Rig::holding();
+            rig.upload(&points, 10);
+            rig.exec(ExecCommand::Execute);
+            rig.until(3000, |r| r.controller.telemetry().point == 1000 - before_the_end);
+            rig.send(FrameType::TrajSetExecStatus, &[command as u8]);
+            rig.tick();
+            let ticks = rig.until(500, |r| r.tes() != Tes::Execute);
+            assert_eq!(rig.tes(), to, "{command:?} {before_the_end} ms before the end, after {ticks} ms");
+            rig.run(100);
+            assert_eq!((rig.tes(), rig.state(), rig.errors()), (to, State::HoldPos, 0));
+            if to == Tes::Pause {
+                assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+                rig.until(1000, |r| r.tes() == Tes::Finish);
+                assert_eq!(rig.controller.telemetry().joints[2].set_position, rad(points[100].position[2]));
+            }
+        }
+    }
+}
+
 #[test]
 fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
     // 1 rad/s on every joint: 200 ms would need 7.5 rad/s², which this configuration does not allow.
@@ -306,6 +331,28 @@ fn j34_a_finished_closed_path_runs_again() {
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
         rig.until(3000, |r| r.tes() == Tes::Finish);
         rig.run(3);
+    }
+}
+
+#[test]
+fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
+    let mut config = Config::avena();
+    config.joints[4].torque_max = 1000.0;
+    let mut rig = Rig::holding_with(config);
+    rig.upload(&motion(100, 10), 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(1000, |r| r.controller.telemetry().point > 300);
+    rig.exec(ExecCommand::Pause);
+    rig.until(1000, |r| r.tes() == Tes::Pause);
+    // Somebody leans on it: a little, then too much.
+    rig.follow = false;
+    for (push, answer) in [(0.022, DataStatus::StartPositionMismatch), (-0.004, DataStatus::NoError)] {
+        for _ in 0..20 {
+            rig.nodes[4].report.position += push / 20.0;
+            rig.tick();
+        }
+        assert_eq!(rig.exec(ExecCommand::Execute), answer);
+        assert_eq!(rig.tes() == Tes::Execute, answer == DataStatus::NoError);
     }
 }
 

@@ -2,7 +2,7 @@
 //! motions.
 //!
 //! The real client library is `jtc-host`; this one exists so that the world can be exercised without it.
-use jtc_dynamics::{JOINTS, JointVec};
+use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin};
 use jtc_wire::{
     ACCELERATION_SCALE, ExecCommand, FrameType, HEADER, POSITION_SCALE, RawPoint, STATUS_LEN, Status,
     VELOCITY_SCALE, crc16,
@@ -27,6 +27,15 @@ pub fn use_defaults() -> Vec<u8> {
         .into_iter()
         .flat_map(|t| frame(t, &[]))
         .collect()
+}
+
+/// The arm model with which the controller is to reckon, as far as 32 bit floats can say it.
+pub fn arm_model(model: &ArmModel) -> Vec<u8> {
+    let origin = |o: &Origin| o.xyz.into_iter().chain(o.rpy);
+    let joints = model.joints.iter().flat_map(origin);
+    let links = model.links.iter().flat_map(|l| origin(&l.origin).chain(l.inertia).chain([l.mass]));
+    let body: Vec<u8> = joints.chain(links).flat_map(|x| (x as f32).to_be_bytes()).collect();
+    frame(FrameType::ArmModel, &body)
 }
 
 /// Execute, pause or stop.

@@ -2,11 +2,12 @@
 //! and bus-off.
 use std::collections::VecDeque;
 
-use jtc_bus::{Answer, Frame, JOINTS, NODES, Request, Scale};
+use jtc_bus::{Answer, Frame, JOINTS, NODES, Scale};
 use jtc_core::BusState;
 
 use crate::drive::Drive;
 use crate::gripper::Gripper;
+use crate::request::NodeRequest;
 
 /// A tick, µs.
 const TICK_US: u32 = 1000;
@@ -21,6 +22,8 @@ const RECOVERY_US: u32 = 1408;
 
 /// Bit of an answer's id.
 const RESPONSE: u16 = 0x200;
+/// Bytes of the gripper's answer to Move.
+const GRIPPER_ANSWER: usize = 20;
 /// Frames of others that may wait.
 const FOREIGN_MAX: usize = 64;
 
@@ -114,15 +117,22 @@ impl Nodes {
         &mut self,
         node: usize,
         now_us: u64,
-        request: &Request,
+        request: &NodeRequest,
         scales: &[Scale; JOINTS],
     ) -> Option<(u32, Frame)> {
         let answer = self.receive(node, now_us, request)?;
-        let frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
+        let mut frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
+        if matches!(answer, Answer::Gripper(_)) {
+            // Real ones send 20 bytes, of which the last mean nothing.
+            let mut data = [0; GRIPPER_ANSWER];
+            let len = frame.data().len().min(GRIPPER_ANSWER);
+            data[..len].copy_from_slice(&frame.data()[..len]);
+            frame = Frame::new(frame.id, &data).unwrap_or(frame);
+        }
         Some((ANSWER_US.0 + ANSWER_US.1 * node as u32, frame))
     }
 
-    fn receive(&mut self, node: usize, now_us: u64, request: &Request) -> Option<Answer> {
+    fn receive(&mut self, node: usize, now_us: u64, request: &NodeRequest) -> Option<Answer> {
         match self.drives.get_mut(node) {
             Some(drive) => drive.receive(now_us, request),
             None => self.gripper.as_mut()?.receive(now_us, request),
@@ -238,14 +248,14 @@ impl Bus {
         if !self.carry(frame, time, true) {
             return false;
         }
-        if let Ok(request) = Request::parse(frame) {
+        if let Some(request) = NodeRequest::parse(frame) {
             self.reach_nodes(now_us, &request, nodes, *time);
         }
         true
     }
 
     /// Every node gets a request, and may answer.
-    fn reach_nodes(&mut self, now_us: u64, request: &Request, nodes: &mut Nodes, time: u32) {
+    fn reach_nodes(&mut self, now_us: u64, request: &NodeRequest, nodes: &mut Nodes, time: u32) {
         for node in 0..NODES {
             if self.fault.lost > 0.0 && self.rng.f64() < self.fault.lost {
                 self.statistics.lost += 1;
@@ -329,7 +339,7 @@ impl Bus {
             self.foreign.pop_front();
             if frame.id & RESPONSE != 0 {
                 received.push(frame);
-            } else if let Ok(request) = Request::parse(&frame) {
+            } else if let Some(request) = NodeRequest::parse(&frame) {
                 self.reach_nodes(now_us, &request, nodes, *time);
             }
         }
@@ -380,7 +390,7 @@ mod tests {
         let answer = frame_us(20);
         assert!((65..=74).contains(&request), "{request}");
         assert!((72..=83).contains(&answer), "{answer}");
-        let round = request + ANSWER_US.0 + 6 * answer + frame_us(16);
+        let round = request + ANSWER_US.0 + 7 * answer;
         assert!((570..=660).contains(&round), "{round}");
     }
 }

@@ -6,6 +6,9 @@ use crate::arm::SimArm;
 use crate::drive::DriveConfig;
 use crate::faults::FaultPlan;
 
+/// Over-speed trip of a drive over the velocity limit of its joint: with the default arm that of known drives.
+const OVER_SPEED: f64 = 1.2;
+
 /// How far the true arm is from the one that it was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelError {
@@ -106,8 +109,11 @@ impl Default for SimConfig {
 impl SimConfig {
     /// A world around a controller with these settings, whose arm is made from these parameters.
     pub fn new(controller: Config, parameters: &Parameters) -> Self {
-        let drive =
-            DriveConfig { velocity_full_scale: controller.velocity_full_scale, ..DriveConfig::default() };
+        let drives = core::array::from_fn(|j| DriveConfig {
+            velocity_full_scale: controller.velocity_full_scale,
+            over_speed: OVER_SPEED * controller.joints[j].velocity_max,
+            ..DriveConfig::default()
+        });
         Self {
             arm: SimArm::new(&controller, parameters),
             gripper: controller.gripper,
@@ -115,7 +121,7 @@ impl SimConfig {
             model_error: ModelError::default(),
             start: [0.0; JOINTS],
             support: Support::Brakes,
-            drives: [drive; JOINTS],
+            drives,
             absent_drives: 0,
             bus_monitored: false,
             baud: Some(115_200),

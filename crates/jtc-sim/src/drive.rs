@@ -3,6 +3,7 @@
 use jtc_bus::{Answer, JointReport, Request, fsm, warning};
 
 use crate::inbox::Inbox;
+use crate::request::NodeRequest;
 
 /// Full turns of the 16-bit absolute encoder.
 const ENCODER_COUNTS: f64 = 65_536.0;
@@ -52,7 +53,8 @@ pub struct DriveConfig {
     pub rest_ms: u32,
     /// Speed at 32767, rad/s: 2.0, older drives 6.283185.
     pub velocity_full_scale: f64,
-    /// Speed that trips, rad/s.
+    /// Measured speed that trips, rad/s, either way. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times the default
+    /// arm's velocity limit; [`SimConfig::new`](crate::SimConfig::new) sets each joint's to 1.2 times its limit.
     pub over_speed: f64,
     /// Half of the working area, rad.
     pub working_area: f64,
@@ -110,6 +112,8 @@ pub struct DriveFault {
     pub not_accurate: bool,
     /// The safety line is at the level that means danger.
     pub safety_line: bool,
+    /// Requests for another state are answered and have no effect.
+    pub ignores_state: bool,
 }
 
 /// A drive.
@@ -128,6 +132,8 @@ pub struct Drive {
     /// Ticks until the motor control may start.
     rest: u32,
     pending: u8,
+    /// A configuration was accepted since the last reset.
+    configured: bool,
     mode: u8,
     bits: u8,
     goal: f64,
@@ -162,6 +168,7 @@ impl Drive {
             aligned: false,
             rest: 0,
             pending: 0,
+            configured: false,
             mode: 0,
             bits: 0,
             goal: 0.0,
@@ -190,6 +197,7 @@ impl Drive {
         self.aligned = false;
         self.rest = 0;
         self.pending = 0;
+        self.configured = false;
         self.mode = 1;
         // Over-speed trip is on by default.
         self.bits = config_bit::OVER_SPEED;
@@ -224,12 +232,27 @@ impl Drive {
     }
 
     /// A request arrives at `now_us`; the answer, if it gives one.
-    pub fn receive(&mut self, now_us: u64, request: &Request) -> Option<Answer> {
+    pub fn receive(&mut self, now_us: u64, request: &NodeRequest) -> Option<Answer> {
         if !self.on_bus() {
             return None;
         }
-        let request = self.inbox.take(now_us, request)?;
-        self.execute(&request)
+        match self.inbox.take(now_us, request)? {
+            NodeRequest::ChangeFsm(states) => Some(self.change(states[usize::from(self.node)])),
+            NodeRequest::Other(request) => self.execute(&request),
+        }
+    }
+
+    /// ChangeFsm: any byte is taken; what it means is decided by the tick.
+    fn change(&mut self, state: u8) -> Answer {
+        let before = self.state;
+        if !self.fault.ignores_state {
+            self.pending = state;
+        }
+        if self.config.answers_transition {
+            self.accept_request();
+            return Answer::Fsm { node: self.node, fsm: self.state };
+        }
+        Answer::Fsm { node: self.node, fsm: before }
     }
 
     fn execute(&mut self, request: &Request) -> Option<Answer> {
@@ -239,18 +262,12 @@ impl Drive {
                 self.goal = if self.mode == 1 { torque.get(n).copied().unwrap_or(0.0) } else { 0.0 };
                 Some(Answer::Joint { node: self.node, report: self.report() })
             }
-            Request::ChangeFsm { target } => {
-                let before = self.state;
-                self.pending = target[n] as u8;
-                if self.config.answers_transition {
-                    self.accept_request();
-                    return Some(Answer::Fsm { node: self.node, fsm: self.state });
-                }
-                Some(Answer::Fsm { node: self.node, fsm: before })
-            }
+            // A `NodeRequest` carries it apart.
+            Request::ChangeFsm { .. } => None,
             Request::ChangeMode { mode, config, .. } => {
                 let accepted = matches!(self.state, fsm::INIT | fsm::READY);
                 if accepted {
+                    self.configured = true;
                     self.mode = mode[n];
                     self.bits = config[n];
                 }
@@ -277,7 +294,8 @@ impl Drive {
         if self.outside() {
             warnings |= warning::OUTSIDE_WORKING_AREA;
         }
-        if self.safety_line() {
+        // Also before the first configuration, whatever the line is.
+        if self.safety_line() || !self.configured {
             warnings |= warning::SAFETY_LINE;
         }
         JointReport {
@@ -316,7 +334,7 @@ impl Drive {
         self.read_encoder(q);
         self.check();
         if self.safety_line() && self.state == fsm::ENABLED {
-            self.enter(transition::ENABLED_TO_READY);
+            self.enter(fsm::READY);
         } else {
             self.accept_request();
         }
@@ -379,7 +397,11 @@ impl Drive {
             (fsm::READY, fsm::ENABLED) => ENABLED_TO_READY,
             // Some drives take an echoed fault byte as a command to move: this one does.
             (fsm::ENABLED | fsm::FAULT, fsm::READY) => READY_TO_ENABLED,
-            (254, state) if state != fsm::START => fsm::FAULT,
+            // Its error byte stays 0.
+            (fsm::FAULT_REACTION, state) if state != fsm::START => {
+                self.pending = 0;
+                fsm::FAULT
+            }
             // Anything else stays pending until a transition erases it.
             _ => return,
         };

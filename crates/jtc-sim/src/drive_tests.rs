@@ -1,25 +1,22 @@
 //! The habits of drives, one test each.
-use jtc_bus::Target;
-
 use super::*;
 
 fn change(drive: &mut Drive, target: u8) -> u8 {
-    let target = Target::from_byte(target).expect("the controller can ask for it");
-    match drive.receive(0, &Request::ChangeFsm { target: [target; 7] }) {
+    match drive.receive(0, &NodeRequest::ChangeFsm([target; 7])) {
         Some(Answer::Fsm { fsm, .. }) => fsm,
         answer => panic!("{answer:?}"),
     }
 }
 
 fn configure(drive: &mut Drive, bits: u8) -> bool {
-    match drive.receive(0, &Request::ChangeMode { mode: [1; 6], config: [bits; 6], gripper: 0 }) {
+    match drive.receive(0, &Request::ChangeMode { mode: [1; 6], config: [bits; 6], gripper: 0 }.into()) {
         Some(Answer::Mode { accepted, .. }) => accepted,
         answer => panic!("{answer:?}"),
     }
 }
 
 fn command(drive: &mut Drive, torque: f64) -> JointReport {
-    match drive.receive(0, &Request::Move { torque: [torque; 6], pump: false }) {
+    match drive.receive(0, &Request::Move { torque: [torque; 6], pump: false }.into()) {
         Some(Answer::Joint { report, .. }) => report,
         answer => panic!("{answer:?}"),
     }
@@ -52,7 +49,7 @@ fn enabled() -> Drive {
 fn boot_is_silent_for_a_quarter_of_a_second() {
     let mut drive = Drive::new(3, DriveConfig::default(), 79.0);
     run(&mut drive, 249, 0.0);
-    assert_eq!(drive.receive(0, &Request::Move { torque: [0.0; 6], pump: false }), None);
+    assert_eq!(drive.receive(0, &Request::Move { torque: [0.0; 6], pump: false }.into()), None);
     run(&mut drive, 1, 0.0);
     assert!(drive.on_bus());
 }
@@ -128,13 +125,15 @@ fn speed_is_late_and_coarse() {
 }
 
 #[test]
-fn over_speed_trips_only_when_configured() {
+fn over_speed_trips_either_way_and_only_when_configured() {
     for (bits, state) in [(0x17, fsm::FAULT), (0x07, fsm::ENABLED)] {
-        let mut drive = enabled();
-        drive.bits = bits;
-        (0..30).for_each(|k| drive.tick(0.5 + 2.0e-3 * f64::from(k), 25.0));
-        assert_eq!(drive.state(), state);
-        assert_eq!(drive.errors, if state == fsm::FAULT { error_bit::OVER_SPEED } else { 0 });
+        for speed in [-2.0e-3, 2.0e-3] {
+            let mut drive = enabled();
+            drive.bits = bits;
+            (0..30).for_each(|k| drive.tick(0.5 + speed * f64::from(k), 25.0));
+            assert_eq!(drive.state(), state, "{speed} rad/ms");
+            assert_eq!(drive.errors, if state == fsm::FAULT { error_bit::OVER_SPEED } else { 0 });
+        }
     }
 }
 
@@ -156,7 +155,8 @@ fn outside_the_working_area_only_inward_torque_acts() {
 fn j16_safety_line_drops_to_ready_without_an_error() {
     let mut drive = enabled();
     drive.fault.safety_line = true;
-    run(&mut drive, 2, 0.5);
+    // In one tick, without a transition.
+    run(&mut drive, 1, 0.5);
     assert_eq!(drive.state(), fsm::READY);
     let report = command(&mut drive, 0.0);
     assert_eq!((report.errors, report.warnings), (0, warning::SAFETY_LINE));
@@ -190,8 +190,7 @@ fn j16_an_echoed_fault_byte_is_a_command_to_move() {
     let mut drive = booted();
     change(&mut drive, fsm::READY);
     run(&mut drive, 2, 0.5);
-    // The protocol crate cannot send it: put it where a wire would have.
-    drive.pending = 255;
+    change(&mut drive, fsm::FAULT);
     run(&mut drive, 1, 0.5);
     assert_eq!(drive.state(), 12);
 }
@@ -215,9 +214,50 @@ fn a_request_of_zero_cancels_a_pending_one() {
 fn configuration_is_refused_when_enabled_and_lost_by_a_reset() {
     let mut drive = enabled();
     assert!(!configure(&mut drive, 0x17));
-    assert_eq!(drive.receive(0, &Request::Reset(1)), None);
+    assert_eq!(drive.receive(0, &Request::Reset(1).into()), None);
     assert_eq!(drive.state(), fsm::ENABLED);
-    assert_eq!(drive.receive(0, &Request::ResetAll), None);
+    assert_eq!(drive.receive(0, &Request::ResetAll.into()), None);
     run(&mut drive, 260, 0.5);
     assert_eq!(command(&mut drive, 0.0).position, 0.0);
+}
+
+#[test]
+fn j16_the_safety_line_warns_until_the_first_configuration() {
+    let mut drive = booted();
+    assert_eq!(command(&mut drive, 0.0).warnings, warning::SAFETY_LINE);
+    configure(&mut drive, 0x17);
+    run(&mut drive, 1, 0.5);
+    assert_eq!(command(&mut drive, 0.0).warnings, 0);
+    drive.reset();
+    run(&mut drive, 260, 0.5);
+    assert_eq!(
+        command(&mut drive, 0.0).warnings,
+        warning::SAFETY_LINE,
+        "a reset takes the configuration away"
+    );
+}
+
+#[test]
+fn j16_a_request_of_254_forces_the_fault_state_without_an_error_bit() {
+    for mut drive in [booted(), enabled()] {
+        change(&mut drive, 254);
+        run(&mut drive, 1, 0.5);
+        let report = command(&mut drive, 5.0);
+        assert_eq!((report.fsm, report.errors, report.mc_occurred), (fsm::FAULT, 0, 0));
+        run(&mut drive, 5, 0.5);
+        assert_eq!((drive.state(), drive.torque()), (fsm::FAULT, 0.0));
+        change(&mut drive, fsm::INIT);
+        run(&mut drive, 3, 0.5);
+        assert_eq!(drive.state(), fsm::INIT);
+    }
+}
+
+#[test]
+fn a_drive_that_ignores_its_state_command_answers_and_stays() {
+    let mut drive = enabled();
+    drive.fault.ignores_state = true;
+    command(&mut drive, 5.0);
+    assert_eq!(change(&mut drive, fsm::READY), fsm::ENABLED);
+    run(&mut drive, 100, 0.5);
+    assert_eq!((drive.state(), drive.torque()), (fsm::ENABLED, 5.0));
 }

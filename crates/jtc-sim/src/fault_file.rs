@@ -100,12 +100,13 @@ impl fmt::Display for FaultFileError {
 
 impl std::error::Error for FaultFileError {}
 
-const KINDS: [&str; 20] = [
+const KINDS: [&str; 21] = [
     "node-silent",
     "node-reboot",
     "motor-fault",
     "hardware-fault",
     "fault-state",
+    "ignores-state",
     "encoder-jump",
     "not-accurate",
     "friction",
@@ -196,6 +197,7 @@ impl Reader {
             "motor-fault" => FaultKind::MotorFault { joint: self.joint()?, bits: self.bits()? },
             "hardware-fault" => FaultKind::HardwareFault { joint: self.joint()? },
             "fault-state" => FaultKind::FaultState { joint: self.joint()? },
+            "ignores-state" => FaultKind::IgnoresState { joint: self.joint()? },
             "encoder-jump" => FaultKind::EncoderJump {
                 joint: self.joint()?,
                 rad: self.take("rad", |e| &mut e.rad, -6.3, 6.3)?,

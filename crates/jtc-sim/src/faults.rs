@@ -33,6 +33,11 @@ pub enum FaultKind {
         /// 0..5.
         joint: u8,
     },
+    /// A drive answers requests for another state, and stays in the one that it is in.
+    IgnoresState {
+        /// 0..5.
+        joint: u8,
+    },
     /// The encoder reads something else.
     EncoderJump {
         /// 0..5.
@@ -110,6 +115,7 @@ impl FaultKind {
             Self::MotorFault { .. } => "motor-fault",
             Self::HardwareFault { .. } => "hardware-fault",
             Self::FaultState { .. } => "fault-state",
+            Self::IgnoresState { .. } => "ignores-state",
             Self::EncoderJump { .. } => "encoder-jump",
             Self::NotAccurate { .. } => "not-accurate",
             Self::Friction { .. } => "friction",
@@ -137,7 +143,10 @@ impl fmt::Display for FaultKind {
                 write!(f, " node {node}")
             }
             Self::MotorFault { joint, bits } => write!(f, " joint {joint} bits 0x{bits:02X}"),
-            Self::HardwareFault { joint } | Self::FaultState { joint } | Self::NotAccurate { joint } => {
+            Self::HardwareFault { joint }
+            | Self::FaultState { joint }
+            | Self::IgnoresState { joint }
+            | Self::NotAccurate { joint } => {
                 write!(f, " joint {joint}")
             }
             Self::EncoderJump { joint, rad } => write!(f, " joint {joint} by {rad} rad"),

@@ -2,6 +2,7 @@
 use jtc_bus::{Answer, GRIPPER, GripperReport, Request, fsm};
 
 use crate::inbox::Inbox;
+use crate::request::NodeRequest;
 
 /// Ticks until the measured pump current follows the command.
 const PUMP_LAG: u32 = 100;
@@ -74,20 +75,25 @@ impl Gripper {
     }
 
     /// A request arrives at `now_us`; the answer, if it gives one.
-    pub fn receive(&mut self, now_us: u64, request: &Request) -> Option<Answer> {
+    pub fn receive(&mut self, now_us: u64, request: &NodeRequest) -> Option<Answer> {
         if !self.on_bus() {
             return None;
         }
         let node = GRIPPER as u8;
-        match self.inbox.take(now_us, request)? {
+        let request = match self.inbox.take(now_us, request)? {
+            NodeRequest::ChangeFsm(states) => {
+                self.change(states[GRIPPER]);
+                return Some(Answer::Fsm { node, fsm: self.state });
+            }
+            NodeRequest::Other(request) => request,
+        };
+        match request {
             Request::Move { pump, .. } => {
                 self.command = pump;
                 Some(Answer::Gripper(self.report()))
             }
-            Request::ChangeFsm { target } => {
-                self.change(target[GRIPPER] as u8);
-                Some(Answer::Fsm { node, fsm: self.state })
-            }
+            // A `NodeRequest` carries it apart.
+            Request::ChangeFsm { .. } => None,
             Request::ChangeMode { gripper, .. } => {
                 let accepted = matches!(self.state, fsm::INIT | fsm::READY);
                 if accepted {
@@ -117,7 +123,7 @@ impl Gripper {
             (fsm::READY, fsm::INIT) => 11,
             (fsm::READY, fsm::ENABLED) => 13,
             (fsm::ENABLED, fsm::READY) => 12,
-            (254, state) if state != fsm::START => fsm::FAULT,
+            (fsm::FAULT_REACTION, state) if state != fsm::START => fsm::FAULT,
             _ => return,
         };
         self.age = 0;
@@ -145,7 +151,7 @@ impl Gripper {
         let edge = self.safety_line && !self.line_before;
         self.line_before = self.safety_line;
         if edge && self.reacts_to_safety && self.state == fsm::ENABLED {
-            self.state = 13;
+            self.state = fsm::READY;
         }
         self.state = match self.state {
             fsm::START => 10,
@@ -171,8 +177,6 @@ impl Gripper {
 
 #[cfg(test)]
 mod tests {
-    use jtc_bus::Target;
-
     use super::*;
 
     fn run(gripper: &mut Gripper, ms: u32) {
@@ -180,15 +184,14 @@ mod tests {
     }
 
     fn request(gripper: &mut Gripper, target: u8) -> u8 {
-        let target = [Target::from_byte(target).unwrap(); 7];
-        match gripper.receive(0, &Request::ChangeFsm { target }) {
+        match gripper.receive(0, &NodeRequest::ChangeFsm([target; 7])) {
             Some(Answer::Fsm { fsm, .. }) => fsm,
             answer => panic!("{answer:?}"),
         }
     }
 
     fn pump(gripper: &mut Gripper, on: bool) -> GripperReport {
-        match gripper.receive(0, &Request::Move { torque: [0.0; 6], pump: on }) {
+        match gripper.receive(0, &Request::Move { torque: [0.0; 6], pump: on }.into()) {
             Some(Answer::Gripper(report)) => report,
             answer => panic!("{answer:?}"),
         }

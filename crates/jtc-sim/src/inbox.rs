@@ -1,7 +1,7 @@
 //! How a node takes frames out of its receive buffer: at once, or as older firmware does, one per interrupt.
 use std::collections::VecDeque;
 
-use jtc_bus::Request;
+use crate::request::NodeRequest;
 
 /// Requests closer together than this make one interrupt, µs.
 const BACK_TO_BACK_US: u64 = 250;
@@ -12,7 +12,7 @@ const DEPTH: usize = 3;
 #[derive(Clone, Debug)]
 pub struct Inbox {
     one_per_interrupt: bool,
-    waiting: VecDeque<Request>,
+    waiting: VecDeque<NodeRequest>,
     last_us: Option<u64>,
 }
 
@@ -23,7 +23,7 @@ impl Inbox {
     }
 
     /// A request arrives at `now_us`; the one that the node looks at because of it.
-    pub fn take(&mut self, now_us: u64, request: &Request) -> Option<Request> {
+    pub fn take(&mut self, now_us: u64, request: &NodeRequest) -> Option<NodeRequest> {
         if !self.one_per_interrupt {
             return Some(*request);
         }
@@ -38,12 +38,14 @@ impl Inbox {
 
 #[cfg(test)]
 mod tests {
+    use jtc_bus::Request;
+
     use super::*;
 
     #[test]
     fn j12_two_requests_back_to_back_leave_an_older_node_one_behind_for_good() {
         let mut inbox = Inbox::new(true);
-        let request = |node| Request::Reset(node);
+        let request = |node| NodeRequest::from(Request::Reset(node));
         assert_eq!(inbox.take(0, &request(0)), Some(request(0)));
         assert_eq!(inbox.take(1000, &request(1)), Some(request(1)));
         assert_eq!(inbox.take(1100, &request(2)), None);

@@ -1,6 +1,6 @@
 //! What is behind the joint bus: drives, gripper and the arm that they move. It knows nothing of the controller, which may be
 //! the simulated one of [`World`](crate::World) or any other that sends frames.
-use jtc_bus::{Frame, JOINTS, NODES, Request, Scale};
+use jtc_bus::{Frame, JOINTS, NODES, Scale};
 use jtc_dynamics::ArmModel;
 
 use crate::arm::Arm;
@@ -9,6 +9,7 @@ use crate::config::{SimConfig, Support};
 use crate::drive::{Drive, DriveFault};
 use crate::faults::FaultKind;
 use crate::gripper::Gripper;
+use crate::request::NodeRequest;
 use crate::world::Truth;
 
 /// Length of a drive's tick and of a step of the arm, s.
@@ -72,7 +73,7 @@ impl Plant {
     /// A frame has ended on the bus at `now_us`; the nodes' answers are added to `answers`. Answers of nodes and frames that
     /// are no request are passed over.
     pub fn hear(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
-        let Ok(request) = Request::parse(frame) else { return };
+        let Some(request) = NodeRequest::parse(frame) else { return };
         for node in 0..NODES {
             answers.extend(self.nodes.answer(node, now_us, &request, &self.scales));
         }
@@ -163,6 +164,7 @@ impl Plant {
                 FaultKind::MotorFault { joint, bits } => drives[usize::from(joint)].motor_control |= bits,
                 FaultKind::HardwareFault { joint } => drives[usize::from(joint)].hardware = true,
                 FaultKind::EncoderJump { joint, rad } => drives[usize::from(joint)].encoder_offset += rad,
+                FaultKind::IgnoresState { joint } => drives[usize::from(joint)].ignores_state = true,
                 FaultKind::NotAccurate { joint } => drives[usize::from(joint)].not_accurate = true,
                 FaultKind::Friction { joint, factor } => friction[usize::from(joint)] *= factor,
                 FaultKind::Temperature { joint, celsius } => {

@@ -111,6 +111,8 @@ impl Board {
         }
         self.watchdog_resets += 1;
         self.reset();
+        // The board starts with the reason for its reset, as an internal error that latches (J-12, J-21).
+        self.controller.raise_internal();
         true
     }
 

@@ -74,16 +74,23 @@ fn j24_after_a_node_error_the_trajectory_is_not_resumed() {
 }
 
 #[test]
-fn j12_a_stopped_tick_resets_the_controller_and_the_arm_is_let_go() {
+fn j12_j21_a_stopped_tick_resets_the_controller_and_leaves_an_internal_error_latched() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let at = Trigger::At(operator.world.now_us() / 1000 + 1000);
     operator.world.inject(Fault { kind: FaultKind::TickOverrun, trigger: at, duration_ms: Some(40) });
     operator.run(1500);
     assert!(operator.world.statistics().watchdog_resets >= 1);
-    assert_eq!(operator.state(), State::Init, "parameters are wanted again");
+    let internal = |operator: &Operator| operator.world.telemetry().errors & jtc_core::error::INTERNAL != 0;
+    assert!(operator.state() == State::Error && internal(&operator), "{:?}", operator.world.telemetry());
+    assert!(!operator.world.safety_output(), "J-22: 0 while the internal error is latched");
     assert_eq!(operator.world.truth().torque, [0.0; 6]);
-    operator.bring_up().unwrap();
+    // It latches: parameters alone bring nothing back.
+    operator.world.host_write(&host::use_defaults());
+    operator.run(1500);
+    assert!(operator.state() == State::Error && internal(&operator));
+    operator.recover().unwrap();
+    assert!(operator.world.safety_output());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, STATUS_LEN, Status};
 
+use crate::check::{TrajectoryCheck, Violation};
 use crate::config::{Config, PidGains, TableOf};
 use crate::defaults;
 use crate::errors::Errors;
@@ -67,6 +68,10 @@ pub struct Controller<M> {
     pub(crate) pump: bool,
     // The trajectory and its execution.
     pub(crate) store: Store<M>,
+    pub(crate) check: TrajectoryCheck,
+    pub(crate) violation: Option<Violation>,
+    /// Friction was given since the trajectory was checked.
+    pub(crate) friction_is_new: bool,
     pub(crate) tes: Tes,
     clock: PathClock,
     path: Path,
@@ -97,6 +102,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             teaching: false,
             pump: false,
             store: Store::new(points),
+            check: TrajectoryCheck::new(&config, 1, None),
+            violation: None,
+            friction_is_new: false,
             tes: Tes::Null,
             clock: PathClock::default(),
             path: Path::Waiting,
@@ -175,6 +183,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// What the last tick computed.
     pub fn telemetry(&self) -> &Telemetry {
         &self.telemetry
+    }
+
+    /// Why the last segment or the last Execute was refused by the check of J-36; `None` when it was not.
+    pub fn violation(&self) -> Option<&Violation> {
+        self.violation.as_ref()
     }
 
     /// The settings.

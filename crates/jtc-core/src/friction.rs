@@ -1,5 +1,6 @@
 //! Friction compensation of one joint (J-42).
 use crate::config::TableOf;
+use crate::interpolation::ROUNDING;
 
 /// Sign of a speed, smoothed: a straight line between −`width` and `width` (rad/s).
 fn smooth_sign(v: f64, width: f64) -> f64 {
@@ -16,15 +17,37 @@ pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     factor * (c[0] * s + v * (c[1] + v * (c[2] * s + c[3] * v)))
 }
 
-/// Bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m; both axes with their ends, `None` outside.
+/// Lowest and highest velocity of the table, rad/s.
+pub fn velocities(table: &TableOf<f32>) -> (f64, f64) {
+    ends(&table.velocity)
+}
+
+/// Lowest and highest temperature of the table, °C.
+pub fn temperatures(table: &TableOf<f32>) -> (f64, f64) {
+    ends(&table.temperature)
+}
+
+fn ends(axis: &[f32; 20]) -> (f64, f64) {
+    let [first, .., last] = axis;
+    (f64::from(*first), f64::from(*last))
+}
+
+/// Bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. A temperature outside has the value of the
+/// nearest column; `None` for a velocity outside, the ends being inside.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
+    let (slowest, fastest) = velocities(table);
+    // What interpolation between two points may add by rounding does not lead out of the table.
+    let inside = (v >= slowest - ROUNDING) & (v <= fastest + ROUNDING);
+    let (coldest, warmest) = temperatures(table);
+    // Not `clamp`, which may panic. NaN becomes the coldest.
+    let (v, t) = (v.max(slowest).min(fastest), t.max(coldest).min(warmest));
     let (x, [row, next]) = locate(&table.velocity, table.torque.array_windows(), v)?;
     let columns = row.array_windows().zip(next.array_windows());
     let (y, ([a, b], [c, d])) = locate(&table.temperature, columns, t)?;
     let [a, b, c, d] = [a, b, c, d].map(|&torque| f64::from(torque));
     // Along the velocity at both temperatures of the cell, then between them.
     let (low, high) = (a + x * (c - a), b + x * (d - b));
-    Some(low + y * (high - low))
+    inside.then_some(low + y * (high - low))
 }
 
 /// Where in its cell of an axis `value` is (0..1), and which of `cells` that is; `None` outside the axis.
@@ -65,8 +88,18 @@ mod tests {
                 (table(&t, v, temp).unwrap() - (3.0 + 2.0 * v - 0.5 * temp + 0.25 * v * temp)).abs() < 1e-5
             );
         }
-        for (v, temp) in [(-1.001, 30.0), (1.376, 30.0), (0.0, 19.99), (0.0, 58.01), (f64::NAN, 30.0)] {
+        for (v, temp) in [(-1.001, 30.0), (1.376, 30.0), (f64::NAN, 30.0)] {
             assert_eq!(table(&t, v, temp), None);
+        }
+    }
+
+    #[test]
+    fn j42_a_temperature_outside_the_table_has_the_nearest_column() {
+        let t = sample();
+        for v in [-1.0, 0.3, 1.375] {
+            assert_eq!(table(&t, v, 5.0), table(&t, v, 20.0));
+            assert_eq!(table(&t, v, 90.0), table(&t, v, 58.0));
+            assert_ne!(table(&t, v, 20.0), table(&t, v, 58.0));
         }
     }
 

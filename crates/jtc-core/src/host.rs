@@ -4,14 +4,20 @@ use jtc_wire::{
     Command, DataStatus, ExecCommand, Floats, FrameStatus, LinkEvent, RawPoint, Response, Segment,
 };
 
+use crate::check::{self, TrajectoryCheck, Violation};
 use crate::config::{PidGains, TableOf};
 use crate::controller::{Controller, Given};
 use crate::defaults;
+use crate::motion::celsius;
 use crate::nodes::GRIPPER;
 use crate::{JOINTS, State, Tes};
 
-/// Trajectory points copied in one tick.
-const POINTS_PER_TICK: usize = 64;
+/// Ticks that the check of a segment takes at most (J-36), and ticks for copying it: with the record, less than 40 ms.
+const CHECK_TICKS: usize = 28;
+const COPY_TICKS: usize = 10;
+/// Points of a short segment checked and copied in one tick.
+const CHECKED_PER_TICK: usize = 16;
+const COPIED_PER_TICK: usize = 64;
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
@@ -24,8 +30,10 @@ const GRIPPER_MASK: u8 = 1 << GRIPPER;
 pub(crate) enum Work {
     #[default]
     Begin,
+    /// Points checked.
+    PointCheck(usize),
     /// Points copied.
-    Points(usize),
+    PointCopy(usize),
     /// Joints whose table is checked.
     TableCheck(usize),
     /// Joints whose table is copied.
@@ -168,42 +176,89 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-30, a slice of points a tick.
+    /// J-30, J-36: all points are checked before the first is copied, so that a refused segment changes nothing.
     fn take_segment(&mut self, segment: &Segment<'_>) -> Progress {
         if self.state != State::HoldPos {
             // Also in the middle of a segment: the change of state has cleared the trajectory.
             return Progress::Refused(DataStatus::NotAllowed);
         }
-        let from = match self.work {
-            Work::Points(copied) => copied,
-            _ => {
-                if let Err(status) = self.store.check(segment) {
-                    return Progress::Refused(status);
+        match self.work {
+            Work::PointCopy(from) => self.copy_points(segment, from),
+            Work::PointCheck(from) => self.check_points(segment, from),
+            _ => match self.store.check(segment) {
+                Err(status) => Progress::Refused(status),
+                Ok(()) => {
+                    self.begin_check(segment);
+                    self.check_points(segment, 0)
                 }
-                self.store.begin(segment);
-                if segment.segment == 0 {
-                    self.set_tes(Tes::Null);
-                }
-                0
-            }
+            },
+        }
+    }
+
+    /// Segment 0 begins a trajectory, others go on behind what was received.
+    fn begin_check(&mut self, segment: &Segment<'_>) {
+        let tables = self.friction_is_table.then_some(&self.tables);
+        let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
+        self.check = match self.store.tail() {
+            Some((points, last, speeds)) if segment.segment > 0 => check.behind(points, last, speeds),
+            _ => check,
         };
-        let to = (from + POINTS_PER_TICK).min(segment.len());
+        self.violation = None;
+    }
+
+    fn check_points(&mut self, segment: &Segment<'_>, from: usize) -> Progress {
+        let slice = segment.len().div_ceil(CHECK_TICKS).max(CHECKED_PER_TICK);
+        for point in segment.points_from(from).take(slice) {
+            if let Err(violation) = self.check.take(&point) {
+                return self.refuse_path(violation);
+            }
+        }
+        if from + slice < segment.len() {
+            return Progress::Working(Work::PointCheck(from + slice));
+        }
+        if segment.segment + 1 == segment.segments
+            && let Err(violation) = self.check.end()
+        {
+            return self.refuse_path(violation);
+        }
+        self.store.begin(segment);
+        if segment.segment == 0 {
+            self.set_tes(Tes::Null);
+            self.friction_is_new = false;
+        }
+        Progress::Working(Work::PointCopy(0))
+    }
+
+    fn copy_points(&mut self, segment: &Segment<'_>, from: usize) -> Progress {
+        let slice = segment.len().div_ceil(COPY_TICKS).max(COPIED_PER_TICK);
+        let to = (from + slice).min(segment.len());
         self.store.copy(segment, from, to);
         if to < segment.len() {
-            return Progress::Working(Work::Points(to));
+            return Progress::Working(Work::PointCopy(to));
         }
-        self.store.commit(segment);
+        self.store.commit(segment, self.check.speeds());
         if self.store.complete() {
             self.set_tes(Tes::Stop);
         }
         Progress::Done
     }
 
+    fn refuse_path(&mut self, violation: Violation) -> Progress {
+        self.violation = Some(violation);
+        Progress::Refused(DataStatus::IncorrectValue)
+    }
+
     /// J-34.
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         match (self.tes, command) {
-            (Tes::Stop | Tes::Finish, ExecCommand::Execute) => self.start_path(),
-            (Tes::Pause, ExecCommand::Execute) => self.resume_path(),
+            (Tes::Stop | Tes::Finish, ExecCommand::Execute) => {
+                self.check_friction()?;
+                self.start_path()
+            }
+            (Tes::Pause, ExecCommand::Execute) => {
+                self.check_friction()?;
+                self.resume_path()
+            }
             (Tes::Execute, ExecCommand::Pause | ExecCommand::Stop) => {
                 self.leave_path(command);
                 Ok(())
@@ -214,6 +269,23 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             _ => Err(DataStatus::NotAllowed),
         }
+    }
+
+    /// J-36: bearings inside the temperatures of the friction table and, if friction was given since the trajectory was
+    /// loaded, the path inside its velocities. Nothing else that can be given in HoldPos bears on that check.
+    fn check_friction(&mut self) -> Result<(), DataStatus> {
+        if !self.friction_is_table {
+            return Ok(());
+        }
+        let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));
+        let mut verdict = check::temperatures_inside(&temperatures, &self.tables);
+        if self.friction_is_new {
+            verdict = verdict.and(check::inside_tables(self.store.speeds(), &self.tables));
+        }
+        verdict.map_err(|violation| {
+            self.violation = Some(violation);
+            DataStatus::IncorrectValue
+        })
     }
 
     fn take_pid(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
@@ -295,6 +367,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn friction_given(&mut self, table: bool) {
         self.friction_is_table = table;
+        self.friction_is_new = true;
         self.given.set(Given::FRICTION);
     }
 }

@@ -2,6 +2,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod check;
 mod config;
 mod controller;
 mod defaults;
@@ -18,6 +19,7 @@ mod pid;
 mod store;
 mod telemetry;
 
+pub use check::{TrajectoryCheck, Violation};
 pub use config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf, WORKING_AREA};
 pub use controller::Controller;
 pub use interpolation::{SetPoint, interpolate};

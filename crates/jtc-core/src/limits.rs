@@ -1,5 +1,6 @@
 //! Limits of a joint (J-43).
 use crate::config::JointConfig;
+use crate::interpolation::ROUNDING;
 use crate::joint_error;
 
 /// Ticks in which torque at its limit is counted.
@@ -42,13 +43,15 @@ impl Saturation {
 }
 
 /// Set values (position, velocity, acceleration) outside the limits, as joint errors. The position limit holds for positions that
-/// somebody `commanded`: an arm that is found beyond it is held where it is, or it could never be brought back.
+/// somebody `commanded`: an arm that is found beyond it is held where it is, or it could never be brought back. Rounding on
+/// the way between two points that the check of J-36 has passed is no error.
 pub(crate) fn check_set(set: (f64, f64, f64), measured: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
     // Written so that NaN is outside.
-    let inside = (position >= limits.position_min) & (position <= limits.position_max);
+    let (low, high) = (limits.position_min - ROUNDING, limits.position_max + ROUNDING);
+    let inside = (position >= low) & (position <= high);
     bit(inside | !commanded, joint_error::POSITION)
-        | bit(velocity.abs() <= limits.velocity_max, joint_error::VELOCITY)
+        | bit(velocity.abs() <= limits.velocity_max + ROUNDING, joint_error::VELOCITY)
         | bit(acceleration.abs() <= limits.acceleration_max, joint_error::ACCELERATION)
         | bit((position - measured).abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
 }
@@ -90,7 +93,7 @@ mod tests {
             // The error is measured around 0, where it is exact.
             assert_eq!(check_set(set, position, &l, true), 0);
             assert_eq!(check_set((0.0, 0.0, 0.0), s * l.position_error_max, &l, true), 0);
-            let beyond = |x: f64| x * (1.0 + 1e-12);
+            let beyond = |x: f64| x * (1.0 + 1e-8);
             let set = (beyond(position), beyond(set.1), beyond(set.2));
             let three = joint_error::POSITION | joint_error::VELOCITY | joint_error::ACCELERATION;
             assert_eq!(check_set(set, position, &l, true), three);

@@ -385,7 +385,7 @@ fn brake(velocity: f64, torque: f64, config: &Config, torque_max: f64) -> f64 {
 }
 
 /// Temperature in °C: drives send negative ones modulo 256, and no bearing reaches 200 °C.
-fn celsius(byte: u8) -> f64 {
+pub(crate) fn celsius(byte: u8) -> f64 {
     let t = f64::from(byte);
     if byte >= 200 { t - 256.0 } else { t }
 }

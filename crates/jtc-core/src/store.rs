@@ -1,6 +1,7 @@
 //! The trajectory store: which segments are accepted (J-30), and the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
+use crate::check::SpeedRange;
 use crate::interpolation::{SetPoint, interpolate};
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
@@ -15,11 +16,14 @@ pub(crate) struct Store<M> {
     segments: u16,
     number: u16,
     step_ms: u16,
+    /// Velocities of the accepted segments.
+    speeds: [SpeedRange; JOINTS],
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     pub fn new(points: M) -> Self {
-        Self { points, received: 0, next_segment: 0, segments: 0, number: 0, step_ms: 1 }
+        let speeds = [SpeedRange::default(); JOINTS];
+        Self { points, received: 0, next_segment: 0, segments: 0, number: 0, step_ms: 1, speeds }
     }
 
     /// Points that fit: never more than the protocol allows, never more than the memory holds.
@@ -72,7 +76,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         Ok(())
     }
 
-    /// Begins to take a segment that passed `check`; segment 0 replaces what was there.
+    /// Begins to copy a segment that was accepted; segment 0 replaces what was there.
     pub fn begin(&mut self, segment: &Segment<'_>) {
         if segment.segment == 0 {
             self.clear();
@@ -90,10 +94,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// All points of the segment are copied.
-    pub fn commit(&mut self, segment: &Segment<'_>) {
+    /// All points of the segment are copied; `speeds` are those of all points so far.
+    pub fn commit(&mut self, segment: &Segment<'_>, speeds: [SpeedRange; JOINTS]) {
+        self.speeds = speeds;
         self.received = (self.received + segment.len()).min(self.capacity());
         self.next_segment = segment.segment + 1;
+    }
+
+    /// How many points there are, the last of them, and their speeds; `None` without points.
+    pub fn tail(&self) -> Option<(u32, RawPoint, [SpeedRange; JOINTS])> {
+        let last = *self.points.as_ref().get(..self.received)?.last()?;
+        Some((self.received as u32, last, self.speeds))
+    }
+
+    /// Speeds of the points.
+    pub fn speeds(&self) -> &[SpeedRange; JOINTS] {
+        &self.speeds
     }
 
     /// Positions of point 0, rad.

@@ -217,9 +217,8 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
     rig.follow = true;
     let out: Vec<_> =
         (0..10).map(|_| RawPoint { position: [0, (1.6 / rad(1)) as i16, 0, 0, 0, 0], ..rest(0) }).collect();
-    rig.upload(&out, 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(500, |r| r.state() == State::Error);
+    let answer = rig.ask(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &out));
+    assert_eq!((answer, rig.tes()), (DataStatus::IncorrectValue, Tes::Null));
 }
 
 #[test]
@@ -325,7 +324,9 @@ fn j42_drives_send_temperatures_below_zero_modulo_256() {
         rig.nodes[1].report.temperature = byte;
         let mut point = RawPoint::default();
         point.velocity[1] = 1000;
-        rig.upload(&[point; 50], 10);
+        let mut points = [point; 50];
+        (points[0], points[49]) = (rest(0), rest(0));
+        rig.upload(&points, 10);
         rig.exec(ExecCommand::Execute);
         rig.until(500, |r| r.controller.telemetry().point == 20);
         rig.controller.telemetry().joints[1].torque_friction

@@ -238,14 +238,17 @@ fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
 
 #[test]
 fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
-    // 1 rad/s on every joint: 200 ms would need 7.5 rad/s², which this configuration does not allow.
-    let n = 101;
+    // 1 rad/s on every joint, from rest and to rest: 200 ms would need 7.5 rad/s², which this configuration does not allow.
+    let n = 151;
+    let speed = |i: i32| (0.04 * f64::from(i.min(n - 1 - i))).min(1.0);
+    let mut way = 0.0;
     let points: Vec<_> = (0..n)
         .map(|i| {
+            way += if i == 0 { 0.0 } else { 0.005 * (speed(i - 1) + speed(i)) };
             let mut p = RawPoint::default();
             for j in 0..6 {
-                p.position[j] = (f64::from(i) * 0.01 / 3.141592 * 32767.0).round() as i16;
-                p.velocity[j] = (1.0 / 6.283185 * 32767.0f64).round() as i16;
+                p.position[j] = (way / 3.141592 * 32767.0).round() as i16;
+                p.velocity[j] = (speed(i) / 6.283185 * 32767.0f64).round() as i16;
             }
             p
         })

@@ -1,0 +1,265 @@
+//! The check of a trajectory when it is loaded, point by point, before anything moves (J-36).
+//!
+//! Between two points (J-32) the commanded velocity is a cubic, the position a quintic and its derivative a quartic: the cubic
+//! and a bump for the way that the velocities do not explain. In Bernstein form each lies within the hull of a few control
+//! points. An interval whose hulls, roughly taken, are within the limits passes at once ([`screen`]); for any other the curves
+//! are halved until the hull is within or the curve itself is seen outside ([`curve`]).
+//!
+//! Positions come in steps of 96 µrad, and what that rounding does to the derivative is no fault of the path: the way of
+//! each interval is judged less one such step.
+mod curve;
+mod screen;
+#[cfg(test)]
+mod tests;
+
+use jtc_wire::{POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
+
+use crate::JOINTS;
+use crate::config::{Config, TableOf};
+use crate::friction;
+use crate::interpolation::SetPoint;
+use curve::{Leaves, bound_crossed, leaves};
+pub(crate) use screen::SpeedRange;
+use screen::{Screen, Steps};
+
+/// Speed at the first and the last point that counts as standing, rad/s.
+pub const REST_SPEED: f64 = 0.02;
+/// rad and rad/s of one step of the wire.
+const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
+const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
+/// Halvings of curves in one interval, all joints together. A curve is followed until its hull is within about a thousandth of
+/// its own height; six joints at their limits in the same interval share them, and then the hull decides.
+const HALVINGS: u8 = 16;
+
+/// What of a trajectory can be outside its bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// The position, rad: at a point, or of the quintic between two.
+    Position,
+    /// The velocity, rad/s: at a point, or of the cubic between two.
+    Velocity,
+    /// The acceleration at a point, rad/s².
+    Acceleration,
+    /// The speed of the position itself between two points, less one int16 step, rad/s.
+    PositionSpeed,
+    /// The speed of the first or the last point, which has to be at rest, rad/s.
+    Rest,
+    /// A velocity outside the friction table in use, rad/s.
+    FrictionVelocity,
+    /// A bearing temperature outside the friction table in use, °C.
+    FrictionTemperature,
+}
+
+/// Where a trajectory is outside its bounds first (J-36).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Violation {
+    /// Point from 0.
+    pub point: u32,
+    /// How far on the way to the next point, 0..1.
+    pub fraction: f64,
+    /// Index of the joint, base to wrist.
+    pub joint: usize,
+    /// What it is of.
+    pub quantity: Quantity,
+    /// Its value, in the unit of the quantity.
+    pub value: f64,
+    /// The bound that it crosses.
+    pub limit: f64,
+}
+
+/// What one joint has to keep to.
+#[derive(Clone, Copy, Debug)]
+struct JointBounds {
+    position: (f64, f64),
+    speed: f64,
+    acceleration: f64,
+    /// Velocities inside the friction table; without end where none is used.
+    friction: (f64, f64),
+}
+
+/// The state of one check: what it checks against, and the point before.
+#[derive(Clone, Debug)]
+pub struct TrajectoryCheck {
+    bounds: [JointBounds; JOINTS],
+    screen: Screen,
+    /// s between points.
+    step: f64,
+    points: u32,
+    last: RawPoint,
+    last_steps: Steps,
+    speeds: [SpeedRange; JOINTS],
+}
+
+impl TrajectoryCheck {
+    /// Begins the check of a trajectory whose points are `step_ms` apart, with the friction `tables` if these are in use.
+    pub fn new(config: &Config, step_ms: u16, tables: Option<&[TableOf<f32>; JOINTS]>) -> Self {
+        let bounds = core::array::from_fn(|j| JointBounds {
+            position: config.position_range(j),
+            speed: config.joints[j].velocity_max,
+            acceleration: config.joints[j].acceleration_max,
+            friction: tables.map_or((f64::NEG_INFINITY, f64::INFINITY), |t| friction::velocities(&t[j])),
+        });
+        let step = f64::from(step_ms) / 1000.0;
+        Self {
+            screen: Screen::new(&bounds, step),
+            bounds,
+            step,
+            points: 0,
+            last: RawPoint::default(),
+            last_steps: Steps::default(),
+            speeds: [SpeedRange::default(); JOINTS],
+        }
+    }
+
+    /// Goes on behind `points` points that have passed: the last of them, and their speeds.
+    pub(crate) fn behind(mut self, points: u32, last: RawPoint, speeds: [SpeedRange; JOINTS]) -> Self {
+        (self.points, self.last, self.last_steps, self.speeds) = (points, last, (&last).into(), speeds);
+        self
+    }
+
+    /// Checks the next point and what lies between it and the one before. The point is taken in any case.
+    pub fn take(&mut self, point: &RawPoint) -> Result<(), Violation> {
+        let steps = Steps::from(point);
+        let verdict = if self.points == 0 {
+            self.begins(point)
+        } else if self.screen.passes(&self.last_steps, &steps) {
+            Ok(())
+        } else {
+            self.judge(point)
+        };
+        for (range, velocities) in self.speeds.iter_mut().zip(self.screen.velocities(&steps)) {
+            range.add(velocities, self.points);
+        }
+        (self.last, self.last_steps) = (*point, steps);
+        self.points = self.points.saturating_add(1);
+        verdict
+    }
+
+    /// Checks that the trajectory may end with the point taken last.
+    pub fn end(&self) -> Result<(), Violation> {
+        at_rest(&self.last, self.points.saturating_sub(1))
+    }
+
+    /// Speeds of the points taken so far.
+    pub(crate) fn speeds(&self) -> [SpeedRange; JOINTS] {
+        self.speeds
+    }
+
+    /// The first point.
+    fn begins(&self, point: &RawPoint) -> Result<(), Violation> {
+        self.stands(point)?;
+        at_rest(point, 0)
+    }
+
+    /// A point by itself.
+    fn stands(&self, point: &RawPoint) -> Result<(), Violation> {
+        let at = SetPoint::from(point);
+        for (j, bounds) in self.bounds.iter().enumerate() {
+            let (q, v, a) = (at.position[j], at.velocity[j], at.acceleration[j]);
+            let outside = |quantity, value, (low, high)| {
+                bound_crossed(value, low, high).map_or(Ok(()), |limit| {
+                    Err(Violation { point: self.points, fraction: 0.0, joint: j, quantity, value, limit })
+                })
+            };
+            outside(Quantity::Position, q, bounds.position)?;
+            outside(Quantity::Velocity, v, (-bounds.speed, bounds.speed))?;
+            outside(Quantity::Acceleration, a, (-bounds.acceleration, bounds.acceleration))?;
+            outside(Quantity::FrictionVelocity, v, bounds.friction)?;
+            if self.points == 0 {
+                // Every ramp of path time leads through standstill.
+                outside(Quantity::FrictionVelocity, 0.0, bounds.friction)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A point, and what lies between it and the last one.
+    fn judge(&self, point: &RawPoint) -> Result<(), Violation> {
+        self.stands(point)?;
+        let (a, b, h) = (SetPoint::from(&self.last), SetPoint::from(point), self.step);
+        let mut halvings = HALVINGS;
+        for (j, bounds) in self.bounds.iter().enumerate() {
+            let outside = |quantity, found: Option<Leaves>| {
+                found.map_or(Ok(()), |Leaves { at, value, bound }| {
+                    let point = self.points.saturating_sub(1);
+                    Err(Violation { point, fraction: at, joint: j, quantity, value, limit: bound })
+                })
+            };
+            let (p0, p1) = (a.position[j], b.position[j]);
+            let (v0, v1) = (a.velocity[j] * h, b.velocity[j] * h);
+            let (a0, a1) = (a.acceleration[j] * h * h, b.acceleration[j] * h * h);
+            let position = [
+                p0,
+                p0 + v0 / 5.0,
+                p0 + 2.0 * v0 / 5.0 + a0 / 20.0,
+                p1 - 2.0 * v1 / 5.0 + a1 / 20.0,
+                p1 - v1 / 5.0,
+                p1,
+            ];
+            let (low, high) = bounds.position;
+            outside(Quantity::Position, leaves(position, low, high, &mut halvings))?;
+            // Velocities in rad per interval until here, from here in rad/s.
+            let velocity = [v0, v0 + a0 / 3.0, v1 - a1 / 3.0, v1].map(|v| v / h);
+            let found = leaves(velocity, -bounds.speed, bounds.speed, &mut halvings);
+            outside(Quantity::Velocity, found)?;
+            let found = leaves(velocity, bounds.friction.0, bounds.friction.1, &mut halvings);
+            outside(Quantity::FrictionVelocity, found)?;
+            let unexplained = p1 - p0 - 0.5 * (v0 + v1) - (a0 - a1) / 12.0;
+            let unexplained = unexplained - unexplained.clamp(-POSITION_STEP, POSITION_STEP);
+            let [c0, c1, c2, c3] = velocity;
+            let speed = [
+                c0,
+                0.25 * (c0 + 3.0 * c1),
+                0.5 * (c1 + c2) + 5.0 * unexplained / h,
+                0.25 * (3.0 * c2 + c3),
+                c3,
+            ];
+            let found = leaves(speed, -bounds.speed, bounds.speed, &mut halvings);
+            outside(Quantity::PositionSpeed, found)?;
+        }
+        Ok(())
+    }
+}
+
+/// Every joint stands.
+fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
+    for (j, value) in point.velocity_rad_s().into_iter().enumerate() {
+        if let Some(limit) = bound_crossed(value, -REST_SPEED, REST_SPEED) {
+            let quantity = Quantity::Rest;
+            return Err(Violation { point: index, fraction: 0.0, joint: j, quantity, value, limit });
+        }
+    }
+    Ok(())
+}
+
+/// Whether a trajectory with these `speeds`, loaded under other friction, is inside the `tables` now in use.
+pub(crate) fn inside_tables(
+    speeds: &[SpeedRange; JOINTS],
+    tables: &[TableOf<f32>; JOINTS],
+) -> Result<(), Violation> {
+    for (joint, (range, table)) in speeds.iter().zip(tables).enumerate() {
+        let (low, high) = friction::velocities(table);
+        for (value, point) in range.ends() {
+            if let Some(limit) = bound_crossed(value, low, high) {
+                let quantity = Quantity::FrictionVelocity;
+                return Err(Violation { point, fraction: 0.0, joint, quantity, value, limit });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether these bearing `temperatures` (°C) are inside the `tables`.
+pub(crate) fn temperatures_inside(
+    temperatures: &[f64; JOINTS],
+    tables: &[TableOf<f32>; JOINTS],
+) -> Result<(), Violation> {
+    for (joint, (&value, table)) in temperatures.iter().zip(tables).enumerate() {
+        let (low, high) = friction::temperatures(table);
+        if let Some(limit) = bound_crossed(value, low, high) {
+            let quantity = Quantity::FrictionTemperature;
+            return Err(Violation { point: 0, fraction: 0.0, joint, quantity, value, limit });
+        }
+    }
+    Ok(())
+}

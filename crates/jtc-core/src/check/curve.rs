@@ -1,0 +1,91 @@
+//! Polynomials in Bernstein form: a curve over 0..1 lies within the hull of its control points (Farin 2002).
+
+/// Halvings of one curve on the way to its extremum: each takes the hull about four times closer to the curve.
+const DEPTH: usize = 6;
+
+/// Where a curve leaves its bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Leaves {
+    /// Where in the interval, 0..1.
+    pub at: f64,
+    /// The curve's value there or, where the halvings did not suffice, what it cannot be shown to keep below.
+    pub value: f64,
+    /// The bound.
+    pub bound: f64,
+}
+
+/// The first place found in which the curve leaves `low..=high`. Exact at its ends and wherever it is halved; where `halvings`
+/// are used up, the hull decides, so that nothing passes that leaves the bounds.
+pub(super) fn leaves<const N: usize>(
+    curve: [f64; N],
+    low: f64,
+    high: f64,
+    halvings: &mut u8,
+) -> Option<Leaves> {
+    // Pieces yet to be looked at, from the rear of the interval to its front.
+    let mut stack = [(curve, 0.0, 1.0); DEPTH + 1];
+    let mut waiting = 1;
+    while waiting > 0 {
+        waiting -= 1;
+        let &(piece, start, width) = stack.get(waiting)?;
+        let Some((value, bound)) = outside(&piece, low, high) else { continue };
+        let end = |end: Option<&f64>, at| {
+            let &value = end?;
+            let bound = bound_crossed(value, low, high)?;
+            Some(Leaves { at, value, bound })
+        };
+        let on_the_curve = end(piece.first(), start).or(end(piece.last(), start + width));
+        if on_the_curve.is_some() {
+            return on_the_curve;
+        }
+        // A piece at the full depth has no room on the stack.
+        let (Some(left), true) = (halvings.checked_sub(1), waiting + 1 < stack.len()) else {
+            return Some(Leaves { at: start + 0.5 * width, value, bound });
+        };
+        *halvings = left;
+        let (front, rear) = halve(piece);
+        let half = 0.5 * width;
+        for part in [(rear, start + half, half), (front, start, half)] {
+            if let Some(slot) = stack.get_mut(waiting) {
+                *slot = part;
+                waiting += 1;
+            }
+        }
+    }
+    None
+}
+
+/// The control point that is furthest outside, and the bound that it crosses.
+fn outside<const N: usize>(curve: &[f64; N], low: f64, high: f64) -> Option<(f64, f64)> {
+    let lowest = curve.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+    let highest = curve.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
+    let furthest = if low - lowest > highest - high { lowest } else { highest };
+    Some((furthest, bound_crossed(furthest, low, high)?))
+}
+
+/// The bound that `value` crosses.
+pub(super) fn bound_crossed(value: f64, low: f64, high: f64) -> Option<f64> {
+    if value < low {
+        Some(low)
+    } else if value <= high {
+        None
+    } else {
+        Some(high)
+    }
+}
+
+/// De Casteljau's halves of a curve.
+fn halve<const N: usize>(curve: [f64; N]) -> ([f64; N], [f64; N]) {
+    let (mut front, mut rear) = (curve, curve);
+    for level in 1..N {
+        for i in (level..N).rev() {
+            front[i] = 0.5 * (front[i - 1] + front[i]);
+        }
+    }
+    for level in 1..N {
+        for i in 0..N - level {
+            rear[i] = 0.5 * (rear[i] + rear[i + 1]);
+        }
+    }
+    (front, rear)
+}

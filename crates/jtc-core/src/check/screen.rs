@@ -1,0 +1,126 @@
+//! The quick part of the check: bounds on what happens around a point, in single precision and in steps of the wire.
+//!
+//! The control points of an interval (J-32) need the velocity and acceleration of one of its ends only, but for the one in the
+//! middle of the quintic's derivative. So six joints cost a few dozen operations each, and nearly every interval of a real path
+//! passes here. What does not is not refused: it is judged exactly.
+use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
+
+use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
+use crate::JOINTS;
+
+/// What rounding in single precision may add, in steps of the position, and as a share of the speed limit.
+const SLACK: f64 = 0.1;
+const SLACK_SHARE: f64 = 2e-6;
+/// Highest point of the quintic's derivative over the cubic, per share of way that the velocities leave unexplained.
+const BUMP: f32 = 1.875;
+
+/// A point as floats, in steps of the wire.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Steps {
+    position: [f32; JOINTS],
+    velocity: [f32; JOINTS],
+    acceleration: [f32; JOINTS],
+}
+
+impl From<&RawPoint> for Steps {
+    fn from(raw: &RawPoint) -> Self {
+        Self {
+            position: raw.position.map(f32::from),
+            velocity: raw.velocity.map(f32::from),
+            acceleration: raw.acceleration.map(f32::from),
+        }
+    }
+}
+
+/// Limits in steps of the wire.
+#[derive(Clone, Debug)]
+pub(super) struct Screen {
+    position_low: [f32; JOINTS],
+    position_high: [f32; JOINTS],
+    /// Position steps in an interval.
+    speed: [f32; JOINTS],
+    acceleration: [f32; JOINTS],
+    /// Position steps in an interval for a step of velocity, and of acceleration.
+    per_velocity: f32,
+    per_acceleration: f32,
+    /// Velocity steps that a step of acceleration adds to a control point of the velocity.
+    rise: f32,
+}
+
+impl Screen {
+    pub fn new(bounds: &[JointBounds; JOINTS], step: f64) -> Self {
+        let each = |value: fn(&JointBounds, f64) -> f64| {
+            core::array::from_fn(|j| bounds.get(j).map_or(f32::NAN, |b| value(b, step) as f32))
+        };
+        Self {
+            position_low: each(|b, _| b.position.0 / POSITION_STEP + SLACK),
+            position_high: each(|b, _| b.position.1 / POSITION_STEP - SLACK),
+            speed: each(|b, step| {
+                let slowest = b.speed.min(b.friction.1).min(-b.friction.0);
+                slowest * step / POSITION_STEP * (1.0 - SLACK_SHARE) - SLACK
+            }),
+            acceleration: each(|b, _| b.acceleration / (ACCELERATION_SCALE / 32767.0)),
+            per_velocity: (VELOCITY_SCALE / POSITION_SCALE * step) as f32,
+            per_acceleration: (ACCELERATION_SCALE / POSITION_SCALE * step * step) as f32,
+            rise: (ACCELERATION_SCALE / VELOCITY_SCALE * step / 3.0) as f32,
+        }
+    }
+
+    /// Point `b` and what lies between it and point `a` before it are certainly within every bound.
+    pub fn passes(&self, a: &Steps, b: &Steps) -> bool {
+        let (kv, ka) = (self.per_velocity, self.per_acceleration);
+        let mut good = true;
+        for j in 0..JOINTS {
+            let (speed_a, speed_b) = (a.velocity[j].abs() * kv, b.velocity[j].abs() * kv);
+            let (bend_a, bend_b) = (a.acceleration[j].abs() * ka, b.acceleration[j].abs() * ka);
+            // Control points of the position are at most this far from the point that they belong to.
+            let around = (0.4 * speed_a + 0.05 * bend_a).max(0.4 * speed_b + 0.05 * bend_b);
+            let low = a.position[j].min(b.position[j]) - around;
+            let high = a.position[j].max(b.position[j]) + around;
+            // Control points of the velocity.
+            let speed = (speed_a + bend_a * (1.0 / 3.0)).max(speed_b + bend_b * (1.0 / 3.0));
+            // The way that the velocities do not explain, less one step.
+            let way = b.position[j] - a.position[j];
+            let explained = 0.5 * kv * (a.velocity[j] + b.velocity[j])
+                + (1.0 / 12.0) * ka * (a.acceleration[j] - b.acceleration[j]);
+            let bump = BUMP * ((way - explained).abs() - 1.0).max(0.0);
+            good &= (low >= self.position_low[j])
+                & (high <= self.position_high[j])
+                & (speed + bump <= self.speed[j])
+                & (b.acceleration[j].abs() <= self.acceleration[j]);
+        }
+        good
+    }
+
+    /// Between what velocities (rad/s) the control points around `point` are: `(lowest, highest)` of joint `j`.
+    pub fn velocities(&self, point: &Steps) -> [(f32, f32); JOINTS] {
+        core::array::from_fn(|j| {
+            let rise = point.acceleration[j].abs() * self.rise;
+            (point.velocity[j] - rise, point.velocity[j] + rise)
+        })
+    }
+}
+
+/// Velocities that a trajectory commands in one joint, its control points included.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct SpeedRange {
+    low: (f32, u32),
+    high: (f32, u32),
+}
+
+impl SpeedRange {
+    /// Adds the velocities (in steps) around a point.
+    pub(super) fn add(&mut self, (low, high): (f32, f32), point: u32) {
+        if low < self.low.0 {
+            self.low = (low, point);
+        }
+        if high > self.high.0 {
+            self.high = (high, point);
+        }
+    }
+
+    /// Lowest and highest, rad/s, each with its point. Standing is among them.
+    pub(super) fn ends(&self) -> [(f64, u32); 2] {
+        [self.low, self.high].map(|(steps, point)| (f64::from(steps) * VELOCITY_STEP, point))
+    }
+}

@@ -1,0 +1,213 @@
+//! The check against what the controller computes between points, sampled densely.
+use jtc_wire::{ACCELERATION_SCALE, RAW_FULL_SCALE};
+use proptest::prelude::*;
+
+use super::*;
+use crate::interpolation::interpolate;
+
+/// No joint may go as far down as up.
+fn config() -> Config {
+    let mut config = Config::avena();
+    for limit in &mut config.joints {
+        (limit.position_min, limit.position_max) = (-0.7, 1.3);
+        (limit.velocity_max, limit.acceleration_max) = (1.5, 8.0);
+    }
+    config
+}
+
+/// A point with these values (rad, rad/s, rad/s²) in joint `j`.
+fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
+    let mut point = RawPoint::default();
+    point.position[j] = (q / POSITION_STEP).round() as i16;
+    point.velocity[j] = (v / VELOCITY_STEP).round() as i16;
+    point.acceleration[j] = (a / (ACCELERATION_SCALE / RAW_FULL_SCALE)).round() as i16;
+    point
+}
+
+/// The verdict on `b` and on what lies between `a`, the point before it, and `b`.
+fn between(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> Result<(), Violation> {
+    let check = TrajectoryCheck::new(config, step_ms, None);
+    check.behind(1, *a, [SpeedRange::default(); JOINTS]).take(b)
+}
+
+/// Extremes of joint `j` between two points, by sampling: position, velocity, and speed of the position whose way is one step
+/// less.
+fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64, f64) {
+    let (a, b, h) = (SetPoint::from(a), SetPoint::from(b), f64::from(step_ms) / 1000.0);
+    let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
+    let way = 0.5 * h * (a.velocity[j] + b.velocity[j]) + h * h * (a0 - a1) / 12.0;
+    let rest = b.position[j] - a.position[j] - way;
+    let rest = rest - rest.clamp(-POSITION_STEP, POSITION_STEP);
+    let (mut position, mut velocity, mut speed) = ([f64::INFINITY, f64::NEG_INFINITY], 0.0f64, 0.0f64);
+    for k in 0..=1000 {
+        let u = f64::from(k) / 1000.0;
+        let at = interpolate(&a, &b, h, u);
+        position = [position[0].min(at.position[j]), position[1].max(at.position[j])];
+        velocity = velocity.max(at.velocity[j].abs());
+        speed = speed.max((at.velocity[j] + 30.0 * rest / h * u * u * (1.0 - u) * (1.0 - u)).abs());
+    }
+    (position, velocity, speed)
+}
+
+/// Pairs of points that come near the limits, at steps from 1 ms to a second.
+fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
+    let step = prop::sample::select(&[1u16, 2, 5, 10, 20, 50, 100, 250, 1000][..]);
+    (
+        step,
+        -0.72..1.32f64,
+        prop::array::uniform2(-1.52..1.52f64),
+        prop::array::uniform2(-8.1..8.1f64),
+        -0.3..0.3f64,
+    )
+        .prop_map(|(step, q, [v0, v1], [a0, a1], off)| {
+            let h = f64::from(step) / 1000.0;
+            // Accelerations that change the velocity less within the interval than the limit itself.
+            let bend = |a: f64| a / (1.0 + 4.0 * h);
+            let v1 = v0 + (v1 - v0) * (8.0 * h).min(1.0);
+            let way = 0.5 * h * (v0 + v1) + off * h * 1.5;
+            (step, point(0, q, v0, bend(a0)), point(0, q + way, v1, bend(a1)))
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4000))]
+
+    /// Never passes what the samples see outside; never refuses what keeps a hundredth of the limits and of what happens
+    /// within the interval.
+    #[test]
+    fn j36_the_verdict_is_that_of_dense_samples((step, a, b) in pair()) {
+        let config = config();
+        let ([low, high], velocity, speed) = sampled(0, step, &a, &b);
+        let verdict = between(&config, step, &a, &b);
+        let over = |margin: f64| {
+            low < -0.7 + margin || high > 1.3 - margin || velocity > 1.5 - margin || speed > 1.5 - margin
+                || b.acceleration_rad_s2()[0].abs() > 8.0
+        };
+        if over(0.0) {
+            prop_assert!(verdict.is_err(), "{low}..{high} rad, {velocity} and {speed} rad/s passed");
+        }
+        if !over(0.01) {
+            prop_assert!(verdict.is_ok(), "{low}..{high} rad, {velocity} and {speed} rad/s: {verdict:?}");
+        }
+    }
+
+    /// What the quick part passes, the exact part passes.
+    #[test]
+    fn j36_the_screen_passes_nothing_that_the_judge_refuses((step, a, b) in pair()) {
+        let mut check = TrajectoryCheck::new(&config(), step, None);
+        check = check.behind(1, a, [SpeedRange::default(); JOINTS]);
+        let passed = check.screen.passes(&Steps::from(&a), &Steps::from(&b));
+        // The screen looks at the point before as well, the judge only at what follows it.
+        prop_assert!(!passed || check.judge(&b).is_ok(), "{:?}", check.judge(&b));
+    }
+
+    /// Rounding to the steps of the wire refuses no path that keeps to the velocity limit before it.
+    #[test]
+    fn j36_rounding_of_a_path_at_full_speed_is_no_violation(q in -0.5..0.5f64, step in 1u16..50) {
+        let v = 7820.0 * VELOCITY_STEP;
+        let way = v * f64::from(step) / 1000.0;
+        prop_assert_eq!(between(&config(), step, &point(0, q, v, 0.0), &point(0, q + way, v, 0.0)), Ok(()));
+    }
+}
+
+#[test]
+fn j36_each_limit_is_found_and_named() {
+    let config = config();
+    let check = |a: RawPoint, b: RawPoint, step| {
+        let v = between(&config, step, &a, &b).unwrap_err();
+        assert_eq!(v.joint, 4);
+        (v.point, v.quantity, v.limit, v.fraction)
+    };
+    let at = |q, v, a| point(4, q, v, a);
+    use Quantity::*;
+    // The lower position limit is not the upper one turned round.
+    assert_eq!(check(at(-0.69, 0.0, 0.0), at(-0.71, 0.0, 0.0), 100), (1, Position, -0.7, 0.0));
+    assert!(between(&config, 100, &at(0.69, 0.0, 0.0), &at(0.71, 0.0, 0.0)).is_ok());
+    assert_eq!(check(at(1.29, 0.0, 0.0), at(1.31, 0.0, 0.0), 100), (1, Position, 1.3, 0.0));
+    assert_eq!(check(at(0.0, 1.49, 0.0), at(0.015, 1.51, 0.0), 10), (1, Velocity, 1.5, 0.0));
+    assert_eq!(check(at(0.0, -1.49, 0.0), at(-0.015, -1.51, 0.0), 10), (1, Velocity, -1.5, 0.0));
+    assert_eq!(check(at(0.0, 0.0, 0.0), at(0.0, 0.0, -8.1), 10), (1, Acceleration, -8.0, 0.0));
+    // Between the points: over the upper position limit, over the velocity limit in the channel, and in the positions alone.
+    let (point, quantity, limit, fraction) = check(at(1.25, 1.0, 0.0), at(1.25, -1.0, 0.0), 400);
+    assert_eq!((point, quantity, limit), (0, Position, 1.3));
+    assert!((0.2..0.8).contains(&fraction), "{fraction}");
+    let (point, quantity, limit, _) = check(at(0.0, 1.4, 7.0), at(0.15, 1.4, -7.0), 100);
+    assert_eq!((point, quantity, limit), (0, Velocity, 1.5));
+    let (point, quantity, limit, fraction) = check(at(0.0, 0.0, 0.0), at(-0.0085, 0.0, 0.0), 10);
+    assert_eq!((point, quantity, limit), (0, PositionSpeed, -1.5));
+    assert!((0.3..0.7).contains(&fraction), "{fraction}");
+    assert!(between(&config, 10, &at(0.0, 0.0, 0.0), &at(-0.0079, 0.0, 0.0)).is_ok());
+}
+
+#[test]
+fn j36_a_path_begins_and_ends_at_rest() {
+    let slow = |v: f64| point(2, 0.0, v, 0.0);
+    let begin = |p| TrajectoryCheck::new(&config(), 10, None).take(&p);
+    assert_eq!(begin(slow(0.0199)), Ok(()));
+    assert_eq!(
+        begin(slow(-0.021)).map_err(|v| (v.joint, v.quantity, v.limit)),
+        Err((2, Quantity::Rest, -0.02))
+    );
+    let mut check = TrajectoryCheck::new(&config(), 10, None);
+    assert_eq!((check.take(&slow(0.0)), check.take(&slow(0.03))), (Ok(()), Ok(())));
+    assert_eq!(check.end().map_err(|v| (v.point, v.quantity)), Err((1, Quantity::Rest)));
+    assert_eq!((check.take(&slow(0.01)), check.end()), (Ok(()), Ok(())));
+}
+
+#[test]
+fn j36_velocities_are_inside_the_friction_table_in_use() {
+    let crate::Friction::Table(tables) = crate::Parameters::avena_friction_table() else {
+        panic!("no table")
+    };
+    let (low, high) = friction::velocities(&tables[3]);
+    assert!(low > -1.0 && high < 1.0 && low != -high);
+    let with = |v: f64| {
+        let mut check = TrajectoryCheck::new(&config(), 1000, Some(&tables));
+        [0.0, 0.4 * v, v]
+            .map(|v| check.take(&point(3, 0.0, v, 0.0)))
+            .into_iter()
+            .collect::<Result<(), _>>()?;
+        Ok(check.speeds())
+    };
+    let inside = with(high - 0.001).expect("inside");
+    assert_eq!(inside_tables(&inside, &tables), Ok(()));
+    let refused = with(high + 0.001).map_err(|v: Violation| (v.point, v.joint, v.quantity, v.limit));
+    assert_eq!(refused, Err((2, 3, Quantity::FrictionVelocity, high)));
+    // Loaded without a table: the same when it is asked later.
+    let mut check = TrajectoryCheck::new(&config(), 1000, None);
+    for v in [0.0, -0.4, low - 0.001, 0.0] {
+        check.take(&point(3, 0.0, v, 0.0)).unwrap();
+    }
+    let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
+    assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
+}
+
+#[test]
+fn j36_a_table_that_leaves_standstill_out_is_no_table_for_a_path() {
+    let crate::Friction::Table(mut tables) = crate::Parameters::avena_friction_table() else {
+        panic!("no table")
+    };
+    tables[5].velocity = core::array::from_fn(|i| 0.01 + 0.1 * i as f32);
+    let refused = TrajectoryCheck::new(&config(), 10, Some(&tables)).take(&point(5, 0.0, 0.015, 0.0));
+    let v = refused.unwrap_err();
+    assert_eq!((v.joint, v.quantity, v.value), (5, Quantity::FrictionVelocity, 0.0));
+}
+
+#[test]
+fn j36_where_the_halvings_are_used_up_the_hull_decides() {
+    // A parabola with its top at 0.5, whose hull reaches 1.
+    let curve = [0.0, 1.0, 0.0];
+    let mut many = HALVINGS;
+    assert_eq!(leaves(curve, -1.0, 0.501, &mut many), None);
+    assert!(many > 0 && many < HALVINGS);
+    let (mut none, mut used) = (0, 1);
+    let hull = Leaves { at: 0.5, value: 1.0, bound: 0.501 };
+    assert_eq!(leaves(curve, -1.0, 0.501, &mut none), Some(hull));
+    assert!(leaves(curve, -1.0, 0.4999, &mut used).is_some(), "seen outside where it is halved");
+    let mut enough = HALVINGS;
+    assert_eq!(
+        leaves(curve, -1.0, 0.5, &mut enough),
+        None,
+        "the top itself is a control point of both halves"
+    );
+}

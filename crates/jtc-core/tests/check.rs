@@ -1,0 +1,299 @@
+//! A trajectory is checked when it is loaded, and again by what may have changed when it is executed (J-36).
+mod rig;
+
+use jtc_core::check::Quantity;
+use jtc_core::{Config, State, Tes, Violation};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use rig::{Rig, floats, rad, rest, segment_body};
+
+/// int16 of rad, rad/s and rad/s².
+fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
+    let raw = |value: f64, scale: f64| (value / scale * 32767.0).round() as i16;
+    let mut p = RawPoint::default();
+    (p.position[j], p.velocity[j], p.acceleration[j]) =
+        (raw(q, 3.141592), raw(v, 6.283185), raw(a, 12.566370));
+    p
+}
+
+/// Limits that are not the same both ways, and no limits but these.
+fn rig() -> Rig {
+    let mut config = Config::avena();
+    for joint in &mut config.joints {
+        (joint.position_min, joint.position_max) = (-0.5, 1.2);
+        (joint.acceleration_max, joint.torque_max, joint.position_error_max) = (8.0, 1e6, 10.0);
+    }
+    Rig::holding_with(config)
+}
+
+fn load(rig: &mut Rig, segment: u16, segments: u16, points: &[RawPoint]) -> DataStatus {
+    rig.ask(FrameType::Trajectory, &segment_body(7, segment, segments, 100, points))
+}
+
+/// What the last refusal was for: point, joint, quantity.
+fn why(rig: &Rig) -> Option<(u32, usize, Quantity)> {
+    rig.controller.violation().map(|v| (v.point, v.joint, v.quantity))
+}
+
+#[test]
+fn j36_what_no_path_may_do_is_refused_when_it_is_loaded() {
+    use Quantity::*;
+    let still = rest(0);
+    for (points, expected) in [
+        (vec![still, point(1, -0.51, 0.0, 0.0), still], (1, Position)),
+        (vec![still, point(1, 1.21, 0.0, 0.0), still], (1, Position)),
+        (vec![still, point(1, 0.0, 1.55, 0.0), still], (1, Velocity)),
+        (vec![still, point(1, 0.0, 0.0, 9.0), still], (1, Acceleration)),
+        (vec![still, point(1, 0.1, 0.0, 0.0), still], (0, PositionSpeed)),
+        (vec![point(1, 0.0, 0.03, 0.0), still], (0, Rest)),
+        (vec![still, point(1, 0.0, 0.03, 0.0)], (1, Rest)),
+    ] {
+        let mut rig = rig();
+        assert_eq!(load(&mut rig, 0, 1, &points), DataStatus::IncorrectValue, "{expected:?}");
+        assert_eq!(why(&rig), Some((expected.0, 1, expected.1)));
+        assert_eq!((rig.tes(), rig.exec(ExecCommand::Execute)), (Tes::Null, DataStatus::NotAllowed));
+        assert_eq!(load(&mut rig, 0, 1, &[still, still]), DataStatus::NoError);
+        assert_eq!((rig.tes(), why(&rig)), (Tes::Stop, None));
+    }
+    let mut rig = rig();
+    assert_eq!(load(&mut rig, 0, 1, &[still, point(1, 0.0, 0.0, 0.0), still]), DataStatus::NoError);
+}
+
+#[test]
+fn j30_a_refused_segment_0_leaves_the_old_trajectory_as_it_was() {
+    let mut rig = rig();
+    let good: Vec<_> = (0..40).map(|i| point(2, 0.0005 * f64::from(i), 0.0, 0.0)).collect();
+    assert_eq!(load(&mut rig, 0, 1, &good), DataStatus::NoError);
+    // As long as the old one, so that every point of it would be written over.
+    let mut bad = vec![point(2, 0.015, 0.0, 0.0); 39];
+    bad.push(point(2, 3.0, 0.0, 0.0));
+    assert_eq!(load(&mut rig, 0, 1, &bad), DataStatus::IncorrectValue);
+    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    for (i, p) in good.iter().enumerate().skip(1) {
+        rig.until(1000, |r| r.controller.telemetry().point == 100 * i as u32);
+        assert_eq!(rig.controller.telemetry().joints[2].set_position, rad(p.position[2]));
+    }
+}
+
+#[test]
+fn j30_the_right_segment_can_follow_one_that_was_refused() {
+    let mut rig = rig();
+    let at = |q| point(3, q, 0.0, 0.0);
+    assert_eq!(load(&mut rig, 0, 2, &[at(0.0), at(0.02)]), DataStatus::NoError);
+    // The way from the last point of one segment to the first of the next is part of the path.
+    assert_eq!(load(&mut rig, 1, 2, &[at(0.2), at(0.2)]), DataStatus::IncorrectValue);
+    assert_eq!(why(&rig), Some((1, 3, Quantity::PositionSpeed)));
+    assert_eq!(load(&mut rig, 1, 2, &[at(0.04), point(3, 0.05, 0.2, 0.0)]), DataStatus::IncorrectValue);
+    assert_eq!(why(&rig), Some((3, 3, Quantity::Rest)), "only the last segment has the last point");
+    assert_eq!(load(&mut rig, 1, 2, &[at(0.04), at(0.05)]), DataStatus::NoError);
+    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(1000, |r| r.tes() == Tes::Finish);
+    assert_eq!(rig.controller.telemetry().joints[3].set_position, rad(at(0.05).position[3]));
+}
+
+#[test]
+fn j30_points_of_a_segment_that_loses_holdpos_do_not_count() {
+    let mut rig = rig();
+    rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 100, &vec![rest(0); 1500]));
+    rig.run(34);
+    rig.safety_input = false;
+    rig.run(2);
+    assert_eq!(rig.statuses.last().unwrap().response.data, DataStatus::NotAllowed);
+    rig.safety_input = true;
+    rig.clear(true, 0);
+    rig.until(500, |r| r.state() == State::HoldPos);
+    assert_eq!((rig.tes(), rig.exec(ExecCommand::Execute)), (Tes::Null, DataStatus::NotAllowed));
+    // Nothing of it is there to go on behind.
+    let second = segment_body(7, 1, 2, 100, &[rest(0)]);
+    assert_eq!(rig.ask(FrameType::Trajectory, &second), DataStatus::IncorrectSegmentOrder);
+}
+
+#[test]
+fn j36_the_verdict_on_the_longest_segment_comes_within_40_ms() {
+    for (n, last) in [(1500, rest(0)), (1500, point(0, 2.0, 0.0, 0.0)), (500, rest(0)), (1, rest(0))] {
+        let mut rig = rig();
+        let mut points = vec![rest(0); n - 1];
+        points.push(last);
+        rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
+        let before = rig.statuses.len();
+        let kind = FrameType::Trajectory as u8;
+        let ticks = rig.until(40, |r| r.statuses[before..].iter().any(|s| s.response.frame_type == kind));
+        assert!(ticks <= 39, "{n} points: {ticks}");
+    }
+}
+
+/// Six joints with a table of these velocities and temperatures.
+fn table(low: f32, high: f32, cold: f32, warm: f32) -> Vec<u8> {
+    let axis = |from: f32, to: f32| (0..20).map(move |i| from + (to - from) * i as f32 / 19.0);
+    floats(
+        (0..6).flat_map(|_| axis(low, high).chain(axis(cold, warm)).chain((0..400).map(|i| (i % 20) as f32))),
+    )
+}
+
+/// Up to `v` rad/s and back to rest in joint 4, turning round halfway.
+fn swing(v: f64) -> Vec<RawPoint> {
+    [0.0, 0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5, 0.0].map(|share| point(4, 0.0, share * v, 0.0)).to_vec()
+}
+
+#[test]
+fn j36_velocities_outside_the_friction_table_are_refused_at_loading_and_at_execute() {
+    let mut rig = rig();
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.3, 0.4, 0.0, 60.0)), DataStatus::NoError);
+    assert_eq!(load(&mut rig, 0, 1, &swing(0.35)), DataStatus::IncorrectValue);
+    assert_eq!(why(&rig), Some((6, 4, Quantity::FrictionVelocity)), "the table ends sooner below zero");
+    assert_eq!(load(&mut rig, 0, 1, &swing(0.25)), DataStatus::NoError);
+    // Narrower tables that come after the trajectory.
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.3, 0.2, 0.0, 60.0)), DataStatus::NoError);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
+    assert_eq!(why(&rig), Some((2, 4, Quantity::FrictionVelocity)));
+    rig.run(300);
+    assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Stop), "nothing moves");
+    // The polynomial has no ends.
+    assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::NoError);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(2000, |r| r.tes() == Tes::Finish);
+    assert_eq!(rig.errors(), 0);
+}
+
+#[test]
+fn j36_a_new_table_in_pause_is_asked_before_the_path_goes_on() {
+    let mut rig = rig();
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.4, 0.4, 0.0, 60.0)), DataStatus::NoError);
+    assert_eq!(load(&mut rig, 0, 1, &swing(0.3)), DataStatus::NoError);
+    rig.exec(ExecCommand::Execute);
+    rig.until(1000, |r| r.controller.telemetry().point == 50);
+    rig.exec(ExecCommand::Pause);
+    rig.until(1000, |r| r.tes() == Tes::Pause);
+    rig.run(2);
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.2, 0.2, 0.0, 60.0)), DataStatus::NoError);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
+    assert_eq!((rig.tes(), rig.state()), (Tes::Pause, State::HoldPos));
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.4, 0.4, 0.0, 60.0)), DataStatus::NoError);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(3000, |r| r.tes() == Tes::Finish);
+    assert_eq!(rig.errors(), 0);
+}
+
+#[test]
+fn j36_temperature_is_asked_at_execute_and_j42_in_motion_the_nearest_column_is_used() {
+    let mut rig = rig();
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table(-1.0, 1.0, 20.0, 58.0)), DataStatus::NoError);
+    rig.nodes[4].report.temperature = 19;
+    rig.run(5);
+    assert_eq!(
+        load(&mut rig, 0, 1, &swing(0.3)),
+        DataStatus::NoError,
+        "a path may be loaded into a cold arm"
+    );
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
+    let Some(Violation { joint, quantity, value, limit, .. }) = rig.controller.violation() else { panic!() };
+    assert_eq!((*joint, *quantity, *value, *limit), (4, Quantity::FrictionTemperature, 19.0, 20.0));
+    for (temperature, column) in [(20, 0.0), (58, 19.0)] {
+        rig.nodes[4].report.temperature = temperature;
+        rig.run(5);
+        assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+        rig.until(1000, |r| r.controller.telemetry().point == 150);
+        assert!((rig.controller.telemetry().joints[4].torque_friction - column).abs() < 1e-6);
+        // It gets colder or warmer than the table while it moves.
+        rig.nodes[4].report.temperature = if temperature == 20 { 251 } else { 70 };
+        rig.run(20);
+        assert_eq!((rig.state(), rig.errors()), (State::Operate, 0));
+        assert!((rig.controller.telemetry().joints[4].torque_friction - column).abs() < 1e-6);
+        rig.until(2000, |r| r.tes() == Tes::Finish);
+        assert_eq!(rig.errors(), 0);
+        assert_eq!(
+            rig.exec(ExecCommand::Execute),
+            DataStatus::IncorrectValue,
+            "and again when it starts anew"
+        );
+    }
+}
+
+#[test]
+fn j42_friction_acts_at_the_commanded_velocity_not_at_the_measured_one() {
+    let mut rig = rig();
+    // Torque by velocity alone: the row's number.
+    let rows = floats((0..6).flat_map(|_| {
+        let axis = |from: f32, to: f32| (0..20).map(move |i| from + (to - from) * i as f32 / 19.0);
+        axis(-0.95, 0.95).chain(axis(0.0, 60.0)).chain((0..400).map(|i| (i / 20) as f32))
+    }));
+    assert_eq!(rig.ask(FrameType::FrictionTable, &rows), DataStatus::NoError);
+    assert_eq!(load(&mut rig, 0, 1, &swing(0.3)), DataStatus::NoError);
+    // Far outside the table, were it asked for this one.
+    rig.nodes[4].report.velocity = -1.2;
+    rig.exec(ExecCommand::Execute);
+    for at in [130, 250, 420, 610] {
+        rig.until(1000, |r| r.controller.telemetry().point == at);
+        let joint = rig.controller.telemetry().joints[4];
+        let row = (joint.set_velocity + 0.95) / 0.1;
+        assert!((joint.torque_friction - row).abs() < 1e-3, "{joint:?}");
+    }
+    assert_eq!(rig.errors(), 0);
+}
+
+#[test]
+fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
+    for (away, tes) in [(0.015, Tes::Finish), (-0.015, Tes::Finish), (0.025, Tes::Stop), (-0.025, Tes::Stop)]
+    {
+        let mut rig = Rig::new(Config::avena());
+        // A drive that takes its time, and an arm that sags meanwhile.
+        rig.nodes[5].slow_enable = true;
+        rig.defaults();
+        rig.until(300, |r| r.state() == State::HoldPos);
+        assert_eq!(load(&mut rig, 0, 1, &[rest(0), rest(0)]), DataStatus::NoError);
+        rig.follow = false;
+        assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+        rig.run(50);
+        assert_eq!((rig.state(), rig.tes()), (State::Operate, Tes::Execute), "it waits");
+        for mm in 1..=100 {
+            rig.nodes[5].report.position = away * f64::from(mm) / 100.0;
+            rig.tick();
+        }
+        rig.follow = true;
+        rig.nodes[5].report.fsm = jtc_bus::fsm::ENABLED;
+        rig.until(1000, |r| r.tes() != Tes::Execute);
+        assert_eq!((rig.tes(), rig.errors()), (tes, 0), "{away} rad away");
+        if tes == Tes::Stop {
+            let held = rig.controller.telemetry().joints[5].set_position;
+            assert!((held - away).abs() < 1e-3, "nothing moves: {held}");
+        }
+    }
+}
+
+/// Trajectories that exist keep their verdicts (19 columns of int16, 10 ms apart).
+#[test]
+fn j36_the_existing_trajectories_keep_their_verdicts() {
+    let folder = std::env::var("OPENJTC_DATA")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
+    for (name, passes) in [("TrajectoryInt.csv", true), ("TrajectoryInt_Long.csv", false)] {
+        let Ok(text) = std::fs::read_to_string(format!("{folder}/{name}")) else {
+            println!("skipped: {folder}/{name} is not there");
+            continue;
+        };
+        let points: Vec<RawPoint> = text
+            .lines()
+            .filter(|line| !line.trim().is_empty())
+            .map(|line| {
+                let n: Vec<i16> = line.split(',').skip(1).map(|x| x.trim().parse().expect("int16")).collect();
+                let six = |at: usize| core::array::from_fn(|j| n[at + j]);
+                RawPoint { position: six(0), velocity: six(6), acceleration: six(12) }
+            })
+            .collect();
+        let mut rig = Rig::holding();
+        let chunks: Vec<_> = points.chunks(500).collect();
+        let answers: Vec<_> = (0u16..)
+            .zip(&chunks)
+            .map(|(i, chunk)| {
+                let body = segment_body(7, i, chunks.len() as u16, 10, chunk);
+                rig.ask(FrameType::Trajectory, &body)
+            })
+            .take_while(|&answer| answer == DataStatus::NoError)
+            .collect();
+        assert_eq!((answers.len() == chunks.len(), rig.tes() == Tes::Stop), (passes, passes), "{name}");
+        if !passes {
+            let v = rig.controller.violation().expect("kept");
+            assert_eq!((v.point, v.quantity), (1053, Quantity::PositionSpeed), "{v:?}");
+        }
+    }
+}

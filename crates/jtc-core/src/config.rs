@@ -56,8 +56,16 @@ pub struct Config {
     pub missed_moves_max: u8,
     /// Silence of a node after its reset that is no error yet, ms.
     pub node_boot_ms: u32,
-    /// Longest READY→ENABLE, ms (J-16).
+    /// Longest READY→ENABLE, ms (J-16); counted while enabling is asked for.
     pub enable_timeout_ms: u32,
+    /// Joints are enabled only while every one has moved slower than this for `enable_still_ms`, rad/s (J-16): an arm that
+    /// falls is not caught with a jolt.
+    pub enable_speed_max: f64,
+    /// How long the arm has to have been that slow, ms.
+    pub enable_still_ms: u16,
+    /// Time for which joints are not enabled after torque was taken away, ms: as long as the motor control of the drives
+    /// rests after a stop. Asked earlier, they would answer only then, when the arm may have begun to fall.
+    pub enable_rest_ms: u16,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
     /// Time scale ramp for pause, stop and resume, ms (J-33); made longer where acceleration or torque limits ask for it.

@@ -334,7 +334,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn hold(&mut self) -> [f64; JOINTS] {
-        self.motion.latch(&self.nodes);
+        self.motion.latch(&self.nodes, &self.config);
         self.motion.hold(&self.config);
         self.control(Law::Hold)
     }
@@ -348,7 +348,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// same number in every tick.
     #[inline(never)]
     fn operate(&mut self) -> [f64; JOINTS] {
-        self.motion.latch(&self.nodes);
+        self.motion.latch(&self.nodes, &self.config);
         self.walk();
         self.control(Law::Follow)
     }

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod check;
+mod coast;
 mod config;
 mod controller;
 mod defaults;

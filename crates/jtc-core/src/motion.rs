@@ -1,6 +1,7 @@
 //! The control law: set values of each state, τ = τ_id + τ_pid + τ_fric (section 6), and torque without steps (J-44).
 use jtc_dynamics::Dynamics;
 
+use crate::coast::{Coast, STANDING};
 use crate::config::{Config, PidGains, TableOf};
 use crate::friction;
 use crate::interpolation::SetPoint;
@@ -14,8 +15,6 @@ use crate::{JOINTS, joint_error};
 /// a tick and for the controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
-/// Speed below which a joint counts as standing, rad/s.
-const STANDING: f64 = 0.02;
 /// Length of a tick, s.
 const DT: f64 = 0.001;
 
@@ -61,16 +60,6 @@ impl JointTorque {
     }
 }
 
-/// A motion that comes to rest: leaving teaching while somebody still moves the arm.
-#[derive(Clone, Copy, Debug)]
-struct Coast {
-    /// Joints that were held when it began; those enabled later stay where they are.
-    joints: [bool; JOINTS],
-    from: [f64; JOINTS],
-    velocity: [f64; JOINTS],
-    elapsed_ms: f64,
-}
-
 /// What the control law remembers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Motion {
@@ -89,7 +78,8 @@ pub(crate) struct Motion {
     fresh: [bool; JOINTS],
     /// The next torque has to continue the last one: all of it, or all but the model.
     rebase: Option<Rebase>,
-    coast: Option<Coast>,
+    /// Joints on their way to rest.
+    coast: [Option<Coast>; JOINTS],
     /// Mass matrix with rotors at the start of a ramp of path time.
     inertia: [[f64; JOINTS]; JOINTS],
 }
@@ -137,16 +127,15 @@ impl Motion {
 
     /// Begin to hold where the arm is, coming to rest first if it moves.
     pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
-        let (from, mut velocity) = (*nodes.positions(), *nodes.velocities());
-        for (v, limit) in velocity.iter_mut().zip(&config.joints) {
-            *v = v.max(-limit.velocity_max).min(limit.velocity_max);
-        }
-        self.set = SetPoint::still(from);
-        for pid in &mut self.pid {
-            pid.reset(0.0);
-        }
+        let (from, velocity) = (nodes.positions(), nodes.velocities());
+        self.set = SetPoint::still(*from);
         let moves = velocity.iter().any(|v| v.abs() > STANDING);
-        self.coast = moves.then_some(Coast { joints: self.holding, from, velocity, elapsed_ms: 0.0 });
+        for j in 0..JOINTS {
+            self.pid[j].reset(0.0);
+            // Joints that are enabled later begin on their own.
+            let coasts = moves && self.holding[j];
+            self.coast[j] = coasts.then_some(Coast::led(from[j], velocity[j], config, &config.joints[j]));
+        }
     }
 
     /// Joints that move, by their set values or as measured: `bit` in each.
@@ -159,19 +148,23 @@ impl Motion {
 
     /// Every joint is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
-        self.coast.is_none() && self.holding.iter().all(|&h| h)
+        self.coast.iter().all(Option::is_none) && self.holding.iter().all(|&h| h)
     }
 
-    /// Latches the set position of joints that have just been enabled; joints that are not are followed, without torque.
-    pub fn latch(&mut self, nodes: &Nodes) {
-        let measured = nodes.positions();
+    /// Latches the set position of joints that have just been enabled, and brings those to rest that move; joints that are
+    /// not enabled are followed, without torque.
+    pub fn latch(&mut self, nodes: &Nodes, config: &Config) {
+        let (measured, velocity) = (nodes.positions(), nodes.velocities());
         for j in 0..JOINTS {
             let enabled = nodes.node(j).enabled();
+            self.fresh[j] = enabled && !self.holding[j];
             if !(enabled && self.holding[j]) {
                 self.set.position[j] = measured[j];
                 self.pid[j].reset(0.0);
+                let moves = self.fresh[j] && velocity[j].abs() > STANDING;
+                self.coast[j] =
+                    moves.then_some(Coast::falling(measured[j], velocity[j], config, &config.joints[j]));
             }
-            self.fresh[j] = enabled && !self.holding[j];
             self.holding[j] = enabled;
         }
     }
@@ -179,26 +172,12 @@ impl Motion {
     /// Set values of HoldPos: the held position.
     pub fn hold(&mut self, config: &Config) {
         (self.set.velocity, self.set.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
-        let length = f64::from(config.ramp_ms.max(1));
-        if let Some(coast) = &mut self.coast {
-            coast.elapsed_ms += 1.0;
-            let u = (coast.elapsed_ms / length).min(1.0);
-            // Integral of the falling velocity v·(1 − smooth(u)).
-            let way = (u - u * u * u + 0.5 * u * u * u * u) * length * DT;
-            for j in 0..JOINTS {
-                if !coast.joints[j] {
-                    continue;
-                }
-                let limit = &config.joints[j];
-                let position = coast.from[j] + coast.velocity[j] * way;
-                // Coasting never leads out of the limits; where the arm already is outside, it stays.
-                self.set.position[j] = position
-                    .max(limit.position_min.min(coast.from[j]))
-                    .min(limit.position_max.max(coast.from[j]));
-                self.set.velocity[j] = coast.velocity[j] * (1.0 - smooth(u));
-            }
-            if u >= 1.0 {
-                self.coast = None;
+        for j in 0..JOINTS {
+            let Some(coast) = &mut self.coast[j] else { continue };
+            let (position, velocity, rests) = coast.step(&config.joints[j]);
+            (self.set.position[j], self.set.velocity[j]) = (position, velocity);
+            if rests {
+                self.coast[j] = None;
             }
         }
     }

@@ -402,7 +402,8 @@ fn j16_enabling_has_a_time_limit() {
     rig.until(200, |r| r.state() == State::HoldPos);
     rig.run(490);
     assert_eq!(rig.state(), State::HoldPos);
-    rig.run(30);
+    // The arm has to have been still for 50 ms before enabling is asked for.
+    rig.run(80);
     assert_eq!((rig.state(), rig.errors()), (State::Error, error::EXTERNAL | error::EXTERNAL_JOINTS));
     // The default leaves time for the four seconds of motor alignment.
     assert_eq!(Config::avena().enable_timeout_ms, 10_000);

@@ -73,7 +73,10 @@ impl Nodes {
     fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
         let mut target = [Target::NoChange; NODES];
         for (node, target) in self.joints().iter().zip(&mut target) {
-            *target = node.request(goal);
+            // J-16: an arm that falls is not caught with a jolt.
+            let request = node.request(goal);
+            let held_back = request == Target::Enable && !self.may_enable(config);
+            *target = if held_back { Target::NoChange } else { request };
         }
         target[GRIPPER] = self.gripper_target(goal, config);
         target

@@ -68,6 +68,12 @@ impl Measurement {
         self.used
     }
 
+    /// Speed of the joint, rad/s: what it reports, or what its positions say, whichever is more. Reported velocities are not
+    /// trusted alone: their full scale depends on the drive (J-11).
+    pub fn speed(&self) -> f64 {
+        self.used.velocity.abs().max(self.rate.abs())
+    }
+
     /// The next answer is taken as it is.
     pub fn forget(&mut self) {
         self.known = false;
@@ -193,5 +199,15 @@ mod tests {
             last = now;
         }
         assert_eq!(last, Reading { position: 0.01, velocity: 0.5 });
+    }
+
+    #[test]
+    fn j16_the_speed_is_seen_where_the_reported_velocity_is_wrong() {
+        let mut joint = Measurement::default();
+        for k in 0..20 {
+            let answer = Some(Reading { position: 0.3 * f64::from(k) * DT, velocity: 0.0 });
+            joint.step(&Tick { answer, ..tick(None, 0.0) }, &Config::avena());
+        }
+        assert!((joint.speed() - 0.3).abs() < 1e-9);
     }
 }

@@ -30,6 +30,12 @@ pub(crate) struct Nodes {
     velocity: [f64; JOINTS],
     gripper: bool,
     gripper_lost: bool,
+    /// Ticks for which every joint has been slow enough to be enabled (J-16).
+    still_ms: u16,
+    /// Ticks left in which the drives rest after torque was taken away.
+    rest_ms: u16,
+    /// Torque was wanted in the last tick.
+    powered: bool,
     /// Measured state of the gripper.
     pub pump: bool,
     pub pressure: [bool; 2],
@@ -55,6 +61,9 @@ impl Nodes {
             velocity: [0.0; JOINTS],
             gripper: config.gripper,
             gripper_lost: false,
+            still_ms: 0,
+            rest_ms: 0,
+            powered: false,
             pump: false,
             pressure: [false; 2],
             ignored: 0,
@@ -158,6 +167,8 @@ impl Nodes {
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
         }
+        let torque_taken = core::mem::replace(&mut self.powered, goal == Goal::Enabled) && !self.powered;
+        self.rest_ms = if torque_taken { config.enable_rest_ms } else { self.rest_ms.saturating_sub(1) };
         let usable = self.measure(answered, commanded, config);
         self.count_missing(inputs, config, answered, usable);
         let gripper = &self.nodes[GRIPPER];
@@ -192,7 +203,7 @@ impl Nodes {
 
     /// Positions and velocities from the nodes that `answered`; returns those whose answers are usable.
     fn measure(&mut self, answered: u8, commanded: &[f64; JOINTS], config: &Config) -> u8 {
-        let mut usable = answered;
+        let (mut usable, mut still) = (answered, true);
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
             let reading = Reading { position: node.report.position, velocity: node.report.velocity };
             let tick = Tick {
@@ -207,8 +218,15 @@ impl Nodes {
             }
             let Reading { position, velocity } = node.measured.used();
             (self.position[j], self.velocity[j]) = (position, velocity);
+            still &= node.valid && node.measured.speed() < config.enable_speed_max;
         }
+        self.still_ms = if still { self.still_ms.saturating_add(1) } else { 0 };
         usable
+    }
+
+    /// The arm stands, or moves slowly, and its drives have rested: joints may be enabled (J-16).
+    fn may_enable(&self, config: &Config) -> bool {
+        self.still_ms >= config.enable_still_ms && self.rest_ms == 0
     }
 
     /// Counts Moves without answer, without usable answer, and without acknowledge (J-14, J-35).
@@ -252,6 +270,7 @@ impl Nodes {
 
     /// Sees joints that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
     fn watch(&mut self, config: &Config, goal: Goal) {
+        let may_enable = self.may_enable(config);
         for node in self.nodes.iter_mut().take(JOINTS) {
             if goal != Goal::Enabled {
                 (node.enabled, node.enable_wait) = (false, 0);
@@ -268,7 +287,8 @@ impl Nodes {
                 node.misbehaved = true;
             }
             node.enabled = false;
-            node.enable_wait = node.enable_wait.saturating_add(1);
+            // J-16: while the arm falls nothing is asked for.
+            node.enable_wait = node.enable_wait.saturating_add(u32::from(may_enable));
             if node.enable_wait > config.enable_timeout_ms {
                 (node.misbehaved, node.enable_wait) = (true, 0);
             }

@@ -1,0 +1,163 @@
+//! Joints are enabled only in an arm that hardly moves, and come to rest without a torque step where one moves all the same (J-16).
+mod rig;
+
+use jtc_bus::{Request, Target, fsm};
+use jtc_core::{Config, State, error};
+use jtc_wire::FrameType;
+use rig::Rig;
+
+const JOINT: usize = 1;
+
+/// In Error, the cause gone and cleared; joint 1 swings. What it reports is up to `report`: position and velocity from its
+/// true ones.
+fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
+    let start = rig.nodes[JOINT].report.position;
+    for k in 0..ticks {
+        // To and fro, 0.2 s each way, so that it stays near.
+        let phase = (k % 400) as f64;
+        let (way, sign) = if phase < 200.0 { (phase, 1.0) } else { (400.0 - phase, -1.0) };
+        let (position, velocity) = report(speed * way * 0.001, sign * speed);
+        rig.nodes[JOINT].report.position = start + position;
+        rig.nodes[JOINT].report.velocity = velocity;
+        rig.tick();
+    }
+}
+
+/// What a joint reports of its position and velocity.
+type Report = fn(f64, f64) -> (f64, f64);
+
+fn asked_to_enable(requests: &[Request]) -> bool {
+    requests
+        .iter()
+        .any(|r| matches!(r, Request::ChangeFsm { target } if target[..6].contains(&Target::Enable)))
+}
+
+/// In Error with nothing left to clear.
+fn stopped(config: Config) -> Rig {
+    let mut rig = Rig::new(config);
+    rig.defaults();
+    rig.until(500, |r| r.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+    rig.run(3);
+    rig.follow = false;
+    rig.safety_input = false;
+    rig.run(100);
+    rig.safety_input = true;
+    rig
+}
+
+#[test]
+fn j16_no_joint_is_enabled_while_one_moves() {
+    // As it is; a drive that reports no velocity; one that reports it while the position is still that of before.
+    let reports: [Report; 3] = [|q, v| (q, v), |q, _| (q, 0.0), |_, v| (0.0, v)];
+    for report in reports {
+        for speed in [0.3, 1.5] {
+            let config = Config { enable_timeout_ms: 500, ..Config::avena() };
+            let mut rig = stopped(config);
+            swing(&mut rig, 100, speed, report);
+            rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
+            let from = rig.sent.len();
+            // The time limit of enabling counts only while enabling is asked for.
+            swing(&mut rig, 3000, speed, report);
+            assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0), "{speed} rad/s");
+            assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
+            assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY), "which the status shows");
+            // It must have been slow for 50 ms.
+            let from = rig.sent.len();
+            swing(&mut rig, 49, 0.2, report);
+            assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
+            swing(&mut rig, 30, 0.2, report);
+            assert!(asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
+            rig.run(100);
+            assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+            assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        }
+    }
+}
+
+#[test]
+fn j16_the_speed_and_the_time_are_settings() {
+    let config = Config { enable_speed_max: 0.5, enable_still_ms: 200, ..Config::avena() };
+    let mut rig = stopped(config);
+    swing(&mut rig, 500, 1.0, |q, v| (q, v));
+    rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
+    let from = rig.sent.len();
+    swing(&mut rig, 198, 0.45, |q, v| (q, v));
+    assert!(!asked_to_enable(&rig.sent[from..]));
+    swing(&mut rig, 30, 0.45, |q, v| (q, v));
+    assert!(asked_to_enable(&rig.sent[from..]));
+}
+
+#[test]
+fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step() {
+    for velocity in [0.2, -0.7, 1.4] {
+        // Its motor takes long, and meanwhile the joint begins to fall.
+        let mut rig = stopped(Config::avena());
+        rig.nodes[JOINT].slow_enable = true;
+        rig.clear(true, 0x7F);
+        rig.until(500, |r| r.nodes[JOINT].report.fsm == 12);
+        let mut falling = 0.0;
+        for _ in 0..100 {
+            falling += velocity * 0.01;
+            rig.nodes[JOINT].report.velocity = falling;
+            rig.nodes[JOINT].report.position += falling * 0.001;
+            rig.tick();
+        }
+        rig.nodes[JOINT].report.fsm = fsm::ENABLED;
+        let (start, mut last) = (rig.nodes[JOINT].report.position, 0.0);
+        for tick in 0..900 {
+            // An arm that goes where it is commanded to; what it reports now is seen two ticks after that command.
+            let t = rig.controller.telemetry().joints[JOINT];
+            if t.set_velocity != 0.0 {
+                rig.nodes[JOINT].report.velocity = t.set_velocity;
+                rig.nodes[JOINT].report.position = t.set_position + t.set_velocity * 0.002;
+            } else if tick < 3 {
+                rig.nodes[JOINT].report.position += velocity * 0.001;
+            }
+            rig.tick();
+            let t = rig.controller.telemetry().joints[JOINT];
+            let correction = t.torque - t.torque_model;
+            assert!(
+                f64::abs(correction - last) < 3.0,
+                "{velocity} rad/s, tick {tick}: {last} to {correction}"
+            );
+            last = if t.fsm == fsm::ENABLED { correction } else { 0.0 };
+        }
+        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        let t = rig.controller.telemetry().joints[JOINT];
+        let way = t.set_position - start;
+        assert_eq!(t.set_velocity, 0.0);
+        // 200 ms, or 3 rad/s² at most.
+        let seconds = f64::max(0.2, 1.5 * f64::abs(velocity) / 3.0);
+        assert!(
+            (way - 0.5 * seconds * velocity).abs() < 0.01,
+            "{velocity} rad/s: came to rest after {way} rad"
+        );
+    }
+}
+
+/// The motor control of a drive rests after a stop. If it were asked earlier, the joint would be enabled at the end of that
+/// rest, whatever the arm does by then.
+#[test]
+fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
+    let mut rig = Rig::holding();
+    rig.safety_input = false;
+    rig.tick();
+    rig.safety_input = true;
+    let from = rig.sent.len();
+    rig.clear(true, 0x7F);
+    rig.until(600, |r| asked_to_enable(&r.sent[from..]));
+    let ticks = rig.sent.len() - from;
+    assert!((400..=410).contains(&ticks), "{ticks} ms");
+}
+
+/// A joint that leaves OperationEnable after it has been enabled is an error still, whatever the arm does.
+#[test]
+fn j16_the_gate_hides_no_joint_that_leaves_operation_enable() {
+    let mut rig = Rig::holding();
+    rig.follow = false;
+    rig.nodes[JOINT].report.velocity = 1.0;
+    rig.run(3);
+    rig.nodes[JOINT].report.fsm = fsm::READY;
+    rig.run(2);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+}

@@ -129,7 +129,7 @@ impl Display for Command<'_> {
             Self::FrictionTable(values) => {
                 let ends = |from, to| (values.get(from).unwrap_or(0.0), values.get(to).unwrap_or(0.0));
                 let (velocity, temperature) = (ends(0, 19), ends(20, 39));
-                write!(f, ": joint 0 {}..{} rad/s, ", velocity.0, velocity.1)?;
+                write!(f, ": joint 1 {}..{} rad/s, ", velocity.0, velocity.1)?;
                 write!(f, "{}..{} °C", temperature.0, temperature.1)?;
                 if f.alternate() { list(kind, values, f) } else { Ok(()) }
             }
@@ -160,7 +160,7 @@ fn polynomial(values: Floats<'_>, f: &mut Formatter<'_>) -> Result {
     write!(f, ": {each} coefficients a joint")?;
     if f.alternate() && each > 0 {
         for (i, value) in values.iter().enumerate() {
-            let (joint, index) = (i / each, each - 1 - i % each);
+            let (joint, index) = (1 + i / each, each - 1 - i % each);
             write!(f, "\n  joint {joint} c{index} = {value}")?;
         }
     }
@@ -185,7 +185,7 @@ impl Display for Status {
             write!(f, "\n  friction: {}", words::friction_type(self.friction_type))?;
             write!(f, "\n  CAN occurred: {}", Bits(self.can_occurred, &words::CAN_FLAGS))?;
             for (j, joint) in self.joints.iter().enumerate() {
-                write!(f, "\n  joint {j}: {joint}")?;
+                write!(f, "\n  joint {}: {joint}", j + 1)?;
             }
             if let Some(gripper) = &self.gripper {
                 write!(f, "\n  gripper: {gripper}")?;

@@ -159,7 +159,8 @@ impl fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// What a float of a frame is: its type and the index from 0 in the order of the wire. Displays as `PidParam joint 2 Ki`.
+/// What a float of a frame is: its type and the index from 0 in the order of the wire. Displays as `PidParam joint 3 Ki`, joints
+/// counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FloatName(pub FrameType, pub usize);
 
@@ -172,11 +173,12 @@ impl fmt::Display for FloatName {
         let Self(kind, index) = *self;
         write!(f, "{kind} ")?;
         match kind {
-            FrameType::PidParam => write!(f, "joint {} {}", index / 5, PID[index % 5]),
-            FrameType::ArmModel if index < 42 => write!(f, "joint {} {}", index / 6, ORIGIN[index % 6]),
+            FrameType::PidParam => write!(f, "joint {} {}", 1 + index / 5, PID[index % 5]),
+            FrameType::ArmModel if index < 36 => write!(f, "joint {} {}", 1 + index / 6, ORIGIN[index % 6]),
+            FrameType::ArmModel if index < 42 => write!(f, "flange {}", ORIGIN[index % 6]),
             FrameType::ArmModel => write!(f, "link {} {}", (index - 42) / 13, LINK[(index - 42) % 13]),
             FrameType::FrictionTable => {
-                let (joint, i) = (index / 440, index % 440);
+                let (joint, i) = (1 + index / 440, index % 440);
                 match i {
                     0..20 => write!(f, "joint {joint} velocity {i}"),
                     20..40 => write!(f, "joint {joint} temperature {}", i - 20),

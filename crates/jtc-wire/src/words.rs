@@ -18,8 +18,16 @@ pub const JTC_ERRORS: [&str; 8] = [
 ];
 /// Bits of what the host has not given yet.
 pub const JTC_INIT: [&str; 3] = ["friction", "PID", "arm model"];
-/// Nodes of the joint bus.
-pub const NODES: [&str; 7] = ["joint 0", "joint 1", "joint 2", "joint 3", "joint 4", "joint 5", "gripper"];
+/// Nodes of the joint bus: nodes count from 0 on the wire, joints from 1.
+pub const NODES: [&str; 7] = [
+    "node 0 (joint 1)",
+    "node 1 (joint 2)",
+    "node 2 (joint 3)",
+    "node 3 (joint 4)",
+    "node 4 (joint 5)",
+    "node 5 (joint 6)",
+    "gripper",
+];
 /// Bits of a joint's errors found by the controller.
 pub const JOINT_INTERNAL: [&str; 6] = [
     "position over limit",
@@ -60,12 +68,12 @@ pub const CAN_FLAGS: [&str; 15] = [
     "",
     "",
     "",
-    "no answer from joint 0",
-    "no answer from joint 1",
-    "no answer from joint 2",
-    "no answer from joint 3",
-    "no answer from joint 4",
-    "no answer from joint 5",
+    "no answer from node 0 (joint 1)",
+    "no answer from node 1 (joint 2)",
+    "no answer from node 2 (joint 3)",
+    "no answer from node 3 (joint 4)",
+    "no answer from node 4 (joint 5)",
+    "no answer from node 5 (joint 6)",
     "no answer from the gripper",
 ];
 

@@ -118,7 +118,7 @@ fn j06_floats_that_are_none() {
     let mut gains = [[1.0; 5]; 6];
     gains[2][1] = f64::NAN;
     let error = pid_param(&mut out, &gains).expect_err("not a number");
-    assert_eq!(error.to_string(), "PidParam joint 2 Ki: NaN is no number that a frame carries");
+    assert_eq!(error.to_string(), "PidParam joint 3 Ki: NaN is no number that a frame carries");
     let mut links = [[0.5; 13]; 7];
     links[6][12] = 1e300;
     let error = arm_model(&mut out, &[[0.0; 6]; 7], &links).expect_err("too large for an f32");
@@ -325,14 +325,14 @@ fn every_frame_in_words() {
     let says = |bytes: &[u8], text: &str| assert_eq!(Described(bytes).to_string(), text);
     says(
         &fixed::clear_current_errors(true, 0x41),
-        "ClearCurrentErrors: the controller's own, nodes: joint 0, gripper",
+        "ClearCurrentErrors: the controller's own, nodes: node 0 (joint 1), gripper",
     );
     says(
         &fixed::empty(FrameType::FrictionPolynomial),
         "FrictionPolynomialUseDefault (sent as an empty FrictionPolynomial)",
     );
     says(&fixed::PUMP_OFF, "GripperControl: pump off");
-    says(&fixed::reset_can_devices(0x02), "ResetCanDevices: joint 1");
+    says(&fixed::reset_can_devices(0x02), "ResetCanDevices: node 1 (joint 2)");
     says(&[0x9B, 0x0B, 0, 9], "TrajSetExecStatus with a length field of 9, which it cannot have; 4 bytes");
     says(&[0x9B, 0x09, 2, 0x1A, 0, 0], "ArmModel: 6 bytes of 538");
     says(&[0x00; 7], "7 bytes that begin with 00 instead of 9B");

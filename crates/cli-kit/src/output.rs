@@ -43,9 +43,9 @@ impl Output {
         let _ = stdout.flush();
     }
 
-    /// One line of a log.
+    /// One line of a log. A terminal that has gone is no reason to leave a machine alone: what cannot be printed is dropped.
     pub fn note(&self, text: impl std::fmt::Display) {
-        eprintln!("{text}");
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 
     /// A bar on stderr; invisible where stderr is no terminal.
@@ -71,11 +71,11 @@ impl Output {
     pub fn failure(&self, exit: u8, code: &str, message: &str, hint: &str) {
         if self.json {
             let error = json!({ "code": code, "message": message, "hint": hint, "exit": exit });
-            println!("{}", json!({ "error": error }));
+            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error }));
         }
-        eprintln!("{}: {message}", self.program);
+        self.note(format_args!("{}: {message}", self.program));
         if !hint.is_empty() {
-            eprintln!("{:1$}  {hint}", "", self.program.len());
+            self.note(format_args!("{:1$}  {hint}", "", self.program.len()));
         }
     }
 }

@@ -4,20 +4,38 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+/// Signals that ask a command to end: Ctrl-C, `kill`, and the end of its terminal, unless it was started to outlive that (`nohup`).
+fn signals() -> impl Iterator<Item = i32> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    #[cfg(unix)]
+    let hangup = (!hangup_ignored()).then_some(signal_hook::consts::SIGHUP);
+    #[cfg(not(unix))]
+    let hangup = None;
+    [SIGINT, SIGTERM].into_iter().chain(hangup)
+}
+
+/// This process was started with SIGHUP ignored, where the system says so.
+#[cfg(unix)]
+fn hangup_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok()).is_some_and(|mask| mask & 1 != 0)
+}
+
 /// How often the thread of [`Stop::listen_with`] looks.
 const LOOK: Duration = Duration::from_millis(10);
 /// Signals so close together are one.
 const ONE_PRESS: Duration = Duration::from_millis(100);
 
-/// Set by SIGINT or SIGTERM.
+/// Set by SIGINT, SIGTERM or SIGHUP.
 #[derive(Clone, Debug)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// From now on SIGINT and SIGTERM only set the flag.
+    /// From now on SIGINT, SIGTERM and SIGHUP only set the flag; the second one ends the process.
     pub fn listen() -> std::io::Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
-        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        for signal in signals() {
             // The second Ctrl-C ends the process whatever it does: registered first, because it must see the flag of the last time.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))?;
             signal_hook::flag::register(signal, Arc::clone(&flag))?;
@@ -25,13 +43,13 @@ impl Stop {
         Ok(Self(flag))
     }
 
-    /// From now on the first SIGINT or SIGTERM sets the flag. The second one ends the process, whatever the rest of it does,
+    /// From now on the first SIGINT, SIGTERM or SIGHUP sets the flag. The second one ends the process, whatever the rest of it does,
     /// with the exit code that `last_words` returns; it runs in a thread of its own and may print.
     ///
     /// Signals that follow each other within 0.1 s are one: a terminal and a wrapper may both send theirs.
     pub fn listen_with(last_words: impl Fn() -> u8 + Send + 'static) -> std::io::Result<Self> {
         let came = Arc::new(AtomicBool::new(false));
-        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        for signal in signals() {
             signal_hook::flag::register(signal, Arc::clone(&came))?;
         }
         let asked = Arc::new(AtomicBool::new(false));

@@ -19,7 +19,7 @@ pub enum FrictionChoice {
     Table,
 }
 
-/// Parameters from a file or a directory.
+/// Parameters from files and directories.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterFile {
     /// The whole arm, where the file describes one.
@@ -41,23 +41,30 @@ pub struct ParameterFile {
 impl ParameterFile {
     /// Reads an arm file (TOML, URDF), one of the CSV forms, or all of a directory.
     pub fn load(path: &Path) -> Result<Self, FileError> {
+        Self::load_all(std::slice::from_ref(&path.to_owned()))
+    }
+
+    /// Reads files and directories together, later ones over earlier ones. Tables of single joints count only when all six of a
+    /// kind are named or lie in a directory that is named: no joint is given another one's numbers, and no file is read that was
+    /// not meant.
+    pub fn load_all(paths: &[PathBuf]) -> Result<Self, FileError> {
         let mut all = Self::default();
-        if path.is_dir() {
-            all.directory(path)?
-        } else {
-            all.file(path)?
+        let mut joints = JointTables::default();
+        for path in paths {
+            if path.is_dir() { all.directory(path, &mut joints)? } else { all.file(path, &mut joints)? }
         }
-        all.parameter_set(FrictionChoice::default())
-            .check()
-            .map_err(|e| FileError::form(e.to_string()).in_file(path))?;
-        all.parameter_set(FrictionChoice::Table)
-            .check()
-            .map_err(|e| FileError::form(e.to_string()).in_file(path))?;
+        all.take_joints(joints)?;
+        let about = paths.first().map_or(Path::new(""), PathBuf::as_path);
+        for choice in [FrictionChoice::Polynomial, FrictionChoice::Table] {
+            let set = all.parameter_set(choice);
+            set.check().map_err(|e| FileError::form(e.to_string()).in_file(about))?;
+        }
         Ok(all)
     }
 
-    /// From the text of a table alone.
-    pub fn parse_table(text: &str) -> Result<Self, FileError> {
+    /// From the text of a table alone; that of one joint stands for all, so that its numbers are looked at.
+    #[cfg(any(test, feature = "fuzzing"))]
+    pub(crate) fn parse_table(text: &str) -> Result<Self, FileError> {
         let mut all = Self::default();
         match csv::read(text)? {
             Table::Friction(t) => all.table = Some(Box::new([*t; JOINTS])),
@@ -82,7 +89,7 @@ impl ParameterFile {
         self.warnings.push(Warning { place, problem: problem.into() });
     }
 
-    fn file(&mut self, path: &Path) -> Result<(), FileError> {
+    fn file(&mut self, path: &Path, joints: &mut JointTables) -> Result<(), FileError> {
         let text = read_text(path)?;
         if is_arm(&text) {
             let arm = Arm::parse(&text).map_err(|e| e.in_file(path))?;
@@ -90,24 +97,23 @@ impl ParameterFile {
             return Ok(());
         }
         match csv::read(&text).map_err(|e| e.in_file(path))? {
-            // One joint's file stands for its five siblings beside it.
-            Table::Friction(own) => {
-                let tables = siblings(path, |t| if let Table::Friction(t) = t { Some(*t) } else { None })?;
-                if tables.is_none() {
-                    self.warn(path.display().to_string(), "one friction table: used for all six joints");
-                }
-                self.table = Some(Box::new(tables.unwrap_or([*own; JOINTS])));
-                self.sources.push((path.to_owned(), "friction table"));
+            Table::Friction(table) => joints.friction.add(path, *table),
+            Table::Pid(gains) => joints.gains.add(path, gains),
+            whole => {
+                self.take(path, whole);
+                Ok(())
             }
-            Table::Pid(own) => {
-                let gains = siblings(path, |t| if let Table::Pid(g) = t { Some(g) } else { None })?;
-                if gains.is_none() {
-                    self.warn(path.display().to_string(), "gains of one joint: used for all six");
-                }
-                self.pid = Some(gains.unwrap_or([own; JOINTS]));
-                self.sources.push((path.to_owned(), "gains"));
-            }
-            whole => self.take(path, whole),
+        }
+    }
+
+    fn take_joints(&mut self, joints: JointTables) -> Result<(), FileError> {
+        if let Some((tables, paths)) = joints.friction.complete()? {
+            self.table = Some(Box::new(tables));
+            self.sources.extend(paths.into_iter().map(|path| (path, "friction table")));
+        }
+        if let Some((gains, paths)) = joints.gains.complete()? {
+            self.pid = Some(gains);
+            self.sources.extend(paths.into_iter().map(|path| (path, "gains")));
         }
         Ok(())
     }
@@ -145,7 +151,8 @@ impl ParameterFile {
         self.sources.push((path.to_owned(), "arm"));
     }
 
-    fn directory(&mut self, path: &Path) -> Result<(), FileError> {
+    fn directory(&mut self, path: &Path, joints: &mut JointTables) -> Result<(), FileError> {
+        let before = self.sources.len() + joints.len();
         let io = |source| FileError::Io { path: path.to_owned(), source };
         let mut files: Vec<PathBuf> = Vec::new();
         for entry in std::fs::read_dir(path).map_err(io)? {
@@ -156,12 +163,13 @@ impl ParameterFile {
             let fits = |p: &&PathBuf| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(head));
             files.iter().filter(fits).cloned().collect()
         };
-        for head in ["FricTableJoint0", "PidParamJoint0", "FricPolynomial"] {
-            if let Some(file) = named(head).first() {
-                self.file(file)?;
-            }
+        for head in ["FricTableJoint", "PidParamJoint"] {
+            named(head).iter().try_for_each(|file| self.file(file, joints))?;
         }
-        if self.table.is_some() && self.polynomial.is_some() {
+        if let Some(file) = named("FricPolynomial").first() {
+            self.file(file, joints)?;
+        }
+        if joints.friction.len() > 0 && self.polynomial.is_some() {
             self.warn(
                 path.display().to_string(),
                 "friction polynomial and table are there: the polynomial is taken",
@@ -171,7 +179,7 @@ impl ParameterFile {
             files.iter().filter(|p| p.extension().is_some_and(|e| e == "toml" || e == "urdf")).collect();
         match arms[..] {
             [] => {}
-            [one] => self.file(one)?,
+            [one] => self.file(one, joints)?,
             _ => {
                 let names: Vec<String> = arms.iter().map(|p| p.display().to_string()).collect();
                 self.warn(
@@ -180,7 +188,7 @@ impl ParameterFile {
                 );
             }
         }
-        if self.sources.is_empty() {
+        if self.sources.len() + joints.len() == before {
             let problem = "no FricTableJointN.csv, FricPolynomialCoeffs.csv, PidParamJointN.csv, URDF or TOML file in it";
             return Err(FileError::form(problem).in_file(path));
         }
@@ -194,25 +202,88 @@ fn is_arm(text: &str) -> bool {
     start.starts_with('<') || start.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
-/// The six files `…Joint0.csv` to `…Joint5.csv` beside `path`, when they are all there.
-fn siblings<T>(path: &Path, get: impl Fn(Table) -> Option<T>) -> Result<Option<[T; JOINTS]>, FileError> {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let Some((head, tail)) = name.split_once("Joint") else { return Ok(None) };
-    let Some(tail) = tail.strip_prefix(|c: char| c.is_ascii_digit()) else { return Ok(None) };
-    let mut all = Vec::new();
-    for j in 0..JOINTS {
-        let file = path.with_file_name(format!("{head}Joint{j}{tail}"));
-        if !file.exists() {
-            return Ok(None);
+/// Tables of single joints, until all six of a kind are there.
+#[derive(Default)]
+struct JointTables {
+    friction: PerJoint<TableOf<f32>>,
+    gains: PerJoint<PidGains>,
+}
+
+impl JointTables {
+    fn len(&self) -> usize {
+        self.friction.len() + self.gains.len()
+    }
+}
+
+/// Tables of all six joints, and the files that they are from.
+type Complete<T> = ([T; JOINTS], Vec<PathBuf>);
+
+/// One kind of table, and the file of each joint.
+struct PerJoint<T> {
+    found: [Option<(PathBuf, T)>; JOINTS],
+}
+
+impl<T> Default for PerJoint<T> {
+    fn default() -> Self {
+        Self { found: [const { None }; JOINTS] }
+    }
+}
+
+impl<T> PerJoint<T> {
+    fn len(&self) -> usize {
+        self.found.iter().flatten().count()
+    }
+
+    /// Takes the table of a joint; the name of the file says which.
+    fn add(&mut self, path: &Path, table: T) -> Result<(), FileError> {
+        let Some((_, joint, _)) = split_name(path) else {
+            let problem = "holds the numbers of one joint, and its name does not say of which: such files are named ...Joint0.csv \
+                           (joint 1) to ...Joint5.csv (joint 6), and all six are needed";
+            return Err(FileError::form(problem).in_file(path));
+        };
+        if let Some((other, _)) = &self.found[joint] {
+            let problem = format!("holds joint {}, which {} holds already", joint + 1, other.display());
+            return Err(FileError::form(problem).in_file(path));
         }
-        match get(csv::read(&read_text(&file)?).map_err(|e| e.in_file(&file))?) {
-            Some(v) => all.push(v),
-            None => {
-                return Err(
-                    FileError::form("is another kind of table than the files beside it").in_file(&file)
+        self.found[joint] = Some((path.to_owned(), table));
+        Ok(())
+    }
+
+    /// All six, or none; an error that names the files that are missing.
+    fn complete(self) -> Result<Option<Complete<T>>, FileError> {
+        let Some((first, _)) = self.found.iter().flatten().next() else { return Ok(None) };
+        let first = first.clone();
+        let missing: Vec<String> = (0..JOINTS)
+            .filter(|joint| self.found[*joint].is_none())
+            .map(|joint| format!("{} (joint {})", sibling(&first, joint), joint + 1))
+            .collect();
+        let found: Vec<(PathBuf, T)> = self.found.into_iter().flatten().collect();
+        let (paths, tables): (Vec<PathBuf>, Vec<T>) = found.into_iter().unzip();
+        match <[T; JOINTS]>::try_from(tables) {
+            Ok(tables) => Ok(Some((tables, paths))),
+            Err(_) => {
+                let problem = format!(
+                    "holds the numbers of one joint; not named: {}. Name all six files, or their directory",
+                    missing.join(", ")
                 );
+                Err(FileError::form(problem).in_file(&first))
             }
         }
     }
-    Ok(all.try_into().ok())
+}
+
+/// `PidParamJoint3.csv` is joint index 3 between `PidParamJoint` and `.csv`: these files count from 0.
+fn split_name(path: &Path) -> Option<(String, usize, String)> {
+    let name = path.file_name()?.to_string_lossy().into_owned();
+    let (head, tail) = name.split_once("Joint")?;
+    let digit = tail.chars().next()?.to_digit(10)? as usize;
+    (digit < JOINTS).then(|| (format!("{head}Joint"), digit, tail[1..].to_owned()))
+}
+
+/// The file of another joint beside `path`.
+fn sibling(path: &Path, joint: usize) -> String {
+    match split_name(path) {
+        Some((head, _, tail)) => path.with_file_name(format!("{head}{joint}{tail}")).display().to_string(),
+        None => format!("...Joint{joint}.csv"),
+    }
 }

@@ -2,6 +2,7 @@
 
 mod collect;
 mod csv;
+mod device;
 mod export;
 mod frames;
 mod parameters;
@@ -16,6 +17,7 @@ use jtc_core::{Config, Friction, JOINTS, JointConfig, Parameters, PidGains, Tabl
 use jtc_dynamics::ArmModel;
 
 pub use collect::{FrictionChoice, ParameterFile};
+pub use device::{Difference, NOT_CARRIED};
 pub use parameters::{ParameterError, ParameterSet};
 
 use crate::file::{FileError, Place, read_text};

@@ -70,6 +70,16 @@ impl ParameterSet {
         self.friction.is_none() && self.pid.is_none() && self.model.is_none()
     }
 
+    /// What a controller needs before it powers an arm, and is not in here.
+    pub fn missing(&self) -> Vec<&'static str> {
+        let parts = [
+            (self.friction.is_none(), "friction"),
+            (self.pid.is_none(), "PID gains"),
+            (self.model.is_none(), "arm model"),
+        ];
+        parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
+    }
+
     /// All that the controller would refuse with "incorrect value" (J-06), before anything is sent.
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {

@@ -179,13 +179,17 @@ fn the_existing_parameter_files_are_read() {
     if let Some(file) = load("FricPolynomialCoeffs.csv") {
         assert_eq!(file.polynomial, arm.polynomial);
     }
-    if let Some(file) = load("FricTableJoint3.csv") {
+    let six = |head: &str| -> Option<ParameterFile> {
+        let paths: Option<Vec<PathBuf>> = (0..6).map(|j| data(&format!("{head}{j}.csv"))).collect();
+        paths.map(|paths| ParameterFile::load_all(&paths).unwrap())
+    };
+    if let Some(file) = six("FricTableJoint") {
         assert_eq!((file.table, file.warnings.len()), (arm.table.clone(), 0));
     }
     if let Some(file) = load("friction_table_default.csv") {
         assert_eq!(file.table, arm.table);
     }
-    if let Some(file) = load("PidParamJoint0.csv") {
+    if let Some(file) = six("PidParamJoint") {
         assert_eq!(file.pid, arm.pid);
     }
     if let Some(file) = load("model_default.txt") {
@@ -212,4 +216,44 @@ fn the_existing_parameter_files_are_read() {
             file.polynomial.is_some() && file.table.is_some() && file.pid.is_some() && file.model.is_none()
         );
     }
+}
+
+/// Gains of one joint as the existing programs write them; each joint has its own Kp.
+fn gains_file(dir: &Path, joint: usize) -> PathBuf {
+    let path = dir.join(format!("PidParamJoint{joint}.csv"));
+    std::fs::write(&path, format!("{},10,5,-1,1\n", 1000 + joint)).unwrap();
+    path
+}
+
+#[test]
+fn gains_of_one_joint_are_never_those_of_six() {
+    let dir = tempfile::tempdir().unwrap();
+    let all: Vec<PathBuf> = (0..6).map(|j| gains_file(dir.path(), j)).collect();
+    let kp = |file: ParameterFile| file.pid.unwrap().map(|g| g.kp);
+    let expected = [1000.0, 1001.0, 1002.0, 1003.0, 1004.0, 1005.0];
+    assert_eq!(kp(ParameterFile::load_all(&all).unwrap()), expected);
+    let backwards: Vec<PathBuf> = all.iter().rev().cloned().collect();
+    assert_eq!(kp(ParameterFile::load_all(&backwards).unwrap()), expected);
+    assert_eq!(kp(ParameterFile::load(dir.path()).unwrap()), expected);
+
+    // One is named although all are there: which is meant is not guessed.
+    let say = |paths: &[PathBuf]| ParameterFile::load_all(paths).unwrap_err().to_string();
+    let text = say(&all[2..3]);
+    assert!(
+        text.contains("PidParamJoint0.csv (joint 1)") && text.contains("PidParamJoint5.csv (joint 6)"),
+        "{text}"
+    );
+    assert!(!text.contains("(joint 3)"), "{text}");
+    let text = say(&[&all[..3], &all[4..]].concat());
+    assert!(text.contains("not named: ") && text.contains("PidParamJoint3.csv (joint 4). "), "{text}");
+    assert!(say(&[&all[..], &all[..1]].concat()).contains("joint 1"));
+
+    // One is missing in the directory.
+    std::fs::remove_file(&all[3]).unwrap();
+    let text = ParameterFile::load(dir.path()).unwrap_err().to_string();
+    assert!(text.contains("PidParamJoint3.csv (joint 4)") && !text.contains("(joint 5)"), "{text}");
+
+    let nameless = dir.path().join("gains.csv");
+    std::fs::write(&nameless, "1000,10,5,-1,1\n").unwrap();
+    assert!(say(&[nameless]).contains("does not say of which"));
 }

@@ -1,0 +1,148 @@
+//! What of an arm a controller cannot be given: friction, gains and arm model go over the wire; limits, gravity and rotor inertia
+//! are built into the controller.
+//!
+//! A controller that runs with other limits or another gravity than the arm file says moves another arm than the one that was
+//! checked (J-55). It is known to use the built-in arm's settings, [`Config::avena`].
+
+use jtc_core::{Config, JointConfig};
+
+use super::Arm;
+
+/// Values closer than this, relative to their size, are the same number written in two ways.
+const SAME: f64 = 1e-9;
+
+/// A value of the arm file that the controller does not use.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Difference {
+    /// Its key in an arm file.
+    pub name: &'static str,
+    /// Joint from 1; none for what concerns the whole arm.
+    pub joint: Option<usize>,
+    /// As the arm file says.
+    pub file: f64,
+    /// As the controller has it built in.
+    pub device: f64,
+    /// Of both.
+    pub unit: &'static str,
+}
+
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(joint) = self.joint {
+            write!(f, "joint {joint}, ")?;
+        }
+        let Self { name, file, device, unit, .. } = self;
+        write!(f, "{name}: {file} {unit} in the file, {device} {unit} in the controller")
+    }
+}
+
+/// Key, unit and value of each setting of a joint.
+type Setting = (&'static str, &'static str, fn(&JointConfig) -> f64);
+
+const JOINT_SETTINGS: [Setting; 7] = [
+    ("position_min_rad", "rad", |j| j.position_min),
+    ("position_max_rad", "rad", |j| j.position_max),
+    ("velocity_max_rad_s", "rad/s", |j| j.velocity_max),
+    ("acceleration_max_rad_s2", "rad/s²", |j| j.acceleration_max),
+    ("torque_max_nm", "N·m", |j| j.torque_max),
+    ("position_error_max_rad", "rad", |j| j.position_error_max),
+    ("rotor_inertia_kg_m2", "kg·m²", |j| j.rotor_inertia),
+];
+
+const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
+
+/// What no frame of the protocol carries, in words.
+pub const NOT_CARRIED: &str =
+    "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
+
+impl Arm {
+    /// The settings of this arm that a controller uses otherwise: gravity first, then joint by joint. Empty: the controller's
+    /// built-in settings are those of this arm.
+    pub fn device_differences(&self) -> Vec<Difference> {
+        let (own, device) = (self.config(), Config::avena());
+        let mut all = Vec::new();
+        let mut compare = |name, joint, file: f64, device: f64, unit| {
+            if (file - device).abs() > SAME * file.abs().max(device.abs()) {
+                all.push(Difference { name, joint, file, device, unit });
+            }
+        };
+        for (name, (file, device)) in
+            GRAVITY_SETTINGS.into_iter().zip(own.gravity.into_iter().zip(device.gravity))
+        {
+            compare(name, None, file, device, "m/s²");
+        }
+        for (i, (file, device)) in own.joints.iter().zip(&device.joints).enumerate() {
+            for (name, unit, value) in JOINT_SETTINGS {
+                compare(name, Some(i + 1), value(file), value(device), unit);
+            }
+        }
+        all
+    }
+
+    /// Settings to check a motion against that a controller with its built-in settings is to execute: of each limit the tighter
+    /// one, and the gravity and rotor inertia that the controller computes with.
+    pub fn config_on_device(&self) -> Config {
+        let (mut config, device) = (self.config(), Config::avena());
+        config.gravity = device.gravity;
+        for (own, device) in config.joints.iter_mut().zip(&device.joints) {
+            *own = JointConfig {
+                position_min: own.position_min.max(device.position_min),
+                position_max: own.position_max.min(device.position_max),
+                velocity_max: own.velocity_max.min(device.velocity_max),
+                acceleration_max: own.acceleration_max.min(device.acceleration_max),
+                torque_max: own.torque_max.min(device.torque_max),
+                position_error_max: own.position_error_max.min(device.position_error_max),
+                rotor_inertia: device.rotor_inertia,
+            };
+        }
+        config
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j55_each_value_that_the_controller_does_not_use_is_listed() {
+        let mut arm = Arm::avena();
+        assert!(arm.device_differences().is_empty());
+        arm.gravity = Some([0.0, 0.0, 9.81]);
+        arm.joints[1].velocity_max = 3.15;
+        arm.joints[4].rotor_inertia = 0.0;
+        let all = arm.device_differences();
+        let seen: Vec<_> = all.iter().map(|d| (d.name, d.joint, d.file, d.device, d.unit)).collect();
+        assert_eq!(
+            seen,
+            [
+                ("gravity_m_s2, z", None, 9.81, -9.81, "m/s²"),
+                ("velocity_max_rad_s", Some(2), 3.15, 1.5, "rad/s"),
+                ("rotor_inertia_kg_m2", Some(5), 0.0, Config::avena().joints[4].rotor_inertia, "kg·m²"),
+            ]
+        );
+        assert_eq!(
+            all[1].to_string(),
+            "joint 2, velocity_max_rad_s: 3.15 rad/s in the file, 1.5 rad/s in the controller"
+        );
+    }
+
+    /// An arm without gravity in its file stands as the controller takes it to stand.
+    #[test]
+    fn j55_what_the_file_leaves_open_is_no_difference() {
+        let arm = Arm { gravity: None, ..Arm::avena() };
+        assert!(arm.device_differences().is_empty());
+    }
+
+    #[test]
+    fn j55_a_motion_is_checked_against_the_tighter_of_both_limits() {
+        let mut arm = Arm::avena();
+        arm.joints[0].velocity_max = 3.0;
+        arm.joints[1].velocity_max = 0.5;
+        arm.joints[2].position_min = -1.0;
+        let config = arm.config_on_device();
+        assert_eq!(config.joints[0].velocity_max, 1.5);
+        assert_eq!(config.joints[1].velocity_max, 0.5);
+        assert_eq!(config.joints[2].position_min, -1.0);
+        assert!(config.joints.iter().all(|j| j.position_min < j.position_max));
+    }
+}

@@ -43,6 +43,22 @@ pub struct LinkArgs {
     pub baud: u32,
 }
 
+/// What of an arm file a controller cannot be given.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct AcceptArgs {
+    /// Go on although the controller uses other limits, gravity or rotor inertia than the arm file says
+    #[arg(long, env = "JTC_ACCEPT_DEVICE_LIMITS", value_parser = FalseyValueParser::new())]
+    pub accept_device_limits: bool,
+}
+
+/// Files that are there already.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct ForceArgs {
+    /// Write over output files that are there already
+    #[arg(long, env = "JTC_FORCE", value_parser = FalseyValueParser::new())]
+    pub force: bool,
+}
+
 /// How fast virtual time runs.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum SimSpeed {
@@ -89,16 +105,21 @@ pub enum Command {
     /// Clear errors of the controller and all nodes
     #[command(after_help = "Examples:\n  jtc clear\n  jtc clear --occurred")]
     Clear(ClearArgs),
-    /// Reset nodes of the joint bus
+    /// Reset nodes of the joint bus; the arm loses torque, also when only one joint is named
     #[command(
-        after_help = "Examples:\n  jtc reset           all joints and the gripper\n  jtc reset 0x04      joint 3 only"
+        after_help = "Examples:\n  jtc reset --joints 3          joint 3 only\n  jtc reset --joints 1,3 --yes  does not ask, \
+                            also where the arm is held\n  jtc reset --gripper\n  jtc reset --all"
     )]
     Reset(ResetArgs),
     /// Vacuum pump of the gripper
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
     Gripper(GripperArgs),
-    /// The whole way back to HoldPos, saying each step; resumes no motion
-    #[command(after_help = "Examples:\n  jtc recover\n  jtc recover --arm my-arm.toml")]
+    /// The whole way back to HoldPos, saying each step and whose numbers it uses; resumes no motion
+    #[command(
+        after_help = "A controller that has friction, gains and arm model keeps them. One that has not is given all three, those of\n\
+                            --arm FILE or, with --defaults, of the arm that is built into it; without either it is refused.\n\nExamples:\n  \
+                            jtc recover\n  jtc recover --arm my-arm.toml\n  jtc recover --defaults"
+    )]
     Recover(RecoverArgs),
     /// Dynamics of an arm: a line of numbers in, a line of numbers out
     #[command(
@@ -195,7 +216,9 @@ pub enum ParamsCommand {
     /// Send what the files hold: an arm file (TOML, URDF) or CSV files of friction and gains
     #[command(
         after_help = "Files: an arm as TOML or URDF; FricPolynomialCoeffs.csv (a row a joint); six FricTableJointN.csv;\n\
-                            six PidParamJointN.csv. Several may be named; a directory is searched for them.\n\nExamples:\n  \
+                            six PidParamJointN.csv. Several may be named; a directory is searched for them. Files of single joints\n\
+                            count only when all six are named. Limits, gravity and rotor inertia of an arm file are in no frame:\n\
+                            where they differ from the controller's own, nothing is sent unless --accept-device-limits is given.\n\nExamples:\n  \
                             jtc params push my-arm.toml\n  jtc params push arm.urdf FricPolynomialCoeffs.csv PidParamJoint*.csv"
     )]
     Push {
@@ -205,6 +228,8 @@ pub enum ParamsCommand {
         /// Which friction to send where files hold both
         #[arg(long, env = "JTC_FRICTION", value_enum, default_value_t = FrictionKind::Polynomial)]
         friction: FrictionKind,
+        #[command(flatten)]
+        accept: AcceptArgs,
         #[command(flatten)]
         link: LinkArgs,
     },
@@ -267,13 +292,15 @@ pub enum TrajCommand {
     },
     /// Check, upload, execute, follow, report
     #[command(
-        after_help = "Examples:\n  jtc traj run motion.csv --approach\n  jtc traj run motion.csv --speed 10 --record run.mcap"
+        after_help = "On a terminal space pauses and resumes, s stops. Ctrl-C stops on the path, then ends; a second one ends at once.\n\
+                            Output files are opened before anything moves.\n\nExamples:\n  jtc traj run motion.csv --approach\n  \
+                            jtc traj run motion.csv --speed 10 --record run.mcap"
     )]
     Run(RunArgs),
     /// Pause on the path
     #[command(after_help = "Examples:\n  jtc traj pause")]
     Pause(LinkArgs),
-    /// Go on after a pause
+    /// Go on after a pause; refused when nothing is paused
     #[command(after_help = "Examples:\n  jtc traj resume")]
     Resume(LinkArgs),
     /// Stop on the path and end the execution
@@ -302,6 +329,10 @@ pub struct RunArgs {
     /// Write the report page, .html
     #[arg(long, env = "JTC_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+    #[command(flatten)]
+    pub accept: AcceptArgs,
 }
 
 /// `jtc teach …`
@@ -320,6 +351,8 @@ pub enum TeachCommand {
     Record {
         /// Trajectory file to write, CSV
         file: PathBuf,
+        #[command(flatten)]
+        force: ForceArgs,
         #[command(flatten)]
         link: LinkArgs,
         /// End after so many seconds
@@ -341,9 +374,21 @@ pub struct ClearArgs {
 /// Options of `jtc reset`.
 #[derive(Args, Debug)]
 pub struct ResetArgs {
-    /// Nodes: bits 0..5 joints 1..6, bit 6 gripper; decimal or 0x…
-    #[arg(value_parser = mask, default_value = "0x7F")]
-    pub mask: u8,
+    /// Joints, counted from 1: 2, or 1,3
+    #[arg(long, env = "JTC_JOINTS", value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
+    pub joints: Vec<u8>,
+    /// The gripper
+    #[arg(long, env = "JTC_GRIPPER", value_parser = FalseyValueParser::new())]
+    pub gripper: bool,
+    /// All joints and the gripper
+    #[arg(long, env = "JTC_ALL", value_parser = FalseyValueParser::new())]
+    pub all: bool,
+    /// Do not ask: the arm may lose torque
+    #[arg(long, env = "JTC_YES", value_parser = FalseyValueParser::new())]
+    pub yes: bool,
+    /// A bit mask, as older versions took it: refused, with what to type instead
+    #[arg(hide = true, value_name = "MASK")]
+    pub mask: Option<String>,
     #[command(flatten)]
     pub link: LinkArgs,
 }
@@ -371,9 +416,14 @@ pub enum Switch {
 pub struct RecoverArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// Arm file for parameters that are missing; default: the controller's defaults
+    /// Arm file whose friction, gains and arm model the controller is given, all three
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
+    /// Give the controller's own defaults, those of its built-in arm, when it misses parameters
+    #[arg(long, env = "JTC_DEFAULTS", value_parser = FalseyValueParser::new())]
+    pub defaults: bool,
+    #[command(flatten)]
+    pub accept: AcceptArgs,
 }
 
 /// Options of `jtc dynamics`.
@@ -418,20 +468,11 @@ pub struct ReportArgs {
     /// Page to write; default: beside the recording
     #[arg(long, env = "JTC_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
     /// Arm whose limits count, for recordings that do not say (CSV)
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-}
-
-fn mask(text: &str) -> Result<u8, String> {
-    let value = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
-        Some(hex) => u8::from_str_radix(hex, 16),
-        None => text.parse(),
-    };
-    match value {
-        Ok(mask) if mask & 0x80 == 0 && mask != 0 => Ok(mask),
-        _ => Err("a mask of nodes lies between 1 and 0x7F: bits 0..5 joints 1..6, bit 6 gripper".into()),
-    }
 }
 
 fn gravity(text: &str) -> Result<[f64; 3], String> {
@@ -471,10 +512,7 @@ mod tests {
     }
 
     #[test]
-    fn masks_and_gravity_are_checked() {
-        assert_eq!(mask("0x7F"), Ok(0x7F));
-        assert_eq!(mask("5"), Ok(5));
-        assert!(mask("0").is_err() && mask("0x80").is_err() && mask("joint").is_err());
+    fn gravity_is_checked() {
         assert_eq!(gravity("0,0,-9.81"), Ok([0.0, 0.0, -9.81]));
         assert!(gravity("0,0").is_err() && gravity("0,0,x").is_err() && gravity("0,0,1,2").is_err());
     }

@@ -34,9 +34,27 @@ impl Failure {
         }
     }
 
+    /// What the library says.
+    pub fn of(e: &jtc_host::Error) -> Self {
+        Self {
+            exit: e.exit_code(),
+            code: e.code().into(),
+            message: e.to_string(),
+            hint: e.hint(),
+            printed: false,
+        }
+    }
+
     /// With the next command or act.
     pub fn hint(self, hint: impl Display) -> Self {
         Self { hint: hint.to_string(), ..self }
+    }
+
+    /// What was measured cannot be written, after it was measured: what the command was run for is lost.
+    pub fn output_lost(self) -> Self {
+        let message = format!("{}; what was recorded is lost", self.message);
+        Self { exit: FAULT, code: "output-lost".into(), message, ..self }
+            .hint("make room or name another place, and run again")
     }
 
     /// A verdict that was printed as the command's result.
@@ -47,13 +65,7 @@ impl Failure {
 
 impl From<jtc_host::Error> for Failure {
     fn from(e: jtc_host::Error) -> Self {
-        Self {
-            exit: e.exit_code(),
-            code: e.code().into(),
-            message: e.to_string(),
-            hint: e.hint(),
-            printed: false,
-        }
+        Self::of(&e)
     }
 }
 

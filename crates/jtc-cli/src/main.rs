@@ -2,9 +2,14 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod ask;
 mod commands;
 mod failure;
+mod keys;
+mod limits;
 mod link;
+mod operator;
+mod output_file;
 #[cfg(unix)]
 mod serve;
 

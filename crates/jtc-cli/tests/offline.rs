@@ -7,7 +7,12 @@ use common::{jtc, jtc_with, motion};
 #[test]
 fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["traj", "rum", "x"]).ends(2);
-    jtc(&["reset", "0x80", "--port", "/dev/null"]).ends(2);
+    // Which nodes must be named, and a bit mask is none: nothing is even opened.
+    jtc(&["reset", "--port", "/nowhere/tty"]).ends(2);
+    let said = jtc(&["reset", "3", "--port", "/nowhere/tty"]).ends(2);
+    assert!(said.err.contains("--joints 3") && said.err.contains("--joints 1,2"), "{}", said.err);
+    jtc(&["reset", "--joints", "0", "--port", "/nowhere/tty"]).ends(2);
+    jtc(&["reset", "--joints", "1,7", "--port", "/nowhere/tty"]).ends(2);
     let said = jtc(&["traj", "check", "/nowhere/motion.csv"]).ends(2);
     assert!(said.err.contains("/nowhere/motion.csv"), "{}", said.err);
     let said = jtc(&["--json", "traj", "check", "/nowhere/motion.csv"]).ends(2);
@@ -93,11 +98,95 @@ fn decode_knows_frames_of_both_directions() {
     // Rubbish before and after costs no frame.
     let said = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
     assert!(said.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", said.out);
+    // Bit 2 of the mask is joint 3.
+    let said = jtc_with(&["decode"], "9B 10 00 0A 04 00 00 00 AD BE").ends(0);
+    assert!(said.out.contains("ResetCanDevices: node 2 (joint 3)"), "{}", said.out);
     jtc_with(&["decode"], "hello").ends(2);
     jtc_with(&["decode"], "").ends(2);
     let capture = "0.001250 > 9B 0B 00 07\n0.001300 > 03 7D 9E\n0.016400 < 9B 03\n";
     let said = jtc_with(&["decode"], capture).ends(0);
     assert!(said.out.contains("to device") && said.out.contains("execute"), "{}", said.out);
+}
+
+/// An arm file whose joint 2 may turn faster than the controller lets it.
+fn faster(dir: &std::path::Path) -> String {
+    let arm = include_str!("../../../arms/avena.toml").replacen(
+        "velocity_max_rad_s = 1.5",
+        "velocity_max_rad_s = 3.15",
+        2,
+    );
+    let path = dir.join("faster.toml");
+    std::fs::write(&path, arm).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// J-55: what the controller does not use of an arm file is listed and refused before a port is opened.
+#[test]
+fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
+    let dir = tempfile::tempdir().unwrap();
+    let (arm, motion_file) = (faster(dir.path()), dir.path().join("motion.csv"));
+    std::fs::write(&motion_file, motion(0.3)).unwrap();
+    let file = motion_file.to_str().unwrap();
+    let port = ["--port", "/nowhere/tty"];
+    for words in [
+        vec!["params", "push", &arm],
+        vec!["traj", "run", file, "--arm", &arm],
+        vec!["recover", "--arm", &arm],
+    ] {
+        let said = jtc(&[&["--json"], &words[..], &port].concat()).ends(4);
+        let value = said.json();
+        let differences = value["differences"].as_array().unwrap();
+        assert_eq!(differences.len(), 2, "{words:?}: {value}");
+        assert_eq!(differences[1]["joint"], 2);
+        assert_eq!(
+            (differences[1]["file"].as_f64(), differences[1]["device"].as_f64()),
+            (Some(3.15), Some(1.5))
+        );
+        assert!(
+            said.err.contains("joint 2, velocity_max_rad_s: 3.15 rad/s in the file, 1.5 rad/s"),
+            "{}",
+            said.err
+        );
+        // Accepted, it fails only at the port that is not there.
+        jtc(&[&words[..], &port, &["--accept-device-limits"]].concat()).ends(3);
+    }
+}
+
+/// J-55: a URDF has neither friction nor gains, and those of another arm are not filled in.
+#[test]
+fn j55_recover_refuses_an_arm_that_is_not_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("arm.toml");
+    let text: String = include_str!("../../../arms/avena.toml")
+        .lines()
+        .filter(|line| !line.starts_with("pid ="))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    std::fs::write(&path, text).unwrap();
+    let said = jtc(&["recover", "--arm", path.to_str().unwrap(), "--port", "/nowhere/tty"]).ends(4);
+    assert!(said.err.contains("PID gains missing") && said.err.contains("avena.toml"), "{}", said.err);
+    jtc(&["recover", "--arm", path.to_str().unwrap(), "--defaults", "--port", "/nowhere/tty"]).ends(2);
+}
+
+#[test]
+fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (file, old) = (path("motion.csv"), path("old.mcap"));
+    std::fs::write(&file, motion(0.3)).unwrap();
+    std::fs::write(&old, "precious").unwrap();
+    let run = |more: &[&str]| jtc(&[&["traj", "run", &file, "--port", "/nowhere/tty"], more].concat());
+    let said = run(&["--record", &old]).ends(4);
+    assert!(said.err.contains("there already") && said.err.contains("--force"), "{}", said.err);
+    let said = run(&["--record", &file, "--force"]).ends(4);
+    assert!(said.err.contains("uses itself"), "{}", said.err);
+    run(&["--record", &path("no/where.mcap")]).ends(2);
+    run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--force"]).ends(4);
+    // Allowed, and then there is no port: the old file is as it was, and no empty one is left behind.
+    run(&["--record", &old, "--report", &path("new.html"), "--force"]).ends(3);
+    assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
+    assert!(!std::path::Path::new(&path("new.html")).exists());
+    jtc(&["teach", "record", &old, "--port", "/nowhere/tty"]).ends(4);
 }
 
 #[test]
@@ -136,8 +225,11 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
     }
-    // What was recorded gives the same figures again.
+    // A second demo may take the place of the first; a report may not.
     let file = out.join("recording.mcap");
+    let page = out.join("report.html");
+    jtc(&["report", file.to_str().unwrap(), "--out", page.to_str().unwrap()]).ends(4);
+    // What was recorded gives the same figures again.
     let again = jtc(&["--json", "report", file.to_str().unwrap()]).ends(0).json();
     for (a, b) in again["joints"].as_array().unwrap().iter().zip(value["joints"].as_array().unwrap()) {
         let rms = |v: &serde_json::Value| v["rms_error_mrad"].as_f64().unwrap();

@@ -69,15 +69,61 @@ fn from_power_up_to_a_recorded_motion() {
 
     let status = sim.jtc(&["--json", "status"]).ends(0).json();
     assert_eq!((status["state"].as_str(), status["trajectory"].as_str()), (Some("HoldPos"), Some("Finish")));
+    // J-34: nothing is paused, so there is nothing to go on with.
+    let said = sim.jtc(&["traj", "resume"]).ends(4);
+    assert!(said.err.contains("nothing is paused") && said.err.contains("trajectory Finish"), "{}", said.err);
     sim.jtc(&["traj", "stop"]).ends(0);
+    let said = sim.jtc(&["traj", "resume"]).ends(4);
+    assert!(said.err.contains("trajectory Stop") && said.err.contains("jtc traj run"), "{}", said.err);
     sim.jtc(&["traj", "pause"]).ends(1);
+    // Held: a reset is not assumed to be meant, and in teaching no joint is reset at all.
+    let said = sim.jtc(&["reset", "--joints", "2"]).ends(4);
+    assert!(said.err.contains("joint 2") && said.err.contains("--yes"), "{}", said.err);
     sim.jtc(&["gripper", "on"]).ends(0);
     sim.jtc(&["teach", "on"]).ends(0);
+    sim.jtc(&["reset", "--joints", "2", "--yes"]).ends(4);
     sim.jtc(&["teach", "off"]).ends(0);
     let doctor = sim.jtc(&["--json", "doctor"]).ends(0).json();
     assert_eq!(doctor["healthy"], true, "{doctor}");
     let lines = sim.jtc(&["--json", "monitor", "--count", "5"]).ends(0);
     assert_eq!(lines.out.lines().count(), 5);
+    let said = sim.jtc(&["--json", "reset", "--joints", "2", "--yes"]).ends(0);
+    assert_eq!(said.json()["reset"], serde_json::json!(["joint 2"]));
+}
+
+/// J-55: defaults only by name.
+#[test]
+fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
+    let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
+    let said = sim.jtc(&["--json", "recover"]).ends(4);
+    assert_eq!(said.json()["error"]["code"], "no-parameters");
+    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    assert_eq!(status["missing_parameters"].as_array().unwrap().len(), 3, "{status}");
+    let said = sim.jtc(&["--json", "recover", "--defaults"]).ends(0);
+    assert!(said.err.contains("the controller's own defaults"), "{}", said.err);
+    assert_eq!(said.json()["status"]["state"], "HoldPos");
+    let said = sim.jtc(&["recover"]).ends(0);
+    assert!(said.err.contains("given before"), "{}", said.err);
+}
+
+/// The motion is made, and the recording is lost: an error that says so.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_on_a_full_disk_is_an_error_although_the_run_was_good() {
+    let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let (file, full, page) = (sim.path("motion.csv"), sim.path("full.mcap"), sim.path("page.html"));
+    std::fs::write(&file, motion(0.2)).unwrap();
+    std::os::unix::fs::symlink("/dev/full", &full).unwrap();
+    let said = sim.jtc(&["--json", "traj", "run", &file, "--record", &full, "--report", &page]).ends(5);
+    let value = said.json();
+    assert_eq!(
+        (value["outcome"].as_str(), value["error"]["code"].as_str()),
+        (Some("finished"), Some("output-lost"))
+    );
+    assert!(value["error"]["message"].as_str().unwrap().contains("No space left"), "{value}");
+    // The other output is not lost with it.
+    assert_eq!(value["files"], serde_json::json!([page]));
 }
 
 #[test]

@@ -105,9 +105,56 @@ pub enum Error {
         /// The status that says so.
         status: Box<Status>,
     },
+    /// Resume was asked for, and nothing is paused.
+    #[error("nothing is paused (state {}, trajectory {}): resume would start a motion, not go on with one", words::state(*state), words::tes(*tes))]
+    NotPaused {
+        /// State of the controller.
+        state: u8,
+        /// Trajectory execution state.
+        tes: u8,
+    },
+    /// The controller needs parameters, and nobody said whose.
+    #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
+    NoParameters {
+        /// What it misses.
+        missing: Vec<&'static str>,
+    },
+    /// An arm file does not hold all that a controller needs.
+    #[error("{arm}: {} missing; parts of another arm are not filled in, nothing was sent", missing.join(", "))]
+    IncompleteArm {
+        /// Name of the arm.
+        arm: String,
+        /// What it lacks.
+        missing: Vec<&'static str>,
+    },
+    /// The link was lost while the arm moves, or may move.
+    #[error("{source}. {}", where_the_arm_is(last.as_deref()))]
+    LinkLost {
+        /// The last status that came.
+        last: Option<Box<Status>>,
+        /// What happened to the link.
+        source: Box<Error>,
+    },
     /// The caller's callback asked to end.
     #[error("cancelled")]
     Cancelled,
+}
+
+/// What is known about the motion when the link is gone.
+fn where_the_arm_is(last: Option<&Status>) -> String {
+    match last {
+        Some(s) if s.tes == 2 => format!(
+            "The trajectory was paused at point {}: the arm should stand there, but nothing confirms it any more",
+            s.point
+        ),
+        Some(s) if s.tes == 3 => format!(
+            "THE ARM MAY BE MOVING: at the last status it was at point {} ({:.3} s) of its trajectory, and the controller goes on \
+             without this program",
+            s.point,
+            f64::from(s.point) * 1e-3
+        ),
+        _ => "THE ARM MAY BE MOVING: whether the command arrived is not known".into(),
+    }
 }
 
 fn heard(bytes: u64) -> String {
@@ -122,14 +169,17 @@ impl Error {
     /// 5 fault while running.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } => 3,
+            Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } | Error::LinkLost { .. } => 3,
             Error::Refused { .. }
             | Error::SegmentRefused { .. }
             | Error::UploadFailed { .. }
             | Error::Device { .. }
             | Error::StateTimeout { .. } => 1,
             Error::File(_) | Error::Parameter(_) | Error::Frame(_) => 2,
-            Error::Check(_) => 4,
+            Error::Check(_)
+            | Error::NotPaused { .. }
+            | Error::NoParameters { .. }
+            | Error::IncompleteArm { .. } => 4,
             Error::RunFault { .. } | Error::Cancelled => 5,
         }
     }
@@ -150,6 +200,10 @@ impl Error {
             Error::Parameter(_) => "parameter",
             Error::Check(_) => "check",
             Error::RunFault { .. } => "run-fault",
+            Error::NotPaused { .. } => "not-paused",
+            Error::NoParameters { .. } => "no-parameters",
+            Error::IncompleteArm { .. } => "incomplete-arm",
+            Error::LinkLost { .. } => "link-lost",
             Error::Cancelled => "cancelled",
         }
     }
@@ -167,6 +221,11 @@ impl Error {
                 baud.map_or("none".into(), |b| b.to_string())
             ),
             Error::NotConfirmed { .. } => "the line towards the controller loses bytes: `jtc doctor`".into(),
+            Error::Refused { request: FrameType::TrajSetExecStatus, code, tes: 2, .. } if is_place(*code) => {
+                "the arm was moved since it was paused: resume needs each joint where it paused, to 0.02 rad. `jtc traj stop`, then \
+                 `jtc traj run FILE --approach`"
+                    .into()
+            }
             Error::Refused { code, state, .. } => refused(*code, *state).into(),
             Error::SegmentRefused { code, .. } => refused(*code, 2).into(),
             Error::UploadFailed { .. } => "`jtc doctor` looks at the line; then run it again".into(),
@@ -176,9 +235,31 @@ impl Error {
             Error::Parameter(e) => e.hint(),
             Error::Check(v) => v.hint(),
             Error::RunFault { .. } => "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos".into(),
-            Error::Cancelled => "`jtc status` tells where the arm is".into(),
+            Error::NotPaused { tes: 3, .. } => {
+                "it is being executed, or still slowing down after a pause: `jtc status`, then try again".into()
+            }
+            Error::NotPaused { .. } => "`jtc traj run FILE` checks a trajectory and starts it".into(),
+            Error::NoParameters { .. } => {
+                "`jtc recover --arm FILE` gives the numbers of your arm; `jtc recover --defaults` those of the arm that is built into \
+                 the controller, when it is that one"
+                    .into()
+            }
+            Error::IncompleteArm { .. } => {
+                "a URDF holds neither friction nor gains: copy arms/avena.toml and put in all numbers of this arm, or name all files \
+                 with `jtc params push`"
+                    .into()
+            }
+            Error::LinkLost { .. } => {
+                "press the emergency stop if it must stand; or restore the link, then `jtc traj stop` and `jtc status`".into()
+            }
+            Error::Cancelled => "`jtc status` shows where the arm is".into(),
         }
     }
+}
+
+/// The arm is not where the command needs it. On a line that did not ask for more, code 6 stands for 7 and 8 (J-51).
+fn is_place(code: DataStatus) -> bool {
+    matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
 }
 
 fn refused(code: DataStatus, state: u8) -> &'static str {

@@ -137,7 +137,9 @@ pub fn waiting_for(s: &Status) -> String {
 
 /// The command that leads on from here.
 pub fn next_step(s: &Status) -> &'static str {
-    if s.errors != 0 || s.fsm == 5 {
+    if (s.errors != 0 || s.fsm == 5) && s.jtc_init != 0 {
+        "`jtc recover --arm FILE`, or `--defaults` for the arm that is built into the controller"
+    } else if s.errors != 0 || s.fsm == 5 {
         "`jtc recover`"
     } else if s.jtc_init != 0 {
         "`jtc params push FILE` or `jtc params use-defaults`"

@@ -6,7 +6,7 @@ use jtc_core::Config;
 use jtc_host::arm::{Arm, FrictionChoice, ParameterFile};
 use jtc_host::port::sim::SimPort;
 use jtc_host::port::{Port, PortError};
-use jtc_host::session::{Flow, Outcome, RecoverStep, UploadOptions, UploadReport};
+use jtc_host::session::{Flow, Outcome, ParameterSource, RecoverStep, UploadOptions, UploadReport};
 use jtc_host::{Error, Session, Trajectory, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
@@ -212,8 +212,9 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     assert_eq!(error.exit_code(), 5);
     assert!(error.to_string().contains("joint 3"), "{error}");
     let mut steps = Vec::new();
-    let status =
-        s.recover(None, |step| steps.push(step.clone())).unwrap_or_else(|e| panic!("{e}: {steps:?}"));
+    let status = s
+        .recover(ParameterSource::None, |step| steps.push(step.clone()))
+        .unwrap_or_else(|e| panic!("{e}: {steps:?}"));
     assert_eq!((status.fsm, status.errors), (2, 0), "{steps:?}");
     assert!(steps.iter().any(|s| matches!(s, RecoverStep::Clear(_))));
     // J-24: nothing moves on its own.
@@ -223,7 +224,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
 #[test]
 fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
     let mut s = session(Some(921_600));
-    let status = s.recover(None, |_| {}).unwrap();
+    let status = s.recover(ParameterSource::ControllerDefaults, |_| {}).unwrap();
     assert_eq!(status.fsm, 2);
     s.port_mut().world_mut().inject(Fault {
         kind: FaultKind::SafetyInput,
@@ -232,13 +233,14 @@ fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
     });
     s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
     let mut steps = Vec::new();
-    let status = s.recover(None, |step| steps.push(step.clone())).unwrap();
+    let status = s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert_eq!((status.fsm, status.errors), (2, 0));
     assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
 }
 
 #[test]
 fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
+    use jtc_host::Port;
     use jtc_host::port::test::ScriptedPort;
     let mut silent = Session::new(ScriptedPort::new(Some(115_200), |_, _| Vec::new()));
     let error = silent.next_status().unwrap_err();
@@ -248,4 +250,151 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     let error = upload(&mut s, &trajectory(50)).unwrap_err();
     assert!(matches!(error, Error::SegmentRefused { segment: 0, .. }), "{error}");
     assert_eq!(s.teach(true).unwrap_err().exit_code(), 1);
+}
+
+/// What the session wrote, while a controller behind a scripted port says nothing or the same status again and again.
+mod scripted {
+    use std::cell::RefCell;
+    use std::rc::Rc;
+    use std::time::Duration;
+
+    use jtc_host::Port;
+    use jtc_host::Session;
+    use jtc_host::port::test::ScriptedPort;
+    use jtc_wire::{Response, Status};
+
+    pub type Written = Rc<RefCell<Vec<u8>>>;
+
+    /// Answers each frame with `status` and its record; silent when there is none. Statuses come every 40 ms until `end`.
+    pub fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
+        let written = Written::default();
+        let taken = Rc::clone(&written);
+        let mut next = Duration::ZERO;
+        let port = ScriptedPort::new(None, move |now, bytes| {
+            taken.borrow_mut().extend_from_slice(bytes);
+            if now >= end {
+                return Vec::new();
+            }
+            let mut out = Vec::new();
+            if let [_, kind, ..] = bytes {
+                let response = Response {
+                    frame_type: *kind,
+                    status: jtc_wire::FrameStatus::NoError,
+                    data: jtc_wire::DataStatus::NoError,
+                    length: bytes.len() as u16,
+                };
+                out.extend(Status { response, ..status }.emit());
+            }
+            if now >= next {
+                next = now + Duration::from_millis(40);
+                out.extend(status.emit());
+            }
+            out
+        });
+        (Session::new(port), written)
+    }
+}
+
+/// J-34: resume goes on with what is paused and starts nothing else.
+#[test]
+fn j34_resume_only_after_a_pause() {
+    for tes in [0, 1, 3, 4] {
+        let (mut s, written) =
+            scripted::session(jtc_wire::Status { fsm: 2, tes, ..Default::default() }, Duration::MAX);
+        let error = s.resume().unwrap_err();
+        assert!(matches!(error, Error::NotPaused { tes: t, .. } if t == tes), "{error}");
+        assert_eq!((error.exit_code(), written.borrow().len()), (4, 0), "{error}");
+        assert!(!error.hint().contains("traj resume"), "{}", error.hint());
+    }
+    let (mut s, written) =
+        scripted::session(jtc_wire::Status { fsm: 2, tes: 2, ..Default::default() }, Duration::MAX);
+    s.resume().unwrap();
+    assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Execute));
+}
+
+/// A link that is lost in motion: the error says that the arm may be moving, and a stop goes out that may still arrive.
+#[test]
+fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
+    let moving = jtc_wire::Status { fsm: 3, tes: 3, point: 1234, ..Default::default() };
+    let (mut s, written) = scripted::session(moving, Duration::from_millis(500));
+    let error = s.follow(|_| Flow::Continue).unwrap_err();
+    assert_eq!((error.exit_code(), error.code()), (3, "link-lost"));
+    let text = error.to_string();
+    assert!(text.contains("THE ARM MAY BE MOVING") && text.contains("point 1234 (1.234 s)"), "{text}");
+    assert!(error.hint().contains("emergency stop"), "{}", error.hint());
+    assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Stop));
+
+    let (mut s, _) = scripted::session(moving, Duration::ZERO);
+    let text = s.stop().unwrap_err().to_string();
+    assert!(text.contains("THE ARM MAY BE MOVING"), "{text}");
+
+    let paused = jtc_wire::Status { fsm: 2, tes: 2, point: 700, ..Default::default() };
+    let (mut s, written) = scripted::session(paused, Duration::from_millis(500));
+    let text = s.follow(|_| Flow::Continue).unwrap_err().to_string();
+    assert!(text.contains("paused at point 700") && !text.contains("MAY BE MOVING"), "{text}");
+    assert_eq!(written.borrow().len(), 0);
+}
+
+/// J-55: a controller without parameters is not given a stranger's, and no part of an arm is filled in.
+#[test]
+fn j55_recover_gives_no_numbers_that_nobody_named() {
+    let mut s = session(Some(921_600));
+    let (sent, mut steps) = (s.statistics().frames_sent, 0);
+    let error = s.recover(ParameterSource::None, |_| steps += 1).unwrap_err();
+    assert!(matches!(&error, Error::NoParameters { missing } if missing.len() == 3), "{error}");
+    assert_eq!((error.exit_code(), s.statistics().frames_sent, steps), (4, sent, 0));
+    assert!(error.hint().contains("--arm FILE") && error.hint().contains("--defaults"), "{}", error.hint());
+
+    let arm = Arm { pid: None, ..Arm::avena() };
+    let half = arm.parameter_set();
+    let error = s.recover(ParameterSource::Arm { name: "half.toml", set: &half }, |_| {}).unwrap_err();
+    assert_eq!(error.exit_code(), 4);
+    assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
+    assert_eq!(s.statistics().frames_sent, sent);
+
+    // One part is there, of another arm: the file's are sent whole.
+    s.use_default(jtc_host::session::Parameter::Pid).unwrap();
+    let set = Arm::avena().parameter_set();
+    let before = s.statistics().frames_sent;
+    let mut steps = Vec::new();
+    let status = s
+        .recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
+        .unwrap();
+    assert_eq!((status.fsm, s.statistics().frames_sent - before), (2, 3), "{steps:?}");
+    assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
+    // Held: nothing is sent under the arm's weight, and that is said.
+    let mut steps = Vec::new();
+    s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
+        .unwrap();
+    assert_eq!(s.statistics().frames_sent - before, 3);
+    assert!(steps.iter().any(|s| s.contains("not with those of avena.toml")), "{steps:?}");
+}
+
+/// After an error, an arm that is named is the one that is powered again.
+#[test]
+fn j55_after_an_error_the_named_arm_is_powered() {
+    let mut s = ready(Some(921_600));
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::SafetyInput,
+        trigger: Trigger::At(0),
+        duration_ms: Some(500),
+    });
+    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    let set = Arm::avena().parameter_set();
+    let mut steps = Vec::new();
+    s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.clone()))
+        .unwrap();
+    let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
+    let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
+    assert!(give < clear, "{steps:?}");
+    // Without one the controller keeps what it has, and says so.
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::SafetyInput,
+        trigger: Trigger::At(0),
+        duration_ms: Some(500),
+    });
+    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    let mut steps = Vec::new();
+    s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
+    assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
 }

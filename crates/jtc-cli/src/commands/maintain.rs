@@ -1,15 +1,17 @@
-//! `jtc clear`, `reset`, `gripper`, `recover`: short commands that change the controller's state.
+//! `jtc clear`, `gripper`, `recover`: short commands that change the controller's state.
 
 use std::time::Duration;
 
 use cli_kit::Output;
 use jtc_host::arm::Arm;
+use jtc_host::session::ParameterSource;
 use jtc_host::words;
 use serde_json::json;
 
 use super::status;
-use crate::args::{ClearArgs, GripperArgs, RecoverArgs, ResetArgs, Switch};
+use crate::args::{ClearArgs, GripperArgs, RecoverArgs, Switch};
 use crate::failure::Failure;
+use crate::limits;
 
 /// All joints and the gripper.
 const ALL_NODES: u8 = 0x7F;
@@ -38,14 +40,6 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     if s.errors == 0 { Ok(()) } else { Err(Failure::printed(1)) }
 }
 
-/// Resets the nodes of a mask.
-pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
-    args.link.session()?.reset(args.mask)?;
-    let nodes = words::missing_nodes(args.mask);
-    out.result(&json!({ "reset": nodes }), || format!("reset: {}", nodes.join(", ")));
-    Ok(())
-}
-
 /// Switches the pump.
 pub fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
     let on = args.pump == Switch::On;
@@ -57,16 +51,29 @@ pub fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
 /// Leads the controller back to HoldPos.
 pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
-    let parameters = arm.map(|a| a.parameter_set());
+    if args.defaults && arm.is_some() {
+        return Err(Failure::usage("--arm (or JTC_ARM) and --defaults name two sets of numbers")
+            .hint("name one: nothing was sent"));
+    }
+    let given = arm.as_ref().map(|arm| (arm.name.as_str(), arm.parameter_set()));
+    let source = match &given {
+        Some((name, set)) => ParameterSource::Arm { name, set },
+        None if args.defaults => ParameterSource::ControllerDefaults,
+        None => ParameterSource::None,
+    };
+    source.check()?;
+    let differences = match &arm {
+        Some(arm) => limits::accept(arm, args.accept.accept_device_limits, out)?,
+        None => Vec::new(),
+    };
     let mut session = args.link.session()?;
     let mut steps = Vec::new();
-    let done = session.recover(parameters.as_ref(), |step| {
+    let done = session.recover(source, |step| {
         out.note(step);
         steps.push(step.to_string());
     });
     let s = done?;
-    out.result(&json!({ "steps": steps, "status": status::as_json(&s) }), || {
-        format!("state {}: ready", words::state(s.fsm))
-    });
+    let value = json!({ "steps": steps, "differences": differences, "status": status::as_json(&s) });
+    out.result(&value, || format!("state {}: ready", words::state(s.fsm)));
     Ok(())
 }

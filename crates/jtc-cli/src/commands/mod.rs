@@ -10,6 +10,7 @@ mod monitor;
 mod params;
 mod ports;
 mod report;
+mod reset;
 mod run;
 mod run_report;
 mod sim;
@@ -35,7 +36,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Traj(command) => traj::traj(&command, out),
         Command::Teach(command) => teach::teach(&command, out),
         Command::Clear(args) => maintain::clear(&args, out),
-        Command::Reset(args) => maintain::reset(&args, out),
+        Command::Reset(args) => reset::reset(&args, out),
         Command::Gripper(args) => maintain::gripper(&args, out),
         Command::Recover(args) => maintain::recover(&args, out),
         Command::Dynamics(args) => dynamics::dynamics(&args, out),

@@ -3,17 +3,20 @@
 use std::path::PathBuf;
 
 use cli_kit::{Output, table};
-use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
+use jtc_host::arm::{Arm, FrictionChoice, NOT_CARRIED, ParameterFile, ParameterSet};
 use jtc_host::words;
 use serde_json::json;
 
-use crate::args::{FrictionKind, LinkArgs, ParamsCommand};
+use crate::args::{AcceptArgs, FrictionKind, LinkArgs, ParamsCommand};
 use crate::failure::Failure;
+use crate::limits;
 
 /// Does one of the family.
 pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
     match command {
-        ParamsCommand::Push { files, friction, link } => push(files, (*friction).into(), link, out),
+        ParamsCommand::Push { files, friction, accept, link } => {
+            push(files, (*friction).into(), *accept, link, out)
+        }
         ParamsCommand::UseDefaults(link) => use_defaults(link, out),
         ParamsCommand::Show { files, port, baud } => {
             let link = port.as_ref().map(|p| LinkArgs { port: Some(p.clone()), baud: *baud });
@@ -22,8 +25,19 @@ pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
     }
 }
 
-fn push(files: &[PathBuf], choice: FrictionChoice, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let set = load(files, choice, out)?;
+fn push(
+    files: &[PathBuf],
+    choice: FrictionChoice,
+    accept: AcceptArgs,
+    link: &LinkArgs,
+    out: &Output,
+) -> Result<(), Failure> {
+    let read = load(files, out)?;
+    let set = read.parameter_set(choice);
+    let differences = match &read.arm {
+        Some(arm) => limits::accept(arm, accept.accept_device_limits, out)?,
+        None => Vec::new(),
+    };
     let mut session = link.session()?;
     let mut pushed = Vec::new();
     let done = session.push(&set, |p| {
@@ -38,16 +52,30 @@ fn push(files: &[PathBuf], choice: FrictionChoice, link: &LinkArgs, out: &Output
     done?;
     let status = session.fresh_status()?;
     let missing = words::missing_parameters(status.jtc_init);
-    out.result(
-        &json!({ "pushed": pushed, "state": words::state(status.fsm), "missing_parameters": missing }),
-        || {
-            if missing.is_empty() {
-                format!("all parameters given; {}", words::waiting_for(&status))
-            } else {
-                format!("still missing: {}", missing.join(", "))
-            }
-        },
-    );
+    // What was neither sent nor is missing: the controller had it before, from whom is not known.
+    let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
+    let value = json!({
+        "pushed": pushed, "kept": kept, "differences": differences,
+        "state": words::state(status.fsm), "missing_parameters": missing,
+    });
+    out.result(&value, || {
+        let sent: Vec<&str> = pushed.iter().map(|p| p.parameter.name()).collect();
+        let mut text = format!("sent: {}\n", sent.join(", "));
+        if !kept.is_empty() {
+            text += &format!("not sent, as the controller was given before: {}\n", kept.join(", "));
+        }
+        if read.arm.is_some() {
+            let whose =
+                if differences.is_empty() { "the same as in the file" } else { "other ones, listed above" };
+            text += &format!("in no frame: {NOT_CARRIED}; the controller uses its own, {whose}\n");
+        }
+        text += &if missing.is_empty() {
+            format!("all parameters given; {}", words::waiting_for(&status))
+        } else {
+            format!("still missing: {}", missing.join(", "))
+        };
+        text
+    });
     Ok(())
 }
 
@@ -68,7 +96,7 @@ fn show(files: &[PathBuf], link: Option<&LinkArgs>, out: &Output) -> Result<(), 
         let set = arm.parameter_set();
         (Some(arm), set)
     } else {
-        (None, load(files, FrictionChoice::default(), out)?)
+        (None, load(files, out)?.parameter_set(FrictionChoice::default()))
     };
     let status = link.map(|l| l.session()?.fresh_status().map_err(Failure::from)).transpose()?;
     let friction = set.friction.as_ref().map(|f| match f {
@@ -143,22 +171,15 @@ fn as_text(set: &ParameterSet) -> String {
 }
 
 /// What the files hold together, later ones over earlier ones; what could not be carried over goes to stderr.
-fn load(files: &[PathBuf], choice: FrictionChoice, out: &Output) -> Result<ParameterSet, Failure> {
-    let mut all = ParameterSet::default();
-    for file in files {
-        let read = ParameterFile::load(file)?;
-        for warning in &read.warnings {
-            out.note(format!("note: {warning}"));
-        }
-        for (path, what) in &read.sources {
-            out.note(format!("{what} from {}", path.display()));
-        }
-        let set = read.parameter_set(choice);
-        all.friction = set.friction.or(all.friction);
-        all.pid = set.pid.or(all.pid);
-        all.model = set.model.or(all.model);
+fn load(files: &[PathBuf], out: &Output) -> Result<ParameterFile, Failure> {
+    let read = ParameterFile::load_all(files)?;
+    for warning in &read.warnings {
+        out.note(format!("note: {warning}"));
     }
-    Ok(all)
+    for (path, what) in &read.sources {
+        out.note(format!("{what} from {}", path.display()));
+    }
+    Ok(read)
 }
 
 impl From<FrictionKind> for FrictionChoice {

@@ -1,5 +1,7 @@
 //! `jtc report`: page and picture of a recording made earlier.
 
+use std::path::{Path, PathBuf};
+
 use cli_kit::Output;
 use jtc_host::arm::Arm;
 use jtc_host::recording::Recording;
@@ -9,9 +11,17 @@ use serde_json::json;
 use super::run_report;
 use crate::args::ReportArgs;
 use crate::failure::Failure;
+use crate::output_file::OutputFile;
 
 /// Writes the page and says the figures.
 pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
+    let page = args.out.clone().unwrap_or_else(|| args.file.with_extension("html"));
+    let picture = page.with_extension("svg");
+    let inputs: Vec<&Path> =
+        [Some(&args.file), args.arm.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    let force = args.force.force;
+    let page_file = OutputFile::open(&page, force, &inputs)?;
+    let picture_file = OutputFile::open(&picture, force, &[&inputs[..], &[page.as_path()]].concat())?;
     let recording = Recording::read(&args.file)?;
     let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
@@ -22,11 +32,8 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
     let input = ReportInput { info: &info, samples: &recording.samples, facts: &[] };
-    let page = args.out.clone().unwrap_or_else(|| args.file.with_extension("html"));
-    let picture = page.with_extension("svg");
-    for (path, text) in [(&page, html(&input)), (&picture, picture_svg(&input))] {
-        std::fs::write(path, text).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-    }
+    page_file.write(&html(&input))?;
+    picture_file.write(&picture_svg(&input))?;
     let summary = Summary::of(&info, &recording.samples);
     let value = json!({
         "recorded_s": summary.recorded_s,

@@ -1,13 +1,14 @@
 //! `jtc traj run`: check, upload, execute, follow, report.
 
 use std::cell::RefCell;
+use std::path::Path;
 use std::rc::Rc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use cli_kit::{Output, Stop};
+use cli_kit::Output;
 use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
-use jtc_host::recording::{self, Format, RecordingInfo};
+use jtc_host::recording::{Format, RecordingInfo};
 use jtc_host::report::{self, ReportInput, Summary};
 use jtc_host::session::{Flow, Outcome, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
@@ -19,6 +20,9 @@ use super::run_report;
 use super::traj::{Job, refuse};
 use crate::args::RunArgs;
 use crate::failure::{FAULT, Failure, REFUSED};
+use crate::limits;
+use crate::operator::Operator;
+use crate::output_file::OutputFile;
 
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(15);
@@ -31,7 +35,10 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     if let Some(path) = &args.record {
         Format::of(path)?; // a wrong ending is said before anything moves
     }
-    let job = Job::load(&args.file, &args.check, out)?;
+    let mut job = Job::load(&args.file, &args.check, out)?;
+    if !limits::accept(&job.arm, args.accept.accept_device_limits, out)?.is_empty() {
+        job.config = job.arm.config_on_device();
+    }
     let options = UploadOptions { points_per_segment: args.points_per_segment, number: 0 };
     let verdict = job.verdict(&job.trajectory, None, options);
     if !verdict.is_ok() {
@@ -41,7 +48,8 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         out.note(format!("warning: {warning}"));
     }
 
-    let stop = Stop::listen()?;
+    let outputs = Outputs::open(args)?;
+    let mut operator = Operator::listen(out)?;
     let mut session = args.link.session()?;
     let status = ready(&mut session, out)?;
     let here = status.joints.map(|j| f64::from(j.position));
@@ -50,28 +58,34 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         if !args.approach {
             return Err(refuse(&verdict, out));
         }
-        approach(&mut session, &job, here, args, &stop, out)?;
+        approach(&mut session, &job, here, args, &mut operator)?;
     }
 
-    let upload = upload(&mut session, &job.trajectory, &options, "upload", &stop, out)?;
+    let upload = upload(&mut session, &job.trajectory, &options, "upload", &operator)?;
     let start_unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
     let samples = observe(&mut session, &job.trajectory);
-    let outcome = execute(&mut session, &job.trajectory, "motion", &stop, out);
+    let outcome = execute(&mut session, &job.trajectory, "motion", &mut operator);
     session.stop_observing();
+    drop(operator);
 
     let link = session.statistics();
     let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let info = run_report::info(&job.arm, &session.port().name(), &name, start_unix_ns);
     let samples = samples.take();
     // A run that ended in a fault is what one wants to look at most: it is recorded and reported as well.
-    let files =
-        write(args, &info, &samples, &[run_report::link_facts(&upload, &link, session.port().baud())])?;
+    let facts = [run_report::link_facts(&upload, &link, session.port().baud())];
+    let (files, lost) = outputs.write(&info, &samples, &facts);
     let summary = Summary::of(&info, &samples);
     let word = match &outcome {
         Ok(Outcome::Finished(_)) => "finished",
         Ok(Outcome::Stopped(_)) => "stopped",
         Err(_) => "fault",
     };
+    // A file that is lost is said even when the run failed, but the run comes first.
+    for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
+        out.note(format!("jtc: {}", failure.message));
+    }
+    let failure = outcome.as_ref().err().map(Failure::of).or(lost.into_iter().next());
     let value = json!({
         "outcome": word,
         "recorded_s": summary.recorded_s,
@@ -82,21 +96,21 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         "upload": upload,
         "link": link,
         "files": files,
-        "error": outcome.as_ref().err().map(|e| json!({ "code": e.code(), "message": e.to_string(), "hint": e.hint() })),
+        "error": failure.as_ref().map(|f| json!({ "code": f.code, "message": f.message, "hint": f.hint, "exit": f.exit })),
     });
     out.result(&value, || {
         let made: String = files.iter().map(|f| format!("\n{f}")).collect();
         let line = run_report::link_line(&upload, &link);
         format!("\n{word}: {:.2} s\n{}\n{line}{made}", summary.executed_s, run_report::figures(&summary))
     });
-    match outcome {
-        Ok(Outcome::Finished(_)) => Ok(()),
-        Ok(Outcome::Stopped(_)) => Err(Failure::printed(FAULT)),
-        Err(e) if out.is_json() => {
-            out.note(format!("jtc: {e}\n     {}", e.hint()));
-            Err(Failure::printed(e.exit_code()))
+    match (outcome, failure) {
+        (_, Some(failure)) if out.is_json() => {
+            out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
+            Err(Failure::printed(failure.exit))
         }
-        Err(e) => Err(e.into()),
+        (_, Some(failure)) => Err(failure),
+        (Ok(Outcome::Stopped(_)), None) => Err(Failure::printed(FAULT)),
+        (_, None) => Ok(()),
     }
 }
 
@@ -124,23 +138,22 @@ fn approach(
     job: &Job,
     here: [f64; 6],
     args: &RunArgs,
-    stop: &Stop,
-    out: &Output,
+    operator: &mut Operator,
 ) -> Result<(), Failure> {
+    let out = operator.out;
     let refused =
         |e: plan::PlanError| Failure { exit: REFUSED, code: "approach".into(), ..Failure::usage(e) };
     let first = job.trajectory.points.first().map_or(here, |p| p.position);
-    let config = job.arm.config();
     // Half of the limits: nobody has looked at this path for obstacles.
     let speed = args.check.speed.min(50.0);
-    let path = plan::approach(&here, &first, &config, Some(&job.arm.model), speed).map_err(refused)?;
+    let path = plan::approach(&here, &first, &job.config, Some(&job.arm.model), speed).map_err(refused)?;
     let verdict = job.verdict(&path, Some(here), UploadOptions::default());
     if !verdict.is_ok() {
         return Err(refuse(&verdict, out));
     }
     out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
-    upload(session, &path, &UploadOptions::default(), "approach", stop, out)?;
-    match execute(session, &path, "approach", stop, out)? {
+    upload(session, &path, &UploadOptions::default(), "approach", operator)?;
+    match execute(session, &path, "approach", operator)? {
         Outcome::Finished(_) => Ok(()),
         Outcome::Stopped(_) => {
             Err(Failure { exit: FAULT, code: "stopped".into(), ..Failure::usage("stopped on the approach") })
@@ -153,15 +166,14 @@ fn upload(
     trajectory: &Trajectory,
     options: &UploadOptions,
     what: &str,
-    stop: &Stop,
-    out: &Output,
+    operator: &Operator,
 ) -> Result<UploadReport, Failure> {
     let points = trajectory.raw().map_err(Failure::usage)?;
-    let bar = out.bar(1, what);
+    let bar = operator.out.bar(1, what);
     let report = session.upload(&points, trajectory.step_ms, options, |p| {
         bar.set_length(p.segments as u64);
         bar.set_position(p.segments_done as u64);
-        if stop.asked() { Flow::Cancel } else { Flow::Continue }
+        if operator.wants_the_end() { Flow::Cancel } else { Flow::Continue }
     });
     bar.finish_and_clear();
     Ok(report?)
@@ -171,15 +183,21 @@ fn execute(
     session: &mut Session<SerialPort>,
     trajectory: &Trajectory,
     what: &str,
-    stop: &Stop,
-    out: &Output,
+    operator: &mut Operator,
 ) -> Result<Outcome, jtc_host::Error> {
-    let bar = out.bar((trajectory.duration_s() * 1e3) as u64, what);
-    session.execute()?;
-    let outcome = session.follow(|s| {
-        bar.set_position(u64::from(s.point));
-        if stop.asked() { Flow::Stop } else { Flow::Continue }
+    if operator.wants_the_end() {
+        return Err(jtc_host::Error::Cancelled);
+    }
+    let bar = operator.out.bar((trajectory.duration_s() * 1e3) as u64, what);
+    operator.motion_begins();
+    let outcome = session.execute().and_then(|()| {
+        session.follow(|s| {
+            bar.set_position(u64::from(s.point));
+            bar.set_message(if s.tes == 2 { "paused" } else { what }.to_owned());
+            operator.wish(s)
+        })
     });
+    operator.motion_ended();
     bar.finish_and_clear();
     outcome
 }
@@ -223,21 +241,42 @@ impl Clock {
     }
 }
 
-fn write(
-    args: &RunArgs,
-    info: &RecordingInfo,
-    samples: &[Sample],
-    facts: &[report::Facts],
-) -> Result<Vec<String>, Failure> {
-    let mut files = Vec::new();
-    if let Some(path) = &args.record {
-        recording::write_all(path, info, samples)?;
-        files.push(path.display().to_string());
+/// Files of a run, open since before it.
+struct Outputs {
+    record: Option<OutputFile>,
+    report: Option<OutputFile>,
+}
+
+impl Outputs {
+    fn open(args: &RunArgs) -> Result<Self, Failure> {
+        let mut others: Vec<&Path> = vec![&args.file];
+        others.extend(args.check.arm.as_deref());
+        let force = args.force.force;
+        let record = args.record.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
+        others.extend(args.record.as_deref());
+        let report = args.report.as_deref().map(|path| OutputFile::open(path, force, &others)).transpose()?;
+        Ok(Self { record, report })
     }
-    if let Some(path) = &args.report {
-        let page = report::html(&ReportInput { info, samples, facts });
-        std::fs::write(path, page).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-        files.push(path.display().to_string());
+
+    /// Writes all of them; one that is lost does not cost the other. Returns the names of those that were written.
+    fn write(
+        self,
+        info: &RecordingInfo,
+        samples: &[Sample],
+        facts: &[report::Facts],
+    ) -> (Vec<String>, Vec<Failure>) {
+        let record = self.record.map(|file| (file.name(), file.record(info, samples)));
+        let report = self.report.map(|file| {
+            let page = report::html(&ReportInput { info, samples, facts });
+            (file.name(), file.write(&page))
+        });
+        let (mut files, mut lost) = (Vec::new(), Vec::new());
+        for (name, done) in record.into_iter().chain(report) {
+            match done {
+                Ok(()) => files.push(name),
+                Err(e) => lost.push(e.output_lost()),
+            }
+        }
+        (files, lost)
     }
-    Ok(files)
 }

@@ -1,8 +1,6 @@
 //! `jtc teach`: moving the arm by hand, and recording it.
 
 use std::fmt::Write;
-use std::path::Path;
-use std::time::Duration;
 
 use cli_kit::{Output, Stop};
 use jtc_host::trajectory::Loaded;
@@ -11,10 +9,9 @@ use jtc_wire::Status;
 use serde_json::json;
 
 use crate::args::{LinkArgs, TeachCommand};
-use crate::failure::Failure;
+use crate::failure::{FAULT, Failure};
+use crate::output_file::OutputFile;
 
-/// Statuses come every 40 ms; slower ones are as good as none.
-const STATUS: Duration = Duration::from_millis(500);
 /// Movement below this is standing still, rad.
 const STILL: f64 = 0.002;
 
@@ -23,7 +20,9 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TeachCommand::On(link) => switch(link, true, out),
         TeachCommand::Off(link) => switch(link, false, out),
-        TeachCommand::Record { file, link, duration } => record(file, link, *duration, out),
+        TeachCommand::Record { file, force, link, duration } => {
+            record(OutputFile::open(file, force.force, &[])?, link, *duration, out)
+        }
     }
 }
 
@@ -39,7 +38,7 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn record(file: &Path, link: &LinkArgs, duration: Option<f64>, out: &Output) -> Result<(), Failure> {
+fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut session = link.session()?;
     let status = session.fresh_status()?;
@@ -50,21 +49,43 @@ fn record(file: &Path, link: &LinkArgs, duration: Option<f64>, out: &Output) -> 
     out.note("teaching: move the arm by hand; Ctrl-C ends the recording");
     let start = session.now();
     let mut poses: Vec<(f64, [f64; 6])> = Vec::new();
-    let mut failed = None;
+    let mut failed: Option<Failure> = None;
     while !stop.asked() && duration.is_none_or(|s| (session.now() - start).as_secs_f64() < s) {
-        match session.poll(STATUS)? {
-            Some(s) if s.fsm == 4 => poses.push(((session.now() - start).as_secs_f64(), pose(&s))),
-            Some(s) if s.fsm == 5 || s.errors != 0 => {
-                failed = Some(s);
+        match session.next_status() {
+            Ok(s) if s.fsm == 5 || s.errors != 0 => {
+                failed = Some(
+                    Failure {
+                        exit: FAULT,
+                        code: "run-fault".into(),
+                        ..Failure::usage(words::errors_line(&s))
+                    }
+                    .hint(words::next_step(&s)),
+                );
                 break;
             }
-            _ => {}
+            Ok(s) if s.fsm == 4 => poses.push(((session.now() - start).as_secs_f64(), pose(&s))),
+            Ok(_) => {}
+            Err(e) => {
+                let failure = Failure::from(e);
+                let message = format!(
+                    "{}. The controller stays in teaching: the arm can be moved by hand",
+                    failure.message
+                );
+                failed = Some(Failure { message, ..failure });
+                break;
+            }
         }
     }
+    // What was recorded is written first, whatever becomes of the link.
+    let written = write(file, &poses, out);
     if failed.is_none() && !was_on {
         session.teach(false)?;
     }
-    let poses = moving(&poses);
+    failed.map_or(written, Err)
+}
+
+fn write(file: OutputFile, poses: &[(f64, [f64; 6])], out: &Output) -> Result<(), Failure> {
+    let poses = moving(poses);
     if poses.len() < 3 {
         return Err(Failure::usage("the arm was not moved: nothing was written"));
     }
@@ -72,25 +93,13 @@ fn record(file: &Path, link: &LinkArgs, duration: Option<f64>, out: &Output) -> 
     for note in &loaded.notes {
         out.note(format!("note: {note}"));
     }
-    let t = &loaded.trajectory;
-    std::fs::write(file, t.to_csv()).map_err(|e| Failure::usage(format!("{}: {e}", file.display())))?;
-    let value =
-        json!({ "file": file.display().to_string(), "points": t.points.len(), "duration_s": t.duration_s() });
+    let (t, name) = (&loaded.trajectory, file.name());
+    file.write(&t.to_csv()).map_err(Failure::output_lost)?;
+    let value = json!({ "file": name, "points": t.points.len(), "duration_s": t.duration_s() });
     out.result(&value, || {
-        format!(
-            "{}: {} points, {:.2} s\nnext: jtc traj check {0}",
-            file.display(),
-            t.points.len(),
-            t.duration_s()
-        )
+        format!("{name}: {} points, {:.2} s\nnext: jtc traj check {name}", t.points.len(), t.duration_s())
     });
-    match failed {
-        None => Ok(()),
-        Some(s) => {
-            Err(Failure { exit: 5, code: "run-fault".into(), ..Failure::usage(words::errors_line(&s)) }
-                .hint(words::next_step(&s)))
-        }
-    }
+    Ok(())
 }
 
 fn pose(s: &Status) -> [f64; 6] {

@@ -3,15 +3,17 @@
 use std::path::Path;
 
 use cli_kit::{Output, table};
+use jtc_core::Config;
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, Verdict};
+use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Loaded, Trajectory};
-use jtc_host::{Error, plan};
+use jtc_host::{Error, Session, plan};
 use serde_json::json;
 
 use super::run;
-use crate::args::{CheckArgs, TrajCommand};
+use crate::args::{CheckArgs, LinkArgs, TrajCommand};
 use crate::failure::{Failure, REFUSED};
 
 /// Does one of the family.
@@ -20,16 +22,39 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
         TrajCommand::Check { file, check: args } => check(file, args, out),
         TrajCommand::Info { file } => info(file, out),
         TrajCommand::Run(args) => run::run(args, out),
-        TrajCommand::Pause(link) => tell(link.session()?.pause(), "pause", "pausing on the path", out),
-        TrajCommand::Resume(link) => tell(link.session()?.execute(), "resume", "going on", out),
-        TrajCommand::Stop(link) => tell(link.session()?.stop(), "stop", "stopping on the path", out),
+        TrajCommand::Pause(link) => {
+            send(link, Session::pause, "pause", "pausing on the path", out).map_err(may_be_moving)
+        }
+        TrajCommand::Resume(link) => send(link, Session::resume, "resume", "going on", out),
+        TrajCommand::Stop(link) => {
+            send(link, Session::stop, "stop", "stopping on the path", out).map_err(may_be_moving)
+        }
     }
 }
 
-fn tell(done: Result<(), Error>, command: &str, words: &str, out: &Output) -> Result<(), Failure> {
-    done?;
-    out.result(&json!({ "command": command, "accepted": true }), || words.to_owned());
+fn send(
+    link: &LinkArgs,
+    command: impl FnOnce(&mut Session<SerialPort>) -> Result<(), Error>,
+    name: &str,
+    words: &str,
+    out: &Output,
+) -> Result<(), Failure> {
+    command(&mut link.session()?)?;
+    out.result(&json!({ "command": name, "accepted": true }), || words.to_owned());
     Ok(())
+}
+
+/// Whoever wants an arm to stand and has no port must know that nothing was sent.
+fn may_be_moving(failure: Failure) -> Failure {
+    if failure.code != "port" {
+        return failure;
+    }
+    let hint = format!(
+        "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
+         stops there). {}",
+        failure.hint
+    );
+    Failure { hint, ..failure }
 }
 
 /// A trajectory at the speed asked for, and the arm that it is checked against.
@@ -38,8 +63,10 @@ pub struct Job {
     pub loaded: Loaded,
     /// At the speed asked for.
     pub trajectory: Trajectory,
-    /// Limits and masses.
+    /// Masses, friction, names.
     pub arm: Arm,
+    /// Limits and settings that count.
+    pub config: Config,
 }
 
 impl Job {
@@ -58,7 +85,8 @@ impl Job {
         } else {
             plan::at_speed(&loaded.trajectory, args.speed).map_err(Failure::usage)?
         };
-        Ok(Self { loaded, trajectory, arm })
+        let config = arm.config();
+        Ok(Self { loaded, trajectory, arm, config })
     }
 
     /// Limits of every point and between points, torque by the arm model; the start pose, where it is given.
@@ -68,13 +96,13 @@ impl Job {
         start: Option<[f64; 6]>,
         upload: UploadOptions,
     ) -> Verdict {
-        let (config, friction) = (self.arm.config(), self.arm.friction());
+        let friction = self.arm.friction();
         let checker = Checker {
             model: Some(&self.arm.model),
             friction: friction.as_ref(),
             start,
             upload,
-            ..Checker::new(&config)
+            ..Checker::new(&self.config)
         };
         checker.check(trajectory)
     }
@@ -96,6 +124,13 @@ pub fn refuse(verdict: &Verdict, out: &Output) -> Failure {
 
 fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
     let job = Job::load(file, args, out)?;
+    let differences = job.arm.device_differences();
+    if !differences.is_empty() {
+        out.note(format!(
+            "note: {} settings of this arm are in no frame, and the controller has others built in; `jtc traj run` lists them",
+            differences.len()
+        ));
+    }
     let verdict = job.verdict(&job.trajectory, None, UploadOptions::default());
     let value = json!({ "ok": verdict.is_ok(), "form": job.loaded.form, "notes": job.loaded.notes, "verdict": verdict });
     out.result(&value, || {

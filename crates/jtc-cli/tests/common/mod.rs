@@ -7,7 +7,8 @@ use std::process::{Child, Command, Stdio};
 
 use cli_kit::trial::{Said, program, run};
 
-fn command() -> Command {
+/// `jtc`, without variables of the surroundings.
+pub fn command() -> Command {
     program(env!("CARGO_BIN_EXE_jtc"), "JTC_")
 }
 

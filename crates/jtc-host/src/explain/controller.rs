@@ -177,7 +177,7 @@ pub(super) const PAGES: &[Page] = &[
             "Joint 1 (node 0) does not answer.",
             "Its supply or cable is off, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
-            "jtc reset 0x01",
+            "jtc reset --joints 1",
         ],
     ),
     page(
@@ -188,7 +188,7 @@ pub(super) const PAGES: &[Page] = &[
             "Joint 2 (node 1) does not answer.",
             "Its supply or cable is off, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
-            "jtc reset 0x02",
+            "jtc reset --joints 2",
         ],
     ),
     page(
@@ -199,7 +199,7 @@ pub(super) const PAGES: &[Page] = &[
             "Joint 3 (node 2) does not answer.",
             "Its supply or cable is off, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
-            "jtc reset 0x04",
+            "jtc reset --joints 3",
         ],
     ),
     page(
@@ -210,7 +210,7 @@ pub(super) const PAGES: &[Page] = &[
             "Joint 4 (node 3) does not answer.",
             "Its supply or cable is off, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
-            "jtc reset 0x08",
+            "jtc reset --joints 4",
         ],
     ),
     page(
@@ -221,7 +221,7 @@ pub(super) const PAGES: &[Page] = &[
             "Joint 5 (node 4) does not answer.",
             "Its supply or cable is off, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
-            "jtc reset 0x10",
+            "jtc reset --joints 5",
         ],
     ),
     page(
@@ -232,7 +232,7 @@ pub(super) const PAGES: &[Page] = &[
             "Joint 6 (node 5) does not answer.",
             "Its supply or cable is off, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
-            "jtc reset 0x20",
+            "jtc reset --joints 6",
         ],
     ),
     page(
@@ -243,7 +243,7 @@ pub(super) const PAGES: &[Page] = &[
             "The gripper does not answer.",
             "Its supply or cable is off, its node number is wrong, or it restarts.",
             "If there is no gripper, the controller must be configured without.",
-            "jtc reset 0x40",
+            "jtc reset --gripper",
         ],
     ),
     page(
@@ -315,8 +315,8 @@ pub(super) const PAGES: &[Page] = &[
         [
             "A trajectory is complete and at its start.",
             "Uploaded or stopped.",
-            "Execute it.",
-            "jtc traj resume",
+            "Run it: what was uploaded before is checked and uploaded again.",
+            "jtc traj run FILE",
         ],
     ),
     page(

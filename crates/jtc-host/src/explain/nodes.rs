@@ -176,7 +176,7 @@ pub(super) const PAGES: &[Page] = &[
             "Software error of the motor control.",
             "Firmware of the drive.",
             "Reset the drive.",
-            "jtc reset MASK",
+            "jtc reset --joints N",
         ],
     ),
     page(

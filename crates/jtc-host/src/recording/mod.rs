@@ -57,8 +57,13 @@ pub struct Recorder {
 impl Recorder {
     /// Makes (or replaces) the file; its ending chooses the format.
     pub fn create(path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
+        Format::of(path)?;
+        Self::on(File::create(path).map_err(|e| RecordingError::io(path, e))?, path, info)
+    }
+
+    /// Writes into a file that is open already; the ending of `path` chooses the format.
+    pub fn on(file: File, path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
         let format = Format::of(path)?;
-        let file = File::create(path).map_err(|e| RecordingError::io(path, e))?;
         let file = BufWriter::with_capacity(1 << 16, file);
         let writer = match format {
             Format::Mcap => mcap::McapWriter::new(file, info).map(|w| Writer::Mcap(Box::new(w))),
@@ -82,6 +87,11 @@ impl Recorder {
         self.samples
     }
 
+    fn finish_with(mut self, samples: &[Sample]) -> Result<u64, RecordingError> {
+        samples.iter().try_for_each(|sample| self.write(sample))?;
+        self.finish()
+    }
+
     /// Completes the file (index and summary of an MCAP file) and says how many samples it holds.
     pub fn finish(self) -> Result<u64, RecordingError> {
         let done = match self.writer {
@@ -94,11 +104,17 @@ impl Recorder {
 
 /// Writes a whole recording at once.
 pub fn write_all(path: &Path, info: &RecordingInfo, samples: &[Sample]) -> Result<u64, RecordingError> {
-    let mut recorder = Recorder::create(path, info)?;
-    for sample in samples {
-        recorder.write(sample)?;
-    }
-    recorder.finish()
+    Recorder::create(path, info)?.finish_with(samples)
+}
+
+/// Writes a whole recording at once into a file that is open already; the ending of `path` chooses the format.
+pub fn write_into(
+    file: File,
+    path: &Path,
+    info: &RecordingInfo,
+    samples: &[Sample],
+) -> Result<u64, RecordingError> {
+    Recorder::on(file, path, info)?.finish_with(samples)
 }
 
 /// A recording that was read back.

@@ -81,9 +81,18 @@ impl<P: Port> Session<P> {
             .try_for_each(|p| self.use_default(p))
     }
 
-    /// Starts the trajectory, or goes on after a pause.
+    /// Starts the trajectory from its first point; after a pause it goes on from there.
     pub fn execute(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Execute, |s| s.tes == 3)
+    }
+
+    /// Goes on after a pause; an error, and nothing sent, when nothing is paused.
+    pub fn resume(&mut self) -> Result<(), Error> {
+        let status = self.fresh_status()?;
+        match status.tes {
+            2 => self.execute(),
+            tes => Err(Error::NotPaused { state: status.fsm, tes }),
+        }
     }
 
     /// Pauses on the path.
@@ -96,9 +105,10 @@ impl<P: Port> Session<P> {
         self.exec(ExecCommand::Stop, |s| s.tes == 1)
     }
 
+    /// Without a confirmation nobody knows whether the arm moves: such errors say so.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let retries = self.statistics.retries;
-        let record = self.request(&fixed::exec(command))?;
+        let record = self.request(&fixed::exec(command)).map_err(|e| self.link_lost(e))?;
         if accepted(&record) {
             return Ok(());
         }
@@ -108,6 +118,16 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         Err(self.refused(record))
+    }
+
+    /// An error of the link while the arm moves or may move, with what is known about the motion; other errors as they are.
+    pub(super) fn link_lost(&self, error: Error) -> Error {
+        match error {
+            Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } => {
+                Error::LinkLost { last: self.last.map(Box::new), source: Box::new(error) }
+            }
+            other => other,
+        }
     }
 
     /// Waits until the controller is in HoldPos; an error at once when it reports errors.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jtc_wire::Status;
+use jtc_wire::{ExecCommand, Status, fixed};
 
 use super::Session;
 use crate::Error;
@@ -38,13 +38,18 @@ const SETTLE: Duration = Duration::from_millis(300);
 
 impl<P: Port> Session<P> {
     /// Follows the execution that was just started. `each` sees every status.
+    ///
+    /// When the link is lost on the way, a stop is sent that may still arrive, and the error says that the arm may be moving.
     pub fn follow(&mut self, mut each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         let start = self.port.now();
-        let mut begun = false;
+        let (mut begun, mut stopping) = (false, false);
         // On an error the controller forgets the trajectory, and its point with it.
         let mut point = 0;
         loop {
-            let status = self.next_status()?;
+            let status = match self.next_status() {
+                Ok(status) => status,
+                Err(e) => return Err(self.lost_in_motion(e)),
+            };
             begun |= status.tes == 3 || self.port.now() - start > SETTLE;
             if status.fsm == 3 {
                 point = status.point;
@@ -64,20 +69,32 @@ impl<P: Port> Session<P> {
             }
             match flow {
                 Flow::Continue => {}
-                Flow::Pause if status.tes == 3 => self.pause()?,
+                Flow::Pause if status.tes == 3 => unless_ended(self.pause())?,
                 Flow::Resume if status.tes == 2 => self.execute()?,
-                Flow::Stop => self.stop_gently()?,
-                Flow::Pause | Flow::Resume => {}
+                // Once accepted it needs no repetition: the controller slows down to standstill by itself.
+                Flow::Stop if !stopping => {
+                    unless_ended(self.stop())?;
+                    stopping = true;
+                }
+                Flow::Pause | Flow::Resume | Flow::Stop => {}
                 Flow::Cancel => return Err(Error::Cancelled),
             }
         }
     }
 
-    /// Stop, which may cross with the end of the motion.
-    fn stop_gently(&mut self) -> Result<(), Error> {
-        match self.stop() {
-            Err(Error::Refused { tes: 1 | 4, .. }) => Ok(()),
-            other => other,
+    /// Nothing comes back any more; what goes out may still arrive, and an arm that nobody follows had better stand.
+    fn lost_in_motion(&mut self, error: Error) -> Error {
+        if self.last.is_none_or(|s| s.tes == 3) {
+            let _ = self.write(&fixed::exec(ExecCommand::Stop));
         }
+        self.link_lost(error)
+    }
+}
+
+/// A pause or stop may cross with the end of the motion: it is refused then, and that is no failure.
+fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
+    match done {
+        Err(Error::Refused { tes: 1 | 2 | 4, .. }) => Ok(()),
+        other => other,
     }
 }

@@ -18,7 +18,7 @@ use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status, StatusRecei
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
 pub use params::Pushed;
-pub use recover::RecoverStep;
+pub use recover::{ParameterSource, RecoverStep};
 pub use statistics::LinkStatistics;
 pub use upload::{Progress, UploadOptions, UploadReport};
 

@@ -9,6 +9,23 @@ use crate::arm::ParameterSet;
 use crate::port::Port;
 use crate::{Error, words};
 
+/// Whose friction, gains and arm model a controller is given that misses some (J-55).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum ParameterSource<'a> {
+    /// Nobody's: a controller that misses some is refused.
+    #[default]
+    None,
+    /// The defaults that are built into the controller, by name.
+    ControllerDefaults,
+    /// Those of an arm, all of them: a controller without torque is given them whatever it has.
+    Arm {
+        /// Name of the arm or its file.
+        name: &'a str,
+        /// All three parts.
+        set: &'a ParameterSet,
+    },
+}
+
 /// One step of the way back.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -25,8 +42,12 @@ pub enum RecoverStep {
     Clear(Vec<String>),
     /// Nodes are reset.
     Reset(Vec<String>),
-    /// Parameters are given: these names.
-    Parameters(Vec<&'static str>),
+    /// Friction, gains and arm model are given, all three: those of the controller's own defaults, or of the arm of this name.
+    Give(Option<String>),
+    /// Nothing is given: the controller goes on with the parameters that it has.
+    Keep,
+    /// Nothing is given although an arm is named: the controller holds an arm with the parameters that it has.
+    KeepHolding(String),
     /// Nodes come up.
     WaitNodes(Vec<String>),
     /// Done: HoldPos without errors.
@@ -47,7 +68,19 @@ impl std::fmt::Display for RecoverStep {
                 write!(f, "clearing the errors of the controller and of {}", nodes.join(", "))
             }
             RecoverStep::Reset(nodes) => write!(f, "resetting {}", nodes.join(", ")),
-            RecoverStep::Parameters(names) => write!(f, "giving {}", names.join(", ")),
+            RecoverStep::Give(None) => write!(
+                f,
+                "friction, gains and arm model: the controller's own defaults, those of its built-in arm"
+            ),
+            RecoverStep::Give(Some(arm)) => write!(f, "friction, gains and arm model: those of {arm}"),
+            RecoverStep::Keep => {
+                write!(f, "friction, gains and arm model: those that the controller was given before")
+            }
+            RecoverStep::KeepHolding(arm) => write!(
+                f,
+                "the arm is held with the friction, gains and arm model that the controller was given before, not with those of \
+                 {arm}: `jtc params push` gives them"
+            ),
             RecoverStep::WaitNodes(nodes) => write!(f, "waiting for {}", nodes.join(", ")),
             RecoverStep::HoldPos => write!(f, "HoldPos, no errors"),
         }
@@ -56,27 +89,42 @@ impl std::fmt::Display for RecoverStep {
 
 /// First enable of a drive takes 4 s, after a reset some more.
 const NODE_TIME: Duration = Duration::from_secs(15);
+/// From reset to Init.
+const START_TIME: Duration = Duration::from_secs(3);
 /// Effect of a command.
 const EFFECT: Duration = Duration::from_millis(500);
 /// How long a person may take to release the emergency stop.
 const PERSON_TIME: Duration = Duration::from_secs(60);
 
 impl<P: Port> Session<P> {
-    /// Leads the controller to HoldPos without errors. Missing parameters are taken from `parameters`, else the controller's
-    /// defaults are used. No trajectory is resumed.
+    /// Leads the controller to HoldPos without errors. Where it misses friction, gains or arm model, `parameters` says whose it is
+    /// given; no source, or one that lacks a part, is an error before anything is sent. No trajectory is resumed.
     pub fn recover(
         &mut self,
-        parameters: Option<&ParameterSet>,
+        parameters: ParameterSource<'_>,
         mut say: impl FnMut(&RecoverStep),
     ) -> Result<Status, Error> {
+        parameters.check()?;
         let mut status = self.fresh_status()?;
+        parameters.enough_for(&status)?;
         say(&RecoverStep::Found(words::waiting_for(&status)));
+        if let Some(step) = parameters.kept(&status) {
+            say(&step);
+        }
+        let mut given = false;
         let (mut resets, mut clears, mut waited) = (0u8, 0, false);
         let mut asked: Option<Duration> = None;
         let mut rounds = 0;
         while rounds < 24 {
             rounds += 1;
+            parameters.enough_for(&status)?;
             match status.fsm {
+                1 | 5 if parameters.due(&status, given) => {
+                    say(&RecoverStep::Give(parameters.arm_name()));
+                    self.give(parameters)?;
+                    given = true;
+                    self.pause_for(Duration::from_millis(60))?;
+                }
                 // Errors latch: only clearing tells whether the safety input is high again.
                 5 if status.errors & 1 != 0
                     && clears > 0
@@ -111,13 +159,10 @@ impl<P: Port> Session<P> {
                         return Err(Error::Device { status: Box::new(self.fresh_status()?) });
                     }
                 }
-                0 | 1 if status.jtc_init != 0 => {
-                    let missing = words::missing_parameters(status.jtc_init);
-                    say(&RecoverStep::Parameters(missing));
-                    self.give(status.jtc_init, parameters)?;
-                    self.pause_for(Duration::from_millis(60))?;
+                0 => {
+                    self.wait_for("the end of the start-up", START_TIME, |s| s.fsm != 0)?;
                 }
-                0 | 1 => {
+                1 => {
                     say(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
                     let reached = self.wait_for("nodes ready", NODE_TIME, |s| s.fsm != 0 && s.fsm != 1);
                     match reached {
@@ -158,27 +203,12 @@ impl<P: Port> Session<P> {
         Err(Error::Device { status: Box::new(status) })
     }
 
-    fn give(&mut self, missing: u8, parameters: Option<&ParameterSet>) -> Result<(), Error> {
-        use super::Parameter::{ArmModel, FrictionPolynomial, Pid};
-        let given = parameters.cloned().unwrap_or_default();
-        let wanted = |bit: u8| missing >> bit & 1 == 1;
-        let set = ParameterSet {
-            friction: given.friction.filter(|_| wanted(0)),
-            pid: given.pid.filter(|_| wanted(1)),
-            model: given.model.filter(|_| wanted(2)),
-        };
-        let defaults = [
-            (wanted(0) && set.friction.is_none(), FrictionPolynomial),
-            (wanted(1) && set.pid.is_none(), Pid),
-            (wanted(2) && set.model.is_none(), ArmModel),
-        ];
-        self.push(&set, |_| {})?;
-        for (needed, parameter) in defaults {
-            if needed {
-                self.use_default(parameter)?;
-            }
+    fn give(&mut self, parameters: ParameterSource<'_>) -> Result<(), Error> {
+        match parameters {
+            ParameterSource::None => Ok(()),
+            ParameterSource::ControllerDefaults => self.use_defaults(),
+            ParameterSource::Arm { set, .. } => self.push(set, |_| {}).map(|_| ()),
         }
-        Ok(())
     }
 
     /// Lets time pass while statuses are taken in.
@@ -190,6 +220,56 @@ impl<P: Port> Session<P> {
                 return Ok(());
             }
             self.poll(end - now)?;
+        }
+    }
+}
+
+impl ParameterSource<'_> {
+    /// An arm must be whole: friction, gains and arm model.
+    pub fn check(&self) -> Result<(), Error> {
+        match self {
+            ParameterSource::Arm { name, set } if !set.missing().is_empty() => {
+                Err(Error::IncompleteArm { arm: (*name).to_owned(), missing: set.missing() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A controller that misses parameters needs a source.
+    fn enough_for(&self, status: &Status) -> Result<(), Error> {
+        match self {
+            ParameterSource::None if status.jtc_init != 0 => {
+                Err(Error::NoParameters { missing: words::missing_parameters(status.jtc_init) })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// An arm's parameters are given once to any controller, the defaults to one that misses some; always all three, so that those
+    /// of two arms are never mixed.
+    fn due(&self, status: &Status, given: bool) -> bool {
+        match self {
+            ParameterSource::None => false,
+            ParameterSource::ControllerDefaults => status.jtc_init != 0,
+            ParameterSource::Arm { .. } => status.jtc_init != 0 || !given,
+        }
+    }
+
+    /// The step to report when nothing will be given.
+    fn kept(&self, status: &Status) -> Option<RecoverStep> {
+        match self {
+            _ if status.jtc_init != 0 => None,
+            ParameterSource::Arm { name, .. } => {
+                matches!(status.fsm, 2..=4).then(|| RecoverStep::KeepHolding((*name).to_owned()))
+            }
+            ParameterSource::None | ParameterSource::ControllerDefaults => Some(RecoverStep::Keep),
+        }
+    }
+
+    fn arm_name(&self) -> Option<String> {
+        match self {
+            ParameterSource::Arm { name, .. } => Some((*name).to_owned()),
+            _ => None,
         }
     }
 }

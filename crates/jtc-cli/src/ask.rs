@@ -1,0 +1,23 @@
+//! A question to the person at the terminal, which an option answers as well.
+
+use std::io::{BufRead, IsTerminal, Write};
+
+use crate::failure::{Failure, REFUSED};
+
+/// Asks `question` and goes on only when the answer is `yes`. Without a terminal nobody can be asked: the command is refused, and
+/// `option` is what answers the question beforehand.
+pub fn confirm(question: &str, option: &str) -> Result<(), Failure> {
+    let refused = |message: String| {
+        Failure { exit: REFUSED, code: "not-confirmed-by-person".into(), ..Failure::usage(message) }
+            .hint(format!("nothing was sent; {option} answers yes"))
+    };
+    if !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {
+        return Err(refused(format!("{question}: nobody can be asked without a terminal")));
+    }
+    let mut stderr = std::io::stderr();
+    write!(stderr, "{question}: type yes to go on: ")?;
+    stderr.flush()?;
+    let mut answer = String::new();
+    std::io::stdin().lock().read_line(&mut answer)?;
+    if answer.trim() == "yes" { Ok(()) } else { Err(refused(format!("{question}: not confirmed"))) }
+}

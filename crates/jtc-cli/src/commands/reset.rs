@@ -1,0 +1,100 @@
+//! `jtc reset`: restarts nodes of the joint bus, named as people count them.
+
+use cli_kit::Output;
+use jtc_host::words;
+use serde_json::json;
+
+use crate::args::ResetArgs;
+use crate::ask::confirm;
+use crate::failure::{Failure, REFUSED};
+
+/// All joints and the gripper.
+const ALL: u8 = 0x7F;
+/// The gripper's bit.
+const GRIPPER: u8 = 1 << 6;
+/// States of the controller in which the joints have torque.
+const HOLD_POS: u8 = 2;
+const OPERATE: u8 = 3;
+const TEACHING: u8 = 4;
+
+/// Resets the nodes that are named. Where the arm is held, only after a person has agreed; where it moves, no joint.
+pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
+    let nodes = nodes(args)?;
+    let names = words::missing_nodes(nodes).join(", ");
+    let mut session = args.link.session()?;
+    let state = session.fresh_status()?.fsm;
+    if matches!(state, OPERATE | TEACHING) && nodes & !GRIPPER != 0 {
+        let message = format!("{names} cannot be reset in {}: the arm would fall", words::state(state));
+        let next = if state == OPERATE { "`jtc traj stop` first" } else { "`jtc teach off` first" };
+        return Err(Failure { exit: REFUSED, code: "powered".into(), ..Failure::usage(message) }.hint(next));
+    }
+    if matches!(state, HOLD_POS | OPERATE | TEACHING) && !args.yes {
+        let question = format!(
+            "the arm has torque ({}), and a reset of {names} can take it away: the arm may fall",
+            words::state(state)
+        );
+        confirm(&question, "--yes")?;
+    }
+    session.reset(nodes)?;
+    let reset = words::missing_nodes(nodes);
+    out.result(&json!({ "reset": reset }), || format!("reset: {names}"));
+    Ok(())
+}
+
+/// Bits 0..5 of joints 1..6 and bit 6 of the gripper, of what is named.
+fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
+    if let Some(mask) = &args.mask {
+        return Err(of_mask(mask));
+    }
+    let joints = args.joints.iter().fold(0, |mask, joint| mask | 1 << (joint - 1));
+    let nodes = if args.all { ALL } else { joints | if args.gripper { GRIPPER } else { 0 } };
+    if nodes == 0 {
+        return Err(Failure::usage("which nodes? Nothing was sent")
+            .hint("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`"));
+    }
+    Ok(nodes)
+}
+
+/// Older versions took a bit mask, in which 3 meant joints 1 and 2.
+fn of_mask(text: &str) -> Failure {
+    let value = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
+        Some(hex) => u8::from_str_radix(hex, 16).ok(),
+        None => text.parse().ok(),
+    };
+    let failure =
+        Failure::usage(format!("\"{text}\" does not say which joints: nodes are named, nothing was sent"));
+    let Some(mask) = value.filter(|mask| *mask != 0 && mask & !ALL == 0) else {
+        return failure.hint("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`");
+    };
+    let joints: Vec<String> =
+        (0..6).filter(|joint| mask >> joint & 1 == 1).map(|joint| (joint + 1).to_string()).collect();
+    let mut options = Vec::new();
+    if !joints.is_empty() {
+        options.push(format!("--joints {}", joints.join(",")));
+    }
+    if mask & GRIPPER != 0 {
+        options.push("--gripper".to_owned());
+    }
+    let as_mask = format!("`jtc reset {}` resets what the bit mask {text} meant", options.join(" "));
+    match text.parse::<u8>() {
+        Ok(joint @ 1..=6) => {
+            failure.hint(format!("`jtc reset --joints {joint}` resets joint {joint}; {as_mask}"))
+        }
+        _ => failure.hint(as_mask),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bare_mask_is_refused_with_both_things_that_it_may_mean() {
+        let failure = of_mask("3");
+        assert_eq!(failure.exit, 2);
+        assert!(failure.hint.contains("`jtc reset --joints 3` resets joint 3"), "{}", failure.hint);
+        assert!(failure.hint.contains("`jtc reset --joints 1,2`"), "{}", failure.hint);
+        assert!(of_mask("0x44").hint.contains("--joints 3 --gripper"));
+        assert!(of_mask("0x80").hint.contains("--all") && of_mask("elbow").hint.contains("--all"));
+    }
+}

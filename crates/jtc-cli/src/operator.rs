@@ -1,0 +1,91 @@
+//! The person who watches an arm move: keys, Ctrl-C, and the words at a sudden end.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use cli_kit::{Output, Stop};
+use jtc_host::session::Flow;
+use jtc_wire::Status;
+
+use crate::failure::{FAULT, Failure};
+use crate::keys::{HELP, Key, Keys, Terminal};
+
+/// Trajectory execution states, as on the wire.
+const PAUSE: u8 = 2;
+const EXECUTE: u8 = 3;
+
+/// Wishes of the person, asked for at each status.
+pub struct Operator<'a> {
+    /// Where words go.
+    pub out: &'a Output,
+    stop: Stop,
+    terminal: Terminal,
+    /// Only while the arm moves: otherwise the terminal is as it was.
+    keys: Option<Keys>,
+    moving: Arc<AtomicBool>,
+    stopping: bool,
+    /// Trajectory state that was said last.
+    said: u8,
+}
+
+impl<'a> Operator<'a> {
+    /// From now on the first SIGINT, SIGTERM or SIGHUP is a wish to end; the second one ends the process at once, with the terminal
+    /// as it was and words about the arm.
+    pub fn listen(out: &'a Output) -> Result<Self, Failure> {
+        let (terminal, moving) = (Terminal::default(), Arc::new(AtomicBool::new(false)));
+        let (its_terminal, its_moving, its_out) = (terminal.clone(), Arc::clone(&moving), *out);
+        let stop = Stop::listen_with(move || {
+            its_terminal.restore();
+            if its_moving.load(Ordering::Relaxed) {
+                its_out.note(
+                    "jtc: ended at once: THE ARM MAY BE MOVING\n     `jtc traj stop` stops it on its path; the emergency stop always",
+                );
+            } else {
+                its_out.note("jtc: ended at once; this command moves nothing any more");
+            }
+            FAULT
+        })?;
+        Ok(Self { out, stop, terminal, keys: None, moving, stopping: false, said: 0 })
+    }
+
+    /// The command shall end.
+    pub fn wants_the_end(&self) -> bool {
+        self.stop.asked()
+    }
+
+    /// From now on keys count.
+    pub fn motion_begins(&mut self) {
+        self.moving.store(true, Ordering::Relaxed);
+        self.said = 0;
+        self.keys = Keys::listen(&self.terminal);
+        if self.keys.is_some() {
+            self.out.note(HELP);
+        }
+    }
+
+    /// From now on they do not.
+    pub fn motion_ended(&mut self) {
+        self.moving.store(false, Ordering::Relaxed);
+        self.keys = None;
+    }
+
+    /// What the person wants of the motion.
+    pub fn wish(&mut self, status: &Status) -> Flow {
+        if self.keys.is_some() && matches!(status.tes, PAUSE | EXECUTE) && self.said != status.tes {
+            self.said = status.tes;
+            self.out.note(if status.tes == PAUSE { "paused; space goes on" } else { "moving" });
+        }
+        let key = self.keys.as_mut().and_then(Keys::pressed);
+        if self.stop.asked() || key == Some(Key::Stop) {
+            if !std::mem::replace(&mut self.stopping, true) {
+                self.out.note("stopping on the path");
+            }
+            return Flow::Stop;
+        }
+        match (key, status.tes) {
+            (Some(Key::PauseOrResume), EXECUTE) => Flow::Pause,
+            (Some(Key::PauseOrResume), PAUSE) => Flow::Resume,
+            _ => Flow::Continue,
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! Files that a command writes: opened before anything is sent or moved, never written over unless that was asked for.
+
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use jtc_host::Sample;
+use jtc_host::recording::{RecordingInfo, write_into};
+
+use crate::failure::{Failure, REFUSED};
+
+/// An output that is open and still empty, or still what it was. Dropped before it was written, it leaves no trace.
+pub struct OutputFile {
+    path: PathBuf,
+    file: File,
+    /// It was not there before.
+    made: bool,
+    written: bool,
+}
+
+impl OutputFile {
+    /// Opens `path` for writing. A file that is there is refused without `force`, and one of `others` (what the command reads, and
+    /// its other outputs) always.
+    pub fn open(path: &Path, force: bool, others: &[&Path]) -> Result<Self, Failure> {
+        if let Some(other) = others.iter().find(|other| same(path, other)) {
+            let message =
+                format!("{} is {}, which this command uses itself", path.display(), other.display());
+            return Err(refused("same-file", message).hint("name another file; --force does not cover this"));
+        }
+        let io = |e| Failure {
+            code: "io".into(),
+            ..Failure::usage(format!("{}: {e}; nothing was sent", path.display()))
+        };
+        match OpenOptions::new().write(true).create_new(true).open(path) {
+            Ok(file) => return Ok(Self { path: path.to_owned(), file, made: true, written: false }),
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+            Err(e) => return Err(io(e)),
+        }
+        // A pipe or a device holds nothing that could be lost.
+        if !force && path.is_file() {
+            let message = format!("{} is there already; nothing was sent", path.display());
+            return Err(refused("exists", message).hint("name another file; --force writes over it"));
+        }
+        let file = OpenOptions::new().write(true).open(path).map_err(io)?;
+        Ok(Self { path: path.to_owned(), file, made: false, written: false })
+    }
+
+    /// As people name it.
+    pub fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    /// Writes all of the file.
+    pub fn write(mut self, text: &str) -> Result<(), Failure> {
+        let done = self.begin().and_then(|mut file| {
+            file.write_all(text.as_bytes())?;
+            settle(&file)
+        });
+        done.map_err(|e| self.failure(&e))
+    }
+
+    /// Writes a recording, in the form that the ending of the name says.
+    pub fn record(mut self, info: &RecordingInfo, samples: &[Sample]) -> Result<(), Failure> {
+        let file = self.begin().map_err(|e| self.failure(&e))?;
+        let settled = file.try_clone().map_err(|e| self.failure(&e))?;
+        write_into(file, &self.path, info, samples)?;
+        settle(&settled).map_err(|e| self.failure(&e))
+    }
+
+    /// What was in the file goes only now.
+    fn begin(&mut self) -> std::io::Result<File> {
+        self.written = true;
+        if self.file.metadata()?.is_file() {
+            self.file.set_len(0)?;
+        }
+        self.file.try_clone()
+    }
+
+    fn failure(&self, e: &std::io::Error) -> Failure {
+        Failure { code: "io".into(), ..Failure::usage(format!("{}: {e}", self.name())) }
+    }
+}
+
+impl Drop for OutputFile {
+    fn drop(&mut self) {
+        if self.made && !self.written {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// A full disk may show only when the bytes really go there.
+fn settle(file: &File) -> std::io::Result<()> {
+    if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
+}
+
+fn refused(code: &str, message: String) -> Failure {
+    Failure { exit: REFUSED, code: code.into(), ..Failure::usage(message) }
+}
+
+/// Both names lead to the same file that is there.
+fn same(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_is_opened_at_once_and_nothing_is_lost_before_it_is_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let (old, new, input) = (dir.path().join("old"), dir.path().join("new"), dir.path().join("input"));
+        std::fs::write(&old, "precious").unwrap();
+        std::fs::write(&input, "read").unwrap();
+        let code = |result: Result<OutputFile, Failure>| result.err().map(|f| (f.exit, f.code));
+        assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists".into())));
+        assert_eq!(code(OutputFile::open(&input, true, &[&input])), Some((4, "same-file".into())));
+        let around = dir.path().join(".").join("input");
+        assert_eq!(code(OutputFile::open(&around, true, &[&input])), Some((4, "same-file".into())));
+        assert_eq!(code(OutputFile::open(&dir.path().join("no/where"), false, &[])), Some((2, "io".into())));
+        drop(OutputFile::open(&old, true, &[]).unwrap());
+        assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
+        let opened = OutputFile::open(&new, false, &[]).unwrap();
+        assert!(new.exists());
+        drop(opened);
+        assert!(!new.exists());
+        OutputFile::open(&old, true, &[]).unwrap().write("short").unwrap();
+        OutputFile::open(&new, false, &[]).unwrap().write("text").unwrap();
+        let read = |path| std::fs::read_to_string(path).unwrap();
+        assert_eq!((read(&old).as_str(), read(&new).as_str()), ("short", "text"));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_an_error_that_says_so() {
+        let failure =
+            OutputFile::open(Path::new("/dev/full"), false, &[]).unwrap().write("text").unwrap_err();
+        assert!(failure.message.contains("No space left"), "{}", failure.message);
+    }
+}

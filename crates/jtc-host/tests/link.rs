@@ -24,19 +24,16 @@ fn ready(baud: Option<u32>) -> Sim {
     s
 }
 
-/// There and back between two poses, `points` in all.
+/// There and back between two poses and then at rest, `points` in all.
 fn trajectory(points: usize) -> Trajectory {
     let config = Config::avena();
     let there = plan::joint_move(&[0.0; 6], &[0.6, -0.5, 0.4, 0.8, -0.3, 0.9], &config, 60.0).unwrap();
-    let mut all = Trajectory { step_ms: there.step_ms, points: Vec::new() };
-    while all.points.len() < points {
-        all.points.extend(&there.points);
-        all.points.extend(
-            there.points.iter().rev().map(|p| jtc_host::Point { velocity: p.velocity.map(|v| -v), ..*p }),
-        );
-    }
-    all.points.truncate(points);
-    all
+    let back = there.points.iter().rev().map(|p| jtc_host::Point { velocity: p.velocity.map(|v| -v), ..*p });
+    let both: Vec<jtc_host::Point> = there.points.iter().copied().chain(back).collect();
+    let mut all: Vec<jtc_host::Point> =
+        both.iter().copied().cycle().take(points / both.len() * both.len()).collect();
+    all.resize(points, there.points[0]);
+    Trajectory { step_ms: there.step_ms, points: all }
 }
 
 fn upload(s: &mut Sim, t: &Trajectory) -> Result<UploadReport, Error> {
@@ -240,7 +237,6 @@ fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
 
 #[test]
 fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
-    use jtc_host::Port;
     use jtc_host::port::test::ScriptedPort;
     let mut silent = Session::new(ScriptedPort::new(Some(115_200), |_, _| Vec::new()));
     let error = silent.next_status().unwrap_err();

@@ -1,10 +1,9 @@
 //! Settings and parameters of the controller.
+use jtc_bus::config;
 use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
 
-/// Configuration bit of a joint's drive: it keeps to its working area (J-11).
-const KEEPS_WORKING_AREA: u8 = 0x01;
 /// Half of the drives' working area, rad either way from zero (J-43).
 pub const WORKING_AREA: f64 = 2.9905;
 
@@ -42,6 +41,8 @@ pub struct Config {
     pub pump_off_on_error: bool,
     /// Full scale of the drives' velocity, rad/s (J-11).
     pub velocity_full_scale: f64,
+    /// Speed at which the drives trip by themselves while configuration bit 0x10 is set, rad/s (J-35).
+    pub drive_speed_trip: f64,
     /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, far coarser than the bus. At rest the integral is
     /// held within one such step (J-41).
     pub encoder_step: f64,
@@ -70,6 +71,10 @@ pub struct Config {
     pub start_tolerance_rad: f64,
     /// Time scale ramp for pause, stop and resume, ms (J-33); made longer where acceleration or torque limits ask for it.
     pub ramp_ms: u16,
+    /// Measured speed that is an error while torque is on, as a multiple of the joint's limit (J-35).
+    pub overspeed_factor: f64,
+    /// How long a joint may be that fast before it is an error, ms.
+    pub overspeed_ms: u16,
     /// Longest pause or stop, ms, wherever the torque limits allow it (J-33).
     pub stop_ms: u16,
     /// How long a pause or stop may brake with all the torque there is, ms; an arm that still moves then is an error (J-33).
@@ -94,11 +99,123 @@ impl Config {
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);
-        if self.joint_config_bits & KEEPS_WORKING_AREA == 0 {
+        if self.joint_config_bits & config::WORKING_AREA == 0 {
             (low, high)
         } else {
             (low.max(-WORKING_AREA), high.min(WORKING_AREA))
         }
+    }
+}
+
+/// Why no arm can be run with some settings: its drives cannot do what its limits allow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// A position limit is outside the drives' working area (J-43).
+    Position {
+        /// Joint, from 1.
+        joint: usize,
+        /// The position limit, rad.
+        value: f64,
+        /// Half of the working area, rad.
+        limit: f64,
+    },
+    /// The speed that is an error (J-35) is above what the drives can report.
+    SpeedScale {
+        /// Joint, from 1.
+        joint: usize,
+        /// The velocity limit times [`Config::overspeed_factor`], rad/s.
+        value: f64,
+        /// Full scale of the drives' velocity, rad/s.
+        limit: f64,
+    },
+    /// The speed that is an error (J-35) is above the one at which the drives trip.
+    SpeedTrip {
+        /// Joint, from 1.
+        joint: usize,
+        /// The velocity limit times [`Config::overspeed_factor`], rad/s.
+        value: f64,
+        /// Speed at which the drives trip, rad/s.
+        limit: f64,
+    },
+}
+
+impl ConfigError {
+    /// The joint that it is about, from 1.
+    pub const fn joint(&self) -> usize {
+        match *self {
+            Self::Position { joint, .. } | Self::SpeedScale { joint, .. } | Self::SpeedTrip { joint, .. } => {
+                joint
+            }
+        }
+    }
+}
+
+impl core::fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Position { joint, value, limit } => {
+                write!(
+                    f,
+                    "joint {joint}: position limit {value} rad is outside the drives' working area, ±{limit} rad"
+                )
+            }
+            Self::SpeedScale { joint, value, limit } => write!(
+                f,
+                "joint {joint}: over-speed is an error above {value:.3} rad/s (1.2 times the velocity limit, unless set \
+                 otherwise), but the drives report {limit} rad/s at most"
+            ),
+            Self::SpeedTrip { joint, value, limit } => write!(
+                f,
+                "joint {joint}: over-speed is an error above {value:.3} rad/s (1.2 times the velocity limit, unless set \
+                 otherwise), but the drives trip at {limit} rad/s"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+impl Config {
+    /// Whether the drives can do what the joints' limits allow (J-35, J-43): position limits inside the working area, and a
+    /// threshold of over-speed that the drives can report and do not trip below.
+    ///
+    /// # Errors
+    /// The first joint whose limits the drives cannot do; a limit that is NaN is one.
+    #[allow(clippy::neg_cmp_op_on_partial_ord)]
+    pub const fn check(&self) -> Result<(), ConfigError> {
+        let mut j = 0;
+        while j < JOINTS {
+            let limits = &self.joints[j];
+            j += 1;
+            let joint = j;
+            // Written so that NaN is refused.
+            if self.joint_config_bits & config::WORKING_AREA != 0 {
+                if !(limits.position_min >= -WORKING_AREA) {
+                    return Err(ConfigError::Position {
+                        joint,
+                        value: limits.position_min,
+                        limit: WORKING_AREA,
+                    });
+                }
+                if !(limits.position_max <= WORKING_AREA) {
+                    return Err(ConfigError::Position {
+                        joint,
+                        value: limits.position_max,
+                        limit: WORKING_AREA,
+                    });
+                }
+            }
+            let value = self.overspeed_factor * limits.velocity_max;
+            let (scale, trip) = (self.velocity_full_scale, self.drive_speed_trip);
+            if !(value <= scale) {
+                return Err(ConfigError::SpeedScale { joint, value, limit: scale });
+            }
+            if self.joint_config_bits & config::OVER_SPEED_TRIP != 0 && !(value <= trip) {
+                return Err(ConfigError::SpeedTrip { joint, value, limit: trip });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -159,7 +276,7 @@ mod tests {
         config.joints[0].position_min = -3.05;
         config.joints[0].position_max = 1.2;
         assert_eq!(config.position_range(0), (-WORKING_AREA, 1.2));
-        config.joint_config_bits &= !KEEPS_WORKING_AREA;
+        config.joint_config_bits &= !jtc_bus::config::WORKING_AREA;
         assert_eq!(config.position_range(0), (-3.05, 1.2));
         let (low, high) = config.position_range(JOINTS);
         assert!(low > high, "no such joint: no position");

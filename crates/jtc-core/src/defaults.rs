@@ -27,6 +27,7 @@ impl Config {
             gripper: true,
             pump_off_on_error: true,
             velocity_full_scale: 2.0,
+            drive_speed_trip: 1.8,
             encoder_step: core::f64::consts::TAU / 65_536.0,
             joint_config_bits: 0x17,
             gripper_config_bits: 0x04,
@@ -41,6 +42,8 @@ impl Config {
             ramp_ms: 200,
             stop_ms: 500,
             braking_ms_max: 1_000,
+            overspeed_factor: 1.2,
+            overspeed_ms: 5,
             torque_over_ms: 10,
             blend_ms: 100,
             teach_velocity_max: 1.0,
@@ -49,6 +52,9 @@ impl Config {
         }
     }
 }
+
+// The arm that is built in is one that its drives can do.
+const _: () = assert!(Config::avena().check().is_ok());
 
 impl Default for Config {
     fn default() -> Self {

@@ -15,13 +15,14 @@ mod io;
 mod limits;
 mod motion;
 mod nodes;
+mod overspeed;
 mod path;
 mod pid;
 mod store;
 mod telemetry;
 
 pub use check::{TrajectoryCheck, Violation};
-pub use config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf, WORKING_AREA};
+pub use config::{Config, ConfigError, Friction, JointConfig, Parameters, PidGains, TableOf, WORKING_AREA};
 pub use controller::Controller;
 pub use interpolation::{SetPoint, interpolate};
 pub use io::{BusState, Inputs, Outputs};
@@ -98,7 +99,7 @@ pub mod error {
 pub mod joint_error {
     /// Set position over limit.
     pub const POSITION: u16 = 1 << 0;
-    /// Set velocity over limit.
+    /// Set velocity over limit, or measured speed over its own (J-35).
     pub const VELOCITY: u16 = 1 << 1;
     /// Set acceleration over limit.
     pub const ACCELERATION: u16 = 1 << 2;

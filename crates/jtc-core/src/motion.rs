@@ -7,6 +7,7 @@ use crate::friction;
 use crate::interpolation::SetPoint;
 use crate::limits::{self, Saturation};
 use crate::nodes::Nodes;
+use crate::overspeed::OverSpeed;
 use crate::path::{Bounds, SlopeBounds};
 use crate::pid::{Pid, PidTorque};
 use crate::{JOINTS, joint_error};
@@ -71,6 +72,7 @@ pub(crate) struct Motion {
     /// Torque of the last tick.
     pub torque: [JointTorque; JOINTS],
     saturation: [Saturation; JOINTS],
+    over_speed: OverSpeed,
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
@@ -245,7 +247,9 @@ impl Motion {
     ) -> ([f64; JOINTS], [u16; JOINTS]) {
         let missing = self.compute(law, nodes, config, gains);
         let (torque, mut errors) = self.limit(law, braking, nodes, config);
+        let too_fast = self.over_speed.watch(nodes, config);
         for (j, error) in errors.iter_mut().enumerate() {
+            *error |= too_fast[j];
             if nodes.node(j).enabled() {
                 *error |= missing[j];
             }

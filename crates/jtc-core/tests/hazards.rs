@@ -266,7 +266,7 @@ fn j25_the_brake_leaves_room_for_what_is_being_blended_out() {
     rig.nodes[5].report.position = 0.002;
     rig.run(30);
     rig.ask(FrameType::TeachingModeEnable, &[]);
-    rig.nodes[5].report.velocity = 1.9;
+    rig.nodes[5].report.velocity = 1.75;
     rig.run(40);
     assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
 }

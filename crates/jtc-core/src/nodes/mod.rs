@@ -216,6 +216,7 @@ impl Nodes {
             if node.valid && !node.measured.step(&tick, config) {
                 usable &= !(1 << j);
             }
+            node.fresh = usable & (1 << j) != 0;
             let Reading { position, velocity } = node.measured.used();
             (self.position[j], self.velocity[j]) = (position, velocity);
             still &= node.valid && node.measured.speed() < config.enable_speed_max;

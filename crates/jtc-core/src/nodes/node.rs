@@ -46,11 +46,18 @@ pub(crate) struct Node {
     /// Reported OperationEnable while that was wanted.
     pub(super) enabled: bool,
     pub(super) enable_wait: u32,
+    /// A usable answer came in since the last tick: the measurement is no prediction.
+    pub(super) fresh: bool,
     /// Misbehaved in this tick: left OperationEnable, did not enable in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }
 
 impl Node {
+    /// Its measurement came in since the last tick.
+    pub fn fresh(&self) -> bool {
+        self.fresh
+    }
+
     pub fn enabled(&self) -> bool {
         self.valid && self.report.fsm == fsm::ENABLED
     }

@@ -80,6 +80,11 @@ impl Arm {
         let xml = text.trim_start_matches('\u{feff}').trim_start().starts_with('<');
         let arm = if xml { Self::from_urdf(text)? } else { Self::from_toml(text)? };
         arm.model.check().map_err(|e| FileError::at(Place::name("arm model"), e.to_string()))?;
+        // J-35, J-43: limits that the drives cannot keep, or would stop at by themselves.
+        arm.config().check().map_err(|e| {
+            let name = arm.joint_names.get(e.joint() - 1).map_or("", String::as_str);
+            FileError::at(Place::name(format!("joint {name}")), e.to_string())
+        })?;
         Ok(arm)
     }
 

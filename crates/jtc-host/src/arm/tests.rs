@@ -120,9 +120,27 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
         say(&toml.replacen("torque_max_nm = 80.0", "torque_max_nm = -80.0", 1)).contains("torque_max_nm")
     );
     assert!(
-        say(&toml.replacen("position_min_rad = -3.05", "position_min_rad = 4", 1))
+        say(&toml.replacen("position_min_rad = -2.97", "position_min_rad = 4", 1))
             .contains("position_min_rad")
     );
+}
+
+#[test]
+fn j35_j43_limits_that_the_drives_cannot_keep_are_refused_and_those_of_a_description_narrowed() {
+    let say = |from: &str, to: &str| {
+        Arm::parse(&AVENA_TOML.replacen(from, to, 1)).expect_err("accepted").to_string()
+    };
+    let text = say("position_max_rad = 2.9\n", "position_max_rad = 3.05\n");
+    assert!(text.contains("joint_3") && text.contains("3.05") && text.contains("2.9905"), "{text}");
+    let text = say("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 3.15");
+    assert!(text.contains("joint_1") && text.contains("3.780"), "{text}");
+    let wide = urdf("0 0 1", "revolute").replace("\"1.5\"", "\"6.28\"").replace("\"1.2\"", "\"3.15\"");
+    let arm = Arm::parse(&wide).unwrap();
+    assert_eq!((arm.joints[2].position_min, arm.joints[2].position_max), (-1.5, 2.9905));
+    assert_eq!(arm.joints[2].velocity_max, 1.5);
+    assert_eq!(arm.warnings.len(), 12, "{:?}", arm.warnings);
+    let used = |w: &Warning| w.place == "joint j3" && w.problem.contains("1.5 rad/s is used");
+    assert!(arm.warnings.iter().any(used), "{:?}", arm.warnings);
 }
 
 #[test]
@@ -147,7 +165,7 @@ fn arms_come_back_from_their_own_files() {
     assert_eq!(Arm::parse(&arm.to_toml()).unwrap(), arm);
     let back = Arm::parse(&arm.to_urdf()).unwrap();
     assert_eq!((&back.model, &back.joint_names, &back.name), (&arm.model, &arm.joint_names, &arm.name));
-    assert_eq!((back.joints[1].torque_max, back.joints[4].position_min), (180.0, -3.05));
+    assert_eq!((back.joints[1].torque_max, back.joints[4].position_min), (180.0, -2.97));
     assert!(back.warnings.is_empty(), "{:?}", back.warnings);
 }
 
@@ -202,7 +220,8 @@ fn the_existing_parameter_files_are_read() {
         assert_eq!(found.joint_names[0], "avena_joint_1");
         assert_eq!((found.model.links[2].mass, found.joints[1].torque_max), (9.0, 180.0));
         let limits = file.warnings.iter().filter(|w| w.problem.contains("velocity limit 0: 1.5")).count();
-        assert_eq!((limits, file.warnings.len()), (6, 6), "{:?}", file.warnings);
+        let area = file.warnings.iter().filter(|w| w.problem.contains("working area")).count();
+        assert_eq!((limits, area, file.warnings.len()), (6, 4, 10), "{:?}", file.warnings);
     }
     if let Some(file) = load("Avena.urdf") {
         let found = file.arm.unwrap();

@@ -3,7 +3,7 @@
 //! Joints about another axis than +z are carried by turning the frames of their links, which changes neither positions nor
 //! torques. Bodies behind fixed joints become part of the link that carries them.
 
-use jtc_core::{JOINTS, JointConfig};
+use jtc_core::{Config, JOINTS, JointConfig};
 use jtc_dynamics::{ArmModel, Link, Origin};
 use urdf_rs::{Joint, JointType, Robot};
 
@@ -309,7 +309,34 @@ impl<'a> Chain<'a> {
                 self.warn(&place, "safety_controller is not carried");
             }
         }
+        self.narrow_to_drives(&mut all);
         Ok(all)
+    }
+
+    /// A description says what the mechanism can do. Its drives may do less, and the controller refuses limits beyond that
+    /// (J-35, J-43).
+    fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) {
+        let drives = Config::avena();
+        let area = jtc_core::WORKING_AREA;
+        let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
+        for (revolute, to) in self.revolute.into_iter().zip(joints) {
+            let place = format!("joint {}", revolute.name);
+            if to.position_min < -area || to.position_max > area {
+                let (min, max) = (to.position_min, to.position_max);
+                (to.position_min, to.position_max) = (min.clamp(-area, area), max.clamp(-area, area));
+                let used = format!("{}..{} rad are used", to.position_min, to.position_max);
+                let problem = format!("position limits {min}..{max} leave the drives' working area: {used}");
+                self.warn(&place, problem);
+            }
+            if to.velocity_max > fastest {
+                let problem = format!(
+                    "velocity limit {}: {fastest} rad/s is used, above {} rad/s the drives trip",
+                    to.velocity_max, drives.drive_speed_trip
+                );
+                to.velocity_max = fastest;
+                self.warn(&place, problem);
+            }
+        }
     }
 }
 

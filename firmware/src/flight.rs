@@ -7,8 +7,8 @@
 //! All numbers are little-endian, as in the processor's memory. The layout is that of the structures below, which have
 //! no hidden padding; [`Flight::LAYOUT`] changes with it.
 use jtc_bus::{Frame, MAX_LEN};
-use jtc_core::{BusState, Inputs, JOINTS, Telemetry};
-use jtc_wire::LinkEvent;
+use jtc_core::{BusState, HOST_LINES, HostEvent, Inputs, JOINTS, Telemetry};
+use jtc_wire::{EVENTS_MAX, LinkEvent, UrgentCommand, UrgentCommands};
 
 use crate::message_ram::RX;
 
@@ -49,7 +49,7 @@ impl FlightFrame {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightEvent {
-    /// 0 nothing, 1 a good frame, 2 a bad one or bytes that are none.
+    /// 0 nothing, 1 a good frame, 2 a bad one, 3 noise; bit 7: an urgent command has overtaken it.
     pub kind: u8,
     /// Its line: 0 RS422, 1 USB.
     pub line: u8,
@@ -61,6 +61,31 @@ pub struct FlightEvent {
     pub len: u16,
     /// CRC of a good frame, else 0.
     pub crc: u16,
+}
+
+/// The urgent commands of a line: each sort that came (1 Stop, 2 Pause) and how often, the last at the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct FlightUrgent(pub [[u8; 2]; 2]);
+
+impl FlightUrgent {
+    fn of(commands: &UrgentCommands) -> Self {
+        let mut all = [[0; 2]; 2];
+        for (place, (command, count)) in all.iter_mut().zip(commands.iter()) {
+            *place = [if command == UrgentCommand::Stop { 1 } else { 2 }, count];
+        }
+        Self(all)
+    }
+
+    /// The commands.
+    pub fn commands(&self) -> UrgentCommands {
+        let mut commands = UrgentCommands::NONE;
+        for [command, count] in self.0 {
+            let command = if command == 1 { UrgentCommand::Stop } else { UrgentCommand::Pause };
+            commands.add(command, count);
+        }
+        commands
+    }
 }
 
 /// The record.
@@ -91,8 +116,13 @@ pub struct Flight {
     pub heard_count: u8,
     /// Frames of the wrong format that were received instead (J-15), since the start.
     pub wrong_format: u32,
-    /// The host event that was offered.
-    pub event: FlightEvent,
+    /// Stop and Pause that arrived on each line.
+    pub urgent: [FlightUrgent; HOST_LINES],
+    /// Host events that were offered.
+    pub event_count: u8,
+    reserved: [u8; 3],
+    /// These events, oldest first.
+    pub events: [FlightEvent; EVENTS_MAX],
     /// Frames received since the last tick.
     pub heard: [FlightFrame; RX],
 
@@ -103,26 +133,31 @@ pub struct Flight {
     pub tes: u8,
     /// Level of the safety output.
     pub safety_output: u8,
-    /// Bit 0: the event was worked off; bit 1: a status was sent.
-    pub done: u8,
+    /// A status was sent.
+    pub status: u8,
     /// The frame sent.
     pub sent: FlightFrame,
     /// Index of the current 1 ms point.
     pub point: u32,
     /// Current error word.
     pub errors: u16,
-    reserved: [u8; 6],
+    /// Events that are done.
+    pub host_done: u8,
+    /// Line of the response record in the status; 0xFF: it has none.
+    pub record_line: u8,
     /// Torques commanded, N·m.
     pub torque: [f64; JOINTS],
 }
 
-const _: () = assert!(size_of::<Flight>() == 720 && core::mem::offset_of!(Flight, torque) == 672);
+const _: () = assert!(size_of::<Flight>() == 848 && core::mem::offset_of!(Flight, torque) == 800);
 
 impl Flight {
     /// First word of a record: "JTCF".
     pub const MAGIC: u32 = u32::from_le_bytes(*b"JTCF");
     /// Version of the layout.
-    pub const LAYOUT: u16 = 1;
+    pub const LAYOUT: u16 = 2;
+    /// No line has a record.
+    pub const NO_LINE: u8 = 0xFF;
     /// No tick yet.
     pub const PHASE_NONE: u32 = 0;
     /// The inputs are those of tick `tick`, the outputs those of the one before.
@@ -144,16 +179,20 @@ impl Flight {
             status_free: 0,
             heard_count: 0,
             wrong_format: 0,
-            event: FlightEvent { kind: 0, line: 0, frame_type: 0, status: 0, len: 0, crc: 0 },
+            urgent: [FlightUrgent([[0; 2]; 2]); HOST_LINES],
+            event_count: 0,
+            reserved: [0; 3],
+            events: [FlightEvent { kind: 0, line: 0, frame_type: 0, status: 0, len: 0, crc: 0 }; EVENTS_MAX],
             heard: [FlightFrame::NONE; RX],
             state: 0,
             tes: 0,
             safety_output: 0,
-            done: 0,
+            status: 0,
             sent: FlightFrame::NONE,
             point: 0,
             errors: 0,
-            reserved: [0; 6],
+            host_done: 0,
+            record_line: Self::NO_LINE,
             torque: [0.0; JOINTS],
         }
     }
@@ -165,8 +204,8 @@ impl Flight {
             && usize::from(self.size) == size_of::<Self>()
     }
 
-    /// Records what goes into the next tick; `line` is where `inputs.host` came from.
-    pub fn begin(&mut self, inputs: &Inputs<'_>, line: usize, wrong_format: u32) {
+    /// Records what goes into the next tick.
+    pub fn begin(&mut self, inputs: &Inputs<'_>, wrong_format: u32) {
         self.phase = Self::PHASE_INPUTS;
         self.tick += 1;
         let BusState { acknowledged, bus_off } = inputs.bus_state;
@@ -174,7 +213,13 @@ impl Flight {
         self.safety_input = inputs.safety_input.into();
         self.status_free = inputs.status_free.into();
         self.wrong_format = wrong_format;
-        self.event = event(inputs.host, line);
+        for (slot, commands) in self.urgent.iter_mut().zip(&inputs.urgent) {
+            *slot = FlightUrgent::of(commands);
+        }
+        self.event_count = inputs.host.len().min(EVENTS_MAX) as u8;
+        for (slot, received) in self.events.iter_mut().zip(inputs.host) {
+            *slot = event(received);
+        }
         self.heard_count = inputs.bus.len().min(RX) as u8;
         for (slot, frame) in self.heard.iter_mut().zip(inputs.bus) {
             *slot = FlightFrame::of(frame);
@@ -186,7 +231,9 @@ impl Flight {
         self.state = telemetry.state as u8;
         self.tes = telemetry.tes as u8;
         self.safety_output = outputs.safety_output.into();
-        self.done = u8::from(outputs.host_done) | u8::from(outputs.status) << 1;
+        self.status = outputs.status.into();
+        self.host_done = outputs.host_done as u8;
+        self.record_line = outputs.record_line.map_or(Self::NO_LINE, |line| line as u8);
         self.sent = outputs.bus.as_ref().map_or(FlightFrame::NONE, FlightFrame::of);
         self.errors = telemetry.errors;
         self.point = telemetry.point;
@@ -207,25 +254,22 @@ impl Flight {
     }
 }
 
-fn event(event: Option<LinkEvent<'_>>, line: usize) -> FlightEvent {
-    match event {
-        None => FlightEvent::default(),
-        Some(LinkEvent::Frame(frame)) => FlightEvent {
-            kind: 1,
-            line: line as u8,
-            frame_type: frame.frame_type as u8,
-            status: 1,
-            len: frame.bytes.len() as u16,
-            crc: frame.bytes.last_chunk().map_or(0, |crc| u16::from_be_bytes(*crc)),
-        },
-        Some(LinkEvent::Bad(response)) => FlightEvent {
-            kind: 2,
-            line: line as u8,
-            frame_type: response.frame_type,
-            status: response.status as u8,
-            len: response.length,
-            crc: 0,
-        },
+fn event(received: &HostEvent<'_>) -> FlightEvent {
+    let (kind, frame_type, len, crc) = match received.event {
+        LinkEvent::Frame(frame) => {
+            let crc = frame.bytes.last_chunk().map_or(0, |crc| u16::from_be_bytes(*crc));
+            (1, frame.frame_type as u8, frame.bytes.len() as u16, crc)
+        }
+        LinkEvent::Bad(response) => (2, response.frame_type, response.length, 0),
+        LinkEvent::Noise(response) => (3, response.frame_type, response.length, 0),
+    };
+    FlightEvent {
+        kind: kind | u8::from(received.overtaken) << 7,
+        line: received.line as u8,
+        frame_type,
+        status: received.event.status() as u8,
+        len,
+        crc,
     }
 }
 
@@ -242,18 +286,23 @@ mod tests {
         let mut flight = Flight::new(1);
         let answer = Frame::new(0x203, &[7; 16]).expect("16 bytes are allowed");
         for tick in 1..200 {
-            let host = LinkEvent::Frame(FrameRef {
+            let event = LinkEvent::Frame(FrameRef {
                 frame_type: FrameType::PidParamUseDefault,
                 bytes: &fixed::PID_PARAM_USE_DEFAULT,
             });
+            let host = [HostEvent { line: 1, overtaken: tick % 2 == 0, event }; 2];
+            let mut urgent = [UrgentCommands::NONE; HOST_LINES];
+            urgent[tick % 2].add(UrgentCommand::Pause, (tick % 3) as u8);
+            urgent[tick % 2].push(UrgentCommand::Stop);
             let inputs = Inputs {
                 bus: &[answer; 3][..tick % 4],
                 bus_state: BusState { acknowledged: tick % 5 != 0, bus_off: tick == 77 },
                 safety_input: tick != 150,
-                host: (tick % 7 == 0).then_some(host),
+                urgent,
+                host: &host[..tick % 3],
                 status_free: tick % 3 == 0,
             };
-            flight.begin(&inputs, 1, 0);
+            flight.begin(&inputs, 0);
             let outputs = board.tick(&inputs);
             flight.complete(&outputs, board.telemetry());
             assert!(flight.valid() && flight.phase == Flight::PHASE_COMPLETE && flight.tick == tick as u64);
@@ -263,13 +312,15 @@ mod tests {
                 bus: &bus,
                 bus_state: flight.bus_state(),
                 safety_input: flight.safety_input != 0,
-                host: (flight.event.kind == 1).then_some(host),
+                urgent: flight.urgent.map(|urgent| urgent.commands()),
+                host: &host[..flight.event_count.into()],
                 status_free: flight.status_free != 0,
             });
             assert_eq!(again.bus, flight.sent.frame());
             let torque = pc.telemetry().joints.map(|joint| joint.torque.to_bits());
             assert_eq!(torque, flight.torque.map(f64::to_bits));
-            assert_eq!(u8::from(again.host_done) | u8::from(again.status) << 1, flight.done);
+            assert_eq!((again.host_done as u8, u8::from(again.status)), (flight.host_done, flight.status));
+            assert_eq!(flight.urgent.map(|urgent| urgent.commands()), urgent);
         }
     }
 }

@@ -1,6 +1,9 @@
-//! From bytes to frames: each line has a parser of its own; what the parsers find goes to the tick through one slot.
+//! From bytes to frames: each line has a parser of its own; what the parsers find goes to the tick in batches, through one
+//! slot.
 //!
-//! The slot holds a copy, so that a parser can take more bytes while the tick works a long frame off, slice by slice.
+//! A batch is a copy, so that a parser can take more bytes while the tick executes a long frame, slice by slice. What comes
+//! faster than the tick executes fills the parser's buffer, then the ring, and is lost in the end; Stop and Pause are not,
+//! because the tick finds them by itself.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -8,17 +11,19 @@ use critical_section::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant};
-use jtc_wire::{DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Receiver, Response};
+use jtc_wire::{EventBatch, FRAME_MAX, ReceivedEvent, Receiver};
 use openjtc_firmware::{BAUD, lines};
 
 use crate::uart;
 
 /// A gap within a frame that ends it, µs (J-03).
-const GAP_US: u32 = 5_000;
+pub const GAP_US: u32 = 5_000;
 /// Bytes given to a parser at once.
 const CHUNK: usize = 1024;
 /// Rounds before the links wait for the next tick.
 const ROUNDS: usize = 64;
+/// Bytes behind which the links may be: DMA overwrites what is older than the ring is long, and goes on while they read.
+const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
 /// There may be something to do: a tick has ended, or a line has fallen idle.
 pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
@@ -26,99 +31,59 @@ pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Counts up with every round of the links: the tick sees by it that they are alive.
 pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
 
-/// What the tick works on: an event of a line, copied. Integers only: all zeros are a value.
-pub struct Handover {
-    line: u8,
-    /// Type and status as their numbers.
-    frame_type: u8,
-    status: u8,
-    length: u16,
-    frame: [u8; FRAME_MAX],
-}
-
-impl Handover {
-    fn set(&mut self, line: usize, event: LinkEvent<'_>) {
-        self.line = line as u8;
-        match event {
-            LinkEvent::Frame(frame) => {
-                self.status = FrameStatus::NoError as u8;
-                self.frame_type = frame.frame_type as u8;
-                self.length = frame.bytes.len() as u16;
-                if let Some(place) = self.frame.get_mut(..frame.bytes.len()) {
-                    place.copy_from_slice(frame.bytes);
-                }
-            }
-            LinkEvent::Bad(response) => {
-                self.status = response.status as u8;
-                self.frame_type = response.frame_type;
-                self.length = response.length;
-            }
-        }
-    }
-
-    /// The line it came from.
-    pub fn line(&self) -> usize {
-        self.line.into()
-    }
-
-    /// The event.
-    pub fn event(&self) -> LinkEvent<'_> {
-        let status = FrameStatus::from_byte(self.status).unwrap_or_default();
-        let frame = FrameType::from_byte(self.frame_type).zip(self.frame.get(..self.length.into()));
-        match frame {
-            Some((frame_type, bytes)) if status == FrameStatus::NoError => {
-                LinkEvent::Frame(FrameRef { frame_type, bytes })
-            }
-            _ => LinkEvent::Bad(Response {
-                frame_type: self.frame_type,
-                status,
-                data: DataStatus::Idle,
-                length: self.length,
-            }),
-        }
-    }
-}
+/// Bytes received on each line, modulo 2³², as of the last tick.
+pub static RECEIVED: [AtomicU32; lines::LINES] = [const { AtomicU32::new(0) }; lines::LINES];
 
 /// Where the slot is put for the other side to take. Whoever has the reference may use it; there is but one.
-type Place = Mutex<Cell<Option<&'static mut Handover>>>;
+type Place = Mutex<Cell<Option<&'static mut EventBatch>>>;
 static FULL: Place = Mutex::new(Cell::new(None));
 static EMPTY: Place = Mutex::new(Cell::new(None));
 
-/// The links' end of the slot.
-pub struct SlotIn(());
+/// The links' end of the slot, with the batch that they fill.
+pub struct SlotIn(Option<&'static mut EventBatch>);
 
-/// The tick's end of the slot, with the event that it works on.
-pub struct SlotOut(Option<&'static mut Handover>);
+/// The tick's end of the slot, with the batch that it executes.
+pub struct SlotOut(Option<&'static mut EventBatch>);
 
 /// Both ends of the slot, which is empty.
-pub fn slot(memory: &'static mut Handover) -> (SlotIn, SlotOut) {
+pub fn slot(memory: &'static mut EventBatch) -> (SlotIn, SlotOut) {
     critical_section::with(|cs| EMPTY.borrow(cs).set(Some(memory)));
-    (SlotIn(()), SlotOut(None))
+    (SlotIn(None), SlotOut(None))
 }
 
 impl SlotIn {
-    /// Hands an event to the tick; false when it still has one.
-    fn send(&mut self, line: usize, event: LinkEvent<'_>) -> bool {
-        let Some(slot) = critical_section::with(|cs| EMPTY.borrow(cs).take()) else { return false };
-        slot.set(line, event);
-        critical_section::with(|cs| FULL.borrow(cs).set(Some(slot)));
-        true
+    /// Adds an event to the batch; false when the tick has it, or it is full.
+    fn push(&mut self, received: &ReceivedEvent<'_>) -> bool {
+        if self.0.is_none() {
+            self.0 = critical_section::with(|cs| EMPTY.borrow(cs).take());
+        }
+        self.0.as_mut().is_some_and(|batch| batch.push(received))
+    }
+
+    /// Hands the batch to the tick if there is something in it.
+    fn send(&mut self) {
+        if let Some(batch) = self.0.take_if(|batch| !batch.is_empty()) {
+            critical_section::with(|cs| FULL.borrow(cs).set(Some(batch)));
+        }
     }
 }
 
 impl SlotOut {
-    /// The oldest event, until it is done.
-    pub fn event(&mut self) -> Option<&Handover> {
+    /// The batch, until all of it is done.
+    pub fn batch(&mut self) -> Option<&EventBatch> {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| FULL.borrow(cs).take());
         }
         self.0.as_deref()
     }
 
-    /// The event is worked off.
-    pub fn done(&mut self) {
-        if let Some(slot) = self.0.take() {
-            critical_section::with(|cs| EMPTY.borrow(cs).set(Some(slot)));
+    /// The oldest `count` events are done.
+    pub fn done(&mut self, count: usize) {
+        if let Some(batch) = &mut self.0 {
+            batch.done(count);
+        }
+        if let Some(batch) = self.0.take_if(|batch| batch.is_empty()) {
+            critical_section::with(|cs| EMPTY.borrow(cs).set(Some(batch)));
         }
     }
 }
@@ -128,8 +93,10 @@ pub struct Link {
     line: usize,
     uart: uart::Receiver,
     parser: Receiver<&'static mut [u8]>,
-    /// The parser has found something.
-    found: bool,
+    /// Bytes taken from the line, those that were lost included.
+    taken: u64,
+    /// Bytes that were lost.
+    lost: u64,
     /// When the ring was looked at last, µs.
     looked_us: u64,
     /// Bytes that were left in the ring then.
@@ -140,13 +107,14 @@ impl Link {
     /// A link over `line`, whose bytes `uart` receives.
     pub fn new(line: usize, uart: uart::Receiver, buffer: &'static mut [u8; FRAME_MAX]) -> Self {
         let parser = Receiver::new(&mut buffer[..], GAP_US);
-        Self { line, uart, parser, found: false, looked_us: 0, left: 0 }
+        Self { line, uart, parser, taken: 0, lost: 0, looked_us: 0, left: 0 }
     }
 
     /// Takes what has arrived and looks for an event; true when there is more to do at once.
     fn receive(&mut self) -> bool {
         // The clock first: a byte that arrives after it is not counted as silence before it.
         let now = Instant::now().as_micros();
+        self.catch_up();
         let waiting = self.uart.waiting();
         let new = waiting.saturating_sub(self.left);
         if new > 0 && self.left == 0 {
@@ -155,13 +123,30 @@ impl Link {
         let mut chunk = [0; CHUNK];
         let bytes = self.uart.peek(&mut chunk);
         let taken = self.parser.push(now, bytes);
-        self.uart.take(taken);
+        self.take(taken);
         self.left = self.uart.waiting().min(waiting.saturating_sub(taken));
         self.looked_us = now;
-        if !self.found {
-            self.found = self.parser.poll(now);
+        let found = self.parser.poll(now);
+        (taken > 0 && self.left > 0) || (!found && self.parser.busy())
+    }
+
+    fn take(&mut self, count: usize) {
+        self.uart.take(count);
+        self.taken += count as u64;
+    }
+
+    /// Where DMA has come round to bytes that were not taken: all that waits is given up.
+    fn catch_up(&mut self) {
+        let received = RECEIVED[self.line].load(Ordering::Relaxed);
+        let behind = received.wrapping_sub(self.taken as u32);
+        // Bytes taken since the last tick make it negative.
+        if behind > BEHIND && behind < 1 << 31 {
+            self.lost += u64::from(behind);
+            self.taken += u64::from(behind);
+            self.uart.jump(self.taken);
+            self.parser.restart(self.taken);
+            self.left = 0;
         }
-        (taken > 0 && self.left > 0) || (!self.found && self.parser.busy())
     }
 
     /// The first of `new` bytes arrived earlier than the last, which matters for a gap before it: at the latest
@@ -170,20 +155,18 @@ impl Link {
         let first = (now.saturating_sub(duration_us(new))).max(self.looked_us);
         let mut byte = [0];
         let taken = self.parser.push(first, self.uart.peek(&mut byte));
-        self.uart.take(taken);
+        self.take(taken);
     }
 
-    /// Gives the event to the tick if the slot is free.
+    /// Adds the event of the parser to the batch if there is room.
     fn hand_over(&mut self, slot: &mut SlotIn) -> bool {
-        if !self.found {
+        let (Some(event), Some(position)) = (self.parser.event(), self.parser.event_position()) else {
             return false;
-        }
-        let Some(event) = self.parser.event() else { return false };
-        if !slot.send(self.line, event) {
+        };
+        if !slot.push(&ReceivedEvent { line: self.line, position, event }) {
             return false;
         }
         self.parser.release();
-        self.found = false;
         true
     }
 }
@@ -217,6 +200,7 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn) -> ! {
                 break;
             }
         }
+        slot.send();
         report.log(&mut links);
     }
 }
@@ -225,12 +209,18 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn) -> ! {
 struct Report {
     next: Instant,
     line_errors: [u32; lines::LINES],
+    lost: [u64; lines::LINES],
     tick: crate::tick::Summary,
 }
 
 impl Report {
     fn new() -> Self {
-        Self { next: Instant::now(), line_errors: [0; lines::LINES], tick: crate::tick::Summary::new() }
+        Self {
+            next: Instant::now(),
+            line_errors: [0; lines::LINES],
+            lost: [0; lines::LINES],
+            tick: crate::tick::Summary::new(),
+        }
     }
 
     fn log(&mut self, links: &mut [Link; lines::LINES]) {
@@ -243,6 +233,11 @@ impl Report {
         if errors != self.line_errors {
             self.line_errors = errors;
             defmt::warn!("line errors: RS422 {=u32}, USB {=u32}", errors[0], errors[1]);
+        }
+        let lost = [links[0].lost, links[1].lost];
+        if lost != self.lost {
+            self.lost = lost;
+            defmt::warn!("bytes lost, more than can be executed: RS422 {=u64}, USB {=u64}", lost[0], lost[1]);
         }
         let tick = crate::tick::summary();
         if tick != self.tick {

@@ -3,8 +3,8 @@
 //! Two parties share the processor. The *tick* ([`tick`]) is an interrupt of the highest priority, a thousand times a
 //! second: it owns the controller, the joint bus, the safety wires and the LEDs, and nothing delays it by more than a
 //! few instructions. The *links* ([`link`]) run in what time is left: they take bytes from both serial lines and cut
-//! them into frames. Frames go from the links to the tick through one slot, one at a time; statuses go straight from
-//! the tick to the lines' DMA.
+//! them into frames. Frames go from the links to the tick in batches, through one slot; statuses go straight from the tick
+//! to the lines' DMA. A Stop or a Pause needs neither links nor slot: the tick looks for them in what DMA has received.
 //!
 //! What is above the hardware stands in the library beside this program and in `jtc-core`, where it is tested on a PC.
 #![no_std]
@@ -56,13 +56,13 @@ async fn main(_spawner: Spawner) {
         VERSION.points,
     );
 
-    let memory::Memory { points, rings, statuses, receive, handover } = memory::take();
+    let memory::Memory { points, rings, statuses, receive, batch } = memory::take();
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;
     let [status_rs422, status_usb] = statuses;
-    let (rs422_in, rs422_out) = uart::open(rs422, ring_rs422, status_rs422, BAUD);
-    let (usb_in, usb_out) = uart::open(usb, ring_usb, status_usb, BAUD);
-    let (slot_in, slot_out) = link::slot(handover);
+    let (rs422_in, rs422_ahead, rs422_out) = uart::open(rs422, ring_rs422, status_rs422, BAUD);
+    let (usb_in, usb_ahead, usb_out) = uart::open(usb, ring_usb, status_usb, BAUD);
+    let (slot_in, slot_out) = link::slot(batch);
 
     let mut watchdog = IndependentWatchdog::new(board.watchdog, WATCHDOG_US);
     watchdog.unleash();
@@ -70,6 +70,7 @@ async fn main(_spawner: Spawner) {
         points,
         can: fdcan::Fdcan::start(),
         pins: board.pins,
+        ahead: [rs422_ahead, usb_ahead],
         slot: slot_out,
         lines: [rs422_out, usb_out],
         watchdog,

@@ -6,9 +6,8 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 use embassy_stm32::pac;
 use jtc_core::POINTS_MAX;
-use jtc_wire::{FRAME_MAX, RawPoint, STATUS_LEN};
+use jtc_wire::{EventBatch, FRAME_MAX, RawPoint, STATUS_LEN};
 
-use crate::link::Handover;
 use crate::uart::RING;
 
 /// A value outside .data and .bss, which nobody initialises before [`take`].
@@ -40,9 +39,9 @@ impl<T> Place<T> {
 /// The trajectory.
 #[unsafe(link_section = ".axisram")]
 static POINTS: Place<[RawPoint; POINTS_MAX]> = Place::new();
-/// The frame that the controller works on.
+/// The frames that the controller executes.
 #[unsafe(link_section = ".axisram")]
-static HANDOVER: Place<Handover> = Place::new();
+static BATCH: Place<EventBatch> = Place::new();
 /// What the lines' DMA writes; not cached.
 #[unsafe(link_section = ".sram1")]
 static RINGS: Place<[[u8; RING]; 2]> = Place::new();
@@ -64,21 +63,21 @@ pub struct Memory {
     /// Receive buffers of the lines.
     pub receive: [&'static mut [u8; FRAME_MAX]; 2],
     /// The slot between links and tick.
-    pub handover: &'static mut Handover,
+    pub batch: &'static mut EventBatch,
 }
 
 /// Hands out the buffers, zeroed. Once; after [`init`].
 pub fn take() -> Memory {
-    // SAFETY: `main` calls this once, and zero bytes are a value of arrays of integers and of `Handover`, which consists of
+    // SAFETY: `main` calls this once, and zero bytes are a value of arrays of integers and of `EventBatch`, which consists of
     // integers, too.
-    let (points, rings, statuses, receive, handover) =
-        unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), HANDOVER.take()) };
+    let (points, rings, statuses, receive, batch) =
+        unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take()) };
     Memory {
         points,
         rings: rings.each_mut(),
         statuses: statuses.each_mut(),
         receive: receive.each_mut(),
-        handover,
+        batch,
     }
 }
 

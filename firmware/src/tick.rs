@@ -8,21 +8,24 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::peripherals::{IWDG1, TIM7};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, pac, rcc};
-use jtc_core::{Config, Controller, Inputs, Outputs};
-use jtc_wire::{RawPoint, STATUS_LEN};
+use jtc_core::{Config, Controller, HostEvent, Inputs, Outputs};
+use jtc_wire::{EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, UrgentWatch};
 use openjtc_firmware::clock;
 use openjtc_firmware::flight::Flight;
-use openjtc_firmware::lines::{self, Awaiting};
+use openjtc_firmware::lines;
 use static_cell::StaticCell;
 
 use crate::board::Pins;
 use crate::fault::Boot;
 use crate::fdcan::{Counters, Fdcan, Heard};
-use crate::link::{self, Handover, SlotOut};
-use crate::uart::Transmitter;
+use crate::link::{self, SlotOut};
+use crate::uart::{Lookahead, Transmitter};
 
 /// The controller with its trajectory elsewhere.
 type Jtc = Controller<&'static mut [RawPoint]>;
+
+/// Bytes of a line that a tick looks through at most: more than two ticks bring at 15 MBd.
+const LOOK_MAX: usize = 4096;
 
 /// Ticks without a sign of life of the links after which the arm is stopped: a host could not do it.
 const LINKS_SILENT_ERROR: u32 = 100;
@@ -37,7 +40,9 @@ pub struct Parts {
     pub can: Fdcan,
     /// Safety wires and LEDs.
     pub pins: Pins,
-    /// Events of the host.
+    /// What the lines receive, for Stop and Pause.
+    pub ahead: [Lookahead; lines::LINES],
+    /// Events of the hosts.
     pub slot: SlotOut,
     /// RS422, USB.
     pub lines: [Transmitter; lines::LINES],
@@ -72,9 +77,10 @@ struct Tick {
     can: Fdcan,
     heard: Heard,
     pins: Pins,
+    ahead: [Lookahead; lines::LINES],
+    watch: UrgentWatch<{ lines::LINES }>,
     slot: SlotOut,
     lines: [Transmitter; lines::LINES],
-    awaiting: Awaiting,
     watchdog: IndependentWatchdog<'static, IWDG1>,
     flight: &'static mut Flight,
     links: Links,
@@ -106,15 +112,16 @@ static SUMMARY: Mutex<Cell<Summary>> = Mutex::new(Cell::new(Summary::new()));
 #[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
-    let Parts { points, can, pins, slot, lines, watchdog, boot } = parts;
+    let Parts { points, can, pins, ahead, slot, lines, watchdog, boot } = parts;
     let tick = PLACE.init_with(|| Tick {
         controller: Controller::new(Config::default(), points),
         can,
         heard: Heard::new(),
         pins,
+        ahead,
+        watch: UrgentWatch::new(link::GAP_US + clock::TICK_US),
         slot,
         lines,
-        awaiting: Awaiting::new(),
         watchdog,
         flight: boot.flight,
         links: Links::default(),
@@ -164,28 +171,28 @@ impl Tick {
     fn run(&mut self) -> Summary {
         let bus_state = self.can.look(&mut self.heard);
         let counters = self.can.counters();
-        let handover = self.slot.event();
-        let line = handover.map_or(lines::RS422, Handover::line);
+        self.look_ahead();
+        let urgent = self.watch.take();
+        let mut host = [NO_EVENT; EVENTS_MAX];
+        let count = self.slot.batch().map_or(0, |batch| collect(batch, &self.watch, &mut host));
         let inputs = Inputs {
             bus: self.heard.frames(),
             bus_state,
             safety_input: self.pins.safety_input.is_high(),
-            host: handover.map(Handover::event),
+            urgent,
+            host: &host[..count],
             status_free: self.lines.iter().all(Transmitter::is_free),
         };
-        self.flight.begin(&inputs, line, counters.wrong_format);
+        self.flight.begin(&inputs, counters.wrong_format);
         let outputs = control_step(&mut self.controller, &inputs);
 
         self.pins.safety_output.set_level(outputs.safety_output.into());
         if let Some(frame) = &outputs.bus {
             self.can.send(frame);
         }
-        if outputs.host_done {
-            self.slot.done();
-            self.awaiting.push(line);
-        }
+        self.slot.done(outputs.host_done);
         if outputs.status {
-            send(&mut self.lines, &mut self.awaiting, self.controller.status_frame());
+            send(&mut self.lines, outputs.record_line, self.controller.status_frame());
         }
         let telemetry = self.controller.telemetry();
         let (state, errors) = (telemetry.state, telemetry.errors);
@@ -201,6 +208,17 @@ impl Tick {
         }
         self.leave_out_late_tick();
         Summary { state: state as u8, errors, bus: counters, left_out: self.left_out }
+    }
+
+    /// Looks for Stop and Pause in what has arrived since the last tick (J-04).
+    fn look_ahead(&mut self) {
+        let now_us = self.flight.tick * u64::from(clock::TICK_US);
+        for (line, ahead) in self.ahead.iter_mut().enumerate() {
+            ahead.read(LOOK_MAX, |bytes| self.watch.scan(line, now_us, bytes));
+            if let Some(received) = link::RECEIVED.get(line) {
+                received.store(self.watch.received(line) as u32, Ordering::Relaxed);
+            }
+        }
     }
 
     /// A tick that is due already is left out: drives must not get two frames back to back (J-12).
@@ -219,17 +237,29 @@ fn control_step(controller: &mut Jtc, inputs: &Inputs<'_>) -> Outputs {
     controller.tick(inputs)
 }
 
-/// A status goes to both lines, its record only to the line that it answers (J-04).
-fn send(lines: &mut [Transmitter; lines::LINES], awaiting: &mut Awaiting, status: &[u8; STATUS_LEN]) {
-    if !lines::has_record(status) {
-        for line in lines {
-            line.send(status);
-        }
-        return;
+/// Fills the places that hold no event.
+const NO_EVENT: HostEvent<'_> =
+    HostEvent { line: lines::RS422, overtaken: false, event: LinkEvent::Noise(Response::NONE) };
+
+/// The events of the batch, as the controller gets them; returns how many.
+fn collect<'a>(
+    batch: &'a EventBatch,
+    watch: &UrgentWatch<{ lines::LINES }>,
+    host: &mut [HostEvent<'a>; EVENTS_MAX],
+) -> usize {
+    let mut count = 0;
+    while let (Some(slot), Some(received)) = (host.get_mut(count), batch.get(count)) {
+        let overtaken = watch.overtaken(received.line, received.position);
+        *slot = HostEvent { line: received.line, overtaken, event: received.event };
+        count += 1;
     }
-    let answered = awaiting.pop();
-    let other = lines::without_record(status);
+    count
+}
+
+/// A status goes to both lines, its record only to the line that it answers (J-04).
+fn send(lines: &mut [Transmitter; lines::LINES], record_line: Option<usize>, status: &[u8; STATUS_LEN]) {
+    let other = if record_line.is_some() { lines::without_record(status) } else { *status };
     for (n, line) in lines.iter_mut().enumerate() {
-        line.send(if answered == Some(n) { status } else { &other });
+        line.send(if record_line == Some(n) { status } else { &other });
     }
 }

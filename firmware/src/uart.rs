@@ -1,7 +1,8 @@
 //! A serial line: bytes come in through a ring that DMA fills and never stops filling, whatever errors the line has;
 //! statuses go out by DMA, started by the tick.
 //!
-//! No byte causes an interrupt. The links look at the ring after every tick, and at once when the line falls idle.
+//! No byte causes an interrupt. The tick looks through the ring for Stop and Pause; the links look at it after every tick, and
+//! at once when the line falls idle.
 use core::sync::atomic::{Ordering, fence};
 
 use embassy_stm32::interrupt::InterruptExt;
@@ -126,7 +127,7 @@ pub fn open(
     ring: &'static mut [u8; RING],
     status: &'static mut [u8; STATUS_LEN],
     rate: u32,
-) -> (Receiver, Transmitter) {
+) -> (Receiver, Lookahead, Transmitter) {
     let usart = line.usart;
     let baud = defmt::unwrap!(Baud::new(rate), "{=u32} Bd cannot be made", rate);
     usart.brr().write_value(pac::usart::regs::Brr(baud.brr));
@@ -156,19 +157,72 @@ pub fn open(
     // SAFETY: its handler only touches the line's flags and wakes the links.
     unsafe { line.interrupt.enable() };
     (
-        Receiver { usart, stream: line.receive, ring: ring.as_ptr(), next: 0, errors: 0 },
+        Receiver { usart, ring: Ring { stream: line.receive, bytes: ring.as_ptr(), next: 0 }, errors: 0 },
+        Lookahead(Ring { stream: line.receive, bytes: ring.as_ptr(), next: 0 }),
         Transmitter { stream: line.transmit, buffer: status },
     )
+}
+
+/// A reader of the ring that DMA fills; two of them read each line, one for itself.
+struct Ring {
+    stream: Stream,
+    /// Written by DMA: no reference to it may exist.
+    bytes: *const u8,
+    /// First byte that was not taken.
+    next: usize,
+}
+
+impl Ring {
+    /// Bytes that have arrived and were not taken, if they are fewer than the ring holds.
+    fn waiting(&self) -> usize {
+        let end = RING - self.stream.remaining();
+        (end + RING - self.next) % RING
+    }
+
+    /// Copies the oldest bytes without taking them; as many as are in one piece and fit.
+    fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
+        let count = self.waiting().min(into.len()).min(RING - self.next);
+        cortex_m::asm::dmb();
+        // SAFETY: `next + count` is at most the ring's length. DMA has written these bytes and comes to them again only after
+        // all others.
+        unsafe { core::ptr::copy_nonoverlapping(self.bytes.add(self.next), into.as_mut_ptr(), count) };
+        &into[..count]
+    }
+
+    fn take(&mut self, count: usize) {
+        self.next = (self.next + count) % RING;
+    }
+}
+
+/// What the tick sees of a line: every byte, before the links do, at its own pace.
+pub struct Lookahead(Ring);
+
+// SAFETY: it reads a register and memory that only DMA writes, which can be done from any context.
+unsafe impl Send for Lookahead {}
+
+impl Lookahead {
+    /// Gives the bytes that have arrived since the last call to `look`, piece by piece; at most `most`, the rest next time.
+    pub fn read(&mut self, most: usize, mut look: impl FnMut(&[u8])) {
+        let mut left = self.0.waiting().min(most);
+        let mut piece = [0; 64];
+        while left > 0 {
+            let room = left.min(piece.len());
+            let bytes = self.0.peek(&mut piece[..room]);
+            let count = bytes.len();
+            if count == 0 {
+                break;
+            }
+            look(bytes);
+            self.0.take(count);
+            left -= count;
+        }
+    }
 }
 
 /// The receiving half of a line.
 pub struct Receiver {
     usart: Usart,
-    stream: Stream,
-    /// Written by DMA: no reference to it may exist.
-    ring: *const u8,
-    /// First byte that was not taken.
-    next: usize,
+    ring: Ring,
     /// Overruns, framing errors and noise seen since the start.
     errors: u32,
 }
@@ -176,23 +230,22 @@ pub struct Receiver {
 impl Receiver {
     /// Bytes that have arrived and were not taken.
     pub fn waiting(&self) -> usize {
-        let end = RING - self.stream.remaining();
-        (end + RING - self.next) % RING
+        self.ring.waiting()
     }
 
     /// Copies the oldest bytes without taking them; as many as are in one piece and fit.
     pub fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
-        let count = self.waiting().min(into.len()).min(RING - self.next);
-        cortex_m::asm::dmb();
-        // SAFETY: `next + count` is at most the ring's length. DMA has written these bytes and comes to them again only after
-        // all others.
-        unsafe { core::ptr::copy_nonoverlapping(self.ring.add(self.next), into.as_mut_ptr(), count) };
-        &into[..count]
+        self.ring.peek(into)
     }
 
     /// Takes `count` bytes of those that wait.
     pub fn take(&mut self, count: usize) {
-        self.next = (self.next + count) % RING;
+        self.ring.take(count);
+    }
+
+    /// Goes on at byte `position` of all that were received.
+    pub fn jump(&mut self, position: u64) {
+        self.ring.next = (position % RING as u64) as usize;
     }
 
     /// Errors of the line since the start. Reception goes on: the parser finds what is wrong with the bytes.

@@ -3,8 +3,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
-use jtc_core::{BusState, Config, Controller, Inputs, POINTS_MAX, State};
-use jtc_wire::{FrameRef, FrameType, LinkEvent, RawPoint, crc16};
+use jtc_core::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, POINTS_MAX, State};
+use jtc_wire::{FrameRef, FrameType, LinkEvent, RawPoint, UrgentCommands, crc16};
 
 const SCALE: Scale = Scale { velocity: 2.0 };
 
@@ -91,18 +91,23 @@ fn main() {
         let host = queue
             .front()
             .filter(|_| ready)
-            .map(|(t, bytes)| LinkEvent::Frame(FrameRef { frame_type: *t, bytes }));
+            .map(|(t, bytes)| LinkEvent::Frame(FrameRef { frame_type: *t, bytes }))
+            .map(|event| HostEvent { line: 0, overtaken: false, event });
         if controller.telemetry().point == 1000 && start.is_none() {
             start = Some(controller.clone());
         }
         if start.is_some() {
             recorded.push(bus.clone());
         }
-        let outputs =
-            controller.tick(&Inputs { bus: &bus, bus_state, safety_input: true, host, status_free: true });
-        if outputs.host_done {
-            queue.pop_front();
-        }
+        let outputs = controller.tick(&Inputs {
+            bus: &bus,
+            bus_state,
+            safety_input: true,
+            urgent: [UrgentCommands::NONE; HOST_LINES],
+            host: host.as_slice(),
+            status_free: true,
+        });
+        queue.drain(..outputs.host_done);
         let request = Request::parse(&outputs.bus.expect("a frame each tick")).expect("a request");
         let set = controller.telemetry().joints.map(|j| j.set_position);
         bus = answers(&request, &mut nodes, &set);
@@ -114,7 +119,14 @@ fn main() {
         let mut controller = start.clone();
         let begin = Instant::now();
         for bus in &recorded {
-            let inputs = Inputs { bus, bus_state, safety_input: true, host: None, status_free: true };
+            let inputs = Inputs {
+                bus,
+                bus_state,
+                safety_input: true,
+                urgent: [UrgentCommands::NONE; HOST_LINES],
+                host: &[],
+                status_free: true,
+            };
             black_box(controller.tick(black_box(&inputs)));
         }
         times.push(begin.elapsed().as_nanos() as f64 / recorded.len() as f64);

@@ -1,16 +1,17 @@
 //! The controller: state machine and tick (section 4).
 use jtc_dynamics::Dynamics;
-use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, STATUS_LEN, Status};
+use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, Response, STATUS_LEN, Status};
 
 use crate::check::{TrajectoryCheck, Violation};
 use crate::config::{Config, PidGains, TableOf};
 use crate::defaults;
 use crate::errors::Errors;
-use crate::host::{Records, Work};
+use crate::host::{Overtaking, Work};
 use crate::io::{Inputs, Outputs};
 use crate::motion::{Gains, Law, Motion};
 use crate::nodes::{GRIPPER, Goal, Nodes};
 use crate::path::PathClock;
+use crate::records::{HOST_LINES, ResponseQueues};
 use crate::store::Store;
 use crate::telemetry::{JointTelemetry, Telemetry};
 use crate::{JOINTS, State, Tes, joint_error};
@@ -80,7 +81,8 @@ pub struct Controller<M> {
     pub(crate) motion: Motion,
     // The link to the host.
     pub(crate) work: Work,
-    pub(crate) records: Records,
+    pub(crate) overtaking: [Overtaking; HOST_LINES],
+    pub(crate) records: ResponseQueues,
     since_status_ms: u16,
     status_frame: [u8; STATUS_LEN],
     telemetry: Telemetry,
@@ -111,7 +113,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             braking_ms: None,
             motion: Motion::default(),
             work: Work::Begin,
-            records: Records::default(),
+            overtaking: [Overtaking::default(); HOST_LINES],
+            records: ResponseQueues::new(),
             since_status_ms: 0,
             status_frame: [0; STATUS_LEN],
             telemetry: Telemetry::default(),
@@ -136,8 +139,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if self.errors.any() {
             self.enter(State::Error);
         }
-        // In Start nothing is executed yet; the event is offered again.
-        let host_done = before != State::Start && self.serve_host(inputs.host);
+        // In Start nothing is executed yet; the events are offered again.
+        let host_done = if before == State::Start { 0 } else { self.serve_host(inputs) };
 
         // What state that makes. What persists is raised again, where it was cleared.
         self.check_errors(inputs);
@@ -169,10 +172,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // J-22: 0 in Start and while an internal error is latched.
         let safety_output = self.state != State::Start && !self.errors.internal();
         let status = self.status_due(inputs.status_free);
+        let mut record_line = None;
         if status {
-            self.status_frame = self.status().emit();
+            let record = self.records.pop();
+            record_line = record.map(|(line, _)| line);
+            self.status_frame = self.status(record.map_or(Response::NONE, |(_, record)| record)).emit();
         }
-        Outputs { bus: Some(bus), safety_output, status, host_done }
+        Outputs { bus: Some(bus), safety_output, status, record_line, host_done }
     }
 
     /// The JtcStatus frame of the last tick whose outputs said that one is to be sent; zeros before the first.
@@ -476,6 +482,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (t.state, t.tes, t.errors) = (self.state, self.tes, self.errors.word());
         // Index of the current 1 ms point.
         t.point = self.clock.time as u32;
+        t.records_lost = self.records.lost();
         for (j, out) in t.joints.iter_mut().enumerate() {
             let (set, parts, report) = (&self.motion.set, &self.motion.torque[j], &self.nodes.node(j).report);
             *out = JointTelemetry {
@@ -508,7 +515,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         due
     }
 
-    fn status(&mut self) -> Status {
+    fn status(&self, response: Response) -> Status {
         let (can_current, can_occurred) = self.errors.can();
         let (q, v) = (self.nodes.positions(), self.nodes.velocities());
         let joints = core::array::from_fn(|j| {
@@ -530,7 +537,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         });
         let gripper = &self.nodes.node(GRIPPER).report;
         Status {
-            response: self.records.pop().unwrap_or_default(),
+            response,
             fsm: self.state as u8,
             errors: self.errors.word(),
             occurred: self.errors.occurred(),

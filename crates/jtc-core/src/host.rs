@@ -1,13 +1,15 @@
-//! The host's commands: worked off in bounded slices, answered by one record each (J-04, J-06).
+//! The host's commands: executed in bounded slices, answered by one record each (J-04, J-06).
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 use jtc_wire::{
-    Command, DataStatus, ExecCommand, Floats, FrameStatus, LinkEvent, RawPoint, Response, Segment,
+    Command, DataStatus, EVENTS_MAX, ExecCommand, Floats, LinkEvent, RawPoint, Response, Segment,
+    UrgentCommand,
 };
 
 use crate::check::{self, TrajectoryCheck, Violation};
 use crate::config::{PidGains, TableOf};
 use crate::controller::{Controller, Given};
 use crate::defaults;
+use crate::io::{HostEvent, Inputs};
 use crate::motion::celsius;
 use crate::nodes::GRIPPER;
 use crate::{JOINTS, State, Tes};
@@ -25,7 +27,7 @@ const TABLE_FLOATS: usize = 20 + 20 + 400;
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
-/// How far a long frame is worked off.
+/// How far a long frame is executed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Work {
     #[default]
@@ -40,72 +42,134 @@ pub(crate) enum Work {
     TableCopy(usize),
 }
 
-/// Response records that wait for their status frame, oldest first.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Records {
-    ring: [Response; 16],
-    first: usize,
-    len: usize,
+/// What became of the urgent commands of a line whose frames have not had their turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Overtaking {
+    /// Stops and Pauses that were accepted and have no record yet.
+    stops: u8,
+    pauses: u8,
+    /// An Execute was cancelled by them.
+    cancelled: bool,
 }
 
-impl Records {
-    pub fn is_full(&self) -> bool {
-        self.len == self.ring.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    pub fn push(&mut self, response: Response) {
-        let end = (self.first + self.len) % self.ring.len();
-        if let Some(slot) = self.ring.get_mut(end).filter(|_| self.len < 16) {
-            *slot = response;
-            self.len += 1;
+impl Overtaking {
+    fn accepted(&mut self, command: UrgentCommand) -> &mut u8 {
+        match command {
+            UrgentCommand::Stop => &mut self.stops,
+            UrgentCommand::Pause => &mut self.pauses,
         }
     }
+}
 
-    pub fn pop(&mut self) -> Option<Response> {
-        let response = *self.ring.get(self.first).filter(|_| self.len > 0)?;
-        self.first = (self.first + 1) % self.ring.len();
-        self.len -= 1;
-        Some(response)
-    }
+/// How an event was served.
+enum Served {
+    /// With a few instructions: there is time for another.
+    Quickly,
+    /// With as much work as a tick should have.
+    Fully,
+    /// In part; the rest takes more ticks.
+    Partly,
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Works on the oldest event of the host link; true when it is done with.
-    pub(crate) fn serve_host(&mut self, event: Option<LinkEvent<'_>>) -> bool {
-        let Some(event) = event else { return false };
-        if self.records.is_full() {
-            // Nothing is lost: the event is offered again.
-            return false;
+    /// Urgent commands first, then the oldest events of the host link: short ones up to the first that is work, or a slice
+    /// of it. Returns how many are done.
+    pub(crate) fn serve_host(&mut self, inputs: &Inputs<'_>) -> usize {
+        for (line, commands) in inputs.urgent.iter().enumerate() {
+            for (command, count) in commands.iter() {
+                self.overtake(line, command, count);
+            }
         }
-        let response = match event {
-            LinkEvent::Bad(response) => response,
+        let mut done = 0;
+        for event in inputs.host.iter().take(EVENTS_MAX) {
+            match self.serve(event) {
+                Served::Quickly => done += 1,
+                Served::Fully => return done + 1,
+                Served::Partly => break,
+            }
+        }
+        done
+    }
+
+    /// J-04: Stop and Pause act at once. Their records come when their frames have their turn.
+    fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
+        if self.execute(command.into()).is_ok()
+            && let Some(overtaking) = self.overtaking.get_mut(line)
+        {
+            let accepted = overtaking.accepted(command);
+            *accepted = accepted.saturating_add(count);
+        }
+    }
+
+    /// Serves one event, or a slice of it; when it is done it has its record.
+    fn serve(&mut self, received: &HostEvent<'_>) -> Served {
+        let Some(overtaking) = self.overtaking.get_mut(received.line) else { return Served::Quickly };
+        if !received.overtaken {
+            *overtaking = Overtaking::default();
+        }
+        let (response, noise, served) = match received.event {
+            LinkEvent::Bad(response) => (response, false, Served::Quickly),
+            LinkEvent::Noise(response) => (response, true, Served::Quickly),
             LinkEvent::Frame(frame) => {
-                let data = match Command::parse(frame) {
-                    Err(status) => status,
-                    Ok(command) => match self.obey(command) {
-                        Progress::Done => DataStatus::NoError,
-                        Progress::Refused(status) => status,
-                        Progress::Working(work) => {
-                            self.work = work;
-                            return false;
+                let (data, served) = match Command::parse(frame) {
+                    Err(status) => (status, Served::Quickly),
+                    Ok(command) => {
+                        let served = if self.is_quick(&command) { Served::Quickly } else { Served::Fully };
+                        let (progress, served) = match command {
+                            Command::TrajSetExecStatus(exec) if received.overtaken => {
+                                (self.overtaken(received.line, exec).into(), Served::Quickly)
+                            }
+                            command => (self.obey(command), served),
+                        };
+                        match progress {
+                            Progress::Done => (DataStatus::NoError, served),
+                            // What the state forbids has cost nothing.
+                            Progress::Refused(DataStatus::NotAllowed) => {
+                                (DataStatus::NotAllowed, Served::Quickly)
+                            }
+                            Progress::Refused(status) => (status, served),
+                            Progress::Working(work) => {
+                                self.work = work;
+                                return Served::Partly;
+                            }
                         }
-                    },
+                    }
                 };
-                Response {
-                    frame_type: frame.frame_type as u8,
-                    status: FrameStatus::NoError,
-                    data,
-                    length: frame.bytes.len() as u16,
-                }
+                (Response::good(frame.frame_type, data, frame.bytes.len() as u16), false, served)
             }
         };
         self.work = Work::Begin;
-        self.records.push(response);
-        true
+        self.records.push(received.line, response, noise);
+        served
+    }
+
+    /// What the record of an execution command says that an urgent one has overtaken (J-04). A Stop or a Pause has acted.
+    /// It was accepted, or else it has cancelled an Execute and the arm is where the command wants it.
+    fn overtaken(&mut self, line: usize, exec: ExecCommand) -> Result<(), DataStatus> {
+        let overtaking = self.overtaking.get_mut(line).ok_or(DataStatus::NotAllowed)?;
+        let Some(command) = UrgentCommand::from_exec(exec) else {
+            overtaking.cancelled = true;
+            return Err(DataStatus::NotAllowed);
+        };
+        let rests = match command {
+            UrgentCommand::Stop => Tes::Stop,
+            UrgentCommand::Pause => Tes::Pause,
+        };
+        let cancelled = core::mem::take(&mut overtaking.cancelled) && self.tes == rests;
+        let accepted = overtaking.accepted(command);
+        let acted = *accepted > 0;
+        *accepted = accepted.saturating_sub(1);
+        if acted || cancelled { Ok(()) } else { Err(DataStatus::NotAllowed) }
+    }
+
+    /// The command takes a few instructions and leaves the state of the controller as it is, on which the next one depends.
+    fn is_quick(&self, command: &Command<'_>) -> bool {
+        match command {
+            Command::ClearCurrentErrors { .. } | Command::ClearOccurredErrors => self.state != State::Error,
+            Command::TeachingModeDisable => !self.teaching,
+            Command::GripperControl { .. } => true,
+            _ => false,
+        }
     }
 
     fn obey(&mut self, command: Command<'_>) -> Progress {

@@ -1,6 +1,8 @@
 //! What goes into a tick and what comes out.
 use jtc_bus::Frame;
-use jtc_wire::LinkEvent;
+use jtc_wire::{LinkEvent, UrgentCommands};
+
+use crate::HOST_LINES;
 
 /// How the joint bus is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,6 +11,18 @@ pub struct BusState {
     pub acknowledged: bool,
     /// The CAN controller is bus-off.
     pub bus_off: bool,
+}
+
+/// Something that a host sent, in the order of its line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HostEvent<'a> {
+    /// The line, which gets the response record.
+    pub line: usize,
+    /// It was received before an urgent command that the controller was given in this tick or an earlier one: an Execute
+    /// is not carried out any more, and a Stop or a Pause has acted already (J-04).
+    pub overtaken: bool,
+    /// What was received.
+    pub event: LinkEvent<'a>,
 }
 
 /// Inputs of one tick.
@@ -20,8 +34,12 @@ pub struct Inputs<'a> {
     pub bus_state: BusState,
     /// Level of the safety input: true = no error (J-22).
     pub safety_input: bool,
-    /// The oldest event of the host link, offered again each tick until `Outputs::host_done`.
-    pub host: Option<LinkEvent<'a>>,
+    /// Stop and Pause that have arrived on each line since the last tick. They act in this tick, whatever waits (J-04); their
+    /// frames come as events, too, once it is their turn.
+    pub urgent: [UrgentCommands; HOST_LINES],
+    /// The oldest events of the host link (at most [`jtc_wire::EVENTS_MAX`] are looked at). Those that are not done
+    /// are to be offered again in the next tick.
+    pub host: &'a [HostEvent<'a>],
     /// The serial transmitter can take a status now.
     pub status_free: bool,
 }
@@ -36,6 +54,8 @@ pub struct Outputs {
     /// A JtcStatus frame is to be sent now: [`Controller::status_frame`](crate::Controller::status_frame) has it. It is not
     /// in here, because these outputs are copied in every tick, and few of them have a status.
     pub status: bool,
-    /// The host event was worked off: release it.
-    pub host_done: bool,
+    /// The line that the response record in that status is for, the other gets the status without it. `None`: it has none.
+    pub record_line: Option<usize>,
+    /// So many of the host events are done, from the oldest on: release them.
+    pub host_done: usize,
 }

@@ -18,6 +18,7 @@ mod nodes;
 mod overspeed;
 mod path;
 mod pid;
+mod records;
 mod store;
 mod telemetry;
 
@@ -25,7 +26,8 @@ pub use check::{TrajectoryCheck, Violation};
 pub use config::{Config, ConfigError, Friction, JointConfig, Parameters, PidGains, TableOf, WORKING_AREA};
 pub use controller::Controller;
 pub use interpolation::{SetPoint, interpolate};
-pub use io::{BusState, Inputs, Outputs};
+pub use io::{BusState, HostEvent, Inputs, Outputs};
+pub use records::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};
 
 /// Joints of the arm.

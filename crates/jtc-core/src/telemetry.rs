@@ -56,6 +56,8 @@ pub struct Telemetry {
     pub point: u32,
     /// Current error word.
     pub errors: u16,
+    /// Response records lost since boot because too many waited (J-04).
+    pub records_lost: u32,
     /// Per joint.
     pub joints: [JointTelemetry; JOINTS],
 }

@@ -1,18 +1,27 @@
-//! The controller's board: the controller itself, the host link's receive buffer and the watchdog, glued as
+//! The controller's board: the controller itself, the host link's receive buffers and the watchdog, glued as
 //! the firmware does it.
-use jtc_bus::Frame;
-use jtc_core::{BusState, Config, Controller, Inputs, Outputs, POINTS_MAX, Telemetry};
-use jtc_wire::{FRAME_MAX, FrameStatus, LinkEvent, RawPoint, Receiver, STATUS_LEN};
+use std::collections::VecDeque;
 
-/// Room for frames: the longest one and as much again, as a host that pipelines fills it.
-const RECEIVE_BUFFER: usize = FRAME_MAX;
+use jtc_bus::Frame;
+use jtc_core::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX, Telemetry};
+use jtc_wire::{
+    EVENTS_MAX, EventBatch, FRAME_MAX, FrameStatus, LinkEvent, RawPoint, ReceivedEvent, Receiver, STATUS_LEN,
+    UrgentWatch,
+};
+
+/// The host's line: the world has one.
+const LINE: usize = 0;
+/// Bytes that wait in front of the parser at most, as in the ring that the board's DMA fills.
+const RING: usize = 32 * 1024;
+/// Length of a tick, µs.
+const TICK_US: u32 = 1000;
 /// Bytes given to the parser at once.
 const CHUNK: usize = 4096;
 
 /// Looks at the parser between two ticks: what a processor with time to spare does.
-const POLLS: usize = 32;
+const POLLS: usize = 64;
 
-/// A host frame that the controller worked off.
+/// A host frame that the controller executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worked {
     /// A good one, by its type byte.
@@ -37,15 +46,19 @@ pub struct Pins<'a> {
 /// The board.
 pub struct Board {
     controller: Controller<Vec<RawPoint>>,
+    ring: VecDeque<u8>,
     receiver: Receiver<Vec<u8>>,
+    watch: UrgentWatch<HOST_LINES>,
+    batch: Box<EventBatch>,
     config: Config,
     gap_us: u32,
     watchdog_ms: u32,
     /// Ticks that did not come.
     missed: u32,
-    has_event: bool,
-    /// What the tick worked off.
-    pub worked: Option<Worked>,
+    /// What the tick executed.
+    pub worked: Vec<Worked>,
+    /// Bytes from the host that found no room.
+    pub lost_bytes: u64,
     /// Resets by the watchdog.
     pub watchdog_resets: u32,
 }
@@ -55,13 +68,16 @@ impl Board {
     pub fn new(config: Config, gap_us: u32, watchdog_ms: u32) -> Self {
         Self {
             controller: Controller::new(config.clone(), vec![RawPoint::default(); POINTS_MAX]),
-            receiver: Receiver::new(vec![0; RECEIVE_BUFFER], gap_us),
+            ring: VecDeque::new(),
+            receiver: Receiver::new(vec![0; FRAME_MAX], gap_us),
+            watch: UrgentWatch::new(gap_us + TICK_US),
+            batch: Box::new(EventBatch::new()),
             config,
             gap_us,
             watchdog_ms,
             missed: 0,
-            has_event: false,
-            worked: None,
+            worked: Vec::new(),
+            lost_bytes: 0,
             watchdog_resets: 0,
         }
     }
@@ -83,28 +99,46 @@ impl Board {
         self.controller.telemetry()
     }
 
-    /// Between ticks: bytes that arrived by `now_us` go through the parser; those taken are removed from
-    /// `bytes`.
-    pub fn receive(&mut self, now_us: u64, bytes: &mut Vec<u8>) {
-        // Bytes are taken also while a frame is worked off, as an interrupt does: held back, they would make a gap.
-        let mut taken = 0;
+    /// Between ticks: bytes that have arrived by `now_us` are looked at for urgent commands and go through the parser.
+    pub fn receive(&mut self, now_us: u64, bytes: &[u8]) {
+        self.watch.scan(LINE, now_us, bytes);
+        self.ring.extend(bytes);
+        if self.ring.len() > RING {
+            // More than the controller can execute for too long: what waits is lost, but no Stop.
+            self.lost_bytes += self.ring.len() as u64;
+            self.ring.clear();
+            self.receiver.restart(self.watch.received(LINE));
+        }
+        // Bytes are taken also while a frame is executed, as an interrupt does: held back, they would make a gap.
+        let refill = self.batch.is_empty();
         for _ in 0..POLLS {
-            let rest = &bytes[taken..];
-            taken += self.receiver.push(now_us, &rest[..rest.len().min(CHUNK)]);
-            if !self.has_event {
-                self.has_event = self.receiver.poll(now_us);
-            }
-            let more = taken < bytes.len() || (!self.has_event && self.receiver.busy());
+            let waiting = self.ring.as_slices().0;
+            let taken = self.receiver.push(now_us, &waiting[..waiting.len().min(CHUNK)]);
+            self.ring.drain(..taken);
+            let found = self.receiver.poll(now_us);
+            let moved = found && refill && self.hand_over();
+            let more = (taken > 0 && !self.ring.is_empty()) || moved || (!found && self.receiver.busy());
             if !more {
                 break;
             }
         }
-        bytes.drain(..taken);
+    }
+
+    /// Gives the event of the parser to the controller; false when there is no room for it.
+    fn hand_over(&mut self) -> bool {
+        let (Some(event), Some(position)) = (self.receiver.event(), self.receiver.event_position()) else {
+            return false;
+        };
+        let moved = self.batch.push(&ReceivedEvent { line: LINE, position, event });
+        if moved {
+            self.receiver.release();
+        }
+        moved
     }
 
     /// The tick does not come; true when the watchdog resets the board because of it.
     pub fn miss(&mut self) -> bool {
-        self.worked = None;
+        self.worked.clear();
         self.missed += 1;
         if self.missed < self.watchdog_ms {
             return false;
@@ -119,24 +153,29 @@ impl Board {
     /// One tick of the controller.
     pub fn tick(&mut self, pins: &Pins<'_>) -> Outputs {
         self.missed = 0;
-        let host = if self.has_event { self.receiver.event() } else { None };
-        let worked = host.map(|event| match event {
-            LinkEvent::Frame(frame) => Worked::Frame(frame.frame_type as u8),
-            LinkEvent::Bad(response) => Worked::Bad(response.status),
-        });
+        let urgent = self.watch.take();
+        let host: Vec<HostEvent<'_>> = (0..EVENTS_MAX)
+            .map_while(|n| self.batch.get(n))
+            .map(|ReceivedEvent { line, position, event }| HostEvent {
+                line,
+                overtaken: self.watch.overtaken(line, position),
+                event,
+            })
+            .collect();
         let outputs = self.controller.tick(&Inputs {
             bus: pins.bus,
             bus_state: pins.bus_state,
             safety_input: pins.safety_input,
-            host,
+            urgent,
+            host: &host,
             status_free: pins.status_free,
         });
-        self.worked = None;
-        if outputs.host_done && self.has_event {
-            self.worked = worked;
-            self.receiver.release();
-            self.has_event = false;
-        }
+        self.worked.clear();
+        self.worked.extend(host.iter().take(outputs.host_done).map(|host| match host.event {
+            LinkEvent::Frame(frame) => Worked::Frame(frame.frame_type as u8),
+            LinkEvent::Bad(response) | LinkEvent::Noise(response) => Worked::Bad(response.status),
+        }));
+        self.batch.done(outputs.host_done);
         outputs
     }
 }

@@ -24,8 +24,8 @@ pub struct Moment<'a> {
     pub truth: &'a Truth,
     /// The frame that it gave out.
     pub sent: Option<&'a Frame>,
-    /// The host frame that it worked off.
-    pub worked: Option<Worked>,
+    /// The host frames that it executed.
+    pub worked: &'a [Worked],
     /// Level of its safety output.
     pub safety_output: bool,
     /// Largest torque per joint, N·m.
@@ -202,16 +202,17 @@ impl Invariants {
 
     /// Commands that permit something.
     fn hear(&mut self, moment: &Moment<'_>) {
-        let Some(Worked::Frame(frame_type)) = moment.worked else { return };
         const CLEAR_CURRENT: u8 = FrameType::ClearCurrentErrors as u8;
         const CLEAR_OCCURRED: u8 = FrameType::ClearOccurredErrors as u8;
         const EXECUTE: u8 = FrameType::TrajSetExecStatus as u8;
         const TEACH: u8 = FrameType::TeachingModeEnable as u8;
-        match frame_type {
-            CLEAR_CURRENT | CLEAR_OCCURRED => self.cleared = true,
-            EXECUTE => self.execute = true,
-            TEACH => self.teach = true,
-            _ => {}
+        for worked in moment.worked {
+            match *worked {
+                Worked::Frame(CLEAR_CURRENT | CLEAR_OCCURRED) => self.cleared = true,
+                Worked::Frame(EXECUTE) => self.execute = true,
+                Worked::Frame(TEACH) => self.teach = true,
+                _ => {}
+            }
         }
     }
 

@@ -7,7 +7,7 @@ struct Script {
     telemetry: Telemetry,
     truth: Truth,
     request: Request,
-    worked: Option<Worked>,
+    worked: Vec<Worked>,
     safety_output: bool,
 }
 
@@ -18,7 +18,7 @@ impl Script {
             telemetry: Telemetry::default(),
             truth: Truth::default(),
             request: Request::zero_torque(false),
-            worked: None,
+            worked: Vec::new(),
             safety_output: true,
         }
     }
@@ -27,13 +27,14 @@ impl Script {
         self.telemetry.tick += 1;
         (self.telemetry.state, self.telemetry.tes) = (state, tes);
         let frame = self.request.emit();
+        let worked = std::mem::take(&mut self.worked);
         let moment = Moment {
             time_us: 1000 * self.telemetry.tick,
             ticked: true,
             telemetry: &self.telemetry,
             truth: &self.truth,
             sent: Some(&frame),
-            worked: self.worked.take(),
+            worked: &worked,
             safety_output: self.safety_output && state != State::Start,
             torque_max: [80.0; JOINTS],
         };
@@ -41,7 +42,7 @@ impl Script {
     }
 
     fn command(&mut self, frame_type: FrameType) {
-        self.worked = Some(Worked::Frame(frame_type as u8));
+        self.worked.push(Worked::Frame(frame_type as u8));
     }
 }
 

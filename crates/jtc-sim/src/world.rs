@@ -26,8 +26,6 @@ pub struct World {
     plant: Plant,
     to_device: Line,
     to_host: Line,
-    /// Bytes that have arrived at the device and wait for the parser.
-    arriving: Vec<u8>,
     host_inbox: Vec<u8>,
     received: Vec<Frame>,
     bus_state: BusState,
@@ -68,7 +66,6 @@ impl World {
             plant,
             to_device: Line::new(config.baud),
             to_host: Line::new(config.baud),
-            arriving: Vec::new(),
             host_inbox: Vec::new(),
             received: Vec::with_capacity(16),
             bus_state: BusState { acknowledged: true, bus_off: false },
@@ -157,17 +154,14 @@ impl World {
     /// Bytes from the host reach the parser.
     fn receive(&mut self) {
         let now = self.now_us();
-        if self.line_fault.held {
-            return self.board.receive(now, &mut Vec::new());
+        let mut fresh = Vec::new();
+        if !self.line_fault.held {
+            self.to_device.arrived(now, usize::MAX, &mut fresh);
+            if self.line_fault != LineFault::default() {
+                self.line_fault.apply(&mut fresh, &mut self.line_rng);
+            }
         }
-        let before = self.arriving.len();
-        self.to_device.arrived(now, usize::MAX, &mut self.arriving);
-        if self.arriving.len() > before && self.line_fault != LineFault::default() {
-            let mut fresh = self.arriving.split_off(before);
-            self.line_fault.apply(&mut fresh, &mut self.line_rng);
-            self.arriving.append(&mut fresh);
-        }
-        self.board.receive(now, &mut self.arriving);
+        self.board.receive(now, &fresh);
     }
 
     fn tick_controller(&mut self) {
@@ -191,16 +185,18 @@ impl World {
         if outputs.status {
             self.to_host.write(self.now_us(), self.board.status_frame());
         }
-        match self.board.worked {
-            Some(Worked::Frame(frame_type)) => {
-                self.good_frames += 1;
-                self.log.push(self.now_us(), Event::Frame { frame_type });
+        let now = self.now_us();
+        for worked in &self.board.worked {
+            match *worked {
+                Worked::Frame(frame_type) => {
+                    self.good_frames += 1;
+                    self.log.push(now, Event::Frame { frame_type });
+                }
+                Worked::Bad(status) => {
+                    self.bad_frames += 1;
+                    self.log.push(now, Event::BadFrame { status });
+                }
             }
-            Some(Worked::Bad(status)) => {
-                self.bad_frames += 1;
-                self.log.push(self.now_us(), Event::BadFrame { status });
-            }
-            None => {}
         }
     }
 
@@ -211,7 +207,6 @@ impl World {
         self.received.clear();
         self.bus_state = BusState { acknowledged: true, bus_off: false };
         self.to_host.clear();
-        self.arriving.clear();
     }
 
     /// Log what has changed.

@@ -5,7 +5,7 @@
 //!
 //! | | device | host |
 //! |---|---|---|
-//! | bytes → frames | [`Receiver`] | [`StatusReceiver`] |
+//! | bytes → frames | [`Receiver`], ahead of it [`UrgentWatch`], behind it [`EventBatch`] | [`StatusReceiver`] |
 //! | frames → meaning | [`Command::parse`] | [`Status::parse`] |
 //! | meaning → frames | [`Status::emit`] | [`Command::emit`], [`trajectory`], [`pid_param`], …, constants in [`fixed`] |
 //! | in words | | `Display` of all of these, [`Described`], [`words`] |
@@ -41,6 +41,7 @@ extern crate std;
 #[doc(hidden)]
 pub mod fuzzing;
 
+mod batch;
 mod command;
 mod crc;
 mod describe;
@@ -52,8 +53,10 @@ mod response;
 mod segment;
 mod status;
 mod stream;
+mod urgent;
 pub mod words;
 
+pub use batch::{EVENTS_MAX, EventBatch, ReceivedEvent};
 pub use command::{ALL_NODES, Command, ExecCommand, Floats};
 pub use crc::{crc16, crc16_update};
 pub use describe::{Described, Piece, Pieces, pieces};
@@ -72,6 +75,7 @@ pub use status::{
     GripperStatus, JointStatus, STATUS_LEN, STATUS_LEN_NO_GRIPPER, STATUS_LEN_SHORT_INDEX, Status,
 };
 pub use stream::{LinkEvent, Receiver};
+pub use urgent::{UrgentCommand, UrgentCommands, UrgentWatch};
 
 /// Where each part of a frame is: byte ranges, named once.
 pub mod field {

@@ -118,6 +118,9 @@ pub struct Response {
 }
 
 impl Response {
+    /// No record.
+    pub const NONE: Self = Self::bad(0, FrameStatus::Idle, 0);
+
     /// The record of a frame that could not be taken.
     pub const fn bad(frame_type: u8, status: FrameStatus, length: u16) -> Self {
         Self { frame_type, status, data: DataStatus::Idle, length }

@@ -11,23 +11,35 @@
 //! Cost: each byte is copied and enters the CRC once, when it arrives. The CRC register is kept at every 64th byte, so that
 //! any candidate is checked with two registers and some arithmetic, however long it is. Hostile bytes full of false
 //! headers cost a constant each, and [`Receiver::poll`] looks at a bounded number of them per call.
-use crate::crc::{advance, crc16_update};
+use crate::crc::advance;
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
 use crate::response::{FrameStatus, Response};
+
+mod registers;
+
+use registers::Registers;
 
 /// What the parser found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkEvent<'a> {
     /// A good frame.
     Frame(FrameRef<'a>),
-    /// A bad frame or a run of bytes that is no frame.
+    /// A bad frame, and the bytes that follow it without a gap.
     Bad(Response),
+    /// A run of bytes of which not even the first looks like a frame.
+    Noise(Response),
 }
 
-/// Bytes between two kept CRC registers.
-const GRID: usize = 64;
-/// CRC registers kept.
-const REGISTERS: usize = FRAME_MAX.div_ceil(GRID) + 1;
+impl LinkEvent<'_> {
+    /// How it arrived: what its response record says of it (J-05).
+    pub fn status(&self) -> FrameStatus {
+        match self {
+            Self::Frame(_) => FrameStatus::NoError,
+            Self::Bad(response) | Self::Noise(response) => response.status,
+        }
+    }
+}
+
 /// Gaps among the held bytes that are remembered.
 const GAPS: usize = 64;
 /// Work of one `poll`: a byte passed over costs one, a candidate whose CRC is taken `CANDIDATE`.
@@ -51,6 +63,8 @@ const CANDIDATE: usize = 128;
 pub struct Receiver<B> {
     buffer: B,
     gap_us: u64,
+    /// Where in the stream the first byte of the buffer was.
+    base: u64,
     /// Held bytes are `start..end` of the buffer.
     start: usize,
     end: usize,
@@ -72,7 +86,16 @@ pub struct Receiver<B> {
 #[derive(Clone, Copy)]
 enum Found {
     Frame(FrameType, usize),
-    Bad(Response),
+    /// What is wrong at which byte of the stream.
+    Run(Sort, Response, u64),
+}
+
+/// Sort of a run that is no good frame.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sort {
+    /// It begins like a frame.
+    Bad,
+    Noise,
 }
 
 /// What is at the first held byte.
@@ -80,7 +103,7 @@ enum Sight {
     Frame(FrameType, usize),
     /// Nothing can be said before more bytes or a gap.
     Wait,
-    Bad(Response),
+    Run(Sort, Response),
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
@@ -89,6 +112,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         Self {
             buffer,
             gap_us: gap_us.into(),
+            base: 0,
             start: 0,
             end: 0,
             last_us: 0,
@@ -169,10 +193,10 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
                     self.in_run = false;
                     self.event = Some(Found::Frame(kind, n));
                 }
-                Sight::Bad(response) => {
+                Sight::Run(sort, response) => {
                     if !self.in_run {
                         self.in_run = true;
-                        self.event = Some(Found::Bad(response));
+                        self.event = Some(Found::Run(sort, response, self.base + self.start as u64));
                     }
                     budget -= CANDIDATE;
                     let passed = self.pass_over(budget);
@@ -190,8 +214,27 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
                 let bytes = &self.buffer.as_ref()[self.start..self.start + n];
                 LinkEvent::Frame(FrameRef { frame_type, bytes })
             }
-            Found::Bad(response) => LinkEvent::Bad(response),
+            Found::Run(Sort::Bad, response, _) => LinkEvent::Bad(response),
+            Found::Run(Sort::Noise, response, _) => LinkEvent::Noise(response),
         })
+    }
+
+    /// Where in the stream the first byte of the event was, counted from the first byte ever pushed: with it the event is
+    /// older or newer than an urgent command that an [`UrgentWatch`](crate::UrgentWatch) has seen.
+    pub fn event_position(&self) -> Option<u64> {
+        Some(match self.event? {
+            Found::Frame(..) => self.base + self.start as u64,
+            Found::Run(_, _, position) => position,
+        })
+    }
+
+    /// Forgets all that is held, the event too: bytes were lost in front of the next one, which is byte `position` of the
+    /// stream. What comes next continues nothing.
+    pub fn restart(&mut self, position: u64) {
+        (self.base, self.start, self.end) = (position, 0, 0);
+        (self.refused, self.gap_before_refused) = (false, false);
+        (self.in_run, self.busy, self.event) = (false, false, None);
+        (self.gaps, self.registers) = (Gaps::new(), Registers::new());
     }
 
     /// Done with the event.
@@ -220,15 +263,23 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         let closed = self.gaps.first();
         let limit = closed.unwrap_or(self.end);
         let seen = &self.buffer.as_ref()[self.start..limit];
-        let bad = |kind, status, length: usize| Sight::Bad(Response::bad(kind, status, length as u16));
+        let run =
+            |sort, kind, status, length: usize| Sight::Run(sort, Response::bad(kind, status, length as u16));
+        let bad = |kind, status, length| run(Sort::Bad, kind, status, length);
         let incomplete = |kind| match closed {
             Some(_) => bad(kind, FrameStatus::DiscontinuousFrame, seen.len()),
             None => Sight::Wait,
         };
         if seen[field::HEADER] != HEADER {
-            return bad(0, FrameStatus::IncorrectHeader, 0);
+            return run(Sort::Noise, 0, FrameStatus::IncorrectHeader, 0);
         }
-        let Some(&byte) = seen.get(field::TYPE) else { return incomplete(0) };
+        let Some(&byte) = seen.get(field::TYPE) else {
+            return match closed {
+                // A header and nothing more.
+                Some(_) => run(Sort::Noise, 0, FrameStatus::DiscontinuousFrame, seen.len()),
+                None => Sight::Wait,
+            };
+        };
         let kind = match FrameType::from_byte(byte) {
             Some(kind) if kind.from_host() => kind,
             _ => return bad(byte, FrameStatus::IncorrectFrameType, 0),
@@ -285,6 +336,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
         self.registers.shift(self.start, self.end, self.buffer.as_ref());
         self.gaps.shift(self.start);
+        self.base += self.start as u64;
         self.buffer.as_mut().copy_within(self.start..self.end, 0);
         self.end -= self.start;
         self.start = 0;
@@ -326,60 +378,6 @@ impl Gaps {
         for place in &mut self.places[..self.count] {
             *place -= by as u16;
         }
-    }
-}
-
-/// CRC registers along the buffer: before its first byte, and before the bytes `phase`, `phase + 64`, …
-struct Registers {
-    base: u16,
-    last: u16,
-    /// 1..=GRID.
-    phase: usize,
-    count: usize,
-    kept: [u16; REGISTERS],
-}
-
-impl Registers {
-    const fn new() -> Self {
-        Self { base: 0, last: 0, phase: GRID, count: 0, kept: [0; REGISTERS] }
-    }
-
-    /// Goes on over `bytes`, which are at `end..` of the buffer.
-    fn absorb(&mut self, mut end: usize, mut bytes: &[u8]) {
-        while !bytes.is_empty() {
-            let next = self.phase + self.count * GRID;
-            let (piece, rest) = bytes.split_at((next - end).min(bytes.len()));
-            self.last = crc16_update(self.last, piece);
-            end += piece.len();
-            bytes = rest;
-            if end == next {
-                self.kept[self.count] = self.last;
-                self.count += 1;
-            }
-        }
-    }
-
-    fn at(&self, at: usize, end: usize, buffer: &[u8]) -> u16 {
-        if at == end {
-            self.last
-        } else if at < self.phase {
-            crc16_update(self.base, &buffer[..at])
-        } else {
-            let slot = (at - self.phase) / GRID;
-            crc16_update(self.kept[slot], &buffer[self.phase + slot * GRID..at])
-        }
-    }
-
-    /// The bytes before `by` go.
-    fn shift(&mut self, by: usize, end: usize, buffer: &[u8]) {
-        self.base = self.at(by, end, buffer);
-        if by >= self.phase {
-            let gone = (by - self.phase) / GRID + 1;
-            self.kept.copy_within(gone.min(self.count)..self.count, 0);
-            self.count = self.count.saturating_sub(gone);
-            self.phase += gone * GRID;
-        }
-        self.phase -= by;
     }
 }
 

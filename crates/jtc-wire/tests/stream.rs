@@ -11,9 +11,11 @@ const GAP_US: u32 = 5000;
 enum Heard {
     Good(FrameType, usize),
     Bad(u8, FrameStatus, u16),
+    /// Not even a header.
+    Noise(FrameStatus, u16),
 }
 use FrameStatus::*;
-use Heard::{Bad, Good};
+use Heard::{Bad, Good, Noise};
 
 struct Line {
     receiver: Receiver<Vec<u8>>,
@@ -45,6 +47,10 @@ impl Line {
                 Some(LinkEvent::Bad(r)) => {
                     assert_eq!(r.data, DataStatus::Idle);
                     all.push(Bad(r.frame_type, r.status, r.length));
+                }
+                Some(LinkEvent::Noise(r)) => {
+                    assert_eq!((r.data, r.frame_type), (DataStatus::Idle, 0));
+                    all.push(Noise(r.status, r.length));
                 }
                 None => {}
             }
@@ -99,10 +105,10 @@ fn j02_the_longest_frame() {
 #[test]
 fn j05_header() {
     let mut line = Line::new();
-    assert_eq!(line.send(&[0x00, 0x01, 0x02]), [Bad(0, IncorrectHeader, 0)]);
+    assert_eq!(line.send(&[0x00, 0x01, 0x02]), [Noise(IncorrectHeader, 0)]);
     assert_eq!(line.send(&[0x03]), [], "still the same run");
     line.silence(5000);
-    assert_eq!(line.send(&[0x04]), [Bad(0, IncorrectHeader, 0)], "another run");
+    assert_eq!(line.send(&[0x04]), [Noise(IncorrectHeader, 0)], "another run");
     for n in [0u16, 1, 5, 60_001, 65_535] {
         line.silence(5000);
         let [high, low] = n.to_be_bytes();
@@ -167,14 +173,14 @@ fn j05_gap() {
     assert_eq!(line.send(&ON), [GOOD_ON], "the frame was heard in the loop");
     // The type is not known yet.
     assert_eq!(line.send(&ON[..1]), []);
-    assert_eq!(line.silence(5000), [Bad(0, DiscontinuousFrame, 1)]);
+    assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
 }
 
 /// The bytes after a gap may come before anyone looked.
 #[test]
 fn j05_gap_seen_with_the_next_bytes() {
     for (us, expected) in
-        [(4999, vec![GOOD_ON]), (5000, vec![Bad(0x0C, DiscontinuousFrame, 4), Bad(0, IncorrectHeader, 0)])]
+        [(4999, vec![GOOD_ON]), (5000, vec![Bad(0x0C, DiscontinuousFrame, 4), Noise(IncorrectHeader, 0)])]
     {
         let mut line = Line::new();
         assert_eq!(line.send(&ON[..4]), []);
@@ -275,12 +281,15 @@ fn j05_gaps_are_never_forgotten() {
             }
             refused += 1;
             assert!(receiver.poll(now));
-            assert!(matches!(receiver.event(), Some(LinkEvent::Bad(_))), "piece {piece}");
+            assert!(
+                matches!(receiver.event(), Some(LinkEvent::Bad(_) | LinkEvent::Noise(_))),
+                "piece {piece}"
+            );
             receiver.release();
             bad += 1;
         }
         while receiver.poll(now) {
-            assert!(matches!(receiver.event(), Some(LinkEvent::Bad(_))));
+            assert!(matches!(receiver.event(), Some(LinkEvent::Bad(_) | LinkEvent::Noise(_))));
             receiver.release();
             bad += 1;
         }
@@ -357,7 +366,7 @@ fn a_short_buffer() {
         rest = &rest[receiver.push(now, rest)..];
         while receiver.poll(now) || receiver.busy() {
             match receiver.event() {
-                Some(LinkEvent::Bad(record)) => heard.push(record),
+                Some(LinkEvent::Bad(record) | LinkEvent::Noise(record)) => heard.push(record),
                 Some(LinkEvent::Frame(frame)) => {
                     assert_eq!(heard, [Response::bad(0, IncorrectHeader, 0)]);
                     assert_eq!(Command::parse(frame), Ok(Command::TeachingModeEnable));
@@ -383,4 +392,26 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(line.send(&default), [Good(FrameType::FrictionPolynomial, 6)]);
     let command = Command::parse(FrameRef::new_checked(&default).expect("a good frame"));
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
+}
+
+/// Bytes were lost in front of the rest of a frame: the rest is none, and the next frame is found at its true place.
+#[test]
+fn j07_a_restart_joins_nothing_across_lost_bytes() {
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let frame = segment(100);
+    receiver.push(0, &ON);
+    assert!(receiver.poll(0));
+    assert_eq!(receiver.event_position(), Some(0));
+    receiver.push(0, &frame[..500]);
+    receiver.restart(1000);
+    assert!(!receiver.poll(0) && !receiver.mid_frame(), "what was held is gone");
+    receiver.push(0, &frame[994..]);
+    receiver.push(0, &ON);
+    assert!(receiver.poll(0));
+    assert!(matches!(receiver.event(), Some(LinkEvent::Noise(_))));
+    assert_eq!(receiver.event_position(), Some(1000));
+    receiver.release();
+    assert!(receiver.poll(0));
+    assert!(matches!(receiver.event(), Some(LinkEvent::Frame(found)) if found.bytes == ON));
+    assert_eq!(receiver.event_position(), Some(1000 + frame.len() as u64 - 994));
 }

@@ -1,9 +1,10 @@
 //! The flight record, read from its bytes as any tool reads it.
 use jtc_bus::Frame;
-use jtc_core::BusState;
+use jtc_core::{BusState, HOST_LINES};
+use jtc_wire::{UrgentCommand, UrgentCommands};
 
 /// Bytes of the record.
-pub const FLIGHT_SIZE: usize = 720;
+pub const FLIGHT_SIZE: usize = 848;
 
 /// A tick as the board recorded it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,13 +16,17 @@ pub struct Flight {
     pub safety_input: bool,
     pub status_free: bool,
     pub wrong_format: u32,
-    pub event: Event,
+    pub urgent: [UrgentCommands; HOST_LINES],
+    /// What was offered, oldest first.
+    pub events: Vec<Event>,
     pub heard: Vec<Frame>,
     pub state: u8,
     pub tes: u8,
     pub safety_output: bool,
-    /// The event was worked off.
-    pub host_done: bool,
+    /// So many of the events are done.
+    pub host_done: usize,
+    /// Line of the record in the status.
+    pub record_line: Option<usize>,
     /// A status was sent.
     pub status: bool,
     pub sent: Option<Frame>,
@@ -33,8 +38,10 @@ pub struct Flight {
 /// What came from a host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Event {
-    /// 0 nothing, 1 a frame, 2 something bad.
+    /// 1 a frame, 2 a bad one, 3 noise.
     pub kind: u8,
+    /// An urgent command was received after it.
+    pub overtaken: bool,
     pub line: u8,
     pub frame_type: u8,
     pub status: u8,
@@ -79,20 +86,35 @@ impl Flight {
         assert_eq!(bytes.len(), FLIGHT_SIZE);
         let mut b = Bytes(bytes);
         let head = (b.take::<4>(), b.u16(), b.u16());
-        if head != (*b"JTCF", 1, FLIGHT_SIZE as u16) {
+        if head != (*b"JTCF", 2, FLIGHT_SIZE as u16) {
             return None;
         }
         let (phase, cause, tick) = (b.u32(), b.u32(), b.u64());
         let [bus_state, safety_input, status_free, heard_count] = b.take();
         let wrong_format = b.u32();
-        let [kind, line, frame_type, status] = b.take();
-        let event = Event { kind, line, frame_type, status, len: b.u16(), crc: b.u16() };
+        let urgent = [(); HOST_LINES].map(|()| {
+            let mut commands = UrgentCommands::NONE;
+            for [command, count] in [b.take::<2>(), b.take::<2>()] {
+                let command = if command == 1 { UrgentCommand::Stop } else { UrgentCommand::Pause };
+                commands.add(command, count);
+            }
+            commands
+        });
+        let [event_count, ..] = b.take::<4>();
+        let mut events: Vec<_> = (0..16)
+            .map(|_| {
+                let [kind, line, frame_type, status] = b.take();
+                let (kind, overtaken) = (kind & 0x7F, kind & 0x80 != 0);
+                Event { kind, overtaken, line, frame_type, status, len: b.u16(), crc: b.u16() }
+            })
+            .collect();
+        events.truncate(event_count.into());
         let mut heard: Vec<_> = (0..21).map(|_| b.frame()).collect();
         heard.truncate(heard_count.into());
-        let [state, tes, safety_output, done] = b.take();
+        let [state, tes, safety_output, status] = b.take();
         let sent = b.frame();
         let (point, errors) = (b.u32(), b.u16());
-        b.take::<6>();
+        let [host_done, record_line] = b.take();
         let torque = [(); 6].map(|()| f64::from_bits(b.u64()));
         assert!(b.0.is_empty());
         Some(Self {
@@ -103,13 +125,15 @@ impl Flight {
             safety_input: safety_input != 0,
             status_free: status_free != 0,
             wrong_format,
-            event,
+            urgent,
+            events,
             heard: heard.into_iter().map(|f| f.expect("what was heard is a frame")).collect(),
             state,
             tes,
             safety_output: safety_output != 0,
-            host_done: done & 1 != 0,
-            status: done & 2 != 0,
+            host_done: host_done.into(),
+            record_line: (record_line != 0xFF).then_some(record_line.into()),
+            status: status != 0,
             sent,
             point,
             errors,

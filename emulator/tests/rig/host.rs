@@ -86,7 +86,7 @@ impl Host {
             .unwrap_or_else(|| panic!("the host sent no frame like {event:?}"))
     }
 
-    /// The device has worked that frame off.
+    /// The device has executed that frame.
     pub fn done(&mut self, event: &Event) {
         let (at, bytes) = self.place(event);
         self.found += at + bytes.len();

@@ -136,7 +136,7 @@ impl Rig {
             telemetry: shadow.telemetry(),
             truth: &truth,
             sent: flight.sent.as_ref(),
-            worked: shadow.worked,
+            worked: &shadow.worked,
             safety_output: level,
             torque_max: shadow.config().joints.map(|joint| joint.torque_max),
         });

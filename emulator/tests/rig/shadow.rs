@@ -1,11 +1,9 @@
 //! The same controller on this machine.
-use std::collections::VecDeque;
-
-use jtc_core::{Config, Controller, Inputs, POINTS_MAX, Telemetry};
+use jtc_core::{Config, Controller, HostEvent, Inputs, POINTS_MAX, Telemetry};
 use jtc_sim::Worked;
 use jtc_wire::{FrameRef, FrameStatus, LinkEvent, RawPoint, Response, Status};
 
-use super::flight::Flight;
+use super::flight::{Event, Flight};
 use super::host::Host;
 
 /// Causes of a start after which the controller says that it failed (J-12): watchdog, hard fault, panic.
@@ -14,10 +12,8 @@ const FAILED: [u32; 3] = [4, 5, 6];
 /// The controller beside the board.
 pub struct Shadow {
     controller: Controller<Vec<RawPoint>>,
-    /// Lines of the events whose records have not gone out.
-    awaiting: VecDeque<usize>,
-    /// What the last tick worked off.
-    pub worked: Option<Worked>,
+    /// What the last tick executed.
+    pub worked: Vec<Worked>,
 }
 
 impl Shadow {
@@ -28,7 +24,7 @@ impl Shadow {
         if FAILED.contains(&cause) {
             controller.raise_internal();
         }
-        Self { controller, awaiting: VecDeque::new(), worked: None }
+        Self { controller, worked: Vec::new() }
     }
 
     /// What the last tick computed.
@@ -43,42 +39,37 @@ impl Shadow {
 
     /// Runs the tick that the board recorded; everything that comes out must be the board's, to the bit.
     pub fn tick(&mut self, flight: &Flight, hosts: &mut [Host; 2]) {
-        let line = usize::from(flight.event.line);
-        let bytes;
-        let host = match flight.event.kind {
-            0 => None,
-            1 => {
-                bytes = hosts[line].frame(&flight.event);
-                FrameRef::new_checked(&bytes).map(LinkEvent::Frame)
-            }
-            _ => {
-                let status = FrameStatus::from_byte(flight.event.status).expect("a status code");
-                Some(LinkEvent::Bad(Response::bad(flight.event.frame_type, status, flight.event.len)))
-            }
-        };
+        let bytes: Vec<Vec<u8>> = flight
+            .events
+            .iter()
+            .map(|event| match event.kind {
+                1 => hosts[usize::from(event.line)].frame(event),
+                _ => Vec::new(),
+            })
+            .collect();
+        let host: Vec<HostEvent<'_>> =
+            flight.events.iter().zip(&bytes).map(|(event, bytes)| host_event(event, bytes)).collect();
         let outputs = self.controller.tick(&Inputs {
             bus: &flight.heard,
             bus_state: flight.bus(),
             safety_input: flight.safety_input,
-            host,
+            urgent: flight.urgent,
+            host: &host,
             status_free: flight.status_free,
         });
-        self.worked = None;
-        if outputs.host_done {
-            self.worked = host.map(|event| match event {
+        self.worked.clear();
+        for (event, received) in flight.events.iter().zip(&host).take(outputs.host_done) {
+            self.worked.push(match received.event {
                 LinkEvent::Frame(frame) => Worked::Frame(frame.frame_type as u8),
-                LinkEvent::Bad(response) => Worked::Bad(response.status),
+                LinkEvent::Bad(response) | LinkEvent::Noise(response) => Worked::Bad(response.status),
             });
-            if flight.event.kind != 0 {
-                self.awaiting.push_back(line);
-            }
-            if flight.event.kind == 1 {
-                hosts[line].done(&flight.event);
+            if event.kind == 1 {
+                hosts[received.line].done(event);
             }
         }
         if outputs.status {
             let status = *self.controller.status_frame();
-            self.expect_status(&status, hosts);
+            expect_status(&status, outputs.record_line, hosts);
         }
 
         let t = self.controller.telemetry();
@@ -89,18 +80,31 @@ impl Shadow {
         let ours = (t.state as u8, t.tes as u8, t.point, t.errors, outputs.safety_output);
         let board = (flight.state, flight.tes, flight.point, flight.errors, flight.safety_output);
         assert_eq!(ours, board, "tick {tick}: state, execution, point, errors, safety output");
-        let done = (outputs.host_done && host.is_some(), outputs.status);
-        assert_eq!(done, (flight.host_done && host.is_some(), flight.status), "tick {tick}: host");
+        let done = (outputs.host_done, outputs.status, outputs.record_line);
+        assert_eq!(done, (flight.host_done, flight.status, flight.record_line), "tick {tick}: host");
     }
+}
 
-    /// J-04: the record goes to the line of its frame, the other gets the same status without one.
-    fn expect_status(&mut self, bytes: &[u8], hosts: &mut [Host; 2]) {
-        let status = Status::parse(bytes).expect("the controller makes good statuses");
-        let line = status.response().and_then(|_| self.awaiting.pop_front());
-        let without = Status { response: Response::default(), ..status }.emit();
-        for (n, host) in hosts.iter_mut().enumerate() {
-            let bytes = if line == Some(n) { bytes } else { &without };
-            host.expected.extend(bytes);
-        }
+fn host_event<'a>(event: &Event, bytes: &'a [u8]) -> HostEvent<'a> {
+    let response = || {
+        let status = FrameStatus::from_byte(event.status).expect("a status code");
+        Response::bad(event.frame_type, status, event.len)
+    };
+    let what = match event.kind {
+        1 => LinkEvent::Frame(FrameRef::new_checked(bytes).expect("a good frame")),
+        2 => LinkEvent::Bad(response()),
+        _ => LinkEvent::Noise(response()),
+    };
+    HostEvent { line: event.line.into(), overtaken: event.overtaken, event: what }
+}
+
+/// J-04: the record goes to the line of its frame, the other gets the same status without one.
+fn expect_status(bytes: &[u8], line: Option<usize>, hosts: &mut [Host; 2]) {
+    let status = Status::parse(bytes).expect("the controller makes good statuses");
+    assert_eq!(status.response().is_some(), line.is_some());
+    let without = Status { response: Response::default(), ..status }.emit();
+    for (n, host) in hosts.iter_mut().enumerate() {
+        let bytes = if line == Some(n) { bytes } else { &without };
+        host.expected.extend(bytes);
     }
 }

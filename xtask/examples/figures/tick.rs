@@ -4,10 +4,10 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use jtc_bus::Frame;
-use jtc_core::{BusState, Config, Controller, Inputs, POINTS_MAX, State};
+use jtc_core::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, POINTS_MAX, State};
 use jtc_host::frame;
 use jtc_sim::{SimConfig, World};
-use jtc_wire::{Command, ExecCommand, FRAME_MAX, FrameRef, LinkEvent, RawPoint};
+use jtc_wire::{Command, ExecCommand, FRAME_MAX, FrameRef, LinkEvent, RawPoint, UrgentCommands};
 
 use crate::world::Result;
 use crate::{path, print};
@@ -52,13 +52,20 @@ fn controller() -> Controller<Vec<RawPoint>> {
     Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX])
 }
 
-fn event(bytes: &[u8]) -> Option<LinkEvent<'_>> {
-    Some(LinkEvent::Frame(FrameRef::new_checked(bytes)?))
+fn event(bytes: &[u8]) -> Option<HostEvent<'_>> {
+    let event = LinkEvent::Frame(FrameRef::new_checked(bytes)?);
+    Some(HostEvent { line: 0, overtaken: false, event })
 }
 
-fn inputs<'a>(bus: &'a [Frame], host: Option<LinkEvent<'a>>) -> Inputs<'a> {
-    let bus_state = BusState { acknowledged: true, bus_off: false };
-    Inputs { bus, bus_state, safety_input: true, host, status_free: true }
+fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
+    Inputs {
+        bus,
+        bus_state: BusState { acknowledged: true, bus_off: false },
+        safety_input: true,
+        urgent: [UrgentCommands::NONE; HOST_LINES],
+        host: host.as_slice(),
+        status_free: true,
+    }
 }
 
 /// A whole run: bring-up, parameters, upload, motion. The world answers a controller of its own, which sees the same.
@@ -78,8 +85,8 @@ fn record(frames: &[(State, Vec<u8>)]) -> Vec<Seen> {
         }
         let bus: Vec<Frame> =
             world.bus_frames().iter().map(|timed| timed.frame).filter(|frame| frame.id >= 0x200).collect();
-        let outputs = shadow.tick(&inputs(&bus, offered.and_then(|index| event(&frames[index].1))));
-        next += usize::from(outputs.host_done);
+        let host = offered.and_then(|index| event(&frames[index].1));
+        next += shadow.tick(&inputs(&bus, &host)).host_done;
         seen.push(Seen { bus, host: offered });
         world.step();
         moving += usize::from(state == State::Operate);
@@ -98,7 +105,7 @@ pub fn figures() -> Result<()> {
         for (tick, least) in seen.iter().zip(&mut least) {
             let host = tick.host.and_then(|index| event(&frames[index].1));
             let start = Instant::now();
-            black_box(controller.tick(&inputs(&tick.bus, host)));
+            black_box(controller.tick(&inputs(&tick.bus, &host)));
             *least = least.min(start.elapsed().as_secs_f64() * 1e9);
         }
         assert_eq!(controller.telemetry().state, State::Operate, "the run given again ends as the first did");

@@ -2,8 +2,13 @@
 #![allow(dead_code)]
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
-use jtc_core::{BusState, Config, Controller, Inputs, Outputs, POINTS_MAX, State, Tes};
-use jtc_wire::{DataStatus, ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Response, Status, crc16};
+use jtc_core::{
+    BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX, State, Tes,
+};
+use jtc_wire::{
+    DataStatus, EVENTS_MAX, ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Response, Status,
+    UrgentCommand, UrgentCommands, crc16,
+};
 
 pub const SCALE: Scale = Scale { velocity: 2.0 };
 
@@ -40,12 +45,35 @@ pub struct Rig {
     /// Frames that reach the controller instead of those of the nodes, in the next tick.
     pub inject: Vec<Frame>,
     answers: Vec<Frame>,
-    host: std::collections::VecDeque<HostEvent>,
+    /// The serial line can take a status.
+    pub status_free: bool,
+    /// Stop and Pause that arrive before the next tick.
+    urgent: [UrgentCommands; HOST_LINES],
+    host: std::collections::VecDeque<Sent>,
 }
 
-enum HostEvent {
+/// What a host has sent, not done yet.
+struct Sent {
+    line: usize,
+    overtaken: bool,
+    what: What,
+}
+
+enum What {
     Frame(FrameType, Vec<u8>),
     Bad(Response),
+    Noise(Response),
+}
+
+impl Sent {
+    fn event(&self) -> HostEvent<'_> {
+        let event = match &self.what {
+            What::Frame(frame_type, bytes) => LinkEvent::Frame(FrameRef { frame_type: *frame_type, bytes }),
+            What::Bad(response) => LinkEvent::Bad(*response),
+            What::Noise(response) => LinkEvent::Noise(*response),
+        };
+        HostEvent { line: self.line, overtaken: self.overtaken, event }
+    }
 }
 
 /// A frame with length and CRC.
@@ -93,7 +121,8 @@ impl Rig {
             resets: 0,
             booting: 0,
         };
-        let last = Outputs { bus: None, safety_output: false, status: false, host_done: false };
+        let last =
+            Outputs { bus: None, safety_output: false, status: false, record_line: None, host_done: 0 };
         Self {
             controller: Controller::new(config, vec![RawPoint::default(); POINTS_MAX]),
             nodes: [node; 7],
@@ -108,6 +137,8 @@ impl Rig {
             last,
             inject: Vec::new(),
             answers: Vec::new(),
+            status_free: true,
+            urgent: [UrgentCommands::NONE; HOST_LINES],
             host: std::collections::VecDeque::new(),
         }
     }
@@ -155,14 +186,43 @@ impl Rig {
     }
 
     pub fn send(&mut self, frame_type: FrameType, body: &[u8]) {
-        self.host.push_back(HostEvent::Frame(frame_type, frame(frame_type, body)));
+        self.send_on(0, frame_type, body);
+    }
+
+    /// On a line of its own.
+    pub fn send_on(&mut self, line: usize, frame_type: FrameType, body: &[u8]) {
+        let what = What::Frame(frame_type, frame(frame_type, body));
+        self.host.push_back(Sent { line, overtaken: false, what });
     }
 
     pub fn send_bad(&mut self, response: Response) {
-        self.host.push_back(HostEvent::Bad(response));
+        self.host.push_back(Sent { line: 0, overtaken: false, what: What::Bad(response) });
     }
 
-    /// Sends, runs until it is worked off, and returns how its data were taken.
+    pub fn send_noise(&mut self, response: Response) {
+        self.host.push_back(Sent { line: 0, overtaken: false, what: What::Noise(response) });
+    }
+
+    /// Stop or Pause as it arrives on a line: it acts in the next tick, and its frame waits behind the others.
+    pub fn urgent(&mut self, line: usize, command: UrgentCommand) {
+        self.urgent[line].push(command);
+        self.send_on(line, FrameType::TrajSetExecStatus, &[ExecCommand::from(command) as u8]);
+        for sent in &mut self.host {
+            sent.overtaken = true;
+        }
+    }
+
+    /// Events that are not done.
+    pub fn waiting(&self) -> usize {
+        self.host.len()
+    }
+
+    /// Records that came, oldest first.
+    pub fn records(&self) -> Vec<Response> {
+        self.statuses.iter().filter_map(Status::response).collect()
+    }
+
+    /// Sends, runs until it is done, and returns how its data were taken.
     pub fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
         self.send(frame_type, body);
         for _ in 0..1000 {
@@ -231,23 +291,18 @@ impl Rig {
             core::mem::take(&mut self.inject)
         };
         self.answers.clear();
-        let host = self.host.front().map(|e| match e {
-            HostEvent::Frame(frame_type, bytes) => {
-                LinkEvent::Frame(FrameRef { frame_type: *frame_type, bytes })
-            }
-            HostEvent::Bad(response) => LinkEvent::Bad(*response),
-        });
+        let host: Vec<_> = self.host.iter().take(EVENTS_MAX).map(Sent::event).collect();
         let inputs = Inputs {
             bus: &bus,
             bus_state: BusState { acknowledged: self.acknowledged, bus_off: self.bus_off },
             safety_input: self.safety_input,
-            host,
-            status_free: true,
+            urgent: core::mem::take(&mut self.urgent),
+            host: &host,
+            status_free: self.status_free,
         };
         self.last = self.controller.tick(&inputs);
-        if self.last.host_done {
-            self.host.pop_front();
-        }
+        drop(host);
+        self.host.drain(..self.last.host_done);
         if self.last.status {
             let bytes = *self.controller.status_frame();
             self.statuses.push(Status::parse(&bytes).expect("a valid status"));

@@ -33,10 +33,12 @@ pub struct Statistics {
     pub serial_to_device: u64,
     /// Bytes that reached the host.
     pub serial_to_host: u64,
-    /// Good host frames that the controller worked off.
+    /// Good host frames that the controller executed.
     pub good_frames: u64,
-    /// Bad frames and rubbish.
+    /// Bad frames and noise.
     pub bad_frames: u64,
+    /// Bytes from the host that found no room on the board.
+    pub lost_bytes: u64,
     /// Resets by the watchdog.
     pub watchdog_resets: u32,
     /// Milliseconds simulated.
@@ -132,9 +134,9 @@ impl World {
         self.node_states
     }
 
-    /// The host frame that the last tick worked off.
-    pub fn worked(&self) -> Option<Worked> {
-        self.board.worked
+    /// The host frames that the last tick executed.
+    pub fn worked(&self) -> &[Worked] {
+        &self.board.worked
     }
 
     /// Level of the controller's safety output: true = no error.
@@ -172,7 +174,7 @@ impl World {
             telemetry: self.board.telemetry(),
             truth: self.plant.truth(),
             sent: self.sent.as_ref(),
-            worked: self.board.worked,
+            worked: &self.board.worked,
             safety_output: self.safety_output,
             torque_max: self.config.controller.joints.map(|joint| joint.torque_max),
         }
@@ -191,6 +193,7 @@ impl World {
             serial_to_host: self.to_host.carried,
             good_frames: self.good_frames,
             bad_frames: self.bad_frames,
+            lost_bytes: self.board.lost_bytes,
             watchdog_resets: self.board.watchdog_resets,
             ticks: self.ticks,
         }

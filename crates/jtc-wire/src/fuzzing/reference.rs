@@ -14,24 +14,50 @@ pub enum Event {
 
 /// Events of a stream; `regions` are its parts between gaps, `capacity` the longest frame that can be held.
 pub fn events(regions: &[Vec<u8>], capacity: usize) -> Vec<Event> {
-    regions.iter().flat_map(|region| of_region(region, capacity)).collect()
+    placed_events(regions, capacity).into_iter().map(|(_, event)| event).collect()
 }
 
-fn of_region(region: &[u8], capacity: usize) -> Vec<Event> {
+/// The same, each with the place of its first byte in the stream.
+pub(super) fn placed_events(regions: &[Vec<u8>], capacity: usize) -> Vec<(u64, Event)> {
+    let mut all = Vec::new();
+    let mut begin = 0;
+    for region in regions {
+        all.extend(of_region(region, capacity).into_iter().map(|(at, event)| (begin + at as u64, event)));
+        begin += region.len() as u64;
+    }
+    all
+}
+
+/// Where in the stream each Stop and each Pause ends, wherever it stands.
+pub(super) fn urgent_ends(regions: &[Vec<u8>]) -> Vec<u64> {
+    let mut all = Vec::new();
+    let mut begin = 0;
+    for region in regions {
+        let ends = region.windows(7).enumerate().filter(|(_, bytes)| {
+            FrameRef::new_checked(bytes)
+                .is_some_and(|frame| frame.bytes[1] == 0x0B && matches!(bytes[4], 1 | 2))
+        });
+        all.extend(ends.map(|(at, _)| begin + at as u64 + 7));
+        begin += region.len() as u64;
+    }
+    all
+}
+
+fn of_region(region: &[u8], capacity: usize) -> Vec<(usize, Event)> {
     let mut found = Vec::new();
     let mut run = None;
     let mut at = 0;
     while at < region.len() {
         if let Some(n) = good_frame(&region[at..], capacity) {
-            found.extend(run.take().map(|from| Event::Bad(judge(&region[from..], capacity))));
-            found.push(Event::Frame(region[at..at + n].to_vec()));
+            found.extend(run.take().map(|from| (from, Event::Bad(judge(&region[from..], capacity)))));
+            found.push((at, Event::Frame(region[at..at + n].to_vec())));
             at += n;
         } else {
             run.get_or_insert(at);
             at += 1;
         }
     }
-    found.extend(run.map(|from| Event::Bad(judge(&region[from..], capacity))));
+    found.extend(run.map(|from| (from, Event::Bad(judge(&region[from..], capacity)))));
     found
 }
 

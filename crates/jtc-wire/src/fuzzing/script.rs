@@ -2,9 +2,9 @@
 use std::vec;
 use std::vec::Vec;
 
-use super::reference::{Event, events};
+use super::reference::{Event, placed_events, urgent_ends};
 use super::{body_len, sealed};
-use crate::{FrameType, HEADER, LinkEvent, Receiver};
+use crate::{FrameType, HEADER, LinkEvent, Receiver, UrgentWatch, fixed};
 
 const GAP_US: u64 = 5000;
 
@@ -95,7 +95,16 @@ impl<'a> Reader<'a> {
                 frame
             }
             14 => [self.byte()].repeat(usize::from(self.byte()) * 20),
-            _ => vec![self.byte()],
+            _ => match self.byte() {
+                kind @ 0..16 => {
+                    // A Stop or a Pause, a few times, the last one cut off.
+                    let frame = if kind % 2 == 0 { fixed::STOP } else { fixed::PAUSE };
+                    let mut frames = frame.repeat(usize::from(kind / 2) + 1);
+                    frames.truncate(frames.len() - usize::from(self.byte() % 8));
+                    frames
+                }
+                byte => vec![byte],
+            },
         })
     }
 }
@@ -111,7 +120,13 @@ struct Driver {
     held: u8,
     piece: usize,
     lazy: bool,
-    found: Vec<Event>,
+    found: Vec<(u64, Event)>,
+    watch: UrgentWatch<1>,
+    /// Time of the watch, which sees bytes as they arrive, however slow the reader is.
+    arrived_us: u64,
+    /// Where Stops and Pauses ended.
+    urgent: Vec<u64>,
+    urgent_count: usize,
     bytes: usize,
     busy_polls: usize,
 }
@@ -134,8 +149,13 @@ impl Driver {
                 Event::Frame(frame.bytes.to_vec())
             }
             LinkEvent::Bad(response) => Event::Bad(response),
+            LinkEvent::Noise(response) => {
+                assert_eq!(response.frame_type, 0, "noise is of no type");
+                Event::Bad(response)
+            }
         };
-        self.found.push(event);
+        let position = self.receiver.event_position().expect("an event is there");
+        self.found.push((position, event));
         self.receiver.release();
         self.held = self.hold;
     }
@@ -148,7 +168,25 @@ impl Driver {
         }
     }
 
+    /// In the pieces of the reader the watch must see what it would see in the whole.
+    fn watch(&mut self, bytes: &[u8]) {
+        self.arrived_us += if self.now - self.last >= GAP_US { GAP_US } else { 0 };
+        for piece in bytes.chunks(self.piece) {
+            let before = self.watch.received(0);
+            self.watch.scan(0, self.arrived_us, piece);
+            let commands = self.watch.take()[0];
+            let count: usize = commands.iter().map(|(_, count)| usize::from(count)).sum();
+            let ends: Vec<u64> = (before + 1..=before + piece.len() as u64)
+                .filter(|end| self.watch.overtaken(0, end - 1))
+                .collect();
+            // The last one is what is overtaken; the others only count.
+            self.urgent.extend(ends.last().filter(|_| count > 0));
+            self.urgent_count += count;
+        }
+    }
+
     fn push(&mut self, mut bytes: &[u8]) {
+        self.watch(bytes);
         while !bytes.is_empty() {
             let piece = &bytes[..self.piece.min(bytes.len())];
             let taken = self.receiver.push(self.now, piece);
@@ -213,6 +251,10 @@ pub fn stream_parser(data: &[u8]) {
         piece: usize::MAX,
         lazy: false,
         found: Vec::new(),
+        watch: UrgentWatch::new(GAP_US as u32),
+        arrived_us: 0,
+        urgent: Vec::new(),
+        urgent_count: 0,
         bytes: 0,
         busy_polls: 0,
     };
@@ -236,5 +278,15 @@ pub fn stream_parser(data: &[u8]) {
     driver.now += GAP_US;
     driver.drain();
     assert!(!driver.receiver.mid_frame(), "nothing is left");
-    assert_eq!(driver.found, events(&regions, capacity));
+    assert_eq!(driver.found, placed_events(&regions, capacity));
+    let ends = urgent_ends(&regions);
+    assert_eq!(driver.urgent_count, ends.len(), "every Stop and every Pause, once");
+    assert!(driver.urgent.iter().all(|end| ends.contains(end)));
+    for (position, event) in &driver.found {
+        if let Event::Frame(bytes) = event
+            && (bytes[..] == fixed::STOP || bytes[..] == fixed::PAUSE)
+        {
+            assert!(ends.contains(&(position + 7)), "what the parser finds was seen before");
+        }
+    }
 }

@@ -1,0 +1,181 @@
+//! Response records that wait for their status frame (J-04), a queue for each line of the host link.
+use jtc_wire::Response;
+
+/// Records that wait at most on a line: with fewer, none is lost.
+pub const RECORDS_MAX: usize = 64;
+/// Lines to hosts.
+pub const HOST_LINES: usize = 2;
+
+/// The records of one line, oldest first.
+#[derive(Clone, Debug)]
+struct ResponseQueue {
+    ring: [Response; RECORDS_MAX],
+    first: usize,
+    len: usize,
+    /// Place, counted from the oldest, of the one record that stands for all noise.
+    noise: Option<usize>,
+}
+
+impl ResponseQueue {
+    const fn new() -> Self {
+        Self { ring: [Response::NONE; RECORDS_MAX], first: 0, len: 0, noise: None }
+    }
+
+    fn slot(&mut self, n: usize) -> &mut Response {
+        &mut self.ring[(self.first + n) % RECORDS_MAX]
+    }
+
+    /// Puts a record at the end; false when one is lost by it: that of noise if there is one, else the oldest.
+    fn push(&mut self, response: Response, noise: bool) -> bool {
+        if noise && self.noise.is_some() {
+            // It joins the record that waits.
+            return true;
+        }
+        let full = self.len == RECORDS_MAX;
+        if full {
+            match self.noise.take() {
+                Some(place) => self.remove(place),
+                None if noise => return false,
+                None => drop(self.pop()),
+            }
+        }
+        if noise {
+            self.noise = Some(self.len);
+        }
+        *self.slot(self.len) = response;
+        self.len += 1;
+        !full
+    }
+
+    fn remove(&mut self, place: usize) {
+        for n in place + 1..self.len {
+            *self.slot(n - 1) = *self.slot(n);
+        }
+        self.len -= 1;
+    }
+
+    fn pop(&mut self) -> Option<Response> {
+        if self.len == 0 {
+            return None;
+        }
+        let response = *self.slot(0);
+        self.first = (self.first + 1) % RECORDS_MAX;
+        self.len -= 1;
+        // That of noise moves up, or has gone.
+        self.noise = self.noise.and_then(|place| place.checked_sub(1));
+        Some(response)
+    }
+}
+
+/// The records of all lines: a line that floods costs the other none of its own.
+#[derive(Clone, Debug)]
+pub(crate) struct ResponseQueues {
+    lines: [ResponseQueue; HOST_LINES],
+    /// Line whose turn it is.
+    turn: usize,
+    lost: u32,
+}
+
+impl ResponseQueues {
+    pub const fn new() -> Self {
+        Self { lines: [const { ResponseQueue::new() }; HOST_LINES], turn: 0, lost: 0 }
+    }
+
+    /// No record waits.
+    pub fn is_empty(&self) -> bool {
+        self.lines.iter().all(|queue| queue.len == 0)
+    }
+
+    /// Records lost since the start because too many waited.
+    pub fn lost(&self) -> u32 {
+        self.lost
+    }
+
+    /// A record for `line`; `noise`: of bytes that are no frame.
+    pub fn push(&mut self, line: usize, response: Response, noise: bool) {
+        let kept = self.lines.get_mut(line).is_some_and(|queue| queue.push(response, noise));
+        self.lost = self.lost.saturating_add(u32::from(!kept));
+    }
+
+    /// The oldest record of a line and the line, one line after the other.
+    pub fn pop(&mut self) -> Option<(usize, Response)> {
+        for _ in 0..HOST_LINES {
+            let line = self.turn;
+            self.turn = (line + 1) % HOST_LINES;
+            if let Some(response) = self.lines.get_mut(line)?.pop() {
+                return Some((line, response));
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use jtc_wire::{DataStatus, FrameStatus, FrameType};
+    use std::vec::Vec;
+
+    const NOISE: Response = Response::bad(0, FrameStatus::IncorrectHeader, 0);
+
+    fn good(n: u16) -> Response {
+        Response::good(FrameType::PidParam, DataStatus::NoError, n)
+    }
+
+    fn all(records: &mut ResponseQueues) -> Vec<(usize, Response)> {
+        std::iter::from_fn(|| records.pop()).collect()
+    }
+
+    #[test]
+    fn j04_sixty_four_records_wait_and_come_in_order() {
+        let mut records = ResponseQueues::new();
+        for round in 0..3 {
+            (0..64).for_each(|n| records.push(0, good(100 * round + n), false));
+            assert_eq!(all(&mut records), (0..64).map(|n| (0, good(100 * round + n))).collect::<Vec<_>>());
+        }
+        assert_eq!((records.lost(), records.is_empty()), (0, true));
+    }
+
+    #[test]
+    fn j04_the_oldest_go_when_more_wait_and_are_counted() {
+        let mut records = ResponseQueues::new();
+        (0..100).for_each(|n| records.push(0, good(n), false));
+        records.push(1, good(7), false);
+        assert_eq!(records.lost(), 36);
+        let left = all(&mut records);
+        assert_eq!((left[0], left[1], left[2]), ((0, good(36)), (1, good(7)), (0, good(37))));
+        assert_eq!(left.len(), 65);
+    }
+
+    #[test]
+    fn j04_noise_joins_the_record_of_noise_that_waits() {
+        let mut records = ResponseQueues::new();
+        for n in 0..5 {
+            records.push(0, NOISE, true);
+            records.push(0, good(n), false);
+            records.push(1, NOISE, true);
+        }
+        let left = all(&mut records);
+        assert_eq!(left.iter().filter(|(_, record)| *record == NOISE).count(), 2, "one a line");
+        assert_eq!(left[0], (0, NOISE));
+        assert_eq!((records.lost(), left.len()), (0, 7));
+        // The next noise is a new record.
+        records.push(0, good(9), false);
+        records.push(0, NOISE, true);
+        assert_eq!(all(&mut records), [(0, good(9)), (0, NOISE)]);
+    }
+
+    #[test]
+    fn j04_noise_goes_first() {
+        let mut records = ResponseQueues::new();
+        (0..63).for_each(|n| records.push(0, good(n), false));
+        records.push(0, NOISE, true);
+        records.push(0, good(63), false);
+        assert_eq!(records.lost(), 1);
+        // Now 64 good ones wait: noise finds no room at all.
+        records.push(0, NOISE, true);
+        assert_eq!(records.lost(), 2);
+        assert_eq!(all(&mut records), (0..64).map(|n| (0, good(n))).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,174 @@
+//! A Stop or a Pause acts in the tick after its last byte, whatever else the line brings (J-04).
+//!
+//! Each test lets two worlds run that differ in the line only: in one it is quiet but for the Stop, in the other it is not. From
+//! the tick after the last byte of the Stop on, both must command the same, bit for bit.
+use jtc_core::{State, Tes};
+use jtc_sim::{Operator, SimConfig, host};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, Response, fixed};
+
+/// What a host writes, and how many ms after the beginning.
+type Script = Vec<(u64, Vec<u8>)>;
+
+/// An arm on the way, at 115 200 Bd or whatever is asked for.
+fn moving(baud: Option<u32>) -> Operator {
+    let mut operator = Operator::new(SimConfig { baud, ..SimConfig::default() });
+    operator.bring_up().expect("it comes up");
+    let from = operator.world.truth().q;
+    let to = [0, 1, 2, 3, 4, 5].map(|j: usize| from[j] + if j == 1 { 0.3 } else { 0.6 });
+    operator.upload(&host::there_and_back(&from, &to, 3.0, 2, 60), 60).expect("it is taken");
+    operator.ask(&host::exec(ExecCommand::Execute)).expect("it begins");
+    operator.wait("the path", 1000, |world| world.telemetry().point > 300).expect("it moves");
+    operator.listener.responses.clear();
+    operator
+}
+
+/// Runs the script; returns the operator in the millisecond in which byte `end` of it has arrived, and which one that is.
+fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
+    let mut operator = moving(baud);
+    let before = operator.world.statistics().serial_to_device;
+    for ms in 0.. {
+        for (_, bytes) in script.iter().filter(|(at, _)| *at == ms) {
+            operator.world.host_write(bytes);
+        }
+        operator.step();
+        if operator.world.statistics().serial_to_device - before >= end {
+            return (operator, ms);
+        }
+    }
+    unreachable!()
+}
+
+/// The command ends at byte `end` of the script; the arm must slow down as on a quiet line.
+fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
+    let (mut busy, ms) = play(baud, script, end);
+    assert_eq!(busy.world.telemetry().tes, Tes::Execute, "still on the way");
+    // Written so early that its last byte arrives in the same millisecond.
+    let frame = host::exec(command);
+    let lead = baud.map_or(0, |rate| (70_000 / u64::from(rate)) + 1);
+    let (mut quiet, quiet_ms) = play(baud, &vec![(ms - lead, frame.clone())], frame.len() as u64);
+    assert_eq!(quiet_ms, ms);
+    let rest: Script = script.iter().filter(|(at, _)| *at > ms).cloned().collect();
+    let mut stood = None;
+    for n in 1..2000 {
+        let set = |operator: &Operator| operator.world.telemetry().joints.map(|j| j.set_position.to_bits());
+        assert_eq!(set(&busy), set(&quiet), "{n} ms after the last byte");
+        if quiet.world.telemetry().tes != Tes::Execute {
+            stood.get_or_insert(n);
+        }
+        for (_, bytes) in rest.iter().filter(|(at, _)| *at == ms + n) {
+            busy.world.host_write(bytes);
+        }
+        busy.step();
+        quiet.step();
+    }
+    assert!(stood.is_some_and(|ms| ms <= 500), "it stands after {stood:?} ms");
+    let wanted = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
+    assert_eq!(busy.world.telemetry().tes, wanted);
+    assert_eq!((busy.state(), busy.world.telemetry().errors), (State::HoldPos, 0));
+    busy
+}
+
+fn exec_records(operator: &Operator) -> Vec<DataStatus> {
+    let of_exec = |r: &&Response| r.frame_type == FrameType::TrajSetExecStatus as u8;
+    operator.listener.responses.iter().filter(of_exec).map(|r| r.data).collect()
+}
+
+#[test]
+fn j04_a_stop_behind_hundreds_of_frames() {
+    for (baud, frames) in [(Some(115_200), 400), (Some(9600), 400)] {
+        let bytes = [fixed::CLEAR_OCCURRED_ERRORS.repeat(frames), fixed::STOP.to_vec()].concat();
+        let end = bytes.len() as u64;
+        let busy = acts_at_once(baud, &vec![(0, bytes)], end, ExecCommand::Stop);
+        if baud == Some(115_200) {
+            assert_eq!(exec_records(&busy), [DataStatus::NoError], "one record of its own");
+        }
+    }
+}
+
+#[test]
+fn j04_a_stop_behind_four_thousand_frames() {
+    // 24 000 bytes: two seconds at this rate. At the highest one, more than the board can hold.
+    for (baud, frames) in [(115_200, 4000), (15_000_000, 4000), (15_000_000, 200_000)] {
+        let bytes = [fixed::CLEAR_OCCURRED_ERRORS.repeat(frames), fixed::STOP.to_vec()].concat();
+        let end = bytes.len() as u64;
+        let busy = acts_at_once(Some(baud), &vec![(0, bytes)], end, ExecCommand::Stop);
+        let lost = busy.world.statistics().lost_bytes;
+        assert_eq!(lost > 0, frames == 200_000, "{lost} bytes of {end} at {baud} Bd");
+        if lost == 0 {
+            assert_eq!(exec_records(&busy), [DataStatus::NoError]);
+        }
+    }
+}
+
+/// A line outruns the execution of the shortest frames only above 960 kBd, so that nothing but records is lost below.
+#[test]
+fn j04_short_frames_are_executed_as_fast_as_they_come() {
+    let mut operator = moving(Some(921_600));
+    operator.world.host_write(&fixed::PUMP_OFF.repeat(20_000));
+    operator.world.host_write(&fixed::CLEAR_OCCURRED_ERRORS.repeat(20_000));
+    let mut done = 0;
+    while operator.world.host_write_pending() > 0 {
+        operator.step();
+        done += operator.world.worked().len();
+    }
+    operator.step();
+    done += operator.world.worked().len();
+    assert_eq!(done, 40_000, "when the last byte has come, the last frame is executed in the same tick");
+    assert_eq!(operator.world.statistics().lost_bytes, 0);
+}
+
+#[test]
+fn j04_a_stop_among_pump_frames() {
+    // A hundred a second for three seconds, and more after the Stop.
+    let mut script: Script = (0..500).map(|n| (10 * n, fixed::PUMP_OFF.to_vec())).collect();
+    script.insert(300, (3004, fixed::PAUSE.to_vec()));
+    let end = 300 * 10 + 10 + 7;
+    let before: u64 = script.iter().filter(|(at, _)| *at <= 3004).map(|(_, bytes)| bytes.len() as u64).sum();
+    assert!(before <= end);
+    let busy = acts_at_once(Some(115_200), &script, before, ExecCommand::Pause);
+    assert_eq!(exec_records(&busy), [DataStatus::NoError]);
+}
+
+#[test]
+fn j04_a_stop_in_noise() {
+    for baud in [115_200, 9600] {
+        for byte in [0x00, 0x55, 0xFF, 0x9B, 0x0B] {
+            // A byte every 6 ms, before, between and after; the Stop follows one without a gap.
+            let mut script: Script = (0..500).map(|n| (6 * n, vec![byte])).collect();
+            script[250].1.extend(fixed::STOP);
+            let end = 251 + 7;
+            let busy = acts_at_once(Some(baud), &script, end, ExecCommand::Stop);
+            assert_eq!(exec_records(&busy), [DataStatus::NoError], "0x{byte:02X} at {baud} Bd");
+            assert_eq!(busy.world.telemetry().records_lost, 0);
+        }
+    }
+}
+
+#[test]
+fn j04_a_stop_behind_a_false_header_and_a_long_frame() {
+    let points = host::there_and_back(&[0.0; 6], &[0.1; 6], 1.0, 2, 10);
+    let long = host::trajectory(&points, 10, 400).concat();
+    for front in [&[0x9B, 0x04, 0xEA, 0x56][..], &[0x9B], &long, &long[..long.len() - 3]] {
+        let bytes = [front, &fixed::STOP].concat();
+        let end = bytes.len() as u64;
+        let busy = acts_at_once(Some(115_200), &vec![(0, bytes)], end, ExecCommand::Stop);
+        assert_eq!(exec_records(&busy), [DataStatus::NoError], "{} bytes in front", front.len());
+    }
+}
+
+#[test]
+fn j04_a_stop_cancels_an_execute_that_waits() {
+    let mut operator = moving(Some(115_200));
+    operator.ask(&host::exec(ExecCommand::Stop)).expect("it stops");
+    operator.wait("Stop", 600, |world| world.telemetry().tes == Tes::Stop).expect("it stops");
+    operator.listener.responses.clear();
+    // An Execute behind gains that are executed one a tick, and a Stop behind it.
+    let frames = [&fixed::PID_PARAM_USE_DEFAULT.repeat(30)[..], &fixed::EXECUTE, &fixed::STOP].concat();
+    operator.world.host_write(&frames);
+    for _ in 0..1500 {
+        operator.step();
+        assert_eq!(operator.world.telemetry().tes, Tes::Stop, "nothing moves");
+    }
+    assert_eq!(exec_records(&operator), [DataStatus::NotAllowed, DataStatus::NoError]);
+    assert_eq!(operator.listener.responses.len(), 32, "one record a frame");
+}

@@ -1,0 +1,170 @@
+//! What the parsers of the lines found, copied in order for the controller, so that the parsers can take more bytes while
+//! the controller works.
+use crate::frame::{FRAME_MAX, FrameRef, FrameType};
+use crate::response::{DataStatus, FrameStatus, Response};
+use crate::stream::LinkEvent;
+
+/// Events of a batch at most: what a controller executes in one tick at most.
+pub const EVENTS_MAX: usize = 16;
+
+/// An event and where it came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReceivedEvent<'a> {
+    /// Number of its line.
+    pub line: usize,
+    /// Where in the stream of that line it began.
+    pub position: u64,
+    /// What was received.
+    pub event: LinkEvent<'a>,
+}
+
+/// Events in the order in which they are to be executed. Integers only: all zeros are an empty batch.
+pub struct EventBatch {
+    /// Events put in, and how many of them are done.
+    len: u16,
+    done: u16,
+    /// Bytes used.
+    used: u16,
+    entries: [Entry; EVENTS_MAX],
+    bytes: [u8; FRAME_MAX],
+}
+
+#[derive(Clone, Copy)]
+struct Entry {
+    position: u64,
+    /// Bytes of a frame.
+    start: u16,
+    length: u16,
+    line: u8,
+    sort: u8,
+    frame_type: u8,
+    status: u8,
+}
+
+const FRAME: u8 = 0;
+const BAD: u8 = 1;
+const NOISE: u8 = 2;
+
+impl EventBatch {
+    /// Empty.
+    pub const fn new() -> Self {
+        let entry = Entry { position: 0, start: 0, length: 0, line: 0, sort: 0, frame_type: 0, status: 0 };
+        Self { len: 0, done: 0, used: 0, entries: [entry; EVENTS_MAX], bytes: [0; FRAME_MAX] }
+    }
+
+    /// Copies an event; false when there is no room for it.
+    pub fn push(&mut self, received: &ReceivedEvent<'_>) -> bool {
+        let start = usize::from(self.used);
+        let Some(entry) = self.entries.get_mut(usize::from(self.len)) else { return false };
+        let (sort, frame_type, status, length) = match received.event {
+            LinkEvent::Frame(frame) => {
+                let Some(place) = self.bytes.get_mut(start..start + frame.bytes.len()) else { return false };
+                place.copy_from_slice(frame.bytes);
+                // At most FRAME_MAX.
+                self.used += frame.bytes.len() as u16;
+                (FRAME, frame.frame_type as u8, FrameStatus::NoError, frame.bytes.len() as u16)
+            }
+            LinkEvent::Bad(r) => (BAD, r.frame_type, r.status, r.length),
+            LinkEvent::Noise(r) => (NOISE, r.frame_type, r.status, r.length),
+        };
+        *entry = Entry {
+            position: received.position,
+            start: start as u16,
+            length,
+            line: received.line as u8,
+            sort,
+            frame_type,
+            status: status as u8,
+        };
+        self.len += 1;
+        true
+    }
+
+    /// The `n`-th of the events that are not done.
+    pub fn get(&self, n: usize) -> Option<ReceivedEvent<'_>> {
+        let n = usize::from(self.done).checked_add(n)?;
+        let entry = self.entries.get(..usize::from(self.len))?.get(n)?;
+        let response = Response {
+            frame_type: entry.frame_type,
+            status: FrameStatus::from_byte(entry.status).unwrap_or_default(),
+            data: DataStatus::Idle,
+            length: entry.length,
+        };
+        let event = match entry.sort {
+            NOISE => LinkEvent::Noise(response),
+            BAD => LinkEvent::Bad(response),
+            _ => {
+                let start = usize::from(entry.start);
+                let bytes = self.bytes.get(start..start + usize::from(entry.length))?;
+                LinkEvent::Frame(FrameRef { frame_type: FrameType::from_byte(entry.frame_type)?, bytes })
+            }
+        };
+        Some(ReceivedEvent { line: entry.line.into(), position: entry.position, event })
+    }
+
+    /// The oldest `count` events are done. When all are, there is room for as many again.
+    pub fn done(&mut self, count: usize) {
+        let left = usize::from(self.len - self.done);
+        self.done += count.min(left) as u16;
+        if self.done == self.len {
+            (self.len, self.done, self.used) = (0, 0, 0);
+        }
+    }
+
+    /// No event is left.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+}
+
+impl Default for EventBatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed;
+    use std::boxed::Box;
+
+    fn frame(bytes: &[u8]) -> LinkEvent<'_> {
+        LinkEvent::Frame(FrameRef::new_checked(bytes).expect("a good frame"))
+    }
+
+    #[test]
+    fn j04_events_come_out_as_they_went_in() {
+        let mut batch = Box::new(EventBatch::new());
+        let bad = Response::bad(4, FrameStatus::IncorrectCrc, 18_014);
+        let noise = Response::bad(0, FrameStatus::IncorrectHeader, 0);
+        let events =
+            [frame(&fixed::STOP), LinkEvent::Bad(bad), LinkEvent::Noise(noise), frame(&fixed::PUMP_ON)];
+        for round in 0..3u64 {
+            for (n, event) in events.into_iter().enumerate() {
+                assert!(batch.push(&ReceivedEvent { line: n % 2, position: round + n as u64, event }));
+            }
+            for (n, event) in events.into_iter().enumerate() {
+                let received = batch.get(0).expect("one is left");
+                assert_eq!(received, ReceivedEvent { line: n % 2, position: round + n as u64, event });
+                assert_eq!(batch.get(1).is_none(), n == 3);
+                batch.done(1);
+            }
+            assert!(batch.is_empty() && batch.get(0).is_none());
+        }
+    }
+
+    #[test]
+    fn j07_a_full_batch_takes_nothing_more() {
+        let mut batch = Box::new(EventBatch::new());
+        let stop = ReceivedEvent { line: 0, position: 0, event: frame(&fixed::STOP) };
+        assert_eq!((0..100).filter(|_| batch.push(&stop)).count(), EVENTS_MAX);
+        batch.done(EVENTS_MAX + 5);
+        let mut long = std::vec![0; FRAME_MAX];
+        let n =
+            crate::trajectory(&mut long, (0, 0, 1), 10, [crate::RawPoint::default(); 1666]).expect("it fits");
+        let segment = ReceivedEvent { line: 0, position: 7, event: frame(&long[..n]) };
+        assert!(batch.push(&segment) && !batch.push(&segment), "there is room for one of that length");
+        assert_eq!(batch.get(0), Some(segment));
+    }
+}

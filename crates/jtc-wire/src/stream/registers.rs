@@ -1,0 +1,62 @@
+//! CRC registers kept along the receive buffer, so that a candidate of any length is checked with two of them.
+use crate::crc::crc16_update;
+use crate::frame::FRAME_MAX;
+
+/// Bytes between two kept CRC registers.
+const GRID: usize = 64;
+/// CRC registers kept.
+const REGISTERS: usize = FRAME_MAX.div_ceil(GRID) + 1;
+
+/// CRC registers along the buffer: before its first byte, and before the bytes `phase`, `phase + 64`, …
+pub(super) struct Registers {
+    base: u16,
+    last: u16,
+    /// 1..=GRID.
+    phase: usize,
+    count: usize,
+    kept: [u16; REGISTERS],
+}
+
+impl Registers {
+    pub const fn new() -> Self {
+        Self { base: 0, last: 0, phase: GRID, count: 0, kept: [0; REGISTERS] }
+    }
+
+    /// Goes on over `bytes`, which are at `end..` of the buffer.
+    pub fn absorb(&mut self, mut end: usize, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let next = self.phase + self.count * GRID;
+            let (piece, rest) = bytes.split_at((next - end).min(bytes.len()));
+            self.last = crc16_update(self.last, piece);
+            end += piece.len();
+            bytes = rest;
+            if end == next {
+                self.kept[self.count] = self.last;
+                self.count += 1;
+            }
+        }
+    }
+
+    pub fn at(&self, at: usize, end: usize, buffer: &[u8]) -> u16 {
+        if at == end {
+            self.last
+        } else if at < self.phase {
+            crc16_update(self.base, &buffer[..at])
+        } else {
+            let slot = (at - self.phase) / GRID;
+            crc16_update(self.kept[slot], &buffer[self.phase + slot * GRID..at])
+        }
+    }
+
+    /// The bytes before `by` go.
+    pub fn shift(&mut self, by: usize, end: usize, buffer: &[u8]) {
+        self.base = self.at(by, end, buffer);
+        if by >= self.phase {
+            let gone = (by - self.phase) / GRID + 1;
+            self.kept.copy_within(gone.min(self.count)..self.count, 0);
+            self.count = self.count.saturating_sub(gone);
+            self.phase += gone * GRID;
+        }
+        self.phase -= by;
+    }
+}

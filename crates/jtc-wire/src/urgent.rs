@@ -1,0 +1,254 @@
+//! Stop and Pause ahead of everything: found in the bytes of a line as they arrive, before and apart from the parsing of
+//! frames (J-04).
+//!
+//! A frame waits for the frames before it, for a false header that promises bytes which never come, or for a place in a
+//! full buffer. A Stop must wait for nothing. So the seven bytes of a Stop or a Pause are recognised wherever they stand,
+//! and the command acts in the next tick. The frame itself goes its way through the [`Receiver`](crate::Receiver) all the
+//! same and gets its response record in its turn; by its place in the stream the controller sees that it has acted
+//! already, and that an Execute was received before it and is not to be carried out any more.
+//!
+//! The price: the same seven bytes inside the body of another frame also stop the arm. That errs on the safe side, and
+//! happens to one in 2⁵⁶ places of a body of chance bytes.
+use crate::command::ExecCommand;
+use crate::fixed;
+
+/// A command that waits for nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum UrgentCommand {
+    Stop,
+    Pause,
+}
+
+impl From<UrgentCommand> for ExecCommand {
+    fn from(command: UrgentCommand) -> Self {
+        match command {
+            UrgentCommand::Stop => Self::Stop,
+            UrgentCommand::Pause => Self::Pause,
+        }
+    }
+}
+
+impl UrgentCommand {
+    /// Stop or Pause; `None` for Execute.
+    pub const fn from_exec(command: ExecCommand) -> Option<Self> {
+        match command {
+            ExecCommand::Stop => Some(Self::Stop),
+            ExecCommand::Pause => Some(Self::Pause),
+            ExecCommand::Execute => None,
+        }
+    }
+}
+
+/// The urgent commands that a line brought in one tick: how many of each, and which was the last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct UrgentCommands {
+    stops: u8,
+    pauses: u8,
+    pause_is_last: bool,
+}
+
+impl UrgentCommands {
+    /// None.
+    pub const NONE: Self = Self { stops: 0, pauses: 0, pause_is_last: false };
+
+    /// One more, behind the others.
+    pub fn push(&mut self, command: UrgentCommand) {
+        self.add(command, 1);
+    }
+
+    /// So many of one sort behind the others.
+    pub fn add(&mut self, command: UrgentCommand, count: u8) {
+        if count == 0 {
+            return;
+        }
+        self.pause_is_last = command == UrgentCommand::Pause;
+        let counter = if self.pause_is_last { &mut self.pauses } else { &mut self.stops };
+        *counter = counter.saturating_add(count);
+    }
+
+    /// There are none.
+    pub const fn is_empty(&self) -> bool {
+        self.stops == 0 && self.pauses == 0
+    }
+
+    /// Each sort that came and how often, the one that came last at the end.
+    pub fn iter(&self) -> impl Iterator<Item = (UrgentCommand, u8)> {
+        let (stops, pauses) = ((UrgentCommand::Stop, self.stops), (UrgentCommand::Pause, self.pauses));
+        let order = if self.pause_is_last { [stops, pauses] } else { [pauses, stops] };
+        order.into_iter().filter(|(_, count)| *count > 0)
+    }
+}
+
+/// Bytes of a Stop or a Pause.
+const LENGTH: usize = 7;
+/// The last seven bytes, the oldest on top.
+const WINDOW: u64 = (1 << (8 * LENGTH)) - 1;
+const STOP: u64 = window(&fixed::STOP);
+const PAUSE: u64 = window(&fixed::PAUSE);
+
+const fn window(bytes: &[u8; LENGTH]) -> u64 {
+    let [a, b, c, d, e, f, g] = *bytes;
+    u64::from_be_bytes([0, a, b, c, d, e, f, g])
+}
+
+/// One line.
+#[derive(Clone, Copy, Debug)]
+struct Tail {
+    /// Its last bytes.
+    window: u64,
+    /// Bytes received.
+    received: u64,
+    /// When the last of them came.
+    last_us: u64,
+    /// What came since the last [`UrgentWatch::take`].
+    commands: UrgentCommands,
+    /// Where in the stream the last of these ended.
+    hit: u64,
+    /// Bytes received when the last urgent command of any line came: what began before is older than it.
+    overtaken: u64,
+}
+
+/// Watches the bytes of all lines to a controller for Stop and Pause.
+///
+/// In each tick: [`scan`](Self::scan) what has arrived on every line, then [`take`](Self::take) the commands. An Execute at
+/// a place that is [`overtaken`](Self::overtaken) is not to be carried out.
+///
+/// ```
+/// use jtc_wire::{UrgentCommand, UrgentWatch, fixed};
+/// let mut watch = UrgentWatch::<1>::new(6000);
+/// // A false header, then a Stop in two pieces.
+/// watch.scan(0, 0, &[0x9B, 0x04, 0xEA, 0x56, 0x9B, 0x0B]);
+/// assert!(watch.take()[0].is_empty());
+/// watch.scan(0, 1000, &fixed::STOP[2..]);
+/// assert!(watch.take()[0].iter().eq([(UrgentCommand::Stop, 1)]));
+/// assert!(watch.overtaken(0, 4) && !watch.overtaken(0, 11));
+/// ```
+#[derive(Clone, Debug)]
+pub struct UrgentWatch<const LINES: usize> {
+    gap_us: u64,
+    lines: [Tail; LINES],
+}
+
+impl<const LINES: usize> UrgentWatch<LINES> {
+    /// `gap_us`: silence after which bytes no longer belong together. Times are only as fine as the calls of `scan`, so give
+    /// the receiver's gap and a tick more: then every Stop that the receiver finds is seen.
+    pub const fn new(gap_us: u32) -> Self {
+        let tail =
+            Tail { window: 0, received: 0, last_us: 0, commands: UrgentCommands::NONE, hit: 0, overtaken: 0 };
+        Self { gap_us: gap_us as u64, lines: [tail; LINES] }
+    }
+
+    /// Bytes that have arrived on a line by `now_us`: every byte once, in order. A few instructions a byte.
+    pub fn scan(&mut self, line: usize, now_us: u64, bytes: &[u8]) {
+        let Some(tail) = self.lines.get_mut(line) else { return };
+        if bytes.is_empty() {
+            return;
+        }
+        if now_us.saturating_sub(tail.last_us) >= self.gap_us {
+            tail.window = 0;
+        }
+        tail.last_us = now_us;
+        for &byte in bytes {
+            tail.received += 1;
+            tail.window = (tail.window << 8 | u64::from(byte)) & WINDOW;
+            let command = match tail.window {
+                STOP => UrgentCommand::Stop,
+                PAUSE => UrgentCommand::Pause,
+                _ => continue,
+            };
+            tail.commands.push(command);
+            tail.hit = tail.received;
+        }
+    }
+
+    /// The commands of each line since the last call.
+    pub fn take(&mut self) -> [UrgentCommands; LINES] {
+        let commands = self.lines.map(|tail| tail.commands);
+        let lines_with = commands.iter().filter(|commands| !commands.is_empty()).count();
+        for tail in &mut self.lines {
+            let own = !core::mem::take(&mut tail.commands).is_empty();
+            // Which of two lines was first within a tick is not known: all that either has sent counts as older.
+            match lines_with {
+                0 => {}
+                1 if own => tail.overtaken = tail.hit,
+                _ => tail.overtaken = tail.received,
+            }
+        }
+        commands
+    }
+
+    /// What began at byte `position` of a line was received before the last urgent command of any line.
+    pub fn overtaken(&self, line: usize, position: u64) -> bool {
+        self.lines.get(line).is_some_and(|tail| position < tail.overtaken)
+    }
+
+    /// Bytes received on a line.
+    pub fn received(&self, line: usize) -> u64 {
+        self.lines.get(line).map_or(0, |tail| tail.received)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use UrgentCommand::{Pause, Stop};
+
+    fn commands(watch: &mut UrgentWatch<2>) -> [std::vec::Vec<(UrgentCommand, u8)>; 2] {
+        watch.take().map(|commands| commands.iter().collect())
+    }
+
+    #[test]
+    fn j04_a_stop_is_seen_at_its_last_byte_wherever_it_stands() {
+        let mut watch = UrgentWatch::<2>::new(6000);
+        for (n, noise) in
+            [&[][..], &[0x9B], &[0x9B, 0x0B, 0, 7], &[7; 300], &fixed::STOP[..6]].iter().enumerate()
+        {
+            let now = n as u64 * 100_000;
+            watch.scan(1, now, noise);
+            watch.scan(1, now + 1000, &fixed::STOP[..6]);
+            assert_eq!(commands(&mut watch), [[], []]);
+            watch.scan(1, now + 2000, &fixed::STOP[6..]);
+            assert_eq!(commands(&mut watch), [[].to_vec(), [(Stop, 1)].to_vec()], "behind {noise:?}");
+        }
+    }
+
+    #[test]
+    fn j05_a_stop_with_a_gap_in_it_is_none() {
+        let mut watch = UrgentWatch::<2>::new(6000);
+        for cut in 1..7 {
+            let now = cut as u64 * 100_000;
+            watch.scan(0, now, &fixed::PAUSE[..cut]);
+            watch.scan(0, now + 6000, &fixed::PAUSE[cut..]);
+            assert_eq!(commands(&mut watch), [[], []], "cut at {cut}");
+            watch.scan(0, now + 20_000, &fixed::PAUSE[..cut]);
+            watch.scan(0, now + 25_999, &fixed::PAUSE[cut..]);
+            assert_eq!(commands(&mut watch)[0], [(Pause, 1)], "joined at {cut}");
+        }
+    }
+
+    #[test]
+    fn j04_the_last_of_several_commands_acts_last() {
+        let mut watch = UrgentWatch::<2>::new(6000);
+        watch.scan(0, 0, &[fixed::STOP, fixed::PAUSE, fixed::STOP].concat());
+        assert_eq!(commands(&mut watch)[0], [(Pause, 1), (Stop, 2)]);
+        watch.scan(0, 0, &[fixed::STOP, fixed::EXECUTE, fixed::PAUSE].concat());
+        assert_eq!(commands(&mut watch)[0], [(Stop, 1), (Pause, 1)]);
+    }
+
+    #[test]
+    fn j04_only_what_was_received_before_is_overtaken() {
+        let mut watch = UrgentWatch::<2>::new(6000);
+        watch.scan(1, 0, &fixed::EXECUTE);
+        watch.scan(0, 0, &[fixed::EXECUTE, fixed::STOP, fixed::EXECUTE].concat());
+        assert!(!watch.overtaken(0, 0), "not before the command was taken");
+        watch.take();
+        assert!(watch.overtaken(0, 0) && watch.overtaken(0, 7), "the Stop itself has acted, too");
+        assert!(!watch.overtaken(0, 14), "what follows the Stop is newer");
+        assert!(watch.overtaken(1, 0), "an Execute of the other line is older");
+        watch.scan(1, 1000, &fixed::EXECUTE);
+        watch.take();
+        assert!(!watch.overtaken(1, 7));
+        assert_eq!((watch.received(0), watch.received(1)), (21, 14));
+    }
+}

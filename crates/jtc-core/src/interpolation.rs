@@ -64,6 +64,18 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     SetPoint { position: from_fn(position), velocity: from_fn(velocity), acceleration: from_fn(acceleration) }
 }
 
+/// Speed of the position itself (rad/s) where [`interpolate`] takes it: that of the cubic, and what is due to the way that the
+/// velocities of both points do not explain.
+pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
+    let cubic = interpolate(a, b, h, u).velocity;
+    from_fn(|j| {
+        let explained = 0.5 * h * (a.velocity[j] + b.velocity[j])
+            + h * h * (a.acceleration[j] - b.acceleration[j]) / 12.0;
+        let unexplained = b.position[j] - a.position[j] - explained;
+        cubic[j] + 30.0 * unexplained / h * u * u * (1.0 - u) * (1.0 - u)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,6 +124,15 @@ mod tests {
             let got = interpolate(&knot(0.0), &knot(h), h, u);
             prop_assert!((got.velocity[0] - cubic(u * h).0).abs() < 1e-12);
             prop_assert!((got.acceleration[0] - (cubic(0.0).1 + u * (cubic(h).1 - cubic(0.0).1))).abs() < 1e-12);
+        }
+
+        /// The speed of the position is its derivative.
+        #[test]
+        fn j32_the_speed_of_the_position_is_its_slope(a in point(), b in point(), h in 0.01..0.5f64, u in 0.01..0.99f64) {
+            let at = |u| interpolate(&a, &b, h, u).position[2];
+            let slope = (at(u + 1e-5) - at(u - 1e-5)) / (2e-5 * h);
+            let speed = position_speed(&a, &b, h, u)[2];
+            prop_assert!((slope - speed).abs() < 1e-5 * (1.0 + speed.abs()), "{slope} {speed}");
         }
 
         /// Rounding the positions to the int16 grid must not leak into velocity and acceleration.

@@ -25,7 +25,7 @@ mod telemetry;
 pub use check::{TrajectoryCheck, Violation};
 pub use config::{Config, ConfigError, Friction, JointConfig, Parameters, PidGains, TableOf, WORKING_AREA};
 pub use controller::Controller;
-pub use interpolation::{SetPoint, interpolate};
+pub use interpolation::{SetPoint, interpolate, position_speed};
 pub use io::{BusState, HostEvent, Inputs, Outputs};
 pub use records::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};

@@ -1,12 +1,18 @@
-//! Verdicts on a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, start pose.
+//! Verdicts on a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, room to stop,
+//! start pose.
 //!
 //! Between points the controller's own interpolation runs, on the numbers as the wire carries them, once a millisecond: what
-//! passes here is what the controller will compute.
+//! passes here is what the controller will compute. The controller's own check (J-36) runs on the same numbers, so that what
+//! passes here is not refused there.
 
+mod hint;
+mod stopping;
 mod verdict;
 
+use jtc_core::check::{Quantity, REST_SPEED};
 use jtc_core::{
-    Config, Friction, JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX, SetPoint, interpolate,
+    Config, Friction, JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX, SetPoint, TrajectoryCheck,
+    Violation, interpolate, position_speed,
 };
 use jtc_dynamics::{ArmModel, Dynamics};
 
@@ -33,10 +39,8 @@ pub struct Checker<'a> {
 }
 
 /// Least significant bit of positions and velocities on the wire.
-const POSITION_BIT: f64 = jtc_wire::POSITION_SCALE / 32767.0;
+pub(crate) const POSITION_BIT: f64 = jtc_wire::POSITION_SCALE / 32767.0;
 const VELOCITY_BIT: f64 = jtc_wire::VELOCITY_SCALE / 32767.0;
-/// Speed at the first and last point that standing still means, rad/s.
-const REST: f64 = 0.02;
 
 impl<'a> Checker<'a> {
     /// Against the limits of `config` alone.
@@ -66,8 +70,54 @@ impl<'a> Checker<'a> {
         let Some(first) = points.first() else { return verdict.done() };
         self.start_pose(first, &mut verdict);
         self.ends(&points, &mut verdict);
-        self.path(trajectory.step_ms, &points, &mut verdict);
+        let dynamics = self.model.map(|m| Dynamics::new(m, self.config.gravity));
+        self.path(trajectory.step_ms, &points, dynamics.as_ref(), &mut verdict);
+        self.controller(trajectory, &mut verdict);
+        // Without a path that can be run there is none to stop on.
+        if let Some(dynamics) = dynamics.filter(|_| verdict.problems.iter().all(|p| !p.kind.stops_at_once()))
+        {
+            stopping::stops(self.config, &dynamics, trajectory.step_ms, &points, &mut verdict);
+        }
         verdict.done()
+    }
+
+    /// What the controller itself will say when it is loaded (J-36); what is known already stays as it is.
+    fn controller(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
+        let tables = match self.friction {
+            Some(Friction::Table(tables)) => Some(tables),
+            _ => None,
+        };
+        if trajectory.step_ms == 0 {
+            return;
+        }
+        let mut check = TrajectoryCheck::new(self.config, trajectory.step_ms, tables);
+        let mut found = Vec::new();
+        for (i, point) in trajectory.points.iter().enumerate() {
+            let Ok(raw) = point.raw(i) else { return };
+            found.extend(check.take(&raw).err());
+        }
+        found.extend(check.end().err());
+        for Violation { point, fraction, joint, quantity, value, limit } in found {
+            let kind = match quantity {
+                Quantity::Position => ProblemKind::Position,
+                Quantity::Velocity => ProblemKind::Velocity,
+                Quantity::Acceleration => ProblemKind::Acceleration,
+                Quantity::PositionSpeed => ProblemKind::PositionSpeed,
+                Quantity::Rest => ProblemKind::NotAtRest,
+                Quantity::FrictionVelocity => ProblemKind::FrictionVelocity,
+                Quantity::FrictionTemperature => continue,
+            };
+            let point = point as usize;
+            let counted = matches!(kind, ProblemKind::PositionSpeed | ProblemKind::FrictionVelocity);
+            let known = verdict.problems.iter().any(|p| {
+                let jump = p.kind == ProblemKind::Jump && p.point == point;
+                p.joint == Some(joint + 1) && (jump || (p.kind == kind && !counted))
+            });
+            if !known {
+                let ms = (fraction * f64::from(trajectory.step_ms)).round();
+                verdict.add(kind, Some(joint), point, ms, value, limit);
+            }
+        }
     }
 
     fn counts(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
@@ -108,8 +158,8 @@ impl<'a> Checker<'a> {
     fn ends(&self, points: &[SetPoint], verdict: &mut Verdict) {
         for i in [0, points.len() - 1] {
             for (j, v) in points[i].velocity.iter().enumerate() {
-                if v.abs() > REST {
-                    verdict.add(ProblemKind::NotAtRest, Some(j), i, 0.0, *v, REST);
+                if v.abs() > REST_SPEED {
+                    verdict.add(ProblemKind::NotAtRest, Some(j), i, 0.0, *v, REST_SPEED);
                 }
             }
             if points.len() == 1 {
@@ -118,18 +168,21 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn path(&self, step_ms: u16, points: &[SetPoint], verdict: &mut Verdict) {
+    fn path(&self, step_ms: u16, points: &[SetPoint], dynamics: Option<&Dynamics>, verdict: &mut Verdict) {
         let h = f64::from(step_ms) * 1e-3;
-        let dynamics = self.model.map(|m| Dynamics::new(m, self.config.gravity));
         for (i, a) in points.iter().enumerate() {
-            self.moment(a, i, 0.0, dynamics.as_ref(), verdict);
+            self.moment(a, i, 0.0, dynamics, verdict);
             let Some(b) = points.get(i + 1) else { break };
-            if self.step(a, b, i, h, verdict) {
-                continue;
-            }
-            for ms in 1..step_ms {
-                let u = f64::from(ms) / f64::from(step_ms);
-                self.moment(&interpolate(a, b, h, u), i, f64::from(ms), dynamics.as_ref(), verdict);
+            let senseless = self.step(a, b, i, h, verdict);
+            // Also where a point lies in the middle of a step of one or two milliseconds.
+            for k in 1..step_ms.max(2) {
+                let u = f64::from(k) / f64::from(step_ms.max(2));
+                for (figures, speed) in verdict.joints.iter_mut().zip(position_speed(a, b, h, u)) {
+                    figures.speed(speed);
+                }
+                if !senseless && k < step_ms {
+                    self.moment(&interpolate(a, b, h, u), i, f64::from(k), dynamics, verdict);
+                }
             }
         }
     }
@@ -149,8 +202,6 @@ impl<'a> Checker<'a> {
             if moved.abs() > 2.0 * limit.velocity_max * h + 3.0 * POSITION_BIT {
                 verdict.add(ProblemKind::Jump, Some(j), i, 0.0, moved, limit.velocity_max * h);
                 senseless = true;
-            } else if moved.abs() > 1.05 * limit.velocity_max * h + 3.0 * POSITION_BIT {
-                verdict.add(ProblemKind::PositionSpeed, Some(j), i, 0.0, moved / h, limit.velocity_max);
             } else if beyond > 0.05 * limit.velocity_max * h {
                 verdict.add(ProblemKind::VelocityMismatch, Some(j), i, 0.0, moved / h, expected / h);
             }
@@ -174,7 +225,8 @@ impl<'a> Checker<'a> {
                     verdict.add(kind, Some(j), i, ms, value, if value < min { min } else { max });
                 }
             };
-            over(ProblemKind::Position, q, limit.position_min, limit.position_max);
+            let (low, high) = self.config.position_range(j);
+            over(ProblemKind::Position, q, low, high);
             over(ProblemKind::Velocity, v, -limit.velocity_max, limit.velocity_max);
             over(ProblemKind::Acceleration, a, -limit.acceleration_max, limit.acceleration_max);
             let mut whole = None;

@@ -132,6 +132,94 @@ fn torque_along_the_path_is_held_against_the_limits() {
     );
 }
 
+/// Two points that nothing can follow: named as too fast, with the speed that works.
+#[test]
+fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
+    let to = Point { position: [0.0, 0.0, 2.5, 0.0, 0.0, 0.0], ..Point::default() };
+    let t = Trajectory { step_ms: 300, points: vec![Point::default(), to] };
+    let verdict = check(&t);
+    assert_eq!(verdict.problems.len(), 1, "{verdict}");
+    assert_eq!(
+        (verdict.problems[0].kind, verdict.problems[0].joint),
+        (ProblemKind::PositionSpeed, Some(3)),
+        "{verdict}"
+    );
+    // 15/8 of 2.5 rad in 0.3 s, along the path and not at its points.
+    assert!((verdict.joints[2].velocity_peak_rad_s - 15.625).abs() < 0.01);
+    assert!(verdict.hint().contains("--speed 9`"), "{}", verdict.hint());
+    let slow = check(&plan::at_speed(&t, 9.0).unwrap());
+    assert!(slow.is_ok(), "{slow}");
+}
+
+#[test]
+fn degrees_are_recognised() {
+    let mut t = smooth();
+    for p in &mut t.points {
+        for channel in [&mut p.position, &mut p.velocity, &mut p.acceleration] {
+            *channel = channel.map(f64::to_degrees);
+        }
+    }
+    let verdict = check(&t);
+    assert!(!verdict.is_ok() && verdict.hint().contains("degrees"), "{}", verdict.hint());
+    assert!(verdict.to_string().lines().count() < 30, "{verdict}");
+}
+
+/// J-36: what the controller refuses is refused here, with the same words for all of it.
+#[test]
+fn j36_nothing_passes_that_the_controller_refuses() {
+    let mut t = smooth();
+    t.points[20].position[4] += 0.02;
+    let verdict = check(&t);
+    let bump = verdict.refusals().next().expect("refused");
+    assert_eq!((bump.kind, bump.joint), (ProblemKind::PositionSpeed, Some(5)), "{verdict}");
+    assert!((19..=20).contains(&bump.point) && bump.ms > 0.0, "{verdict}");
+    // Limits beyond the drives' working area.
+    let mut config = Config::avena();
+    config.joints[0].position_max = 3.05;
+    let mut out = Trajectory { step_ms: 100, points: vec![Point::default(); 3] };
+    out.points.iter_mut().for_each(|p| p.position[0] = 3.0);
+    let verdict = Checker::new(&config).check(&out);
+    assert_eq!((verdict.problems[0].kind, verdict.problems[0].limit), (ProblemKind::Position, 2.9905));
+}
+
+#[test]
+fn j36_the_friction_table_bounds_the_speed() {
+    let table = jtc_core::Parameters::avena_friction_table();
+    let config = Config::avena();
+    let with = |speed| {
+        let t = plan::joint_move(&[0.0; 6], &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0], &config, speed).unwrap();
+        Checker { friction: Some(&table), ..Checker::new(&config) }.check(&t)
+    };
+    assert!(with(50.0).is_ok(), "{}", with(50.0));
+    let verdict = with(80.0);
+    let over = verdict.refusals().next().expect("refused");
+    assert_eq!((over.kind, over.joint), (ProblemKind::FrictionVelocity, Some(4)), "{verdict}");
+    assert!(verdict.hint().contains("--speed"), "{}", verdict.hint());
+}
+
+/// J-33: the torque suffices for the motion, but not for stopping it: lowering the stretched arm.
+#[test]
+fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
+    let arm = Arm::avena();
+    let mut config = arm.config();
+    // At a constant 1.2 rad/s through the horizontal, with the corners outside it.
+    let t = plan::joint_move(&[0.0, 0.2, 0.0, 0.0, 0.0, 0.0], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], &config, 80.0);
+    let t = t.unwrap();
+    let verdict = |config: &Config| Checker { model: Some(&arm.model), ..Checker::new(config) }.check(&t);
+    let peak = verdict(&config).joints[1].torque_peak_nm.unwrap();
+    assert!(verdict(&config).is_ok(), "{}", verdict(&config));
+    // All that the motion itself takes, and not more.
+    config.joints[1].torque_max = peak + 0.5;
+    let refused = verdict(&config);
+    let stop = refused.refusals().next().expect("refused");
+    assert_eq!((stop.kind, stop.joint), (ProblemKind::NoStop, Some(2)), "{refused}");
+    assert!(stop.value.abs() > stop.limit.abs() && stop.limit.abs() == peak + 0.5, "{refused}");
+    assert!(refused.hint().contains("--speed") && refused.hint().contains("payload"), "{}", refused.hint());
+    // With a second to stop in it is another matter.
+    config.stop_ms = 5_000;
+    assert!(verdict(&config).is_ok(), "{}", verdict(&config));
+}
+
 fn load(name: &str) -> Option<Trajectory> {
     let dir = std::env::var("OPENJTC_DATA")
         .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());

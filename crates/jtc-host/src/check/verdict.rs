@@ -37,6 +37,10 @@ pub enum ProblemKind {
     Acceleration,
     /// Torque by the arm model over its limit.
     Torque,
+    /// A velocity that the friction table does not have (J-36).
+    FrictionVelocity,
+    /// A place from which Pause or Stop cannot bring the arm to rest in time with the torque that there is (J-33).
+    NoStop,
     /// Positions move faster than the velocity limit, whatever the velocities say.
     PositionSpeed,
     /// Positions move at another speed than the velocities say; a warning at single places.
@@ -58,13 +62,21 @@ impl ProblemKind {
         }
     }
 
+    /// It ends the motion before anybody could stop it, or leaves no motion to stop.
+    pub(super) fn stops_at_once(self) -> bool {
+        use ProblemKind::*;
+        !matches!(self, NotAtRest | StartPose | VelocityMismatch | AccelerationMismatch | FrictionVelocity)
+    }
+
     fn unit(self) -> &'static str {
         use ProblemKind::*;
         match self {
             Jump | Position | StartPose | PositionScale => "rad",
-            Velocity | VelocityScale | PositionSpeed | VelocityMismatch | NotAtRest => "rad/s",
+            Velocity | FrictionVelocity | VelocityScale | PositionSpeed | VelocityMismatch | NotAtRest => {
+                "rad/s"
+            }
             Acceleration | AccelerationScale | AccelerationMismatch => "rad/s²",
-            Torque => "N·m",
+            Torque | NoStop => "N·m",
             _ => "",
         }
     }
@@ -85,6 +97,8 @@ impl ProblemKind {
             Velocity => "velocity over its limit",
             Acceleration => "acceleration over its limit",
             Torque => "torque over its limit",
+            FrictionVelocity => "velocity outside the friction table",
+            NoStop => "no stop in time",
             PositionSpeed => "positions move faster than the velocity limit",
             VelocityMismatch => "positions and velocities disagree",
             NotAtRest => "not at rest at an end",
@@ -155,6 +169,11 @@ impl fmt::Display for Problem {
             StartPose => {
                 return write!(f, "{value:+.4} rad away from the first point (tolerance {limit} rad)");
             }
+            NoStop => write!(
+                f,
+                "a stop in time from {ms} ms after point {point} needs {value:+.1} N·m, more than the {limit} N·m \
+                 that there are"
+            )?,
             NotAtRest => write!(f, "{}: {value:+.4} {unit} at point {point}", kind.words())?,
             VelocityMismatch | AccelerationMismatch => write!(
                 f,
@@ -196,6 +215,10 @@ impl JointFigures {
         acceleration_peak_rad_s2: 0.0,
         torque_peak_nm: None,
     };
+
+    pub(super) fn speed(&mut self, v: f64) {
+        self.velocity_peak_rad_s = self.velocity_peak_rad_s.max(v.abs());
+    }
 
     pub(super) fn take(&mut self, q: f64, v: f64, a: f64, torque: Option<f64>) {
         self.position_min_rad = self.position_min_rad.min(q);
@@ -265,6 +288,7 @@ impl Verdict {
 
     /// Kinds in the order of what they do to an arm, jumps in the order of the path, others by how far they are over.
     pub(super) fn done(mut self) -> Self {
+        self.part_haste_from_seams();
         let seams = SEAMS.max(self.points / 50);
         for p in &mut self.problems {
             p.warning = match p.kind {
@@ -283,6 +307,26 @@ impl Verdict {
         self
     }
 
+    /// Pieces that do not meet make single jumps. Where every fifth step or more is one, the path is too fast all along, or not
+    /// in radians: one line per joint says so.
+    fn part_haste_from_seams(&mut self) {
+        let is_jump = |p: &Problem| p.kind == ProblemKind::Jump;
+        let mut places: Vec<usize> = self.problems.iter().filter(|p| is_jump(p)).map(|p| p.point).collect();
+        places.sort_unstable();
+        places.dedup();
+        if 5 * places.len() < self.points {
+            return;
+        }
+        let (jumps, rest): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.problems).into_iter().partition(is_jump);
+        self.problems = rest;
+        let h = f64::from(self.step_ms) * 1e-3;
+        for Problem { joint, point, value, limit, .. } in jumps {
+            let joint = joint.map(|j| j - 1);
+            self.add(ProblemKind::PositionSpeed, joint, point, 0.0, value / h, limit / h);
+        }
+    }
+
     /// Nothing forbids to run it.
     pub fn is_ok(&self) -> bool {
         self.problems.iter().all(|p| p.warning)
@@ -296,33 +340,6 @@ impl Verdict {
     /// What does not.
     pub fn warnings(&self) -> impl Iterator<Item = &Problem> {
         self.problems.iter().filter(|p| p.warning)
-    }
-
-    /// The next command or act that helps.
-    pub fn hint(&self) -> String {
-        let has = |kind| self.problems.iter().any(|p| p.kind == kind);
-        let only = |kinds: &[ProblemKind]| self.refusals().all(|p| kinds.contains(&p.kind));
-        if self.is_ok() {
-            "`jtc traj run FILE`".into()
-        } else if only(&[ProblemKind::StartPose]) {
-            "`jtc traj run FILE --approach` moves the arm to the first point before".into()
-        } else if has(ProblemKind::Jump) {
-            "the file was put together from pieces that do not meet: join them with a move, or run each alone"
-                .into()
-        } else if has(ProblemKind::Position) || has(ProblemKind::PositionScale) {
-            "positions do not change with the speed: correct the path (are all numbers in rad?)".into()
-        } else if only(&[
-            ProblemKind::Velocity,
-            ProblemKind::PositionSpeed,
-            ProblemKind::Acceleration,
-            ProblemKind::Torque,
-            ProblemKind::VelocityScale,
-            ProblemKind::AccelerationScale,
-        ]) {
-            "`--speed PCT` runs it slower: `jtc traj check FILE --speed 50`".into()
-        } else {
-            "correct the file; `jtc traj info FILE` shows its figures".into()
-        }
     }
 }
 

@@ -1,0 +1,132 @@
+//! Whether the arm can stop from every place of a path within the time that Pause and Stop have (J-33).
+//!
+//! Along a path that is run at the rate r, with its slope s, the model's torque is g + r²·f + s·h: what holds the arm, what its
+//! motion at full speed adds, and what a change of the rate costs (Bobrow 1985; Pham & Pham 2018). All three are computed once
+//! per place, so that a ramp to standstill from each of them is only a few sums.
+
+use std::collections::VecDeque;
+
+use jtc_core::{Config, JOINTS, SetPoint, interpolate};
+use jtc_dynamics::Dynamics;
+
+use super::{ProblemKind, Verdict};
+
+/// Distance of the places looked at, along the path and along each ramp, ms.
+const SPACING: f64 = 10.0;
+/// Ramps tried from every place, as shares of the time allowed: one that is possible suffices.
+const LENGTHS: [f64; 3] = [1.0, 0.7, 0.4];
+/// Share of a ramp over which its slope rises, and over which it falls.
+const CORNER: f64 = 0.2;
+
+/// The parts of the torque at a place of the path, N·m.
+struct Place {
+    /// Point before it, and ms after that.
+    point: usize,
+    ms: f64,
+    hold: [f64; JOINTS],
+    motion: [f64; JOINTS],
+    slope: [f64; JOINTS],
+}
+
+/// The joint that comes closest to its limit on a ramp.
+#[derive(Clone, Copy)]
+struct Load {
+    share: f64,
+    joint: usize,
+    torque: f64,
+}
+
+/// Adds a problem for every place from which no ramp of `config.stop_ms` keeps the model's torque, friction not counted, within
+/// the limits.
+pub(super) fn stops(
+    config: &Config,
+    dynamics: &Dynamics,
+    step_ms: u16,
+    points: &[SetPoint],
+    verdict: &mut Verdict,
+) {
+    let end = points.len().saturating_sub(1) as f64 * f64::from(step_ms);
+    let last = (end / SPACING).ceil() as usize;
+    let stop_ms = f64::from(config.stop_ms).max(SPACING);
+    // A ramp takes half of its time at full speed.
+    let ahead = (0.5 * stop_ms / SPACING).ceil() as usize + 1;
+    let mut window = VecDeque::with_capacity(ahead + 1);
+    let mut next = 0;
+    for _ in 0..=last {
+        while window.len() <= ahead && next <= last {
+            window.push_back(place(config, dynamics, step_ms, points, (next as f64 * SPACING).min(end)));
+            next += 1;
+        }
+        let loads = LENGTHS.iter().map(|share| ramp(config, &window, share * stop_ms));
+        let easiest = loads.reduce(|a, b| if a.share <= 1.0 || a.share <= b.share { a } else { b });
+        if let (Some(load), Some(start)) = (easiest.filter(|l| l.share > 1.0), window.front()) {
+            let limit = config.joints[load.joint].torque_max.copysign(load.torque);
+            verdict.add(ProblemKind::NoStop, Some(load.joint), start.point, start.ms, load.torque, limit);
+        }
+        window.pop_front();
+    }
+}
+
+fn place(config: &Config, dynamics: &Dynamics, step_ms: u16, points: &[SetPoint], at: f64) -> Place {
+    let step = f64::from(step_ms);
+    let point = ((at / step) as usize).min(points.len() - 1);
+    let ms = at - point as f64 * step;
+    let s = match points.get(point + 1) {
+        Some(b) => interpolate(&points[point], b, step * 1e-3, ms / step),
+        None => points[point],
+    };
+    let zero = [0.0; JOINTS];
+    let hold = dynamics.inverse(&s.position, &zero, &zero);
+    let all = dynamics.inverse(&s.position, &s.velocity, &s.acceleration);
+    let slope = dynamics.inverse(&s.position, &zero, &s.velocity);
+    let rotor = |j: usize| config.joints[j].rotor_inertia;
+    Place {
+        point,
+        ms,
+        hold,
+        motion: std::array::from_fn(|j| all[j] - hold[j] + rotor(j) * s.acceleration[j]),
+        slope: std::array::from_fn(|j| slope[j] - hold[j] + rotor(j) * s.velocity[j]),
+    }
+}
+
+/// The highest load of a ramp of `length` ms from the first place of `window`.
+fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
+    let mut worst = Load { share: 0.0, joint: 0, torque: 0.0 };
+    let samples = (length / SPACING).ceil().max(2.0);
+    let (mut way, mut before) = (0.0, 1.0);
+    for k in 0..=samples as usize {
+        let (done, steepness) = profile(k as f64 / samples);
+        let (rate, slope) = (1.0 - done, -steepness / (length * 1e-3));
+        way += 0.5 * (rate + before) * length / samples / SPACING * f64::from(u8::from(k > 0));
+        before = rate;
+        let index = (way as usize).min(window.len() - 1);
+        let (a, u) = (&window[index], way - index as f64);
+        let b = window.get(index + 1).unwrap_or(a);
+        for j in 0..JOINTS {
+            let between = |part: fn(&Place) -> &[f64; JOINTS]| {
+                let (x, y) = (part(a)[j], part(b)[j]);
+                x + u.min(1.0) * (y - x)
+            };
+            let torque =
+                between(|p| &p.hold) + rate * rate * between(|p| &p.motion) + slope * between(|p| &p.slope);
+            let share = torque.abs() / config.joints[j].torque_max;
+            if share > worst.share {
+                worst = Load { share, joint: j, torque };
+            }
+        }
+    }
+    worst
+}
+
+/// How much of a ramp is done at the share `x` of its time, and how steep it is there: a straight line with rounded ends.
+fn profile(x: f64) -> (f64, f64) {
+    let steepest = 1.0 / (1.0 - CORNER);
+    let end = 1.0 - x;
+    if x < CORNER {
+        (0.5 * steepest * x * x / CORNER, steepest * x / CORNER)
+    } else if end < CORNER {
+        (1.0 - 0.5 * steepest * end * end / CORNER, steepest * end / CORNER)
+    } else {
+        (steepest * (x - 0.5 * CORNER), steepest)
+    }
+}

@@ -16,5 +16,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut matrix = cargo(&["test", "--package", "jtc-sim", "--test", "fault_matrix"]);
     run(matrix.env("UPDATE_DOCS", "1"))?;
     println!("wrote the fault matrix of docs/safety.md");
+    let mut reactions = cargo(&["test", "--package", "jtc-core", "--test", "reactions"]);
+    run(reactions.env("UPDATE_DOCS", "1"))?;
+    println!("wrote the table of reactions of docs/safety.md");
     Ok(ExitCode::SUCCESS)
 }

@@ -37,10 +37,10 @@ impl Given {
 
 /// Where in Operate the controller is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Path {
+pub(crate) enum Path {
     /// Waits until every joint is enabled.
     Waiting,
-    /// On the way from where the arm is held to the first point.
+    /// On the way from where the arm is held to the first point, or to the one where the path was paused.
     Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<Tes> },
     /// At point 0, which the next tick commands.
     AtStart,
@@ -74,10 +74,10 @@ pub struct Controller<M> {
     /// Friction was given since the trajectory was checked.
     pub(crate) friction_is_new: bool,
     pub(crate) tes: Tes,
-    clock: PathClock,
-    path: Path,
+    pub(crate) clock: PathClock,
+    pub(crate) path: Path,
     /// Ticks since a pause or stop was asked for on the path, until the arm stands (J-33).
-    braking_ms: Option<u16>,
+    pub(crate) braking_ms: Option<u16>,
     pub(crate) motion: Motion,
     // The link to the host.
     pub(crate) work: Work,
@@ -274,7 +274,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
             State::HoldPos if last == State::Teaching => self.motion.hold_measured(&self.nodes, &self.config),
-            State::HoldPos | State::Operate | State::Teaching => {}
+            State::Teaching => self.motion.stand_firm(),
+            State::HoldPos | State::Operate => {}
         }
         self.motion.change_law();
     }
@@ -295,6 +296,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.clock = PathClock::default();
         self.path = Path::Waiting;
         self.braking_ms = None;
+        self.motion.stand_firm();
         self.set_tes(Tes::Execute);
         Ok(())
     }
@@ -307,19 +309,32 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Execute from Pause: at the paused point only.
     pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
-        if !self.near(&self.motion.set.position) {
+        let paused = self.path_point();
+        if !self.near(&paused) {
             return Err(DataStatus::StartPositionMismatch);
         }
         self.braking_ms = None;
-        if self.clock.time > 0.0 {
-            self.clock.go();
-            self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
-            self.path = Path::Running { leave: None };
-        } else {
-            self.path = Path::Waiting;
+        if self.motion.yielding() {
+            // It is held somewhere beside the path; its way back begins where it is.
+            self.motion.begin_at(self.nodes.positions());
+            self.motion.stand_firm();
         }
+        self.path = if self.clock.time == 0.0 {
+            Path::Waiting
+        } else if self.motion.set.position == paused {
+            self.go_on();
+            Path::Running { leave: None }
+        } else {
+            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None }
+        };
         self.set_tes(Tes::Execute);
         Ok(())
+    }
+
+    /// From standstill on the path to full speed.
+    fn go_on(&mut self) {
+        self.clock.go();
+        self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
     }
 
     /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
@@ -366,7 +381,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
                 self.motion.hold(&self.config);
                 if self.motion.all_holding() {
-                    if self.near(&self.first_point()) {
+                    if self.near(&self.path_point()) {
                         self.path =
                             Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
                     } else {
@@ -377,13 +392,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Path::Gliding { from, elapsed_ms, leave } => {
                 let length = f64::from(self.config.ramp_ms.max(1));
                 let elapsed_ms = elapsed_ms + 1.0;
-                self.motion.glide(&from, &self.first_point(), (elapsed_ms / length).min(1.0), length);
+                self.motion.glide(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
                 if elapsed_ms < length {
                     self.path = Path::Gliding { from, elapsed_ms, leave };
                 } else if let Some(tes) = leave {
                     self.set_tes(tes);
-                } else {
+                } else if self.clock.time == 0.0 {
                     self.path = Path::AtStart;
+                } else {
+                    self.go_on();
+                    self.path = Path::Running { leave: None };
                 }
             }
             Path::AtStart => {
@@ -425,9 +443,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.follow(&at, self.clock.rate, self.clock.slope);
     }
 
-    /// Positions of the first point; without a trajectory (which Execute refuses) where the arm is held.
-    fn first_point(&self) -> [f64; JOINTS] {
-        self.store.first().unwrap_or(self.motion.set.position)
+    /// Positions at the present path time; without a trajectory (which Execute refuses) where the arm is held.
+    fn path_point(&self) -> [f64; JOINTS] {
+        self.store.at(self.clock.time).map_or(self.motion.set.position, |at| at.position)
     }
 
     /// The last point was commanded in this tick (J-31).
@@ -461,8 +479,24 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.braking_ms.is_some()
     }
 
-    /// The control law; returns the torque to command, and raises the errors of the joints.
+    /// The control law; returns the torque to command. Errors of the joints are acted upon, or raised.
     fn control(&mut self, law: Law) -> [f64; JOINTS] {
+        // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
+        self.errors.raise_joints(&self.motion.too_fast(&self.nodes, &self.config));
+        let (mut torque, mut errors) = self.compute(law);
+        if errors != [0; JOINTS] {
+            if self.gives_way(&errors) {
+                (torque, errors) = self.compute(Law::Hold);
+            } else if self.stops_on_path(law, &errors) {
+                errors = [0; JOINTS];
+            }
+            self.errors.raise_joints(&errors);
+        }
+        torque
+    }
+
+    /// Torques of the control law, and the joint errors found on the way.
+    fn compute(&mut self, law: Law) -> ([f64; JOINTS], [u16; JOINTS]) {
         let braking = self.brake();
         let gains = Gains {
             dynamics: &self.dynamics,
@@ -470,9 +504,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             polynomial: &self.polynomial,
             table: self.friction_is_table.then_some(&self.tables),
         };
-        let (torque, errors) = self.motion.control(law, braking, &self.nodes, &self.config, &gains);
-        self.errors.raise_joints(&errors);
-        torque
+        self.motion.control(law, braking, &self.nodes, &self.config, &gains)
     }
 
     fn observe(&mut self, torque: &[f64; JOINTS]) {

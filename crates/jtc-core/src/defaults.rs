@@ -44,6 +44,7 @@ impl Config {
             braking_ms_max: 1_000,
             overspeed_factor: 1.2,
             overspeed_ms: 5,
+            yield_torque_share: 0.3,
             torque_over_ms: 10,
             blend_ms: 100,
             teach_velocity_max: 1.0,

@@ -49,6 +49,14 @@ impl Errors {
         self.occurred |= self.word();
     }
 
+    /// Errors that the controller acted upon without going to Error (J-66): they have occurred, and are not current.
+    pub fn note_joints(&mut self, bits: &[u16; JOINTS]) {
+        for (noted, bits) in self.joints_occurred.iter_mut().zip(bits) {
+            *noted |= bits;
+        }
+        self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
+    }
+
     pub fn raise_can(&mut self, flags: u32) {
         self.can |= flags;
         self.can_occurred |= flags;

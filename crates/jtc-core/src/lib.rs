@@ -18,6 +18,7 @@ mod nodes;
 mod overspeed;
 mod path;
 mod pid;
+mod reaction;
 mod records;
 mod store;
 mod telemetry;

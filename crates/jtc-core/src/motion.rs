@@ -82,6 +82,8 @@ pub(crate) struct Motion {
     rebase: Option<Rebase>,
     /// Joints on their way to rest.
     coast: [Option<Coast>; JOINTS],
+    /// The arm gives way: the law adds only so much to the torque of the model (J-66).
+    yielding: bool,
     /// Mass matrix with rotors at the start of a ramp of path time.
     inertia: [[f64; JOINTS]; JOINTS],
 }
@@ -130,14 +132,40 @@ impl Motion {
     /// Begin to hold where the arm is, coming to rest first if it moves.
     pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
-        self.set = SetPoint::still(*from);
+        self.begin_at(from);
         let moves = velocity.iter().any(|v| v.abs() > STANDING);
         for j in 0..JOINTS {
-            self.pid[j].reset(0.0);
             // Joints that are enabled later begin on their own.
             let coasts = moves && self.holding[j];
             self.coast[j] = coasts.then_some(Coast::led(from[j], velocity[j], config, &config.joints[j]));
         }
+    }
+
+    /// Whatever comes next begins at rest at `position`.
+    pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
+        self.set = SetPoint::still(*position);
+        for pid in &mut self.pid {
+            pid.reset(0.0);
+        }
+        self.coast = [None; JOINTS];
+    }
+
+    /// Hold where the arm is, and give way to what moves it from there (J-66).
+    pub fn give_way(&mut self, nodes: &Nodes, config: &Config) {
+        self.hold_measured(nodes, config);
+        // What the law had added is what it is to let go of.
+        (self.rebase, self.step) = (None, [0.0; JOINTS]);
+        self.yielding = true;
+    }
+
+    /// The whole torque may be used again.
+    pub fn stand_firm(&mut self) {
+        self.yielding = false;
+    }
+
+    /// The arm gives way.
+    pub fn yielding(&self) -> bool {
+        self.yielding
     }
 
     /// Joints that move, by their set values or as measured: `bit` in each.
@@ -235,6 +263,11 @@ impl Motion {
         SlopeBounds { easy, full }
     }
 
+    /// Joints that are measured too fast (J-35). Once a tick, while torque is on.
+    pub fn too_fast(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
+        self.over_speed.watch(nodes, config)
+    }
+
     /// The control law and its limits: torques to command, and joint errors found on the way. `braking`: with all the torque
     /// there is, so that what this does to torque, position error and acceleration is none (J-33).
     pub fn control(
@@ -246,10 +279,11 @@ impl Motion {
         gains: &Gains<'_>,
     ) -> ([f64; JOINTS], [u16; JOINTS]) {
         let missing = self.compute(law, nodes, config, gains);
+        if self.yielding {
+            self.soften(config);
+        }
         let (torque, mut errors) = self.limit(law, braking, nodes, config);
-        let too_fast = self.over_speed.watch(nodes, config);
         for (j, error) in errors.iter_mut().enumerate() {
-            *error |= too_fast[j];
             if nodes.node(j).enabled() {
                 *error |= missing[j];
             }
@@ -331,6 +365,15 @@ impl Motion {
                 self.torque[j] = JointTorque::default();
                 self.step[j] = 0.0;
             }
+        }
+    }
+
+    /// Bounds what the law adds to the torque of the model (J-66).
+    fn soften(&mut self, config: &Config) {
+        for (torque, joint) in self.torque.iter_mut().zip(&config.joints) {
+            let most = config.yield_torque_share * joint.torque_max;
+            let correction = torque.correction();
+            torque.blend += correction.max(-most).min(most) - correction;
         }
     }
 

@@ -38,6 +38,8 @@ pub struct Rig {
     pub bus_off: bool,
     /// Positions follow the commanded ones.
     pub follow: bool,
+    /// But not those of these joints.
+    pub apart: [bool; 6],
     /// Frames sent by the controller, by tick.
     pub sent: Vec<Request>,
     pub statuses: Vec<Status>,
@@ -132,6 +134,7 @@ impl Rig {
             acknowledged: true,
             bus_off: false,
             follow: true,
+            apart: [false; 6],
             sent: Vec::new(),
             statuses: Vec::new(),
             last,
@@ -311,7 +314,7 @@ impl Rig {
         self.sent.push(request);
         if self.follow {
             for j in 0..6 {
-                if self.nodes[j].configured {
+                if self.nodes[j].configured && !self.apart[j] {
                     self.nodes[j].report.position = self.controller.telemetry().joints[j].set_position;
                 }
             }

@@ -3,6 +3,7 @@ use jtc_bus::config;
 use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
+use crate::parameters::ParameterBounds;
 
 /// Half of the drives' working area, rad either way from zero (J-43).
 pub const WORKING_AREA: f64 = 2.9905;
@@ -93,6 +94,8 @@ pub struct Config {
     pub teach_damping: f64,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
+    /// Bounds of the gains and masses that a host may give (J-06).
+    pub parameter_bounds: ParameterBounds,
 }
 
 impl Config {

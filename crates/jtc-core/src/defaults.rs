@@ -2,6 +2,7 @@
 use jtc_dynamics::{ArmModel, Link, Origin};
 
 use crate::config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf};
+use crate::parameters::ParameterBounds;
 
 /// The constants as the build script wrote them.
 #[allow(clippy::excessive_precision)]
@@ -50,6 +51,7 @@ impl Config {
             teach_velocity_max: 1.0,
             teach_damping: 40.0,
             friction_sign_width: 0.02,
+            parameter_bounds: ParameterBounds::known_drives(),
         }
     }
 }

@@ -1,13 +1,10 @@
 //! The host's commands: executed in bounded slices, answered by one record each (J-04, J-06).
-use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 use jtc_wire::{
-    Command, DataStatus, EVENTS_MAX, ExecCommand, Floats, LinkEvent, RawPoint, Response, Segment,
-    UrgentCommand,
+    Command, DataStatus, EVENTS_MAX, ExecCommand, LinkEvent, RawPoint, Response, Segment, UrgentCommand,
 };
 
 use crate::check::{self, TrajectoryCheck, Violation};
-use crate::config::{PidGains, TableOf};
-use crate::controller::{Controller, Given};
+use crate::controller::Controller;
 use crate::defaults;
 use crate::io::{HostEvent, Inputs};
 use crate::motion::celsius;
@@ -20,8 +17,6 @@ const COPY_TICKS: usize = 10;
 /// Points of a short segment checked and copied in one tick.
 const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
-/// Floats of one joint's friction table; a tick checks or copies one joint.
-const TABLE_FLOATS: usize = 20 + 20 + 400;
 
 /// Joints and gripper in a mask of nodes.
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
@@ -219,10 +214,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Command::GripperControl { .. } => Progress::Refused(DataStatus::NotAllowed),
             _ if !settable => Progress::Refused(DataStatus::NotAllowed),
             Command::PidParam(floats) => self.take_pid(&floats).into(),
-            Command::PidParamUseDefault => {
-                self.set_pid(defaults::PID);
-                Progress::Done
-            }
+            Command::PidParamUseDefault => self.set_pid(defaults::PID).into(),
             Command::ArmModel(floats) => self.take_model(&floats).into(),
             Command::ArmModelUseDefault => self.set_model(&defaults::MODEL).into(),
             Command::FrictionPolynomial(floats) => self.take_polynomial(&floats).into(),
@@ -351,93 +343,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             DataStatus::IncorrectValue
         })
     }
-
-    fn take_pid(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
-        let mut gains = [PidGains::default(); JOINTS];
-        for (j, gain) in gains.iter_mut().enumerate() {
-            let at = |i: usize| finite(floats, 5 * j + i);
-            *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
-            if gain.int_min > gain.int_max {
-                return Err(DataStatus::IncorrectValue);
-            }
-        }
-        self.set_pid(gains);
-        Ok(())
-    }
-
-    fn set_pid(&mut self, gains: [PidGains; JOINTS]) {
-        self.pid = gains;
-        self.given.set(Given::PID);
-        self.motion.change_law();
-    }
-
-    fn take_model(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
-        let mut next = Reader { floats, next: 0 };
-        let mut model = ArmModel::default();
-        for joint in &mut model.joints {
-            *joint = next.origin()?;
-        }
-        for link in &mut model.links {
-            *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
-        }
-        self.set_model(&model)
-    }
-
-    fn set_model(&mut self, model: &ArmModel) -> Result<(), DataStatus> {
-        model.check().map_err(|_| DataStatus::IncorrectValue)?;
-        self.dynamics = Dynamics::new(model, self.config.gravity);
-        self.given.set(Given::MODEL);
-        self.motion.change_model();
-        Ok(())
-    }
-
-    fn take_polynomial(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
-        // 4 or 6 per joint, highest index first.
-        let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
-        let mut polynomial = [[0.0; 6]; JOINTS];
-        for (j, coefficients) in polynomial.iter_mut().enumerate() {
-            for (i, c) in coefficients.iter_mut().take(count).rev().enumerate() {
-                *c = finite(floats, count * j + i)?;
-            }
-        }
-        self.polynomial = polynomial;
-        self.friction_given(false);
-        Ok(())
-    }
-
-    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
-    fn take_table(&mut self, floats: &Floats<'_>) -> Progress {
-        match self.work {
-            Work::TableCopy(j) => {
-                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), read_table(floats, j)) {
-                    *slot = table;
-                }
-                if j + 1 < JOINTS {
-                    return Progress::Working(Work::TableCopy(j + 1));
-                }
-                self.friction_given(true);
-                Progress::Done
-            }
-            work => {
-                let j = if let Work::TableCheck(j) = work { j } else { 0 };
-                match read_table(floats, j) {
-                    Err(status) => Progress::Refused(status),
-                    Ok(_) if j + 1 < JOINTS => Progress::Working(Work::TableCheck(j + 1)),
-                    Ok(_) => Progress::Working(Work::TableCopy(0)),
-                }
-            }
-        }
-    }
-
-    fn friction_given(&mut self, table: bool) {
-        self.friction_is_table = table;
-        self.friction_is_new = true;
-        self.given.set(Given::FRICTION);
-    }
 }
 
 /// Outcome of a slice of work.
-enum Progress {
+pub(crate) enum Progress {
     Done,
     Refused(DataStatus),
     Working(Work),
@@ -450,50 +359,4 @@ impl From<Result<(), DataStatus>> for Progress {
             Err(status) => Self::Refused(status),
         }
     }
-}
-
-/// Float `i`, refused when it is NaN, infinite or not there (J-06).
-fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
-    floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
-}
-
-/// Takes finite floats one after the other.
-struct Reader<'a> {
-    floats: &'a Floats<'a>,
-    next: usize,
-}
-
-impl Reader<'_> {
-    fn float(&mut self) -> Result<f64, DataStatus> {
-        self.next += 1;
-        finite(self.floats, self.next - 1)
-    }
-
-    fn take<const N: usize>(&mut self) -> Result<[f64; N], DataStatus> {
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = self.float()?;
-        }
-        Ok(values)
-    }
-
-    fn origin(&mut self) -> Result<Origin, DataStatus> {
-        Ok(Origin { xyz: self.take()?, rpy: self.take()? })
-    }
-}
-
-fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataStatus> {
-    let mut table = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
-    let start = joint * TABLE_FLOATS;
-    let slots =
-        table.velocity.iter_mut().chain(&mut table.temperature).chain(table.torque.iter_mut().flatten());
-    for (i, slot) in slots.enumerate() {
-        *slot = floats.get(start + i).filter(|f| f.is_finite()).ok_or(DataStatus::IncorrectValue)?;
-    }
-    for axis in [&table.velocity, &table.temperature] {
-        if axis.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(DataStatus::IncorrectValue);
-        }
-    }
-    Ok(table)
 }

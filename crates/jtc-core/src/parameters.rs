@@ -1,0 +1,211 @@
+//! The parameters that the host gives: gains, model and friction, taken whole or not at all (J-06).
+use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
+use jtc_wire::{DataStatus, Floats, RawPoint};
+
+use crate::JOINTS;
+use crate::config::{JointConfig, PidGains, TableOf};
+use crate::controller::{Controller, Given};
+use crate::host::{Progress, Work};
+
+/// Floats of one joint's friction table; a tick checks or copies one joint.
+const TABLE_FLOATS: usize = 20 + 20 + 400;
+
+/// Bounds of gains and masses: what lies beyond is no arm of these drives, and would throw or drop one that is held (J-06).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterBounds {
+    /// Highest Kp, N·m/rad. No such drive is known to run with more than 28 000.
+    pub kp_max: f64,
+    /// Highest Ki, N·m/(rad·s). No such drive is known to run with more than 24 000.
+    pub ki_max: f64,
+    /// Highest Kd, N·m·s/rad. No such drive is known to run with more than 300.
+    pub kd_max: f64,
+    /// Largest magnitude of IntMin and IntMax, rad·s. Up to 120 is in use.
+    pub integral_max: f64,
+    /// Largest torque that bounds of the integral which leave out zero may force on a joint at rest, as a share of its torque
+    /// limit.
+    pub integral_bias_max: f64,
+    /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, holds 50 kg no further out than 0.73 m.
+    pub link_mass_max: f64,
+    /// Largest moment or product of inertia of a link, kg·m²: what those 50 kg have at 1.4 m.
+    pub link_inertia_max: f64,
+}
+
+impl ParameterBounds {
+    /// For the known drives.
+    pub const fn known_drives() -> Self {
+        Self {
+            kp_max: 50_000.0,
+            ki_max: 50_000.0,
+            kd_max: 500.0,
+            integral_max: 1_000.0,
+            integral_bias_max: 0.25,
+            link_mass_max: 50.0,
+            link_inertia_max: 100.0,
+        }
+    }
+
+    /// Gains of a joint with that torque limit (N·m). Written so that a NaN is refused.
+    fn check_gains(&self, gains: &PidGains, torque_max: f64) -> Result<(), DataStatus> {
+        let PidGains { kp, ki, kd, int_min, int_max } = *gains;
+        let within = |value: f64, low: f64, high: f64| value >= low && value <= high;
+        // The integral nearest to zero.
+        let least = int_min.max(0.0) - int_max.min(0.0);
+        let good = within(kp, 0.0, self.kp_max)
+            && within(ki, 0.0, self.ki_max)
+            && within(kd, 0.0, self.kd_max)
+            && within(int_min, -self.integral_max, int_max)
+            && within(int_max, int_min, self.integral_max)
+            && ki * least <= self.integral_bias_max * torque_max;
+        if good { Ok(()) } else { Err(DataStatus::IncorrectValue) }
+    }
+
+    /// Masses and inertias of a model that is physical.
+    fn check_masses(&self, model: &ArmModel) -> Result<(), DataStatus> {
+        let good = |link: &Link| {
+            link.mass <= self.link_mass_max && link.inertia.iter().all(|i| i.abs() <= self.link_inertia_max)
+        };
+        if model.links.iter().all(good) { Ok(()) } else { Err(DataStatus::IncorrectValue) }
+    }
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    pub(crate) fn take_pid(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
+        let mut gains = [PidGains::default(); JOINTS];
+        for (j, gain) in gains.iter_mut().enumerate() {
+            let at = |i: usize| finite(floats, 5 * j + i);
+            *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
+        }
+        self.set_pid(gains)
+    }
+
+    pub(crate) fn set_pid(&mut self, gains: [PidGains; JOINTS]) -> Result<(), DataStatus> {
+        let bounds = &self.config.parameter_bounds;
+        for (gains, joint) in gains.iter().zip(&self.config.joints) {
+            bounds.check_gains(gains, joint.torque_max)?;
+        }
+        self.pid = gains;
+        self.given.set(Given::PID);
+        self.motion.change_law();
+        Ok(())
+    }
+
+    pub(crate) fn take_model(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
+        let mut next = Reader { floats, next: 0 };
+        let mut model = ArmModel::default();
+        for joint in &mut model.joints {
+            *joint = next.origin()?;
+        }
+        for link in &mut model.links {
+            *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
+        }
+        self.set_model(&model)
+    }
+
+    pub(crate) fn set_model(&mut self, model: &ArmModel) -> Result<(), DataStatus> {
+        model.check().map_err(|_| DataStatus::IncorrectValue)?;
+        self.config.parameter_bounds.check_masses(model)?;
+        let dynamics = Dynamics::new(model, self.config.gravity);
+        // An arm that could not be held where it is. Before every position is known there is nothing to hold either.
+        if !self.nodes.fallen_back() {
+            let gravity = dynamics.gravity_torque(self.nodes.positions());
+            let held = |(torque, joint): (&f64, &JointConfig)| torque.abs() <= joint.torque_max;
+            if !gravity.iter().zip(&self.config.joints).all(held) {
+                return Err(DataStatus::IncorrectValue);
+            }
+        }
+        self.dynamics = dynamics;
+        self.given.set(Given::MODEL);
+        self.motion.change_model();
+        Ok(())
+    }
+
+    pub(crate) fn take_polynomial(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
+        // 4 or 6 per joint, highest index first.
+        let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
+        let mut polynomial = [[0.0; 6]; JOINTS];
+        for (j, coefficients) in polynomial.iter_mut().enumerate() {
+            for (i, c) in coefficients.iter_mut().take(count).rev().enumerate() {
+                *c = finite(floats, count * j + i)?;
+            }
+        }
+        self.polynomial = polynomial;
+        self.friction_given(false);
+        Ok(())
+    }
+
+    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
+    pub(crate) fn take_table(&mut self, floats: &Floats<'_>) -> Progress {
+        match self.work {
+            Work::TableCopy(j) => {
+                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), read_table(floats, j)) {
+                    *slot = table;
+                }
+                if j + 1 < JOINTS {
+                    return Progress::Working(Work::TableCopy(j + 1));
+                }
+                self.friction_given(true);
+                Progress::Done
+            }
+            work => {
+                let j = if let Work::TableCheck(j) = work { j } else { 0 };
+                match read_table(floats, j) {
+                    Err(status) => Progress::Refused(status),
+                    Ok(_) if j + 1 < JOINTS => Progress::Working(Work::TableCheck(j + 1)),
+                    Ok(_) => Progress::Working(Work::TableCopy(0)),
+                }
+            }
+        }
+    }
+
+    pub(crate) fn friction_given(&mut self, table: bool) {
+        self.friction_is_table = table;
+        self.friction_is_new = true;
+        self.given.set(Given::FRICTION);
+    }
+}
+
+/// Float `i`, refused when it is NaN, infinite or not there (J-06).
+fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
+    floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
+}
+
+/// Takes finite floats one after the other.
+struct Reader<'a> {
+    floats: &'a Floats<'a>,
+    next: usize,
+}
+
+impl Reader<'_> {
+    fn float(&mut self) -> Result<f64, DataStatus> {
+        self.next += 1;
+        finite(self.floats, self.next - 1)
+    }
+
+    fn take<const N: usize>(&mut self) -> Result<[f64; N], DataStatus> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.float()?;
+        }
+        Ok(values)
+    }
+
+    fn origin(&mut self) -> Result<Origin, DataStatus> {
+        Ok(Origin { xyz: self.take()?, rpy: self.take()? })
+    }
+}
+
+fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataStatus> {
+    let mut table = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
+    let start = joint * TABLE_FLOATS;
+    let slots =
+        table.velocity.iter_mut().chain(&mut table.temperature).chain(table.torque.iter_mut().flatten());
+    for (i, slot) in slots.enumerate() {
+        *slot = floats.get(start + i).filter(|f| f.is_finite()).ok_or(DataStatus::IncorrectValue)?;
+    }
+    for axis in [&table.velocity, &table.temperature] {
+        if axis.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err(DataStatus::IncorrectValue);
+        }
+    }
+    Ok(table)
+}

@@ -64,7 +64,8 @@ fn unharmed(mut rig: Rig) {
     assert!(late < 1_000, "{late} ns");
 }
 
-/// J-03, J-04, J-05: the records on the wire are those of a parser that has the whole stream at hand.
+/// J-03, J-04, J-05: the records on the wire are those of a parser that has the whole stream at hand, less those of noise that
+/// joined another and those that were lost because more than 64 waited, which are counted.
 #[test]
 fn j03_records_of_kept_streams_are_those_of_the_reference() {
     let mut rig = fast();
@@ -73,6 +74,7 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
         let port = PORTS[n % 2];
         let regions = stream_regions(&input);
         let mut expected = Vec::new();
+        let lost_before = rig.telemetry().records_lost as usize;
         rig.hosts[index(port)].records.clear();
         for region in &regions {
             rig.write(port, region);
@@ -84,13 +86,25 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
                     Event::Bad(bad) => (bad.frame_type, bad.status, bad.length),
                 });
             }
-            let count = expected.len();
-            rig.wait(&name, 60_000, |rig| rig.hosts[index(port)].records.len() >= count);
+            // At this rate each takes a millisecond.
+            rig.run(80);
         }
         rig.run(10);
         let records = rig.hosts[index(port)].records.iter();
         let records: Vec<_> = records.map(|r| (r.frame_type, r.status, r.length)).collect();
-        assert!(records == expected, "{name}: {records:?} instead of {expected:?}");
+        let lost = rig.telemetry().records_lost as usize - lost_before;
+        // Noise joins the record of noise that waits; nothing else does.
+        let noise = |record: &&(u8, FrameStatus, u16)| record.0 == 0;
+        let count = |all: &[(u8, FrameStatus, u16)]| all.iter().filter(|record| !noise(record)).count();
+        assert!(count(&records) + lost >= count(&expected), "{name}: {records:?} instead of {expected:?}");
+        assert_eq!(
+            records.iter().any(|r| noise(&r)),
+            expected.iter().any(|r| noise(&r)),
+            "{name}: noise is answered"
+        );
+        let mut rest = expected.iter();
+        let in_order = records.iter().all(|record| rest.any(|other| other == record));
+        assert!(in_order, "{name}: {records:?} instead of {expected:?}");
     }
     unharmed(rig);
 }

@@ -180,7 +180,7 @@ impl Tick {
             bus_state,
             safety_input: self.pins.safety_input.is_high(),
             urgent,
-            host: &host[..count],
+            host: host.get(..count).unwrap_or(&[]),
             status_free: self.lines.iter().all(Transmitter::is_free),
         };
         self.flight.begin(&inputs, counters.wrong_format);

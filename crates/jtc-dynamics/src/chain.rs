@@ -106,6 +106,8 @@ pub(crate) struct Chain {
     /// Minus gravity, seen after the first joint's Rx(α), m/s²: the base is taken to accelerate upwards.
     pub lift: [f64; 3],
     pub placements: [Placement; 7],
+    /// First moments (`hx`, `hy`) of the bodies of an arm that is nothing but 1 kg at the flange, kg·m.
+    pub flange: [[f64; 2]; JOINTS],
 }
 
 impl Chain {
@@ -142,8 +144,17 @@ impl Chain {
             twists[k].p = [x, y - shifts[k] * twists[k].sin];
         }
         let bodies = regroup(model, &twists, &turns, &shifts);
-        Self { twists, bodies, lift, placements }
+        let flange = regroup(&flange_mass(model), &twists, &turns, &shifts).map(|b| [b.hx, b.hy]);
+        Self { twists, bodies, lift, placements, flange }
     }
+}
+
+/// The arm without its links, but with 1 kg at the flange.
+fn flange_mass(model: &ArmModel) -> ArmModel {
+    let mut arm = ArmModel { joints: model.joints, ..ArmModel::default() };
+    let (last, flange) = (&mut arm.links[JOINTS], &model.joints[JOINTS]);
+    (last.mass, last.origin.xyz) = (1.0, flange.xyz);
+    arm
 }
 
 /// Inertia of the links in our frames, with the part symmetric about each joint axis handed inwards.

@@ -222,13 +222,25 @@ pub(crate) fn inverse(chain: &Chain, turns: &Turns, qd: &JointVec, qdd: &JointVe
 /// Joint torques at rest, N·m: with no mass left in the links there are no forces, only moments.
 #[inline(always)]
 pub(crate) fn gravity_torque(chain: &Chain, turns: &Turns) -> JointVec {
+    static_torque(chain, turns, |k| [chain.bodies[k].hx, chain.bodies[k].hy])
+}
+
+/// Joint torques that hold 1 kg at the flange, N·m.
+#[inline(always)]
+pub(crate) fn flange_torque(chain: &Chain, turns: &Turns) -> JointVec {
+    static_torque(chain, turns, |k| chain.flange[k])
+}
+
+/// Joint torques at rest of bodies with these first moments (kg·m).
+#[inline(always)]
+fn static_torque(chain: &Chain, turns: &Turns, first_moment: impl Fn(usize) -> [f64; 2]) -> JointVec {
     let mut acc = chain.lift;
     let mut moments = [[0.0; 3]; JOINTS];
     unroll!(K in [0, 1, 2, 3, 4, 5] {
         let along = if K == 0 { acc } else { rx_back(&chain.twists[K], acc) };
         acc = rz_back(turns.sin[K], turns.cos[K], along);
-        let b = &chain.bodies[K];
-        moments[K] = [b.hy * acc[2], -b.hx * acc[2], b.hx * acc[1] - b.hy * acc[0]];
+        let [hx, hy] = first_moment(K);
+        moments[K] = [hy * acc[2], -hx * acc[2], hx * acc[1] - hy * acc[0]];
     });
     let mut torque = [0.0; JOINTS];
     let mut n = moments[5];

@@ -43,6 +43,12 @@ impl Dynamics {
         inverse::gravity_torque(&self.chain, &Turns::new(&self.chain, q))
     }
 
+    /// Joint torques that hold 1 kg at the origin of the flange still at `q`, without the arm itself, N·m: gravity through the
+    /// transposed Jacobian of the flange.
+    pub fn flange_torque(&self, q: &JointVec) -> JointVec {
+        inverse::flange_torque(&self.chain, &Turns::new(&self.chain, q))
+    }
+
     /// Joint-space mass matrix, kg·m², symmetric, without rotors.
     pub fn mass_matrix(&self, q: &JointVec) -> [[f64; JOINTS]; JOINTS] {
         forward::mass_matrix(&self.chain, q)

@@ -243,6 +243,33 @@ fn j40_gravity_torque_of_the_default_arm_hanging() {
     }
 }
 
+/// The torque that holds a mass is the slope of its potential energy, here from the heights of forward kinematics.
+#[test]
+fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
+    let gravity = [1.3, -0.7, -9.81];
+    let mut random = random_from(7);
+    for _ in 0..50 {
+        let dynamics = Dynamics::new(&arms::avena(), gravity);
+        let q: JointVec = core::array::from_fn(|_| 6.0 * random() - 3.0);
+        let energy = |q: &JointVec| -dot(gravity, dynamics.forward_kinematics(q)[6].position);
+        let torque = dynamics.flange_torque(&q);
+        for j in 0..JOINTS {
+            let (mut above, mut below) = (q, q);
+            (above[j], below[j]) = (q[j] + 1e-5, q[j] - 1e-5);
+            let slope = (energy(&above) - energy(&below)) / 2e-5;
+            assert!((torque[j] - slope).abs() < 1e-7, "joint {}: {} {slope}", j + 1, torque[j]);
+        }
+    }
+}
+
+/// Numbers from 0 to 1 out of a seed.
+fn random_from(mut seed: u64) -> impl FnMut() -> f64 {
+    move || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
 #[test]
 fn j40_rpy_turns_about_fixed_axes_x_then_y_then_z() {
     let mut model = ArmModel::default();

@@ -92,6 +92,11 @@ pub struct Config {
     pub teach_velocity_max: f64,
     /// Braking torque per speed in excess of the limit, N·m·s/rad (J-25).
     pub teach_damping: f64,
+    /// Largest mass at the flange, kg, that teaching takes the torque for that HoldPos had found missing (J-25); also of a
+    /// negative one, where the modelled arm is too heavy.
+    pub teach_payload_max: f64,
+    /// Time over which teaching fades out the missing torque that no such mass explains, ms (J-25).
+    pub teach_fade_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
     /// Bounds of the gains and masses that a host may give (J-06).

@@ -273,8 +273,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 // A pump that does not run on is off until it is commanded again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
-            State::HoldPos if last == State::Teaching => self.motion.hold_measured(&self.nodes, &self.config),
-            State::Teaching => self.motion.stand_firm(),
+            State::HoldPos if last == State::Teaching => {
+                self.motion.end_teaching(&self.nodes, &self.config, &self.pid);
+            }
+            State::Teaching => self.motion.begin_teaching(&self.nodes, &self.config, &self.dynamics),
             State::HoldPos | State::Operate => {}
         }
         self.motion.change_law();
@@ -529,7 +531,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 torque_i: parts.pid.i,
                 torque_d: parts.pid.d,
                 torque_friction: parts.friction,
-                torque_other: parts.brake + parts.blend,
+                torque_other: parts.payload + parts.brake + parts.blend,
                 torque: torque[j],
                 fsm: report.fsm,
                 internal: self.errors.joint(j).0,

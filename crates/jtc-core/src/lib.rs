@@ -22,6 +22,7 @@ mod pid;
 mod reaction;
 mod records;
 mod store;
+mod teach;
 mod telemetry;
 
 pub use check::{TrajectoryCheck, Violation};

@@ -10,6 +10,7 @@ use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
 use crate::path::{Bounds, SlopeBounds};
 use crate::pid::{Pid, PidTorque};
+use crate::teach::Payload;
 use crate::{JOINTS, joint_error};
 
 /// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the rest is for what changes within
@@ -44,6 +45,8 @@ pub(crate) struct JointTorque {
     pub model: f64,
     pub pid: PidTorque,
     pub friction: f64,
+    /// What teaching carries besides the model.
+    pub payload: f64,
     /// Brake of teaching.
     pub brake: f64,
     /// What is left of a step that is being blended out.
@@ -53,7 +56,7 @@ pub(crate) struct JointTorque {
 impl JointTorque {
     /// All but the model.
     fn correction(&self) -> f64 {
-        self.pid.sum() + self.friction + self.brake + self.blend
+        self.pid.sum() + self.friction + self.payload + self.brake + self.blend
     }
 
     pub fn sum(&self) -> f64 {
@@ -73,6 +76,7 @@ pub(crate) struct Motion {
     pub torque: [JointTorque; JOINTS],
     saturation: [Saturation; JOINTS],
     over_speed: OverSpeed,
+    payload: Payload,
     /// Step to blend out, N·m, and how long that has gone on.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
@@ -268,6 +272,21 @@ impl Motion {
         self.over_speed.watch(nodes, config)
     }
 
+    /// Teaching begins: what HoldPos had found missing becomes a mass at the flange (J-25). What an arm that gives way has
+    /// against it is more likely a contact than a mass.
+    pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
+        self.stand_firm();
+        self.payload.fit(dynamics, nodes.positions(), config);
+    }
+
+    /// Teaching ends: hold where the arm is, and let the integral take over what teaching carried.
+    pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
+        self.hold_measured(nodes, config);
+        for ((pid, gains), torque) in self.pid.iter_mut().zip(gains).zip(&self.torque) {
+            pid.take_over(gains, torque.payload);
+        }
+    }
+
     /// The control law and its limits: torques to command, and joint errors found on the way. `braking`: with all the torque
     /// there is, so that what this does to torque, position error and acceleration is none (J-33).
     pub fn control(
@@ -307,10 +326,15 @@ impl Motion {
         let (qd, qdd) =
             if law == Law::Follow { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
         let model = gains.dynamics.inverse(q, &qd, &qdd);
+        let payload =
+            if law == Law::Teach { self.payload.torque(gains.dynamics, q, config) } else { [0.0; JOINTS] };
         for j in 0..JOINTS {
             let limit = &config.joints[j];
-            let mut torque =
-                JointTorque { model: model[j] + limit.rotor_inertia * qdd[j], ..JointTorque::default() };
+            let mut torque = JointTorque {
+                model: model[j] + limit.rotor_inertia * qdd[j],
+                payload: payload[j],
+                ..JointTorque::default()
+            };
             if law != Law::Teach {
                 let error = self.set.position[j] - q[j];
                 let at_rest = self.set.velocity[j] == 0.0 && self.set.acceleration[j] == 0.0;
@@ -331,6 +355,11 @@ impl Motion {
             self.torque[j] = torque;
         }
         self.blend(rebase, &before, nodes, config);
+        if law == Law::Hold && !self.yielding {
+            self.payload.observe(&self.torque.map(|t| t.correction()));
+        } else {
+            self.payload.forget();
+        }
         if law == Law::Teach {
             for j in 0..JOINTS {
                 if nodes.node(j).enabled() {

@@ -48,6 +48,16 @@ impl Pid {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
+    /// As [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral: bumpless transfer from a state that had
+    /// found it. An integral that has no gain or is bounded cannot have it all.
+    pub fn take_over(&mut self, gains: &PidGains, torque: f64) {
+        self.reset(0.0);
+        let integral = torque / gains.ki;
+        if integral.is_finite() {
+            self.integral = integral.max(gains.int_min).min(gains.int_max);
+        }
+    }
+
     /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held. `encoder_step`
     /// (rad): the joint is commanded at rest, and this is what its encoder can tell; `None` in motion.
     ///

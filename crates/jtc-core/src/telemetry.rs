@@ -26,7 +26,7 @@ pub struct JointTelemetry {
     pub torque_d: f64,
     /// Friction compensation, N·m.
     pub torque_friction: f64,
-    /// What blends out a step at a change of state, and the brake of teaching, N·m.
+    /// What blends out a step at a change of state, and payload and brake of teaching, N·m.
     pub torque_other: f64,
     /// Torque commanded on the bus, N·m.
     pub torque: f64,

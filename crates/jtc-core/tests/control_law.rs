@@ -226,6 +226,47 @@ fn j25_leaving_teaching_in_motion_comes_to_rest() {
 }
 
 #[test]
+fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
+    let config = Config::avena();
+    let limits = config.joints[1];
+    for (limit, side) in [(limits.position_min, -1.0), (limits.position_max, 1.0)] {
+        for (room, stays) in [(0.02, true), (0.3, false)] {
+            let mut rig = Rig::new(config.clone());
+            rig.follow = false;
+            let from = limit - side * room;
+            rig.nodes[1].report.position = from;
+            rig.defaults();
+            rig.run(300);
+            rig.ask(FrameType::TeachingModeEnable, &[]);
+            rig.run(150);
+            rig.nodes[1].report.velocity = side * 0.8;
+            rig.run(2);
+            rig.send(FrameType::TeachingModeDisable, &[]);
+            rig.until(20, |r| r.state() == State::HoldPos);
+            rig.nodes[1].report.velocity = 0.0;
+            rig.follow = true;
+            let mut last = rig.controller.telemetry().joints[1];
+            let mut fastest = last.set_velocity.abs();
+            for _ in 0..400 {
+                rig.tick();
+                let t = rig.controller.telemetry().joints[1];
+                assert!(side * (limit - t.set_position) >= 0.0, "{} beyond {limit}", t.set_position);
+                assert!((t.set_velocity - last.set_velocity).abs() < 0.01, "{last:?} {t:?}");
+                // J-40: gravity alone, though the set value moves.
+                let q = rig.controller.telemetry().joints.map(|j| j.position);
+                let gravity = Dynamics::new(&Parameters::avena().model, config.gravity).gravity_torque(&q);
+                assert!((t.torque_model - gravity[1]).abs() < 1e-9);
+                fastest = fastest.max(t.set_velocity.abs());
+                last = t;
+            }
+            assert!(fastest > 0.5, "it was not in motion: {fastest} rad/s");
+            assert_eq!((last.set_velocity, rig.errors()), (0.0, 0));
+            assert_eq!(last.set_position == limit, stays, "{}", last.set_position);
+        }
+    }
+}
+
+#[test]
 fn j06_refused_parameters_change_nothing() {
     let mut rig = Rig::new(Config::avena());
     rig.run(200);

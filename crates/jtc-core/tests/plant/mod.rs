@@ -182,7 +182,7 @@ impl Plant {
         self.ticks += 1;
     }
 
-    fn report(&self, rig: &mut Rig) {
+    pub fn report(&self, rig: &mut Rig) {
         for j in 0..6 {
             let report = &mut rig.nodes[j].report;
             report.position = (self.q[j] / ENCODER_STEP).floor() * ENCODER_STEP;

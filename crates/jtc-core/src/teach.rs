@@ -1,0 +1,141 @@
+//! What Teaching carries besides the modelled arm: a mass at the flange, fitted to the torque that HoldPos had found missing
+//! (J-25).
+//!
+//! HoldPos cannot tell an unknown payload or a wrong mass from stiction: what is fitted contains up to the static friction of
+//! each joint. At the pose where teaching begins that is harmless, because the same friction holds the difference. So that
+//! little friction never becomes a great mass elsewhere, nothing is fitted where a mass at the flange would hardly load the
+//! joints, and the mass is bounded.
+use jtc_dynamics::Dynamics;
+
+use crate::JOINTS;
+use crate::config::Config;
+use crate::motion::smooth;
+
+/// Ticks over which the missing torque is averaged: the time constant of a low-pass filter.
+const AVERAGE_MS: f64 = 100.0;
+/// Torque of 1 kg at the flange, all joints together (N·m/kg): up to the first nothing is attributed to a mass, from the second
+/// all that fits.
+const LOAD: (f64, f64) = (2.0, 6.0);
+
+/// The fit, and what it is made from.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Payload {
+    /// The torque that the model lacks to hold the arm, averaged, N·m.
+    missing: [f64; JOINTS],
+    /// The average has begun.
+    observed: bool,
+    /// Fitted mass at the flange, kg; negative where the modelled arm is too heavy.
+    mass: f64,
+    /// What did not fit, N·m, and how long it has been fading.
+    rest: [f64; JOINTS],
+    elapsed_ms: u16,
+}
+
+impl Payload {
+    /// The arm is not held: what is missing is to be found anew.
+    pub fn forget(&mut self) {
+        self.observed = false;
+    }
+
+    /// A tick of HoldPos, which adds `correction` (N·m) to the torque of the model.
+    pub fn observe(&mut self, correction: &[f64; JOINTS]) {
+        let weight = if self.observed { 1.0 / AVERAGE_MS } else { 1.0 };
+        self.observed = true;
+        for (missing, correction) in self.missing.iter_mut().zip(correction) {
+            *missing += weight * (correction - *missing);
+        }
+    }
+
+    /// Teaching begins at `q` (rad): fits the mass, by least squares over the joints.
+    pub fn fit(&mut self, dynamics: &Dynamics, q: &[f64; JOINTS], config: &Config) {
+        let missing = if self.observed { self.missing } else { [0.0; JOINTS] };
+        let unit = dynamics.flange_torque(q);
+        let load: f64 = unit.iter().map(|u| u * u).sum();
+        let fitted: f64 =
+            unit.iter().zip(&missing).map(|(u, m)| u * m).sum::<f64>() / load.max(f64::MIN_POSITIVE);
+        let (none, all) = (LOAD.0 * LOAD.0, LOAD.1 * LOAD.1);
+        let mass = fitted * smooth((load - none) / (all - none));
+        let bound = config.teach_payload_max;
+        self.mass = if mass.is_finite() { mass.max(-bound).min(bound) } else { 0.0 };
+        for j in 0..JOINTS {
+            self.rest[j] = missing[j] - self.mass * unit[j];
+        }
+        self.elapsed_ms = 0;
+    }
+
+    /// A tick of Teaching at `q` (rad): the torque that carries the mass, and what is left of the rest, N·m.
+    pub fn torque(&mut self, dynamics: &Dynamics, q: &[f64; JOINTS], config: &Config) -> [f64; JOINTS] {
+        let unit = dynamics.flange_torque(q);
+        let left = 1.0 - smooth(f64::from(self.elapsed_ms) / f64::from(config.teach_fade_ms.max(1)));
+        self.elapsed_ms = self.elapsed_ms.saturating_add(1);
+        core::array::from_fn(|j| self.mass * unit[j] + self.rest[j] * left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Parameters;
+
+    fn dynamics() -> Dynamics {
+        Dynamics::new(&Parameters::avena().model, Config::avena().gravity)
+    }
+
+    fn fitted(missing: [f64; JOINTS], q: &[f64; JOINTS]) -> Payload {
+        let mut payload = Payload::default();
+        for _ in 0..1000 {
+            payload.observe(&missing);
+        }
+        payload.fit(&dynamics(), q, &Config::avena());
+        payload
+    }
+
+    #[test]
+    fn j25_a_mass_at_the_flange_is_found_and_carried_to_other_poses() {
+        let (q, elsewhere) = ([0.3, 0.8, -0.9, 0.4, 0.7, 0.2], [-1.0, 1.2, 0.4, -0.3, 1.0, 2.0]);
+        for mass in [-1.5, 0.4, 2.0, 4.5] {
+            let mut payload = fitted(dynamics().flange_torque(&q).map(|u| mass * u), &q);
+            let torque = payload.torque(&dynamics(), &elsewhere, &Config::avena());
+            for (t, u) in torque.iter().zip(dynamics().flange_torque(&elsewhere)) {
+                assert!((t - mass * u).abs() < 1e-9, "{t} {}", mass * u);
+            }
+        }
+    }
+
+    #[test]
+    fn j25_what_does_not_fit_fades_over_half_a_second() {
+        let q = [0.3, 0.8, -0.9, 0.4, 0.7, 0.2];
+        let missing = [7.0, 0.0, -3.0, 1.0, 0.0, 2.0];
+        let mut payload = fitted(missing, &q);
+        let first = payload.torque(&dynamics(), &q, &Config::avena());
+        for (t, m) in first.iter().zip(missing) {
+            assert!((t - m).abs() < 1e-6, "no step at the beginning: {t} {m}");
+        }
+        let mut last = first;
+        for _ in 0..500 {
+            let torque = payload.torque(&dynamics(), &q, &Config::avena());
+            for j in 0..JOINTS {
+                assert!((torque[j] - last[j]).abs() < 0.03, "{} {}", torque[j], last[j]);
+            }
+            last = torque;
+        }
+        // Nothing at the flange loads the vertical first joint.
+        assert!(last[0].abs() < 1e-6, "{}", last[0]);
+    }
+
+    #[test]
+    fn j25_friction_never_becomes_a_great_mass() {
+        // Stretched along the vertical, a mass at the flange loads nothing; nearly so it would have to be enormous.
+        let up = fitted([8.0; JOINTS], &[0.0; JOINTS]);
+        assert!(up.mass.abs() < 0.2, "{}", up.mass);
+        for k in 0..200 {
+            let q = [0.0, 0.01 * f64::from(k), 0.0, 0.0, 0.0, 0.0];
+            let mass = fitted([8.0, 8.0, -8.0, 3.0, 3.0, 3.0], &q).mass;
+            assert!(mass.abs() < 2.0, "{mass} kg at {q:?}");
+        }
+        let heavy = fitted([0.0, 1e9, 0.0, 0.0, 0.0, 0.0], &[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(heavy.mass.abs(), Config::avena().teach_payload_max);
+        let nan = fitted([f64::NAN; JOINTS], &[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(nan.mass, 0.0);
+    }
+}

@@ -120,7 +120,9 @@ pub struct Flight {
     pub urgent: [FlightUrgent; HOST_LINES],
     /// Host events that were offered.
     pub event_count: u8,
-    reserved: [u8; 3],
+    reserved: u8,
+    /// Ticks before this one that did not come or came late.
+    pub missed_ticks: u16,
     /// These events, oldest first.
     pub events: [FlightEvent; EVENTS_MAX],
     /// Frames received since the last tick.
@@ -181,7 +183,8 @@ impl Flight {
             wrong_format: 0,
             urgent: [FlightUrgent([[0; 2]; 2]); HOST_LINES],
             event_count: 0,
-            reserved: [0; 3],
+            reserved: 0,
+            missed_ticks: 0,
             events: [FlightEvent { kind: 0, line: 0, frame_type: 0, status: 0, len: 0, crc: 0 }; EVENTS_MAX],
             heard: [FlightFrame::NONE; RX],
             state: 0,
@@ -212,6 +215,7 @@ impl Flight {
         self.bus_state = u8::from(acknowledged) | u8::from(bus_off) << 1;
         self.safety_input = inputs.safety_input.into();
         self.status_free = inputs.status_free.into();
+        self.missed_ticks = inputs.missed_ticks;
         self.wrong_format = wrong_format;
         for (slot, commands) in self.urgent.iter_mut().zip(&inputs.urgent) {
             *slot = FlightUrgent::of(commands);
@@ -298,6 +302,7 @@ mod tests {
                 bus: &[answer; 3][..tick % 4],
                 bus_state: BusState { acknowledged: tick % 5 != 0, bus_off: tick == 77 },
                 safety_input: tick != 150,
+                missed_ticks: u16::from(tick % 30 == 0),
                 urgent,
                 host: &host[..tick % 3],
                 status_free: tick % 3 == 0,
@@ -312,6 +317,7 @@ mod tests {
                 bus: &bus,
                 bus_state: flight.bus_state(),
                 safety_input: flight.safety_input != 0,
+                missed_ticks: flight.missed_ticks,
                 urgent: flight.urgent.map(|urgent| urgent.commands()),
                 host: &host[..flight.event_count.into()],
                 status_free: flight.status_free != 0,

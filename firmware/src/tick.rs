@@ -8,6 +8,7 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::peripherals::{IWDG1, TIM7};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, pac, rcc};
+use embassy_time::Instant;
 use jtc_core::{Config, Controller, HostEvent, Inputs, Outputs};
 use jtc_wire::{EVENTS_MAX, EventBatch, LinkEvent, RawPoint, Response, STATUS_LEN, UrgentWatch};
 use openjtc_firmware::clock;
@@ -85,6 +86,8 @@ struct Tick {
     flight: &'static mut Flight,
     links: Links,
     left_out: u32,
+    /// When the last tick began.
+    began: Option<Instant>,
 }
 
 /// Whether the links are alive.
@@ -126,6 +129,7 @@ pub fn start(parts: Parts) {
         flight: boot.flight,
         links: Links::default(),
         left_out: 0,
+        began: None,
     });
     if boot.cause.failed() {
         tick.controller.raise_internal();
@@ -169,6 +173,7 @@ fn TIM7() {
 
 impl Tick {
     fn run(&mut self) -> Summary {
+        let missed_ticks = self.missed_ticks();
         let bus_state = self.can.look(&mut self.heard);
         let counters = self.can.counters();
         self.look_ahead();
@@ -179,6 +184,7 @@ impl Tick {
             bus: self.heard.frames(),
             bus_state,
             safety_input: self.pins.safety_input.is_high(),
+            missed_ticks,
             urgent,
             host: host.get(..count).unwrap_or(&[]),
             status_free: self.lines.iter().all(Transmitter::is_free),
@@ -219,6 +225,15 @@ impl Tick {
                 received.store(self.watch.received(line) as u32, Ordering::Relaxed);
             }
         }
+    }
+
+    /// Ticks that did not come since the last one, or came half a tick late or more, by the microseconds between them.
+    fn missed_ticks(&mut self) -> u16 {
+        let now = Instant::now();
+        let before = self.began.replace(now).unwrap_or(now);
+        let us = now.as_micros().saturating_sub(before.as_micros());
+        let periods = (us + u64::from(clock::TICK_US) / 2) / u64::from(clock::TICK_US);
+        u16::try_from(periods.saturating_sub(1)).unwrap_or(u16::MAX)
     }
 
     /// A tick that is due already is left out: drives must not get two frames back to back (J-12).

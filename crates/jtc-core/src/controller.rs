@@ -8,6 +8,7 @@ use crate::defaults;
 use crate::errors::Errors;
 use crate::host::{Overtaking, Work};
 use crate::io::{Inputs, Outputs};
+use crate::late::LateTicks;
 use crate::motion::{Gains, Law, Motion};
 use crate::nodes::{GRIPPER, Goal, Nodes};
 use crate::path::PathClock;
@@ -84,6 +85,7 @@ pub struct Controller<M> {
     pub(crate) overtaking: [Overtaking; HOST_LINES],
     pub(crate) records: ResponseQueues,
     since_status_ms: u16,
+    late_ticks: LateTicks,
     status_frame: [u8; STATUS_LEN],
     telemetry: Telemetry,
 }
@@ -116,6 +118,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             overtaking: [Overtaking::default(); HOST_LINES],
             records: ResponseQueues::new(),
             since_status_ms: 0,
+            late_ticks: LateTicks::default(),
             status_frame: [0; STATUS_LEN],
             telemetry: Telemetry::default(),
             config,
@@ -134,6 +137,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let before = self.state;
         self.nodes.take(inputs, &self.config, self.goal(), &self.motion.set.velocity);
         self.pump &= !self.nodes.gripper_lost();
+        if self.late_ticks.count(inputs.missed_ticks) {
+            self.errors.raise_device();
+        }
         // A fault is known before a command that may clear it: a clear in this very tick does not hide it.
         self.check_errors(inputs);
         if self.errors.any() {

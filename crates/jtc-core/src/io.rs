@@ -32,8 +32,11 @@ pub struct Inputs<'a> {
     pub bus: &'a [Frame],
     /// State of the bus.
     pub bus_state: BusState,
-    /// Level of the safety input: true = no error (J-22).
+    /// Level of the safety input: true = no error (J-22). A board that latches pulses shorter than a tick gives false in the
+    /// tick after one.
     pub safety_input: bool,
+    /// Ticks since the last one that did not come, or came half a tick late or more (J-12).
+    pub missed_ticks: u16,
     /// Stop and Pause that have arrived on each line since the last tick. They act in this tick, whatever waits (J-04); their
     /// frames come as events, too, once it is their turn.
     pub urgent: [UrgentCommands; HOST_LINES],

@@ -12,6 +12,7 @@ pub mod friction;
 mod host;
 mod interpolation;
 mod io;
+mod late;
 mod limits;
 mod motion;
 mod nodes;

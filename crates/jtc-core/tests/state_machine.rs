@@ -283,6 +283,39 @@ fn j12_one_broadcast_a_tick_and_other_frames_in_one_tick_of_four() {
 }
 
 #[test]
+fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
+    const OWN: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
+    // Every second tick left out: in each state with torque.
+    for teaching in [false, true] {
+        let mut rig = Rig::holding();
+        if teaching {
+            rig.ask(FrameType::TeachingModeEnable, &[]);
+        }
+        rig.run(3);
+        for late in 1..=10 {
+            assert_eq!(rig.errors(), 0, "{late} late ticks");
+            rig.missed_ticks = 1;
+            rig.tick();
+        }
+        assert_eq!((rig.state(), rig.errors()), (State::Error, OWN));
+        assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6], "in the tick that finds it");
+        assert!(!rig.last.safety_output);
+        rig.run(1000);
+        assert_eq!(rig.errors(), OWN, "it latches");
+        rig.clear(true, 0);
+        rig.run(600);
+        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    }
+    // A few are borne, for ever.
+    let mut rig = Rig::holding();
+    for _ in 0..100 {
+        rig.missed_ticks = 5;
+        rig.run(1000);
+        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    }
+}
+
+#[test]
 fn j14_five_unanswered_moves_are_a_receive_timeout() {
     for node in 0..6 {
         let mut rig = Rig::holding();

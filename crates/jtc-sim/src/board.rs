@@ -152,7 +152,7 @@ impl Board {
 
     /// One tick of the controller.
     pub fn tick(&mut self, pins: &Pins<'_>) -> Outputs {
-        self.missed = 0;
+        let missed_ticks = core::mem::take(&mut self.missed).try_into().unwrap_or(u16::MAX);
         let urgent = self.watch.take();
         let host: Vec<HostEvent<'_>> = (0..EVENTS_MAX)
             .map_while(|n| self.batch.get(n))
@@ -166,6 +166,7 @@ impl Board {
             bus: pins.bus,
             bus_state: pins.bus_state,
             safety_input: pins.safety_input,
+            missed_ticks,
             urgent,
             host: &host,
             status_free: pins.status_free,

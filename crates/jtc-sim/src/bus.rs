@@ -188,7 +188,8 @@ impl Bus {
         &self.log
     }
 
-    /// One millisecond: `out` goes to the nodes, answers that are through by its end go to `received`.
+    /// One millisecond: `out` goes to the nodes, answers that are through by its end are added to
+    /// `received`: they wait there until the controller takes them, however late its tick is.
     pub fn tick(
         &mut self,
         now_us: u64,
@@ -197,7 +198,6 @@ impl Bus {
         received: &mut Vec<Frame>,
     ) -> BusState {
         self.log.clear();
-        received.clear();
         if self.recovering() {
             self.pending.clear();
             return BusState { acknowledged: false, bus_off: true };

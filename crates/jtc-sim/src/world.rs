@@ -180,6 +180,7 @@ impl World {
             safety_input: self.safety_input && !self.input_fault,
             status_free: self.to_host.is_idle(),
         });
+        self.received.clear();
         self.sent = outputs.bus;
         self.safety_output = outputs.safety_output;
         if outputs.status {

@@ -220,3 +220,24 @@ fn j12_the_first_frame_after_an_error_is_zero_torque_also_during_bring_up() {
         }
     }
 }
+
+/// Every second tick is left out, as if each took too long.
+#[test]
+fn j12_ticks_that_go_on_missing_are_an_internal_error() {
+    for missing in [9, 10] {
+        let mut operator = held();
+        let now = operator.world.now_us() / 1000;
+        for tick in 0..missing {
+            let trigger = Trigger::At(now + 5 + 2 * tick);
+            operator.world.inject(Fault { kind: FaultKind::TickOverrun, trigger, duration_ms: Some(1) });
+        }
+        operator.run(40);
+        let t = *operator.world.telemetry();
+        if missing < 10 {
+            assert_eq!((t.state, t.errors), (State::HoldPos, 0));
+        } else {
+            use jtc_core::error;
+            assert_eq!((t.state, t.errors), (State::Error, error::INTERNAL | error::EMERGENCY_OUTPUT));
+        }
+    }
+}

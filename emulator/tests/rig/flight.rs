@@ -14,6 +14,7 @@ pub struct Flight {
     pub tick: u64,
     pub bus_state: u8,
     pub safety_input: bool,
+    pub missed_ticks: u16,
     pub status_free: bool,
     pub wrong_format: u32,
     pub urgent: [UrgentCommands; HOST_LINES],
@@ -100,7 +101,8 @@ impl Flight {
             }
             commands
         });
-        let [event_count, ..] = b.take::<4>();
+        let [event_count, _] = b.take();
+        let missed_ticks = b.u16();
         let mut events: Vec<_> = (0..16)
             .map(|_| {
                 let [kind, line, frame_type, status] = b.take();
@@ -123,6 +125,7 @@ impl Flight {
             tick,
             bus_state,
             safety_input: safety_input != 0,
+            missed_ticks,
             status_free: status_free != 0,
             wrong_format,
             urgent,

@@ -53,6 +53,7 @@ impl Shadow {
             bus: &flight.heard,
             bus_state: flight.bus(),
             safety_input: flight.safety_input,
+            missed_ticks: flight.missed_ticks,
             urgent: flight.urgent,
             host: &host,
             status_free: flight.status_free,

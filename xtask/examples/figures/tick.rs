@@ -62,6 +62,7 @@ fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
         bus,
         bus_state: BusState { acknowledged: true, bus_off: false },
         safety_input: true,
+        missed_ticks: 0,
         urgent: [UrgentCommands::NONE; HOST_LINES],
         host: host.as_slice(),
         status_free: true,

@@ -169,7 +169,7 @@ impl Nodes {
         }
         let torque_taken = core::mem::replace(&mut self.powered, goal == Goal::Enabled) && !self.powered;
         self.rest_ms = if torque_taken { config.enable_rest_ms } else { self.rest_ms.saturating_sub(1) };
-        let usable = self.measure(answered, commanded, config);
+        let usable = self.measure(answered, commanded, 1 + u32::from(inputs.missed_ticks), config);
         self.count_missing(inputs, config, answered, usable);
         let gripper = &self.nodes[GRIPPER];
         self.gripper_lost = (gripper_before.report.fsm == fsm::ENABLED && gripper.report.fsm != fsm::ENABLED)
@@ -201,8 +201,8 @@ impl Nodes {
         }
     }
 
-    /// Positions and velocities from the nodes that `answered`; returns those whose answers are usable.
-    fn measure(&mut self, answered: u8, commanded: &[f64; JOINTS], config: &Config) -> u8 {
+    /// Positions and velocities from the nodes that `answered`, so long after the last tick; returns those whose answers are usable.
+    fn measure(&mut self, answered: u8, commanded: &[f64; JOINTS], elapsed_ms: u32, config: &Config) -> u8 {
         let (mut usable, mut still) = (answered, true);
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
             let reading = Reading { position: node.report.position, velocity: node.report.velocity };
@@ -210,7 +210,7 @@ impl Nodes {
                 answer: (answered & (1 << j) != 0).then_some(reading),
                 expected: self.sent_move,
                 commanded: commanded[j],
-                elapsed_ms: 1,
+                elapsed_ms,
                 velocity_max: config.joints[j].velocity_max,
             };
             if node.valid && !node.measured.step(&tick, config) {

@@ -20,6 +20,12 @@ pub struct Node {
     pub silent: bool,
     /// Added to the position that it reports, rad.
     pub glitch: f64,
+    /// Takes its configuration in Init only.
+    pub refuses_when_ready: bool,
+    /// Does not leave ReadyToOperate.
+    pub stays_ready: bool,
+    /// Does not leave OperationEnable.
+    pub stays_enabled: bool,
     /// Refuses to be enabled: stays in the transition.
     pub slow_enable: bool,
     pub configured: bool,
@@ -34,6 +40,8 @@ pub struct Rig {
     pub pump: bool,
     pub torque: [f64; 6],
     pub safety_input: bool,
+    /// Ticks that do not come before the next one.
+    pub missed_ticks: u16,
     pub acknowledged: bool,
     pub bus_off: bool,
     /// Positions follow the commanded ones.
@@ -118,6 +126,9 @@ impl Rig {
             report: JointReport { temperature: 25, ..JointReport::default() },
             silent: false,
             glitch: 0.0,
+            refuses_when_ready: false,
+            stays_ready: false,
+            stays_enabled: false,
             slow_enable: false,
             configured: false,
             resets: 0,
@@ -131,6 +142,7 @@ impl Rig {
             pump: false,
             torque: [0.0; 6],
             safety_input: true,
+            missed_ticks: 0,
             acknowledged: true,
             bus_off: false,
             follow: true,
@@ -299,6 +311,7 @@ impl Rig {
             bus: &bus,
             bus_state: BusState { acknowledged: self.acknowledged, bus_off: self.bus_off },
             safety_input: self.safety_input,
+            missed_ticks: core::mem::take(&mut self.missed_ticks),
             urgent: core::mem::take(&mut self.urgent),
             host: &host,
             status_free: self.status_free,
@@ -356,6 +369,8 @@ impl Rig {
                 Request::ChangeFsm { target } => {
                     self.answers.push(Answer::Fsm { node: number, fsm: node.report.fsm }.emit(SCALE));
                     node.report.fsm = match (target[n], node.report.fsm) {
+                        (_, fsm::READY) if node.stays_ready => fsm::READY,
+                        (_, fsm::ENABLED) if node.stays_enabled => fsm::ENABLED,
                         (Target::Init, fsm::START | fsm::READY) => fsm::INIT,
                         (Target::Init, fsm::FAULT) => {
                             (node.report.errors, node.report.mc_current, node.report.mc_occurred) = (0, 0, 0);
@@ -373,7 +388,8 @@ impl Rig {
                     };
                 }
                 Request::ChangeMode { .. } => {
-                    let accepted = matches!(node.report.fsm, fsm::INIT | fsm::READY);
+                    let accepted = node.report.fsm == fsm::INIT
+                        || node.report.fsm == fsm::READY && !node.refuses_when_ready;
                     node.configured |= accepted;
                     self.answers.push(Answer::Mode { node: number, accepted }.emit(SCALE));
                 }

@@ -1,0 +1,64 @@
+//! Late and missing ticks (J-12): a few are borne; ten within a second are a failure of the device.
+
+/// So many of them.
+const COUNT: usize = 10;
+/// Within less than this, ms.
+const WINDOW_MS: u64 = 1_000;
+
+/// When the last late or missing ticks were.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LateTicks {
+    now_ms: u64,
+    /// The last ones, a ring; those that never were lie far enough back.
+    at_ms: [u64; COUNT],
+    next: usize,
+}
+
+impl Default for LateTicks {
+    fn default() -> Self {
+        Self { now_ms: WINDOW_MS, at_ms: [0; COUNT], next: 0 }
+    }
+}
+
+impl LateTicks {
+    /// One tick, before which `missed` did not come or came late; true when there have been too many.
+    pub fn count(&mut self, missed: u16) -> bool {
+        self.now_ms += 1 + u64::from(missed);
+        let mut too_many = false;
+        for _ in 0..usize::from(missed).min(COUNT) {
+            if let Some(slot) = self.at_ms.get_mut(self.next) {
+                *slot = self.now_ms;
+            }
+            self.next = (self.next + 1) % COUNT;
+            // What is there now is the oldest of the last ten.
+            too_many |= self.at_ms.get(self.next).is_some_and(|oldest| self.now_ms - oldest < WINDOW_MS);
+        }
+        too_many
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ticks, of which every `n`-th comes after `missed` that did not; in which tick that is too many.
+    fn until_too_many(n: u32, missed: u16) -> Option<u32> {
+        let mut late = LateTicks::default();
+        (1..20_000).find(|tick| late.count(if tick % n == 0 { missed } else { 0 }))
+    }
+
+    #[test]
+    fn j12_ten_late_ticks_within_a_second_are_too_many() {
+        assert_eq!(until_too_many(1, 1), Some(10));
+        assert_eq!(until_too_many(2, 1), Some(20), "every second or third one");
+        assert_eq!(until_too_many(100, 1), Some(1000), "the tenth 909 ms after the first");
+        // One in 112 ms: the first and the tenth are 1008 ms apart.
+        assert_eq!(until_too_many(111, 1), None);
+        assert_eq!(until_too_many(109, 1), Some(1090));
+        // Several at once count each.
+        assert_eq!(until_too_many(50, 5), Some(100));
+        assert_eq!(until_too_many(1_500, 9), None);
+        assert_eq!(until_too_many(1_500, 10), Some(1_500));
+        assert_eq!(until_too_many(1_500, u16::MAX), Some(1_500));
+    }
+}

@@ -293,16 +293,35 @@ fn j12_torque_is_taken_away_before_anything_else_is_sent() {
 
 #[test]
 fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
-    for wait in 60..90 {
+    let run = |ticks: usize| {
         let mut rig = Rig::new(Config::avena());
-        rig.run(wait);
+        rig.run(ticks);
+        rig
+    };
+    // The ticks of the bring-up in which another frame goes out: resets, configurations, changes of state.
+    let healthy = run(300).sent;
+    let others: Vec<usize> =
+        (0..300).filter(|&tick| !matches!(healthy[tick], Request::Move { .. })).collect();
+    assert!(matches!(others[..], [reset, mode, state, ..]
+        if healthy[reset] == Request::ResetAll
+            && matches!(healthy[mode], Request::ChangeMode { .. })
+            && matches!(healthy[state], Request::ChangeFsm { .. })));
+    for tick in others {
+        let mut rig = run(tick);
+        assert_eq!(rig.state(), State::Init);
         rig.safety_input = false;
         rig.tick();
         assert_eq!(
             *rig.sent.last().unwrap(),
             Request::Move { torque: [0.0; 6], pump: false },
-            "after {wait} ticks"
+            "instead of {:?} in tick {tick}",
+            healthy[tick]
         );
+        // It has been put off, no more.
+        rig.safety_input = true;
+        rig.clear(true, 0x7F);
+        rig.run(300);
+        assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::READY && n.configured && n.resets == 1));
     }
 }
 

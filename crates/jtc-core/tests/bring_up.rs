@@ -1,0 +1,186 @@
+//! Order of the bring-up: what counts when, and who is asked for what (J-16, J-20, J-21).
+mod rig;
+
+use jtc_bus::{Answer, Frame, JointReport, Request, Target, fsm};
+use jtc_core::{Config, State};
+use jtc_wire::{DataStatus, FrameType};
+use rig::{Rig, SCALE};
+
+const JOINT: usize = 2;
+
+fn configures(request: &Request) -> bool {
+    matches!(request, Request::ChangeMode { .. })
+}
+
+fn target_of(request: &Request) -> Target {
+    match request {
+        Request::ChangeFsm { target } => target[JOINT],
+        _ => Target::NoChange,
+    }
+}
+
+fn joint_answer(position: f64, state: u8) -> Frame {
+    let report = JointReport { position, fsm: state, temperature: 25, ..JointReport::default() };
+    Answer::Joint { node: JOINT as u8, report }.emit(SCALE)
+}
+
+/// Its drive reports 0 until then, whatever else it answers in that tick.
+#[test]
+fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
+    for move_first in [false, true] {
+        let mut rig = Rig::new(Config::avena());
+        rig.follow = false;
+        rig.until(300, |r| r.sent.last().is_some_and(configures));
+        let mode = Answer::Mode { node: JOINT as u8, accepted: true }.emit(SCALE);
+        let moved = joint_answer(0.6, fsm::INIT);
+        rig.inject = if move_first { vec![moved, mode] } else { vec![mode, moved] };
+        rig.tick();
+        let joint = rig.controller.telemetry().joints[JOINT];
+        assert_eq!((joint.position, joint.fsm), (0.0, fsm::INIT));
+        assert_ne!(rig.status().node_init & 1 << JOINT, 1 << JOINT, "it counts from the next answer on");
+        rig.inject = vec![joint_answer(0.01, fsm::INIT)];
+        rig.tick();
+    }
+}
+
+/// An answer that was on its way when the node was reset says nothing of the node that restarts.
+#[test]
+fn j20_late_answers_after_a_reset_do_not_count() {
+    let mut rig = Rig::holding();
+    rig.ask(FrameType::ResetCanDevices, &[1 << JOINT, 0, 0, 0]);
+    rig.until(20, |r| r.sent.last() == Some(&Request::Reset(JOINT as u8)));
+    let late = [
+        joint_answer(0.6, fsm::ENABLED),
+        Answer::Mode { node: JOINT as u8, accepted: true }.emit(SCALE),
+        joint_answer(0.6, fsm::READY),
+    ];
+    let from = rig.sent.len();
+    for tick in 0..15 {
+        let mut answers = vec![late[tick % 3]];
+        for node in (0..6).filter(|&node| node != JOINT) {
+            let report = JointReport { fsm: rig.nodes[node].report.fsm, ..rig.nodes[node].report };
+            answers.push(Answer::Joint { node: node as u8, report }.emit(SCALE));
+        }
+        rig.inject = answers;
+        rig.tick();
+        assert_eq!(rig.state(), State::Init);
+        assert_eq!(rig.controller.telemetry().joints[JOINT].position, 0.0);
+    }
+    assert!(rig.sent[from..].iter().all(|r| target_of(r) == Target::NoChange), "nothing is asked of it yet");
+    rig.inject.clear();
+    rig.run(500);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert!(rig.nodes[JOINT].configured);
+}
+
+/// Drives of one generation take their configuration in Init only.
+#[test]
+fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.nodes[JOINT].refuses_when_ready = true;
+    rig.until(300, |r| r.nodes[JOINT].booting == 0 && r.nodes[JOINT].resets == 1);
+    rig.nodes[JOINT].report.fsm = fsm::READY;
+    rig.run(400);
+    let requests = &rig.sent;
+    assert!(requests.iter().any(|r| target_of(r) == Target::Init));
+    assert!(rig.nodes[JOINT].configured);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+}
+
+/// The way from Error to HoldPos leads through joints in ReadyToOperate; one that is still enabled is not taken over.
+#[test]
+fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
+    let mut rig = Rig::holding();
+    rig.nodes[JOINT].stays_enabled = true;
+    rig.safety_input = false;
+    rig.run(50);
+    rig.safety_input = true;
+    rig.clear(true, 0x7F);
+    for _ in 0..200 {
+        rig.tick();
+        assert_eq!(rig.state(), State::Init);
+        assert_eq!(rig.torque, [0.0; 6]);
+    }
+    rig.nodes[JOINT].stays_enabled = false;
+    rig.run(800);
+    assert_eq!(rig.state(), State::HoldPos);
+}
+
+/// A node that is on its way through 10, from Start to Init, has not followed yet.
+#[test]
+fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
+    let mut rig = Rig::holding();
+    rig.nodes[JOINT].fault();
+    rig.run(3);
+    rig.nodes[JOINT].report.fsm = 254;
+    assert_eq!(rig.clear(true, 1 << JOINT), DataStatus::NoError);
+    rig.run(20);
+    rig.nodes[JOINT].report = JointReport { fsm: 10, temperature: 25, ..JointReport::default() };
+    rig.run(3);
+    let from = rig.sent.len();
+    rig.run(100);
+    assert_eq!(rig.state(), State::Error, "it is still being cleared");
+    assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init), "the command stands");
+    rig.nodes[JOINT].report.fsm = fsm::INIT;
+    rig.nodes[JOINT].configured = false;
+    rig.run(800);
+    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+}
+
+/// Neither in Error, nor while a node of it is being cleared, is anything configured.
+#[test]
+fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
+    let mut rig = Rig::holding();
+    rig.safety_input = false;
+    rig.run(50);
+    // It has restarted: its configuration is lost.
+    rig.nodes[JOINT].restart();
+    let from = rig.sent.len();
+    rig.run(500);
+    assert_eq!(rig.state(), State::Error);
+    assert!(!rig.sent[from..].iter().any(configures));
+
+    // In Init: it waits in ReadyToOperate without configuration, and has something to clear.
+    let mut rig = Rig::new(Config::avena());
+    rig.until(300, |r| r.nodes[JOINT].booting == 0 && r.nodes[JOINT].resets == 1);
+    rig.nodes[JOINT].report.fsm = fsm::READY;
+    rig.nodes[JOINT].report.mc_occurred = 4;
+    rig.nodes[JOINT].refuses_when_ready = true;
+    rig.nodes[JOINT].stays_ready = true;
+    rig.run(3);
+    rig.clear(false, 1 << JOINT);
+    rig.run(150);
+    let from = rig.sent.len();
+    rig.run(200);
+    assert_eq!(rig.state(), State::Init);
+    assert!(!rig.sent[from..].iter().any(configures));
+    assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init));
+}
+
+/// Occurred words tell of what has been, current ones of what is.
+#[test]
+fn j21_occurred_errors_are_not_reported_as_current() {
+    // A joint's own error, and a CAN timeout.
+    let mut rig = Rig::holding();
+    rig.push(JOINT, 0.2);
+    rig.run(50);
+    assert_eq!(rig.state(), State::Error);
+    rig.follow = true;
+    rig.nodes[JOINT + 1].silent = true;
+    rig.run(10);
+    rig.nodes[JOINT + 1].silent = false;
+    rig.run(10);
+    let latched = rig.status();
+    assert!(latched.errors != 0 && latched.can_current != 0 && latched.joints[JOINT].internal != 0);
+    assert_eq!(latched.can_error, 1);
+    rig.clear(true, 0x7F);
+    rig.run(800);
+    let status = rig.status();
+    assert_eq!((status.errors, status.can_current, status.can_error), (0, 0, 0));
+    assert_eq!(status.joints.map(|j| j.internal), [0; 6]);
+    assert_eq!(rig.controller.telemetry().joints.map(|j| j.internal), [0; 6]);
+    assert_eq!((status.occurred, status.can_occurred), (latched.occurred, latched.can_occurred));
+    assert_eq!(status.joints[JOINT].internal_occurred, latched.joints[JOINT].internal_occurred);
+    assert!(status.occurred != 0 && status.can_occurred != 0 && status.joints[JOINT].internal_occurred != 0);
+}

@@ -163,13 +163,13 @@ impl Board {
         let input = !has(FaultKind::SafetyInput);
         let chip = self.machine.chip();
         chip.fdcan.wire.fault = fault;
-        chip.gpio.drive(self.safety.0, Some(input));
+        chip.drive_pin(self.safety.0, Some(input));
     }
 
     /// Drive the safety input; `None`: the wire is broken.
     pub fn set_safety_input(&mut self, level: Option<bool>) {
         let pin = self.safety.0;
-        self.machine.chip().gpio.drive(pin, level);
+        self.machine.chip().drive_pin(pin, level);
     }
 
     /// Level of the safety output; `None` while the pin is not driven.

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use crate::clock::{MICROSECOND, NEVER, Time, period};
 use crate::code::Code;
 use crate::dma::{self, Dma, Memory};
+use crate::exti::Exti;
 use crate::fdcan::Fdcan;
-use crate::gpio::Gpio;
+use crate::gpio::{Gpio, Pin};
 use crate::iwdg::Iwdg;
 use crate::nvic::Nvic;
 use crate::observe::Observers;
@@ -80,6 +81,8 @@ pub struct Chip {
     pub rcc: Rcc,
     /// Pins.
     pub gpio: Gpio,
+    /// Edges of pins.
+    pub exti: Exti,
     /// DMA1, DMA2.
     pub dma: Dma,
     /// TIM2..TIM7.
@@ -114,6 +117,7 @@ impl Default for Chip {
             scs: Scs::default(),
             rcc: Rcc::new(HSE_HZ),
             gpio: Gpio::default(),
+            exti: Exti::default(),
             dma: Dma::default(),
             timers: core::array::from_fn(|i| Timer::new(2 + i as u32)),
             usarts: [Usart::new(2), Usart::new(3)],
@@ -190,6 +194,7 @@ impl Chip {
         let now = self.now();
         self.rcc.reset(flags);
         self.gpio.reset(now);
+        self.exti = Exti::default();
         self.nvic = Nvic::default();
         self.scs = Scs::default();
         self.dma = Dma::default();
@@ -205,6 +210,14 @@ impl Chip {
         self.core = Core { instructions, ..Core::default() };
         self.remap = true;
         self.update_clocks();
+    }
+
+    /// Drive a pin from outside; `None`: leave it open. Its edges reach EXTI.
+    pub fn drive_pin(&mut self, pin: Pin, level: Option<bool>) {
+        let Some(port) = Gpio::port(pin) else { return };
+        let before = self.gpio.levels(port);
+        self.gpio.drive(pin, level);
+        self.exti.edges(port, before, self.gpio.levels(port));
     }
 
     fn moment(&self) -> Moment {
@@ -306,6 +319,8 @@ impl Chip {
         match address {
             RCC..RCC_END => self.rcc.read(address - RCC),
             IWDG1..IWDG1_END => self.iwdg.read(address - IWDG1),
+            EXTI..EXTI_END => self.exti.read(address - EXTI),
+            EXTICR..EXTICR_END => self.exti.source((address - EXTICR) as usize / 4),
             _ => {
                 if !is_plain(address) {
                     note(&mut self.unknown, address, self.core.pc, None);
@@ -360,6 +375,8 @@ impl Chip {
         match word_address {
             RCC..RCC_END => self.write_rcc(word_address - RCC, value, memory),
             IWDG1..IWDG1_END => self.iwdg.write(word_address - IWDG1, value, now),
+            EXTI..EXTI_END => self.exti.write(word_address - EXTI, value),
+            EXTICR..EXTICR_END => self.exti.set_source((word_address - EXTICR) as usize / 4, value),
             _ => {
                 if !is_plain(word_address) {
                     note(&mut self.unknown, word_address, self.core.pc, Some(value));
@@ -432,6 +449,11 @@ const RCC_END: u32 = 0x5802_4800;
 const PWR: u32 = 0x5802_4800;
 const IWDG1: u32 = 0x5800_4800;
 const IWDG1_END: u32 = 0x5800_4C00;
+const EXTI: u32 = 0x5800_0000;
+const EXTI_END: u32 = 0x5800_0400;
+/// SYSCFG_EXTICR1..4.
+const EXTICR: u32 = 0x5800_0408;
+const EXTICR_END: u32 = 0x5800_0418;
 const HSEM: u32 = 0x5802_6400;
 
 /// A register of a peripheral that is modelled and can be switched off.
@@ -472,19 +494,11 @@ fn place(address: u32) -> Option<(Gate, Place)> {
     })
 }
 
-/// Blocks that are nothing but memory for the firmware's purposes: CRS, FLASH, EXTI, SYSCFG, RTC, PWR, HSEM, DBGMCU.
+/// Blocks that are nothing but memory for the firmware's purposes: CRS, FLASH, the rest of SYSCFG, RTC, PWR, HSEM, DBGMCU.
 fn is_plain(address: u32) -> bool {
     matches!(
         address & !0x3FF,
-        0x4000_8400
-            | 0x5200_2000
-            | 0x5800_0000
-            | 0x5800_0400
-            | 0x5800_4000
-            | PWR
-            | HSEM
-            | 0x5C00_1000
-            | 0x4000_A800
+        0x4000_8400 | 0x5200_2000 | 0x5800_0400 | 0x5800_4000 | PWR | HSEM | 0x5C00_1000 | 0x4000_A800
     )
 }
 

@@ -138,6 +138,16 @@ impl Gpio {
         (index < PORTS && pin.1 < 16).then_some((index, u32::from(pin.1)))
     }
 
+    /// Number of a pin's port, 0 for A.
+    pub fn port(pin: Pin) -> Option<usize> {
+        Self::place(pin).map(|(port, _)| port)
+    }
+
+    /// Levels on the pins of a port: IDR.
+    pub fn levels(&self, port: usize) -> u32 {
+        self.ports.get(port).map_or(0, Port::idr)
+    }
+
     /// Drive a pin from outside; `None`: leave it open.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         let Some((index, bit)) = Self::place(pin) else { return };

@@ -9,6 +9,7 @@ mod cpu;
 pub mod dma;
 mod elf;
 mod exception;
+mod exti;
 pub mod fdcan;
 mod gpio;
 mod iwdg;

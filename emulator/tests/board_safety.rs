@@ -72,6 +72,43 @@ fn j22_the_safety_input_acts_in_one_tick() {
     }
 }
 
+/// The safety input is low for `us`, beginning this long after the start of a millisecond; whether one of the next two ticks
+/// has seen it.
+fn pulse(rig: &mut Rig, phase: u64, us: u64) -> bool {
+    let start = rig.board.now_ms() * 1000 + phase;
+    rig.board.machine.run_until(start * MICROSECOND);
+    rig.board.set_safety_input(Some(false));
+    rig.board.machine.run_until((start + us) * MICROSECOND);
+    rig.board.set_safety_input(Some(true));
+    (0..2).fold(false, |seen, _| {
+        rig.step();
+        seen | !rig.flight.safety_input
+    })
+}
+
+/// J-22: a pulse of the safety input between two ticks is latched, whatever its phase, and acts in the next one.
+#[test]
+fn j22_pulses_shorter_than_a_tick_are_seen() {
+    let mut rig = holding();
+    assert!(pulse(&mut rig, 700, 50));
+    assert_eq!(rig.state(), State::Error);
+    assert!(rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
+    for us in [50, 100, 200, 300] {
+        for phase in (5..995 - us).step_by(23) {
+            assert!(pulse(&mut rig, phase, us), "{us} µs, {phase} µs after the start of a millisecond");
+            // It is seen once.
+            rig.step();
+            assert!(rig.flight.safety_input, "{us} µs, {phase} µs after the start of a millisecond");
+        }
+    }
+    rig.ask(HOST, &frames::clear_all());
+    rig.wait_for_hold(15_000);
+    for _ in 0..100 {
+        rig.step();
+        assert!(rig.flight.safety_input && rig.telemetry().errors == 0);
+    }
+}
+
 /// How a program came to its end.
 struct End {
     /// Fault or last tick.

@@ -183,7 +183,7 @@ impl Tick {
         let inputs = Inputs {
             bus: self.heard.frames(),
             bus_state,
-            safety_input: self.pins.safety_input.is_high(),
+            safety_input: self.pins.safety_input.is_safe(),
             missed_ticks,
             urgent,
             host: host.get(..count).unwrap_or(&[]),

@@ -1,10 +1,13 @@
 //! The boards: one file each says which pin does what.
-use embassy_stm32::gpio::{AfType, Flex, Input, Output, OutputType, Pin, Pull, Speed};
+use embassy_stm32::gpio::{AfType, Flex, Output, OutputType, Pin, Pull, Speed};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::{Peri, pac};
 use jtc_core::State;
 
 use crate::uart::Line;
+
+mod safety_input;
+use safety_input::SafetyInput;
 
 #[cfg(not(feature = "nucleo-h743zi2"))]
 mod nucleo_h745zi_q;
@@ -28,7 +31,7 @@ pub struct Board {
 /// Safety wires and LEDs.
 pub struct Pins {
     /// 0 is an error; pulled down, so that a broken wire is one (J-22).
-    pub safety_input: Input<'static>,
+    pub safety_input: SafetyInput,
     /// 0 is an error (J-22).
     pub safety_output: Output<'static>,
     /// LED1, LED2, LED3.
@@ -43,7 +46,7 @@ impl Pins {
         leds: [Output<'static>; 3],
     ) -> Self {
         Self {
-            safety_input: Input::new(input, Pull::Down),
+            safety_input: SafetyInput::new(input),
             safety_output: Output::new(output, embassy_stm32::gpio::Level::Low, Speed::Low),
             leds,
         }

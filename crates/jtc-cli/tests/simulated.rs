@@ -158,8 +158,27 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     sim.jtc(&["params", "use-defaults"]).ends(0);
     let file = sim.path("motion.csv");
     std::fs::write(&file, motion(0.25)).unwrap();
-    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(5);
-    assert_eq!(said.json()["outcome"], "fault");
+    let (record, page) = (sim.path("run.mcap"), sim.path("run.html"));
+    let said = sim.jtc(&["--json", "traj", "run", &file, "--record", &record, "--report", &page]).ends(5);
+    let value = said.json();
+    assert_eq!(value["outcome"], "fault");
+    // What broke first leads, with its joint and the values around it.
+    assert_eq!(value["failure"]["joint"], 3, "{}", value["failure"]);
+    assert!(value["failure"]["causes"][0].as_str().unwrap().starts_with("joint 3: "), "{}", value["failure"]);
+    // The fault is at 500 ms; statuses come every 40 ms, and after it their times are those of arrival.
+    let at_ms = value["failure"]["at_ms"].as_f64().unwrap();
+    assert!((440.0..700.0).contains(&at_ms), "{}", value["failure"]);
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.contains("<title>FAILED: ") && text.contains("ms into the run: joint 3: "));
+    // From the recording, too.
+    let again = sim.path("again.html");
+    let said = jtc(&["report", &record, "--out", &again]).ends(0);
+    assert!(
+        said.out.starts_with("FAILED ") && said.out.contains("figures up to the failure"),
+        "{}",
+        said.out
+    );
+    assert!(std::fs::read_to_string(&again).unwrap().contains("<title>FAILED: "));
     let said = sim.jtc(&["--json", "recover"]).ends(0);
     assert_eq!(said.json()["status"]["state"], "HoldPos", "{}", said.out);
 }

@@ -57,6 +57,12 @@ impl JointSample {
         internal: 0,
     };
 
+    /// Without what a joint that does not answer cannot have said: a gap, not a joint at 0 rad.
+    fn not_measured(self) -> Self {
+        let nan = f64::NAN;
+        Self { position: nan, velocity: nan, torque: nan, temperature: nan, ..self }
+    }
+
     /// Commanded minus measured position, rad; NaN where one is unknown.
     pub fn position_error(&self) -> f64 {
         self.set_position - self.position
@@ -119,7 +125,12 @@ impl From<&Telemetry> for Sample {
             point: t.point,
             errors: t.errors,
             can_current: 0,
-            joints: std::array::from_fn(|j| JointSample::from(&t.joints[j])),
+            joints: std::array::from_fn(|j| {
+                let own = &t.joints[j];
+                // Without torque a joint that is not measured reads as exactly zero.
+                let lost = matches!(t.state as u8, 0 | 1 | 5) && own.position == 0.0 && own.velocity == 0.0;
+                if lost { JointSample::from(own).not_measured() } else { JointSample::from(own) }
+            }),
         }
     }
 }
@@ -136,7 +147,7 @@ impl Sample {
             can_current: status.can_current,
             joints: std::array::from_fn(|j| {
                 let s = &status.joints[j];
-                JointSample {
+                let sample = JointSample {
                     position: f64::from(s.position),
                     velocity: f64::from(s.velocity),
                     torque: f64::from(s.torque),
@@ -144,7 +155,11 @@ impl Sample {
                     fsm: s.fsm,
                     internal: s.internal,
                     ..JointSample::UNKNOWN
-                }
+                };
+                // The controller reports zero for a joint that it does not know: silent, or not ready.
+                let unknown = (status.can_current >> (8 + j) | u32::from(status.node_init) >> j) & 1 == 1;
+                let lost = unknown && s.position == 0.0 && s.velocity == 0.0;
+                if lost { sample.not_measured() } else { sample }
             }),
         }
     }
@@ -161,5 +176,22 @@ impl Sample {
             }
         }
         sample
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_that_does_not_answer_has_no_position() {
+        let mut status = Status { fsm: 5, can_current: 1 << 10, ..Status::default() };
+        status.joints[1].position = 0.5;
+        let sample = Sample::from_status(0.0, &status);
+        assert!(sample.joints[2].position.is_nan() && sample.joints[2].torque.is_nan());
+        assert_eq!((sample.joints[0].position, sample.joints[1].position), (0.0, 0.5));
+        // It answers again, and its error is still latched.
+        status.joints[2].position = 0.3;
+        assert!(Sample::from_status(0.0, &status).joints[2].position > 0.29);
     }
 }

@@ -58,7 +58,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let file = |name: &str| args.out.join(name);
     recording::write_all(&file("recording.mcap"), &run.info, &run.samples)?;
     recording::write_all(&file("recording.csv"), &run.info, &run.samples)?;
-    let input = ReportInput { info: &run.info, samples: &run.samples, facts: &facts };
+    let input = ReportInput { info: &run.info, samples: &run.samples, facts: &facts, failure: None };
     let save = |name: &str, text: String| {
         std::fs::write(file(name), text).map_err(|e| Failure::usage(format!("{}: {e}", file(name).display())))
     };

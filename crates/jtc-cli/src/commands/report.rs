@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use cli_kit::Output;
 use jtc_host::arm::Arm;
 use jtc_host::recording::Recording;
-use jtc_host::report::{ReportInput, Summary, html, picture_svg};
+use jtc_host::report::{ReportInput, RunFailure, Summary, html, picture_svg};
 use serde_json::json;
 
 use super::run_report;
@@ -31,7 +31,9 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         // A CSV file says nothing about limits.
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
-    let input = ReportInput { info: &info, samples: &recording.samples, facts: &[] };
+    let failure = RunFailure::find(&info, &recording.samples);
+    let input =
+        ReportInput { info: &info, samples: &recording.samples, facts: &[], failure: failure.as_ref() };
     page_file.write(&html(&input))?;
     picture_file.write(&picture_svg(&input))?;
     let summary = Summary::of(&info, &recording.samples);
@@ -40,11 +42,12 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         "executed_s": summary.executed_s,
         "samples": recording.samples.len(),
         "joints": summary.joints,
+        "failure": failure,
         "files": [page.display().to_string(), picture.display().to_string()],
     });
     out.result(&value, || {
         let made = format!("{}   open it in a browser\n{}", page.display(), picture.display());
-        format!("{}\n{made}", run_report::figures(&summary))
+        format!("{}\n{made}", run_report::verdict(failure.as_ref(), &summary))
     });
     Ok(())
 }

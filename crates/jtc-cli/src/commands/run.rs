@@ -8,11 +8,11 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use cli_kit::Output;
 use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
-use jtc_host::recording::{Format, RecordingInfo};
-use jtc_host::report::{self, ReportInput, Summary};
+use jtc_host::recording::Format;
+use jtc_host::report::{self, ReportInput, RunFailure, Summary};
 use jtc_host::session::{Flow, Outcome, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
-use jtc_host::{Sample, Session, plan, words};
+use jtc_host::{Error, Sample, Session, plan, words};
 use jtc_wire::Status;
 use serde_json::json;
 
@@ -74,7 +74,16 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     let samples = samples.take();
     // A run that ended in a fault is what one wants to look at most: it is recorded and reported as well.
     let facts = [run_report::link_facts(&upload, &link, session.port().baud())];
-    let (files, lost) = outputs.write(&info, &samples, &facts);
+    let broken = match &outcome {
+        Ok(_) => None,
+        Err(e) => {
+            let found = RunFailure::find(&info, &samples);
+            let found = found.unwrap_or_else(|| RunFailure::ended_by(&info, &samples, e.to_string()));
+            Some(if let Error::RunFault { status, .. } = e { found.with_status(status) } else { found })
+        }
+    };
+    let input = ReportInput { info: &info, samples: &samples, facts: &facts, failure: broken.as_ref() };
+    let (files, lost) = outputs.write(&input);
     let summary = Summary::of(&info, &samples);
     let word = match &outcome {
         Ok(Outcome::Finished(_)) => "finished",
@@ -92,6 +101,7 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         "executed_s": summary.executed_s,
         "samples": summary.samples,
         "joints": summary.joints,
+        "failure": broken,
         "verdict": verdict,
         "upload": upload,
         "link": link,
@@ -101,7 +111,11 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     out.result(&value, || {
         let made: String = files.iter().map(|f| format!("\n{f}")).collect();
         let line = run_report::link_line(&upload, &link);
-        format!("\n{word}: {:.2} s\n{}\n{line}{made}", summary.executed_s, run_report::figures(&summary))
+        format!(
+            "\n{word}: {:.2} s\n{}\n{line}{made}",
+            summary.executed_s,
+            run_report::verdict(broken.as_ref(), &summary)
+        )
     });
     match (outcome, failure) {
         (_, Some(failure)) if out.is_json() => {
@@ -184,9 +198,9 @@ fn execute(
     trajectory: &Trajectory,
     what: &str,
     operator: &mut Operator,
-) -> Result<Outcome, jtc_host::Error> {
+) -> Result<Outcome, Error> {
     if operator.wants_the_end() {
-        return Err(jtc_host::Error::Cancelled);
+        return Err(Error::Cancelled);
     }
     let bar = operator.out.bar((trajectory.duration_s() * 1e3) as u64, what);
     operator.motion_begins();
@@ -259,17 +273,9 @@ impl Outputs {
     }
 
     /// Writes all of them; one that is lost does not cost the other. Returns the names of those that were written.
-    fn write(
-        self,
-        info: &RecordingInfo,
-        samples: &[Sample],
-        facts: &[report::Facts],
-    ) -> (Vec<String>, Vec<Failure>) {
-        let record = self.record.map(|file| (file.name(), file.record(info, samples)));
-        let report = self.report.map(|file| {
-            let page = report::html(&ReportInput { info, samples, facts });
-            (file.name(), file.write(&page))
-        });
+    fn write(self, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
+        let record = self.record.map(|file| (file.name(), file.record(input.info, input.samples)));
+        let report = self.report.map(|file| (file.name(), file.write(&report::html(input))));
         let (mut files, mut lost) = (Vec::new(), Vec::new());
         for (name, done) in record.into_iter().chain(report) {
             match done {

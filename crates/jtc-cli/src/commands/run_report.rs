@@ -3,7 +3,7 @@
 use cli_kit::table;
 use jtc_host::arm::Arm;
 use jtc_host::recording::{JointInfo, RecordingInfo};
-use jtc_host::report::{Facts, Summary};
+use jtc_host::report::{Facts, RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 
 /// What a recording of this arm says about itself.
@@ -28,6 +28,25 @@ pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> Re
         }),
         flange: origin(6),
     }
+}
+
+/// What broke first, where something did, and then the figures.
+pub fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
+    let Some(failure) = failure else { return figures(summary) };
+    let rows: Vec<Vec<String>> = failure.rows().into_iter().map(|row| row.to_vec()).collect();
+    let head = RunFailure::HEAD
+        .map(|head| if matches!(head, "state" | "errors") { head.into() } else { format!(">{head}") });
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let others = match failure.causes.get(1..) {
+        Some(others) if !others.is_empty() => format!("with it: {}\n", others.join(", ")),
+        _ => String::new(),
+    };
+    format!(
+        "{}\n{others}{}\nfigures up to the failure\n{}",
+        failure.headline(),
+        table(&head, &rows),
+        figures(summary)
+    )
 }
 
 /// The figures as a table.

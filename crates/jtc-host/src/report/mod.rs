@@ -3,6 +3,7 @@
 //! [`Summary::of`] reduces samples to the figures that matter, [`html`] makes the page (it opens offline: plots, styles and
 //! data are inside), [`picture_svg`] draws commanded and measured positions and the tracking error as one SVG.
 
+mod failure;
 mod pack;
 mod page;
 mod picture;
@@ -10,6 +11,7 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
+pub use failure::{Moment, RunFailure};
 pub use page::html;
 pub use picture::picture_svg;
 pub use summary::{JointSummary, Summary};
@@ -35,4 +37,11 @@ pub struct ReportInput<'a> {
     pub samples: &'a [Sample],
     /// Tables to show beside the plots.
     pub facts: &'a [Facts],
+    /// What broke first, where the run failed: it leads the page.
+    pub failure: Option<&'a RunFailure>,
+}
+
+/// Text inside of markup.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

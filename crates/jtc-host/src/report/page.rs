@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::pack::{Thinner, coarse, fine, runs};
-use super::{ReportInput, Summary};
+use super::{ReportInput, Summary, escape};
 use crate::sample::JointSample;
 
 const PAGE: &str = include_str!("assets/page.html");
@@ -17,7 +17,11 @@ const PLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 pub fn html(input: &ReportInput<'_>) -> String {
     // `<` is escaped so that no text can end the script element.
     let data = data(input).to_string().replace('<', "\\u003c");
-    let title = escape(&title(input));
+    let failure = input.failure.map_or(String::new(), |f| f.html());
+    let title = escape(&match input.failure {
+        Some(_) => format!("FAILED: {}", title(input)),
+        None => title(input),
+    });
     let mut page = String::with_capacity(data.len() + 200_000);
     let mut rest = PAGE;
     // Each mark is looked for after the last one only: inserted text is never searched.
@@ -25,6 +29,7 @@ pub fn html(input: &ReportInput<'_>) -> String {
         ("{{title}}", title.as_str()),
         ("{{plot_style}}", PLOT_STYLE),
         ("{{style}}", STYLE),
+        ("{{failure}}", &failure),
         ("{{data}}", &data),
         ("{{plot_script}}", PLOT_SCRIPT),
         ("{{arm}}", ARM),
@@ -46,10 +51,6 @@ fn title(input: &ReportInput<'_>) -> String {
         (trajectory, "") => trajectory.to_owned(),
         (trajectory, arm) => format!("{trajectory} · {arm}"),
     }
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 fn data(input: &ReportInput<'_>) -> Value {
@@ -86,6 +87,7 @@ fn data(input: &ReportInput<'_>) -> Value {
         "thinned": thin.bucket(),
         "summary": Summary::of(info, input.samples),
         "facts": facts,
+        "failure_s": input.failure.map(|f| f.time_s - input.samples.first().map_or(0.0, |s| s.time_s)),
         "time_s": fine(&relative(&thin.times())),
         "time_start_s": input.samples.first().map_or(0.0, |s| s.time_s),
         "set_position_rad": per_joint(fine, |j| j.set_position),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{ReportInput, Summary};
+use super::{ReportInput, Summary, escape};
 use crate::sample::Sample;
 
 const WIDTH: f64 = 960.0;
@@ -80,6 +80,11 @@ pub fn picture_svg(input: &ReportInput<'_>) -> String {
 
 fn heading(svg: &mut String, input: &ReportInput<'_>) {
     let summary = Summary::of(input.info, input.samples);
+    if let Some(failure) = input.failure {
+        let text = escape(&failure.headline());
+        let _ = writeln!(svg, r#"<text class="t" style="fill:#c5372c" x="32" y="42">{text}</text>"#);
+        return;
+    }
     let _ = writeln!(svg, r#"<text class="t" x="32" y="42">Six joints on their trajectory</text>"#);
     let worst = |figure: fn(&super::JointSummary) -> Option<f64>| summary.worst(figure).map(|(_, v)| v);
     let mut text = format!("{:.1} s at 1 kHz", summary.recorded_s);

@@ -72,7 +72,7 @@ fn what_is_not_known_is_none() {
 #[test]
 fn the_page_is_whole_and_needs_no_network() {
     let (info, samples) = run(10_530);
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[] });
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None });
     assert!(!page.contains("{{"), "a mark was left");
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     assert!(!page.contains("</script> & Co"), "a name ends the script");
@@ -85,7 +85,7 @@ fn the_page_is_whole_and_needs_no_network() {
 fn an_hour_is_thinned_without_losing_its_peak() {
     let (info, mut samples) = run(400_000);
     samples[123_457].joints[2].position -= 0.05;
-    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[] });
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None });
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     let error = |s: &Sample| s.joints[2].set_position - s.joints[2].position;
     let peak = pack::Thinner::new(&samples).values(error).into_iter().fold(0.0, f64::max);
@@ -95,14 +95,71 @@ fn an_hour_is_thinned_without_losing_its_peak() {
 #[test]
 fn a_run_without_samples_is_still_a_page() {
     let info = RecordingInfo::default();
-    assert!(html(&ReportInput { info: &info, samples: &[], facts: &[] }).contains("</html>"));
-    assert!(picture_svg(&ReportInput { info: &info, samples: &[], facts: &[] }).ends_with("</svg>\n"));
+    assert!(html(&ReportInput { info: &info, samples: &[], facts: &[], failure: None }).contains("</html>"));
+    assert!(
+        picture_svg(&ReportInput { info: &info, samples: &[], facts: &[], failure: None })
+            .ends_with("</svg>\n")
+    );
 }
 
 #[test]
 fn the_picture_is_small() {
     let (info, samples) = run(10_530);
-    let picture = picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[] });
+    let picture = picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[], failure: None });
     assert!(picture.len() < 150_000, "{} bytes", picture.len());
     assert!(!picture.contains("NaN"));
+}
+
+/// A run in which joint 3 falls silent at point 600.
+fn silent_joint() -> (RecordingInfo, Vec<Sample>) {
+    let (info, mut samples) = run(1000);
+    for s in &mut samples[600..] {
+        (s.state, s.tes, s.errors, s.can_current) = (5, 0, 0x20, 1 << 10);
+        s.joints[2] = JointSample { set_position: f64::NAN, ..JointSample::UNKNOWN };
+    }
+    (info, samples)
+}
+
+#[test]
+fn a_failed_run_leads_with_what_broke_first() {
+    let (info, samples) = silent_joint();
+    let failure = RunFailure::find(&info, &samples).expect("it failed");
+    assert_eq!((failure.joint, failure.at_ms.round()), (Some(3), 600.0));
+    assert_eq!(failure.headline(), "FAILED 600 ms into the run: joint 3: does not answer");
+    assert_eq!(failure.causes, ["joint 3: does not answer", "controller: internal CAN error"]);
+    let times: Vec<f64> = failure.moments.iter().map(|m| m.time_ms.round()).collect();
+    assert_eq!(times, [597.0, 598.0, 599.0, 600.0, 601.0, 602.0]);
+    let (before, first) = (&failure.moments[2], &failure.moments[3]);
+    assert!(before.position_rad.is_finite() && before.torque_limit_nm == 50.0 && before.errors.is_empty());
+    assert!(first.first && first.position_rad.is_nan() && first.errors == ["does not answer"]);
+
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
+    let headline = page.find("FAILED 600 ms into the run: joint 3: does not answer").expect("the headline");
+    assert!(headline < page.find("class=\"hero\"").unwrap(), "it leads the page");
+    assert!(page.contains("<title>FAILED: "), "the title says so");
+    assert!(page.contains("<td>–</td>"), "what is not measured is no number");
+    let picture =
+        picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
+    assert!(picture.contains("FAILED") && !picture.contains("tracking error at most"), "{picture}");
+    assert!(!picture.contains("NaN"));
+
+    let (info, samples) = run(1000);
+    assert_eq!(RunFailure::find(&info, &samples), None);
+}
+
+#[test]
+fn a_run_without_its_own_error_says_why_it_ended() {
+    let (info, samples) = run(1000);
+    let failure = RunFailure::ended_by(&info, &samples, "the link was lost".into());
+    assert_eq!((failure.joint, failure.moments.len(), failure.at_ms.round()), (None, 6, 999.0));
+    assert_eq!(RunFailure::ended_by(&info, &[], "early".into()).moments, []);
+}
+
+#[test]
+fn drives_name_their_own_faults() {
+    let (info, samples) = silent_joint();
+    let mut status = jtc_wire::Status { fsm: 5, errors: 0x80, ..Default::default() };
+    status.joints[4].mc_current = 4;
+    let failure = RunFailure::find(&info, &samples).unwrap().with_status(&status);
+    assert_eq!(failure.causes[0], "joint 5: under-voltage");
 }

@@ -51,10 +51,12 @@
   const [rms, rmsJoint] = best("rms_error_mrad");
   const [max, maxJoint] = best("max_error_mrad");
   const [share, shareJoint] = best("torque_share");
-  if (known(rms)) tile(round(rms, 2), "mrad", `worst RMS error, ${names[rmsJoint].toLowerCase()}`);
-  if (known(max)) tile(round(max, 2), "mrad", `largest error, ${names[maxJoint].toLowerCase()}`);
+  // Figures of a run that failed say nothing about how well it went: they are only in the table below.
+  const failed = known(data.failure_s);
+  if (!failed && known(rms)) tile(round(rms, 2), "mrad", `worst RMS error, ${names[rmsJoint].toLowerCase()}`);
+  if (!failed && known(max)) tile(round(max, 2), "mrad", `largest error, ${names[maxJoint].toLowerCase()}`);
   if (known(share)) tile(round(share * 100, 0), "%", `peak torque of limit, ${names[shareJoint].toLowerCase()}`);
-  tile(round(summary.executed_s || last, 2), "s", summary.executed_s ? "of motion" : "recorded");
+  tile(round(summary.executed_s || last, 2), "s", failed ? "executed before it failed" : summary.executed_s ? "of motion" : "recorded");
 
   // --- plots ---------------------------------------------------------------------------------------------------------
   const plots = [];
@@ -70,6 +72,21 @@
     stroke: () => colour("--soft"), font: "12px system-ui, sans-serif",
     grid: { stroke: () => colour("--grid"), width: 1 }, ticks: { show: false }, ...more,
   });
+
+  // Where the run failed, in every plot.
+  const failureLine = (u) => {
+    const { ctx, bbox } = u;
+    const x = u.valToPos(data.failure_s, "x", true);
+    if (x < bbox.left || x > bbox.left + bbox.width) return;
+    ctx.save();
+    ctx.strokeStyle = colour("--warn");
+    ctx.lineWidth = 2 * (devicePixelRatio || 1);
+    ctx.beginPath();
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.stroke();
+    ctx.restore();
+  };
 
   // One plot. `lines`: {y, joint, kind, stroke, width, dash}; a line shows when its joint and its kind do.
   const plot = (host, lines, { height = 250, unit = "", draw, range, digits = 3, axisless = false, onCursor } = {}) => {
@@ -95,7 +112,7 @@
       hooks: {
         setScale: [(u, key) => key === "x" && known(u.scales.x.min) && zoom(u.scales.x.min, u.scales.x.max)],
         setCursor: [(u) => onCursor && onCursor(u.cursor.idx ?? null)],
-        draw: draw ? [draw] : [],
+        draw: [...(draw ? [draw] : []), ...(failed ? [failureLine] : [])],
       },
     }, [time, ...lines.map((l) => l.y)], host);
     plots.push(item);
@@ -262,7 +279,7 @@
   const table = (heading, head, rows) => make("section", { class: "card" }, make("header", {}, make("h2", {}, heading)),
     make("div", { class: "scroll" }, make("table", {}, ...(head ? [make("tr", {}, ...head.map((h) => make("th", {}, h)))] : []),
       ...rows.map((r) => make("tr", {}, ...r.map((cell) => (cell instanceof Node ? cell : make("td", {}, cell))))))));
-  main.append(table("Figures", ["Joint", "RMS error, mrad", "max error, mrad", "peak speed, rad/s", "peak torque, N·m", "limit, N·m", "share of limit", "hottest, °C"],
+  main.append(table(failed ? "Figures up to the failure" : "Figures", ["Joint", "RMS error, mrad", "max error, mrad", "peak speed, rad/s", "peak torque, N·m", "limit, N·m", "share of limit", "hottest, °C"],
     summary.joints.map((s, j) => [
       make("td", {}, make("i", { class: "dot", style: `--c: var(--j${j})` }), names[j]),
       round(s.rms_error_mrad, 3), round(s.max_error_mrad, 3), round(s.peak_velocity_rad_s, 3), round(s.peak_torque_nm, 2), round(s.torque_limit_nm, 1),
@@ -311,7 +328,9 @@
 
   // --- the arm -------------------------------------------------------------------------------------------------------
   let view = null;
-  const poses = has("position_rad") ? column.position_rad : column.set_position_rad;
+  // A joint that is not measured any more is shown where it was seen last.
+  const held = (y) => { let seen = 0; return y && y.map((v) => (known(v) ? (seen = v) : seen)); };
+  const poses = (has("position_rad") ? column.position_rad : column.set_position_rad)?.map(held);
   const origins = data.joints.map((j) => j.origin);
   if (time.length && poses && poses.every(Boolean) && origins.some((o) => o.some((v) => v))) {
     const forward = Arm.chain(origins, data.flange);

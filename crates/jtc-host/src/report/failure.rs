@@ -1,0 +1,277 @@
+//! What broke first in a run that failed: when, at which joint, and the values around it.
+
+use std::fmt::Write;
+
+use jtc_wire::Status;
+use serde::Serialize;
+
+use crate::recording::RecordingInfo;
+use crate::sample::Sample;
+use crate::words;
+
+/// States on the wire: a trajectory is followed; an error is latched.
+const OPERATE: u8 = 3;
+const ERROR: u8 = 5;
+/// Trajectory execution state while it is executed.
+const EXECUTE: u8 = 3;
+/// Samples shown before and after the one that shows the failure.
+const BEFORE: usize = 3;
+const AFTER: usize = 2;
+
+/// One joint at one moment near the failure; numbers are NaN where they are not known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Moment {
+    /// Into the run, ms.
+    pub time_ms: f64,
+    /// From 1.
+    pub joint: usize,
+    /// State of the controller.
+    pub state: &'static str,
+    /// Commanded position, rad.
+    pub set_position_rad: f64,
+    /// Measured position, rad.
+    pub position_rad: f64,
+    /// Measured velocity, rad/s.
+    pub velocity_rad_s: f64,
+    /// Torque, N·m.
+    pub torque_nm: f64,
+    /// Limit of the torque, N·m.
+    pub torque_limit_nm: f64,
+    /// Error bits of this joint in words.
+    pub errors: Vec<String>,
+    /// The failure shows here first.
+    pub first: bool,
+}
+
+/// The failure of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunFailure {
+    /// What is wrong, what broke first before what followed from it.
+    pub causes: Vec<String>,
+    /// The joint that broke first, from 1; none where no joint did.
+    pub joint: Option<usize>,
+    /// Into the run, ms: on the controller's count of 1 ms points while it moves.
+    pub at_ms: f64,
+    /// Time of the sample that shows it first, s, on the clock of the samples.
+    pub time_s: f64,
+    /// Since the last good sample, ms: it happened within this time.
+    pub within_ms: f64,
+    /// Values around it.
+    pub moments: Vec<Moment>,
+}
+
+impl RunFailure {
+    /// The first error in the samples since a trajectory was executed; none in a run without errors.
+    pub fn find(info: &RecordingInfo, samples: &[Sample]) -> Option<Self> {
+        let begin = begin(samples);
+        let bad = |s: &Sample| s.errors != 0 || s.state == ERROR;
+        let at = begin + samples.get(begin..)?.iter().position(bad)?;
+        let (causes, joint) = causes(&Words::of_sample(&samples[at]));
+        Some(Self::at(info, samples, at, causes, joint))
+    }
+
+    /// A run that ended without an error in its samples: at the last of them, for the reason given.
+    pub fn ended_by(info: &RecordingInfo, samples: &[Sample], reason: String) -> Self {
+        Self::at(info, samples, samples.len().saturating_sub(1), vec![reason], None)
+    }
+
+    /// With what only the status knows: the errors that the drives report of themselves.
+    pub fn with_status(self, status: &Status) -> Self {
+        let (causes, joint) = causes(&Words::of_status(status));
+        if causes.is_empty() { self } else { Self { causes, joint: joint.or(self.joint), ..self } }
+    }
+
+    /// The run failed here, of what: one line.
+    pub fn headline(&self) -> String {
+        let cause = self.causes.first().map_or("an error without a name", String::as_str);
+        format!("FAILED {:.0} ms into the run: {cause}", self.at_ms)
+    }
+
+    fn at(
+        info: &RecordingInfo,
+        samples: &[Sample],
+        at: usize,
+        causes: Vec<String>,
+        joint: Option<usize>,
+    ) -> Self {
+        let start_s = start_s(samples, at);
+        let time = |i: usize| samples.get(i).map_or(start_s, |s| s.time_s);
+        let into_ms = |i: usize| (time(i) - start_s) * 1e3;
+        let moment = |i: usize, j: usize| {
+            let (sample, own) = (&samples[i], &samples[i].joints[j]);
+            Moment {
+                time_ms: into_ms(i),
+                joint: j + 1,
+                state: words::state(sample.state),
+                set_position_rad: own.set_position,
+                position_rad: own.position,
+                velocity_rad_s: own.velocity,
+                torque_nm: own.torque,
+                torque_limit_nm: info.joints[j].torque_max_nm,
+                errors: Words::of_sample(sample).joint(j),
+                first: i == at,
+            }
+        };
+        // Of the joint that broke a piece of its history; where no joint did, all of them at that moment.
+        let moments = match joint {
+            Some(joint) => (at.saturating_sub(BEFORE)..samples.len().min(at + AFTER + 1))
+                .map(|i| moment(i, joint - 1))
+                .collect(),
+            None if samples.is_empty() => Vec::new(),
+            None => (0..6).map(|j| moment(at, j)).collect(),
+        };
+        let within_ms = (time(at) - time(at.saturating_sub(1))) * 1e3;
+        Self { causes, joint, at_ms: into_ms(at), time_s: time(at), within_ms, moments }
+    }
+
+    /// The table's head: words, then figures with their units.
+    pub const HEAD: [&'static str; 9] = [
+        "ms",
+        "joint",
+        "state",
+        "commanded rad",
+        "measured rad",
+        "speed rad/s",
+        "torque N·m",
+        "limit N·m",
+        "errors",
+    ];
+
+    /// The table's rows; a dash where a value is not known.
+    pub fn rows(&self) -> Vec<[String; 9]> {
+        let figure = |v: f64, digits: usize| {
+            if v.is_finite() { format!("{v:.digits$}").replace('-', "−") } else { "–".to_owned() }
+        };
+        let row = |m: &Moment| {
+            [
+                figure(m.time_ms, 0),
+                m.joint.to_string(),
+                m.state.to_owned(),
+                figure(m.set_position_rad, 4),
+                figure(m.position_rad, 4),
+                figure(m.velocity_rad_s, 3),
+                figure(m.torque_nm, 1),
+                figure(m.torque_limit_nm, 0),
+                m.errors.join(", "),
+            ]
+        };
+        self.moments.iter().map(row).collect()
+    }
+
+    /// As the first thing on a page.
+    pub(super) fn html(&self) -> String {
+        let mut out = format!(
+            "<section class=\"failure\" role=\"alert\">\n<h1>{}</h1>\n",
+            super::escape(&self.headline())
+        );
+        if self.causes.len() > 1 {
+            let others: Vec<String> = self.causes[1..].iter().map(|c| super::escape(c)).collect();
+            let _ = writeln!(out, "<p>with it: {}</p>", others.join(", "));
+        }
+        let whose = match self.joint {
+            Some(joint) => format!("Joint {joint} around it"),
+            None => "All joints then".to_owned(),
+        };
+        let _ = writeln!(
+            out,
+            "<p>{whose}; it happened in the {:.0} ms before the marked line.</p>",
+            self.within_ms
+        );
+        out.push_str("<div class=\"scroll\"><table><tr>");
+        for head in Self::HEAD {
+            let _ = write!(out, "<th>{head}</th>");
+        }
+        out.push_str("</tr>\n");
+        for (row, moment) in self.rows().iter().zip(&self.moments) {
+            out.push_str(if moment.first && self.joint.is_some() { "<tr class=\"first\">" } else { "<tr>" });
+            for cell in row {
+                let _ = write!(out, "<td>{}</td>", super::escape(cell));
+            }
+            out.push_str("</tr>\n");
+        }
+        out.push_str("</table></div>\n</section>\n");
+        out
+    }
+}
+
+/// The first sample of the execution, or the first of all.
+fn begin(samples: &[Sample]) -> usize {
+    samples.iter().position(|s| s.state == OPERATE && s.tes == EXECUTE).unwrap_or(0)
+}
+
+/// When the run began, s: the controller's own count of milliseconds at the last sample of the motion says it best.
+fn start_s(samples: &[Sample], at: usize) -> f64 {
+    let known = &samples[..samples.len().min(at + 1)];
+    match known.iter().rfind(|s| s.state == OPERATE) {
+        Some(s) => s.time_s - f64::from(s.point) * 1e-3,
+        None => samples.get(begin(samples)).map_or(0.0, |s| s.time_s),
+    }
+}
+
+/// Error words of a moment, from either source.
+struct Words {
+    errors: u16,
+    can: u32,
+    joints: [JointWords; 6],
+}
+
+/// Error words of one joint.
+#[derive(Clone, Copy, Default)]
+struct JointWords {
+    internal: u16,
+    node: u8,
+    motor: u8,
+    fsm: u8,
+}
+
+impl Words {
+    fn of_sample(s: &Sample) -> Self {
+        let joints =
+            s.joints.map(|j| JointWords { internal: j.internal, fsm: j.fsm, ..JointWords::default() });
+        Self { errors: s.errors, can: s.can_current, joints }
+    }
+
+    fn of_status(s: &Status) -> Self {
+        let joints = s.joints.map(|j| JointWords {
+            internal: j.internal,
+            node: j.errors,
+            motor: j.mc_current,
+            fsm: j.fsm,
+        });
+        Self { errors: s.errors, can: s.can_current, joints }
+    }
+
+    /// What is wrong with joint `j`.
+    fn joint(&self, j: usize) -> Vec<String> {
+        let own = &self.joints[j];
+        let silent = (self.can >> (8 + j) & 1 == 1).then_some("does not answer");
+        let all = silent
+            .into_iter()
+            .chain(words::motor_faults(own.motor))
+            .chain(words::node_errors(own.node))
+            .chain(words::joint_errors(own.internal))
+            .chain((own.fsm >= 254).then_some("drive in its fault state"));
+        all.map(String::from).collect()
+    }
+}
+
+/// What is wrong, joints first: the controller's own words follow from theirs. And the first joint.
+fn causes(words: &Words) -> (Vec<String>, Option<usize>) {
+    let mut all = Vec::new();
+    let mut first = None;
+    for j in 0..6 {
+        for problem in words.joint(j) {
+            first = first.or(Some(j + 1));
+            all.push(format!("joint {}: {problem}", j + 1));
+        }
+    }
+    if words.can & 1 != 0 {
+        all.push("no acknowledge on the joint bus".into());
+    }
+    if words.can >> 14 & 1 == 1 {
+        all.push("the gripper does not answer".into());
+    }
+    let own = crate::words::errors(words.errors).into_iter().map(|word| format!("controller: {word}"));
+    all.extend(own);
+    (all, first)
+}

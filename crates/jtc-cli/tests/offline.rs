@@ -108,14 +108,14 @@ fn decode_knows_frames_of_both_directions() {
     assert!(said.out.contains("to device") && said.out.contains("execute"), "{}", said.out);
 }
 
-/// An arm file whose joint 2 may turn faster than the controller lets it.
-fn faster(dir: &std::path::Path) -> String {
+/// An arm file whose first two joints may not turn as fast as the controller lets them.
+fn slower(dir: &std::path::Path) -> String {
     let arm = include_str!("../../../arms/avena.toml").replacen(
         "velocity_max_rad_s = 1.5",
-        "velocity_max_rad_s = 3.15",
+        "velocity_max_rad_s = 1.2",
         2,
     );
-    let path = dir.join("faster.toml");
+    let path = dir.join("slower.toml");
     std::fs::write(&path, arm).unwrap();
     path.to_str().unwrap().to_owned()
 }
@@ -124,7 +124,7 @@ fn faster(dir: &std::path::Path) -> String {
 #[test]
 fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     let dir = tempfile::tempdir().unwrap();
-    let (arm, motion_file) = (faster(dir.path()), dir.path().join("motion.csv"));
+    let (arm, motion_file) = (slower(dir.path()), dir.path().join("motion.csv"));
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let file = motion_file.to_str().unwrap();
     let port = ["--port", "/nowhere/tty"];
@@ -140,10 +140,10 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
         assert_eq!(differences[1]["joint"], 2);
         assert_eq!(
             (differences[1]["file"].as_f64(), differences[1]["device"].as_f64()),
-            (Some(3.15), Some(1.5))
+            (Some(1.2), Some(1.5))
         );
         assert!(
-            said.err.contains("joint 2, velocity_max_rad_s: 3.15 rad/s in the file, 1.5 rad/s"),
+            said.err.contains("joint 2, velocity_max_rad_s: 1.2 rad/s in the file, 1.5 rad/s"),
             "{}",
             said.err
         );

@@ -1,6 +1,7 @@
 //! What happened in the world, for reports and for people who read along.
 use core::fmt;
 
+use jtc_bus::GRIPPER;
 use jtc_core::{State, Tes};
 use jtc_wire::FrameStatus;
 
@@ -65,7 +66,10 @@ impl fmt::Display for Event {
             Self::State { from, to } => write!(f, "controller: {from:?} → {to:?}"),
             Self::Execution { from, to } => write!(f, "trajectory: {from:?} → {to:?}"),
             Self::Errors { from, to } => write!(f, "errors: 0x{from:04X} → 0x{to:04X}"),
-            Self::Node { node, from, to } => write!(f, "node {node}: state {from} → {to}"),
+            Self::Node { node, from, to } => match usize::from(*node) {
+                GRIPPER => write!(f, "gripper: state {from} → {to}"),
+                joint => write!(f, "joint {}: state {from} → {to}", joint + 1),
+            },
             Self::Frame { frame_type } => write!(f, "host frame 0x{frame_type:02X}"),
             Self::BadFrame { status } => write!(f, "bad host frame: {status:?}"),
             Self::FaultBegins(kind) => write!(f, "fault begins: {kind}"),

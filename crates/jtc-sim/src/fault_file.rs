@@ -1,106 +1,17 @@
 #![doc = include_str!("fault_file.md")]
-use core::fmt;
-
-use jtc_core::State;
+use jtc_bus::GRIPPER;
+use jtc_core::{JOINTS, State};
 use serde::Deserialize;
 
 use crate::faults::{Fault, FaultKind, FaultPlan, Trigger};
+use crate::hand::HandPath;
+use crate::typed::PUSH_MAX;
 
-/// Why a fault file cannot be used.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FaultFileError {
-    /// It is not TOML of this form; the text says where and why.
-    Syntax(String),
-    /// There is no fault of this kind.
-    UnknownKind {
-        /// Number of the fault in the file, from 1.
-        fault: usize,
-        /// As written.
-        kind: String,
-    },
-    /// A key that this kind needs is missing.
-    Missing {
-        /// Number of the fault in the file, from 1.
-        fault: usize,
-        /// Kind.
-        kind: String,
-        /// The key.
-        key: &'static str,
-    },
-    /// A key that means nothing here.
-    Superfluous {
-        /// Number of the fault in the file, from 1.
-        fault: usize,
-        /// Kind.
-        kind: String,
-        /// The key.
-        key: &'static str,
-    },
-    /// A value outside its range.
-    Range {
-        /// Number of the fault in the file, from 1.
-        fault: usize,
-        /// The key.
-        key: &'static str,
-        /// As written.
-        value: f64,
-        /// Smallest and largest.
-        allowed: (f64, f64),
-    },
-    /// A whole number is needed.
-    NotWhole {
-        /// Number of the fault in the file, from 1.
-        fault: usize,
-        /// The key.
-        key: &'static str,
-        /// As written.
-        value: f64,
-    },
-    /// There is no such state.
-    UnknownState {
-        /// Number of the fault in the file, from 1.
-        fault: usize,
-        /// As written.
-        state: String,
-    },
-    /// Not exactly one of `at_s`, `in_state`, `at_point`.
-    Trigger {
-        /// Number of the fault in the file, from 1.
-        fault: usize,
-    },
-}
+mod error;
 
-impl fmt::Display for FaultFileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Syntax(text) => f.write_str(text),
-            Self::UnknownKind { fault, kind } => {
-                write!(f, "fault {fault}: there is no kind `{kind}`; kinds are {}", KINDS.join(", "))
-            }
-            Self::Missing { fault, kind, key } => write!(f, "fault {fault}: `{kind}` needs the key `{key}`"),
-            Self::Superfluous { fault, kind, key } => {
-                write!(f, "fault {fault}: the key `{key}` means nothing for `{kind}`; remove it")
-            }
-            Self::Range { fault, key, value, allowed: (low, high) } => {
-                write!(f, "fault {fault}: {key} = {value} is outside {low}..{high}")
-            }
-            Self::NotWhole { fault, key, value } => {
-                write!(f, "fault {fault}: {key} = {value} is not a whole number")
-            }
-            Self::UnknownState { fault, state } => {
-                let names: Vec<_> = STATES.iter().map(|(name, _)| *name).collect();
-                write!(f, "fault {fault}: there is no state `{state}`; states are {}", names.join(", "))
-            }
-            Self::Trigger { fault } => {
-                write!(f, "fault {fault}: say when with exactly one of at_s, in_state, at_point")
-            }
-        }
-    }
-}
+pub use error::FaultFileError;
 
-impl std::error::Error for FaultFileError {}
-
-const KINDS: [&str; 21] = [
+const KINDS: [&str; 23] = [
     "node-silent",
     "node-reboot",
     "motor-fault",
@@ -122,6 +33,8 @@ const KINDS: [&str; 21] = [
     "serial-flipped",
     "serial-delayed",
     "tick-overrun",
+    "push",
+    "hand",
 ];
 
 const STATES: [(&str, State); 6] = [
@@ -136,6 +49,7 @@ const STATES: [(&str, State); 6] = [
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    format: Option<f64>,
     #[serde(default)]
     fault: Vec<Entry>,
 }
@@ -146,6 +60,9 @@ struct Entry {
     kind: String,
     node: Option<f64>,
     joint: Option<f64>,
+    gripper: Option<bool>,
+    torque_nm: Option<f64>,
+    file: Option<String>,
     bits: Option<f64>,
     rad: Option<f64>,
     factor: Option<f64>,
@@ -161,33 +78,64 @@ struct Entry {
 /// What fault files look like, for people (Markdown).
 pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 
+/// Format of the files that are read: joints count from 1 since format 2.
+const FORMAT: f64 = 2.0;
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
 
 impl FaultPlan {
-    /// Read a fault file; [`FAULT_FILE_HELP`] describes them.
+    /// Read a fault file without hands; [`FAULT_FILE_HELP`] describes them.
     pub fn from_toml(text: &str) -> Result<Self, FaultFileError> {
+        Self::from_toml_with(text, |file| Err(format!("{file}: files cannot be read here")))
+    }
+
+    /// Read a fault file; `load` reads the trajectory files of hands, or says why it cannot.
+    pub fn from_toml_with(
+        text: &str,
+        mut load: impl FnMut(&str) -> Result<HandPath, String>,
+    ) -> Result<Self, FaultFileError> {
         let file: File = toml::from_str(text).map_err(|e| FaultFileError::Syntax(e.to_string()))?;
-        let faults = (1..).zip(file.fault).map(|(number, entry)| Reader { number, entry }.read());
-        Ok(Self { faults: faults.collect::<Result<_, _>>()? })
+        if file.format != Some(FORMAT) {
+            return Err(FaultFileError::Format { found: file.format });
+        }
+        let mut plan = Self::default();
+        for (number, entry) in (1..).zip(file.fault) {
+            let fault = Reader { number, entry, hands: &mut plan.hands, load: &mut load }.read()?;
+            plan.faults.push(fault);
+        }
+        Ok(plan)
     }
 }
 
-struct Reader {
+struct Reader<'a> {
     number: usize,
     entry: Entry,
+    hands: &'a mut Vec<HandPath>,
+    load: &'a mut dyn FnMut(&str) -> Result<HandPath, String>,
 }
 
-impl Reader {
+impl Reader<'_> {
     fn read(mut self) -> Result<Fault, FaultFileError> {
+        if let Some(node) = self.entry.node {
+            return Err(FaultFileError::Node { fault: self.number, node });
+        }
         let kind = self.kind()?;
         let trigger = self.trigger()?;
         let duration_ms = match self.entry.for_s.take() {
             Some(s) => Some(ms(self.in_range("for_s", s, 0.0, YEAR_S)?)),
+            // A push for good is a mistake.
+            None if matches!(kind, FaultKind::Push { .. }) => return Err(self.missing("for_s")),
             None => None,
         };
         self.nothing_left()?;
         Ok(Fault { kind, trigger, duration_ms })
+    }
+
+    fn hand(&mut self) -> Result<FaultKind, FaultFileError> {
+        let file = self.entry.file.take().ok_or_else(|| self.missing("file"))?;
+        let path = (self.load)(&file).map_err(|text| FaultFileError::Hand { fault: self.number, text })?;
+        self.hands.push(path);
+        Ok(FaultKind::Hand { path: self.hands.len() - 1 })
     }
 
     fn kind(&mut self) -> Result<FaultKind, FaultFileError> {
@@ -222,6 +170,11 @@ impl Reader {
             "serial-flipped" => FaultKind::SerialFlipped { probability: self.probability()? },
             "serial-delayed" => FaultKind::SerialDelayed,
             "tick-overrun" => FaultKind::TickOverrun,
+            "push" => FaultKind::Push {
+                joint: self.joint()?,
+                torque: self.take("torque_nm", |e| &mut e.torque_nm, -PUSH_MAX, PUSH_MAX)?,
+            },
+            "hand" => self.hand()?,
             kind => return Err(FaultFileError::UnknownKind { fault: self.number, kind: kind.into() }),
         })
     }
@@ -246,12 +199,18 @@ impl Reader {
         }
     }
 
+    /// The node of a joint or of the gripper.
     fn node(&mut self) -> Result<u8, FaultFileError> {
-        self.whole("node", |e| &mut e.node, 0.0, 6.0)
+        match (self.entry.joint, self.entry.gripper.take()) {
+            (Some(_), None | Some(false)) => self.joint(),
+            (None, Some(true)) => Ok(GRIPPER as u8),
+            _ => Err(FaultFileError::Device { fault: self.number, kind: self.entry.kind.clone() }),
+        }
     }
 
+    /// The node of a joint, which the file counts from 1.
     fn joint(&mut self) -> Result<u8, FaultFileError> {
-        self.whole("joint", |e| &mut e.joint, 0.0, 5.0)
+        Ok(self.whole("joint", |e| &mut e.joint, 1.0, JOINTS as f64)? - 1)
     }
 
     fn bits(&mut self) -> Result<u8, FaultFileError> {
@@ -284,7 +243,7 @@ impl Reader {
         high: f64,
     ) -> Result<f64, FaultFileError> {
         let Some(value) = field(&mut self.entry).take() else {
-            return Err(FaultFileError::Missing { fault: self.number, kind: self.entry.kind.clone(), key });
+            return Err(self.missing(key));
         };
         self.in_range(key, value, low, high)
     }
@@ -302,8 +261,10 @@ impl Reader {
     fn nothing_left(&self) -> Result<(), FaultFileError> {
         let e = &self.entry;
         let keys = [
-            ("node", e.node),
             ("joint", e.joint),
+            ("gripper", e.gripper.map(f64::from)),
+            ("torque_nm", e.torque_nm),
+            ("file", e.file.as_ref().map(|_| 0.0)),
             ("bits", e.bits),
             ("rad", e.rad),
             ("factor", e.factor),
@@ -314,6 +275,10 @@ impl Reader {
             Some((key, _)) => Err(self.superfluous(key)),
             None => Ok(()),
         }
+    }
+
+    fn missing(&self, key: &'static str) -> FaultFileError {
+        FaultFileError::Missing { fault: self.number, kind: self.entry.kind.clone(), key }
     }
 
     fn superfluous(&self, key: &'static str) -> FaultFileError {

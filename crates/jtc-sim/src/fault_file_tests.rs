@@ -20,6 +20,11 @@ fn the_documented_example_is_read() {
             trigger: Trigger::AtPoint(4000),
             duration_ms: Some(2000),
         },
+        Fault {
+            kind: FaultKind::Push { joint: 2, torque: 12.0 },
+            trigger: Trigger::InState(State::HoldPos, 2000),
+            duration_ms: Some(500),
+        },
     ];
     assert_eq!(plan.faults, expected);
 }
@@ -27,13 +32,14 @@ fn the_documented_example_is_read() {
 #[test]
 fn every_kind_is_read_by_its_own_name() {
     for kind in KINDS {
-        let keys = "node = 1\njoint = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n";
+        let keys = "joint = 1\ngripper = true\ntorque_nm = 3\nfile = \"a.csv\"\nfor_s = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n";
         // Take away what is too much until it fits: the messages name the keys.
         let mut keys: Vec<&str> = keys.lines().collect();
         let fault = loop {
-            let text = format!("[[fault]]\nkind = \"{kind}\"\nat_s = 1\n{}", keys.join("\n"));
-            match FaultPlan::from_toml(&text) {
+            let text = format!("format = 2\n[[fault]]\nkind = \"{kind}\"\nat_s = 1\n{}", keys.join("\n"));
+            match FaultPlan::from_toml_with(&text, |_| Ok(path())) {
                 Ok(plan) => break plan.faults[0],
+                Err(FaultFileError::Device { .. }) => keys.retain(|line| !line.starts_with("gripper")),
                 Err(FaultFileError::Superfluous { key, .. }) => keys.retain(|line| !line.starts_with(key)),
                 Err(error) => panic!("{error}"),
             }
@@ -44,18 +50,21 @@ fn every_kind_is_read_by_its_own_name() {
 
 #[test]
 fn mistakes_are_named() {
-    let message = |text: &str| FaultPlan::from_toml(text).unwrap_err().to_string();
+    let message = |text: &str| FaultPlan::from_toml(&format!("format = 2\n{text}")).unwrap_err().to_string();
     for (text, part) in [
         ("[[fault]]\nkind = \"node-quiet\"\nat_s = 1", "there is no kind `node-quiet`"),
-        ("[[fault]]\nkind = \"node-silent\"\nat_s = 1", "needs the key `node`"),
-        ("[[fault]]\nkind = \"bus-off\"\nnode = 1\nat_s = 1", "`node` means nothing for `bus-off`"),
+        ("[[fault]]\nkind = \"node-silent\"\nat_s = 1", "exactly one of `joint = 1..6` and `gripper = true`"),
+        ("[[fault]]\nkind = \"bus-off\"\njoint = 1\nat_s = 1", "`joint` means nothing for `bus-off`"),
         ("[[fault]]\nkind = \"bus-off\"", "exactly one of at_s, in_state, at_point"),
         ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\nat_point = 2", "exactly one of"),
         ("[[fault]]\nkind = \"bus-off\"\nin_state = \"holding\"", "there is no state `holding`"),
         ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\nafter_s = 2", "`after_s` means nothing"),
         ("[[fault]]\nkind = \"frames-lost\"\nprobability = 2\nat_s = 1", "probability = 2 is outside 0..1"),
-        ("[[fault]]\nkind = \"node-silent\"\nnode = 7\nat_s = 1", "node = 7 is outside 0..6"),
-        ("[[fault]]\nkind = \"node-silent\"\nnode = 1.5\nat_s = 1", "node = 1.5 is not a whole number"),
+        ("[[fault]]\nkind = \"node-silent\"\njoint = 7\nat_s = 1", "joint = 7 is outside 1..6"),
+        ("[[fault]]\nkind = \"fault-state\"\njoint = 0\nat_s = 1", "joint = 0 is outside 1..6"),
+        ("[[fault]]\nkind = \"push\"\njoint = 1\ntorque_nm = 1\nat_s = 1", "`push` needs the key `for_s`"),
+        ("[[fault]]\nkind = \"hand\"\nfile = \"a.csv\"\nat_s = 1", "a.csv: files cannot be read here"),
+        ("[[fault]]\nkind = \"node-silent\"\njoint = 1.5\nat_s = 1", "joint = 1.5 is not a whole number"),
         ("[[fault]]\nkind = \"bus-off\"\nat_s = nan", "at_s = NaN is outside"),
         ("[[fault]]\nkind = \"bus-off\"\nwhen = 3", "unknown field `when`"),
         ("fault = 3", "invalid type"),
@@ -63,12 +72,34 @@ fn mistakes_are_named() {
         let message = message(text);
         assert!(message.contains(part), "{text}\n→ {message}");
     }
-    assert_eq!(FaultPlan::from_toml("").unwrap(), FaultPlan::default());
+    assert_eq!(FaultPlan::from_toml("format = 2").unwrap(), FaultPlan::default());
+}
+
+/// A file that counted joints from 0 must not concern other joints than its writer meant.
+#[test]
+fn files_that_counted_from_0_are_refused_with_what_to_change() {
+    let old = "[[fault]]\nkind = \"fault-state\"\njoint = 2\nat_s = 1";
+    for text in ["", old] {
+        let message = FaultPlan::from_toml(text).unwrap_err().to_string();
+        assert!(message.contains("`format = 2`") && message.contains("add 1 to every `joint`"), "{message}");
+    }
+    let message = FaultPlan::from_toml(&format!("format = 1\n{old}")).unwrap_err().to_string();
+    assert!(message.contains("format = 1 is none"), "{message}");
+    for (node, instead) in [("2", "write joint = 3"), ("6", "write gripper = true")] {
+        let text = format!("format = 2\n[[fault]]\nkind = \"node-silent\"\nnode = {node}\nat_s = 1");
+        let message = FaultPlan::from_toml(&text).unwrap_err().to_string();
+        assert!(message.contains(instead), "{message}");
+    }
+}
+
+fn path() -> HandPath {
+    HandPath::new(vec![[0.0; 6]], 0.01).unwrap()
 }
 
 proptest! {
     #[test]
     fn no_text_makes_the_reader_panic(text in "(\\[\\[fault\\]\\]|kind = \"[a-z-]*\"|[a-z_]+ = -?[0-9.e]+|\\PC|\n){0,40}") {
         let _ = FaultPlan::from_toml(&text);
+        let _ = FaultPlan::from_toml(&format!("format = 2\n{text}"));
     }
 }

@@ -1,7 +1,10 @@
 //! What can go wrong in the simulated world, and when.
 use core::fmt;
 
+use jtc_bus::GRIPPER;
 use jtc_core::State;
+
+use crate::hand::HandPath;
 
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,6 +107,18 @@ pub enum FaultKind {
     SerialDelayed,
     /// The controller's tick does not come.
     TickOverrun,
+    /// Someone pushes a joint.
+    Push {
+        /// 0..5.
+        joint: u8,
+        /// N·m.
+        torque: f64,
+    },
+    /// A hand leads the arm while it is taught.
+    Hand {
+        /// Place in [`FaultPlan::hands`].
+        path: usize,
+    },
 }
 
 impl FaultKind {
@@ -131,6 +146,8 @@ impl FaultKind {
             Self::SerialFlipped { .. } => "serial-flipped",
             Self::SerialDelayed => "serial-delayed",
             Self::TickOverrun => "tick-overrun",
+            Self::Push { .. } => "push",
+            Self::Hand { .. } => "hand",
         }
     }
 }
@@ -140,18 +157,22 @@ impl fmt::Display for FaultKind {
         f.write_str(self.name())?;
         match self {
             Self::NodeSilent { node } | Self::NodeReboot { node } | Self::SafetyLine { node } => {
-                write!(f, " node {node}")
+                match usize::from(*node) {
+                    GRIPPER => f.write_str(" gripper"),
+                    joint => write!(f, " joint {}", joint + 1),
+                }
             }
-            Self::MotorFault { joint, bits } => write!(f, " joint {joint} bits 0x{bits:02X}"),
+            Self::MotorFault { joint, bits } => write!(f, " joint {} bits 0x{bits:02X}", joint + 1),
             Self::HardwareFault { joint }
             | Self::FaultState { joint }
             | Self::IgnoresState { joint }
             | Self::NotAccurate { joint } => {
-                write!(f, " joint {joint}")
+                write!(f, " joint {}", joint + 1)
             }
-            Self::EncoderJump { joint, rad } => write!(f, " joint {joint} by {rad} rad"),
-            Self::Friction { joint, factor } => write!(f, " joint {joint} times {factor}"),
-            Self::Temperature { joint, celsius } => write!(f, " joint {joint} at {celsius} °C"),
+            Self::EncoderJump { joint, rad } => write!(f, " joint {} by {rad} rad", joint + 1),
+            Self::Friction { joint, factor } => write!(f, " joint {} times {factor}", joint + 1),
+            Self::Temperature { joint, celsius } => write!(f, " joint {} at {celsius} °C", joint + 1),
+            Self::Push { joint, torque } => write!(f, " joint {} by {torque} N·m", joint + 1),
             Self::FramesLost { probability }
             | Self::FramesCorrupted { probability }
             | Self::FramesGarbled { probability }
@@ -161,7 +182,8 @@ impl fmt::Display for FaultKind {
             | Self::NoAcknowledge
             | Self::SafetyInput
             | Self::SerialDelayed
-            | Self::TickOverrun => Ok(()),
+            | Self::TickOverrun
+            | Self::Hand { .. } => Ok(()),
         }
     }
 }
@@ -193,6 +215,8 @@ pub struct Fault {
 pub struct FaultPlan {
     /// In any order.
     pub faults: Vec<Fault>,
+    /// Paths along which [`FaultKind::Hand`] leads.
+    pub hands: Vec<HandPath>,
 }
 
 /// Where a fault is in its life.

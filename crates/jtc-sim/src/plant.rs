@@ -1,7 +1,7 @@
 //! What is behind the joint bus: drives, gripper and the arm that they move. It knows nothing of the controller, which may be
 //! the simulated one of [`World`](crate::World) or any other that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, Scale};
-use jtc_dynamics::ArmModel;
+use jtc_dynamics::{ArmModel, JointVec};
 
 use crate::arm::Arm;
 use crate::bus::Nodes;
@@ -37,6 +37,9 @@ pub struct Plant {
     pub(crate) nodes: Nodes,
     pub(crate) arm: Arm,
     truth: Truth,
+    /// Torque of pushes and of a hand on the joints, N·m.
+    push: JointVec,
+    pub(crate) hand: JointVec,
     model: ArmModel,
     scales: [Scale; JOINTS],
     support: Support,
@@ -60,6 +63,8 @@ impl Plant {
             nodes: Nodes { drives, gripper: config.gripper.then(|| Gripper::new(older)) },
             arm: Arm::new(parts, friction, config.start),
             truth: Truth::default(),
+            push: [0.0; JOINTS],
+            hand: [0.0; JOINTS],
             model,
             scales: config.drives.map(|d| Scale { velocity: d.velocity_full_scale }),
             support: config.support,
@@ -120,7 +125,8 @@ impl Plant {
                 Support::Brakes => !enabled(drive),
             };
         }
-        self.arm.step(&self.truth.torque, TICK);
+        let total = core::array::from_fn(|j| self.truth.torque[j] + self.push[j] + self.hand[j]);
+        self.arm.step(&total, TICK);
         self.read_truth();
     }
 
@@ -151,6 +157,7 @@ impl Plant {
         let mut drives = [DriveFault::default(); JOINTS];
         let (mut gripper_silent, mut gripper_line) = (false, false);
         let mut friction = [1.0; JOINTS];
+        self.push = [0.0; JOINTS];
         for kind in kinds {
             match kind {
                 FaultKind::NodeSilent { node } => match drives.get_mut(usize::from(node)) {
@@ -164,6 +171,7 @@ impl Plant {
                 FaultKind::MotorFault { joint, bits } => drives[usize::from(joint)].motor_control |= bits,
                 FaultKind::HardwareFault { joint } => drives[usize::from(joint)].hardware = true,
                 FaultKind::EncoderJump { joint, rad } => drives[usize::from(joint)].encoder_offset += rad,
+                FaultKind::Push { joint, torque } => self.push[usize::from(joint)] += torque,
                 FaultKind::IgnoresState { joint } => drives[usize::from(joint)].ignores_state = true,
                 FaultKind::NotAccurate { joint } => drives[usize::from(joint)].not_accurate = true,
                 FaultKind::Friction { joint, factor } => friction[usize::from(joint)] *= factor,

@@ -7,6 +7,7 @@ use crate::bus::{Bus, BusFault};
 use crate::config::SimConfig;
 use crate::event::{Event, Log};
 use crate::faults::{Change, FaultKind, Running};
+use crate::hand::{Hand, HandPath};
 use crate::plant::Plant;
 use crate::serial::{Line, LineFault};
 
@@ -34,6 +35,8 @@ pub struct World {
     safety_output: bool,
     safety_input: bool,
     faults: Running,
+    hands: Vec<HandPath>,
+    hand: Option<Hand>,
     line_fault: LineFault,
     overrun: bool,
     input_fault: bool,
@@ -74,6 +77,8 @@ impl World {
             safety_output: false,
             safety_input: true,
             faults: Running::new(&config.faults),
+            hands: config.faults.hands.clone(),
+            hand: None,
             line_fault: LineFault::default(),
             overrun: false,
             input_fault: false,
@@ -95,6 +100,7 @@ impl World {
         self.tick_controller();
         let now = self.now_us();
         self.bus_state = self.bus.tick(now, self.sent.as_ref(), &mut self.plant.nodes, &mut self.received);
+        self.lead_by_hand();
         self.plant.step(self.safety_output);
         self.ticks += 1;
         let now = self.now_us();
@@ -107,7 +113,7 @@ impl World {
         let telemetry = self.board.telemetry();
         let (state, point) = (telemetry.state, telemetry.point);
         let time = self.now_us();
-        let (log, plant) = (&mut self.log, &mut self.plant);
+        let (log, plant, hand) = (&mut self.log, &mut self.plant, &mut self.hand);
         let mut changed = false;
         self.faults.step(self.ticks, state, point, |change| {
             changed = true;
@@ -115,12 +121,32 @@ impl World {
                 Change::Begin(kind) => {
                     log.push(time, Event::FaultBegins(kind));
                     plant.begin(kind);
+                    if let FaultKind::Hand { path } = kind {
+                        *hand = self.hands.get(path).cloned().map(Hand::new);
+                    }
                 }
-                Change::End(kind) => log.push(time, Event::FaultEnds(kind)),
+                Change::End(kind) => {
+                    log.push(time, Event::FaultEnds(kind));
+                    if matches!(kind, FaultKind::Hand { .. }) {
+                        *hand = None;
+                    }
+                }
             }
         });
         if changed {
             self.apply_faults();
+        }
+    }
+
+    /// The hand's pull of this millisecond.
+    fn lead_by_hand(&mut self) {
+        let Some(hand) = &mut self.hand else { return };
+        let teaching = self.board.telemetry().state == State::Teaching;
+        let truth = self.plant.truth();
+        let pull = hand.torque(teaching, &truth.q, &truth.qd);
+        self.plant.hand = pull.unwrap_or_default();
+        if pull.is_none() {
+            self.hand = None;
         }
     }
 

@@ -13,6 +13,7 @@ fn hash(seed: u64) -> u64 {
             fault(FaultKind::SerialFlipped { probability: 0.002 }, 1_000, 9_000),
             fault(FaultKind::FramesCorrupted { probability: 0.05 }, 8_000, 1_000),
         ],
+        ..FaultPlan::default()
     };
     let mut operator = Operator::new(SimConfig { seed, faults, baud: Some(921_600), ..SimConfig::default() });
     let mut hasher = DefaultHasher::new();

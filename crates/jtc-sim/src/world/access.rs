@@ -8,7 +8,8 @@ use crate::board::Worked;
 use crate::bus::{BusStatistics, TimedFrame};
 use crate::config::SimConfig;
 use crate::event::{Event, Log};
-use crate::faults::Fault;
+use crate::faults::{Fault, FaultKind, Trigger};
+use crate::hand::HandPath;
 use crate::invariants::Moment;
 
 /// How the arm really is.
@@ -157,6 +158,20 @@ impl World {
     /// One more fault; `Trigger::At` counts from the start of the world.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.add(fault);
+    }
+
+    /// Someone pushes a joint (0..5) with a torque (N·m) for some milliseconds, from now on.
+    pub fn push(&mut self, joint: u8, torque: f64, ms: u64) {
+        let trigger = Trigger::At(self.now_us() / TICK_US);
+        self.inject(Fault { kind: FaultKind::Push { joint, torque }, trigger, duration_ms: Some(ms) });
+    }
+
+    /// A hand leads the arm along a path, as soon as it is taught; it takes the place of one that does already.
+    pub fn lead(&mut self, path: HandPath) {
+        let kind = FaultKind::Hand { path: self.hands.len() };
+        self.hands.push(path);
+        let trigger = Trigger::At(self.now_us() / TICK_US);
+        self.inject(Fault { kind, trigger, duration_ms: None });
     }
 
     /// Switch the controller's board off and on.

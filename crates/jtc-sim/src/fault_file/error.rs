@@ -1,0 +1,147 @@
+//! Why a fault file cannot be used, in words.
+use core::fmt;
+
+use jtc_dynamics::JOINTS;
+
+use super::{KINDS, STATES};
+
+/// Why a fault file cannot be used.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FaultFileError {
+    /// It is not TOML of this form; the text says where and why.
+    Syntax(String),
+    /// It does not say `format = 2`.
+    Format {
+        /// What it says instead.
+        found: Option<f64>,
+    },
+    /// The key `node`, which formats before 2 had.
+    Node {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// As written.
+        node: f64,
+    },
+    /// Neither or both of `joint` and `gripper`.
+    Device {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// Kind.
+        kind: String,
+    },
+    /// The file of a hand cannot be used; the text says why.
+    Hand {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// What is wrong.
+        text: String,
+    },
+    /// There is no fault of this kind.
+    UnknownKind {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// As written.
+        kind: String,
+    },
+    /// A key that this kind needs is missing.
+    Missing {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// Kind.
+        kind: String,
+        /// The key.
+        key: &'static str,
+    },
+    /// A key that means nothing here.
+    Superfluous {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// Kind.
+        kind: String,
+        /// The key.
+        key: &'static str,
+    },
+    /// A value outside its range.
+    Range {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// The key.
+        key: &'static str,
+        /// As written.
+        value: f64,
+        /// Smallest and largest.
+        allowed: (f64, f64),
+    },
+    /// A whole number is needed.
+    NotWhole {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// The key.
+        key: &'static str,
+        /// As written.
+        value: f64,
+    },
+    /// There is no such state.
+    UnknownState {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+        /// As written.
+        state: String,
+    },
+    /// Not exactly one of `at_s`, `in_state`, `at_point`.
+    Trigger {
+        /// Number of the fault in the file, from 1.
+        fault: usize,
+    },
+}
+
+impl fmt::Display for FaultFileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Syntax(text) => f.write_str(text),
+            Self::Format { found: None } => f.write_str(
+                "the file does not say `format = 2`. In files without it joints counted from 0. To change it: add 1 to every \
+                 `joint`, write `joint = N + 1` for every `node = N` of 0..5 and `gripper = true` for `node = 6`, then put \
+                 `format = 2` in the first line",
+            ),
+            Self::Format { found: Some(found) } => {
+                write!(f, "format = {found} is none that this program reads; it reads `format = 2`")
+            }
+            Self::Node { fault, node } => {
+                write!(f, "fault {fault}: there is no key `node` in format 2: instead of node = {node} write ")?;
+                if *node == JOINTS as f64 {
+                    f.write_str("gripper = true")
+                } else {
+                    write!(f, "joint = {} if it was meant as a number on the bus; joints count from 1", node + 1.0)
+                }
+            }
+            Self::Device { fault, kind } => write!(
+                f,
+                "fault {fault}: `{kind}` needs exactly one of `joint = 1..6` and `gripper = true`"
+            ),
+            Self::Hand { fault, text } => write!(f, "fault {fault}: {text}"),
+            Self::UnknownKind { fault, kind } => {
+                write!(f, "fault {fault}: there is no kind `{kind}`; kinds are {}", KINDS.join(", "))
+            }
+            Self::Missing { fault, kind, key } => write!(f, "fault {fault}: `{kind}` needs the key `{key}`"),
+            Self::Superfluous { fault, kind, key } => {
+                write!(f, "fault {fault}: the key `{key}` means nothing for `{kind}`; remove it")
+            }
+            Self::Range { fault, key, value, allowed: (low, high) } => {
+                write!(f, "fault {fault}: {key} = {value} is outside {low}..{high}")
+            }
+            Self::NotWhole { fault, key, value } => {
+                write!(f, "fault {fault}: {key} = {value} is not a whole number")
+            }
+            Self::UnknownState { fault, state } => {
+                let names: Vec<_> = STATES.iter().map(|(name, _)| *name).collect();
+                write!(f, "fault {fault}: there is no state `{state}`; states are {}", names.join(", "))
+            }
+            Self::Trigger { fault } => {
+                write!(f, "fault {fault}: say when with exactly one of at_s, in_state, at_point")
+            }
+        }
+    }
+}
+
+impl std::error::Error for FaultFileError {}

@@ -1,0 +1,161 @@
+//! Events that a person types while a simulation runs: `push 3 12 0.5`, `hand FILE`.
+use core::fmt;
+
+use jtc_dynamics::JOINTS;
+
+/// The events, for people.
+pub const TYPED_EVENTS_HELP: &str =
+    "push JOINT TORQUE_NM SECONDS (as in `push 3 12 0.5`), hand FILE (as in `hand lead.csv`)";
+
+/// Strongest push, N·m.
+pub(crate) const PUSH_MAX: f64 = 400.0;
+/// Longest push, s.
+const PUSH_MAX_S: f64 = 60.0;
+
+/// Something that was typed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TypedEvent {
+    /// Someone pushes.
+    Push {
+        /// 0..5: people count from 1.
+        joint: u8,
+        /// N·m in the joint's positive direction.
+        torque: f64,
+        /// s.
+        seconds: f64,
+    },
+    /// A hand leads the arm along the joint positions of a trajectory file, while it is taught.
+    Hand {
+        /// As typed.
+        file: String,
+    },
+}
+
+impl fmt::Display for TypedEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Push { joint, torque, seconds } => {
+                write!(f, "push: joint {} by {torque} N·m for {seconds} s", joint + 1)
+            }
+            Self::Hand { file } => write!(f, "hand: leads along {file} while the arm is taught"),
+        }
+    }
+}
+
+/// Why a typed line is no event.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TypedEventError {
+    /// There is no such event.
+    Unknown(String),
+    /// A push has three words after its name.
+    PushWords(usize),
+    /// Which word of a push is wrong, as typed, and what it may be.
+    Value {
+        /// Its name.
+        what: &'static str,
+        /// As typed.
+        word: String,
+        /// Smallest and largest.
+        allowed: (f64, f64),
+    },
+    /// A hand without a file.
+    NoFile,
+}
+
+impl fmt::Display for TypedEventError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown(word) => write!(f, "there is no event `{word}`; events are {TYPED_EVENTS_HELP}"),
+            Self::PushWords(count) => write!(
+                f,
+                "push takes a joint, a torque in N·m and a time in s, as in `push 3 12 0.5`; here are {count} words"
+            ),
+            Self::Value { what: "joint", word, .. } => {
+                write!(f, "push: joint `{word}` is none of 1..{JOINTS}; joints count from 1, at the base")
+            }
+            Self::Value { what, word, allowed: (low, high) } => {
+                write!(f, "push: {what} `{word}` is no number in {low}..{high}")
+            }
+            Self::NoFile => f.write_str("hand takes a trajectory file, as in `hand lead.csv`"),
+        }
+    }
+}
+
+impl std::error::Error for TypedEventError {}
+
+impl TypedEvent {
+    /// The event of a line; `None` for an empty line or a comment (`#`).
+    pub fn parse(line: &str) -> Result<Option<Self>, TypedEventError> {
+        let line = line.trim();
+        let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        match name {
+            "" => Ok(None),
+            _ if name.starts_with('#') => Ok(None),
+            "push" => push(&rest.split_whitespace().collect::<Vec<_>>()).map(Some),
+            "hand" if rest.trim().is_empty() => Err(TypedEventError::NoFile),
+            "hand" => Ok(Some(Self::Hand { file: rest.trim().into() })),
+            _ => Err(TypedEventError::Unknown(name.into())),
+        }
+    }
+}
+
+fn push(words: &[&str]) -> Result<TypedEvent, TypedEventError> {
+    let [joint, torque, seconds] = words else { return Err(TypedEventError::PushWords(words.len())) };
+    let value = |what, word: &str, low: f64, high: f64| {
+        let number = word.parse().ok().filter(|x: &f64| *x >= low && *x <= high);
+        number.ok_or_else(|| TypedEventError::Value { what, word: word.into(), allowed: (low, high) })
+    };
+    let number = value("joint", joint, 1.0, JOINTS as f64)?;
+    if number.fract() != 0.0 {
+        let word = (*joint).into();
+        return Err(TypedEventError::Value { what: "joint", word, allowed: (1.0, JOINTS as f64) });
+    }
+    Ok(TypedEvent::Push {
+        joint: number as u8 - 1,
+        torque: value("torque (N·m)", torque, -PUSH_MAX, PUSH_MAX)?,
+        seconds: value("time (s)", seconds, 0.001, PUSH_MAX_S)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn events_are_read_and_joints_count_from_1() {
+        let push = TypedEvent::Push { joint: 2, torque: 12.0, seconds: 0.5 };
+        assert_eq!(TypedEvent::parse("  push 3 12  0.5 \n"), Ok(Some(push.clone())));
+        assert_eq!(push.to_string(), "push: joint 3 by 12 N·m for 0.5 s");
+        let hand = TypedEvent::Hand { file: "my lead.csv".into() };
+        assert_eq!(TypedEvent::parse("hand my lead.csv"), Ok(Some(hand)));
+        assert_eq!(TypedEvent::parse(" # push 3 12 1"), Ok(None));
+        assert_eq!(TypedEvent::parse(""), Ok(None));
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (line, part) in [
+            ("shove 3 12 1", "there is no event `shove`; events are push JOINT TORQUE_NM SECONDS"),
+            ("push 3 12", "as in `push 3 12 0.5`; here are 2 words"),
+            ("push 0 12 1", "joint `0` is none of 1..6; joints count from 1"),
+            ("push 7 12 1", "joint `7` is none of 1..6"),
+            ("push 2.5 12 1", "joint `2.5` is none of 1..6"),
+            ("push 2 1e9 1", "torque (N·m) `1e9` is no number in -400..400"),
+            ("push 2 nan 1", "torque (N·m) `nan` is no number"),
+            ("push 2 12 forever", "time (s) `forever` is no number in 0.001..60"),
+            ("hand", "hand takes a trajectory file"),
+        ] {
+            let message = TypedEvent::parse(line).unwrap_err().to_string();
+            assert!(message.contains(part), "{line}\n→ {message}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_line_makes_the_reader_panic(line in "\\PC{0,60}|push( [-0-9.e]{0,6}){0,4}") {
+            let _ = TypedEvent::parse(&line);
+        }
+    }
+}

@@ -78,7 +78,9 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  jtc sim --serial /tmp/jtc\n  jtc sim --serial /tmp/jtc --arm my-arm.toml --seed 7\n  \
                             jtc sim --serial /tmp/jtc --speed max --no-throttle\n  \
-                            jtc sim --serial /tmp/jtc --faults faults.toml"
+                            jtc sim --serial /tmp/jtc --faults faults.toml\n\nLines on the standard input are \
+                            events:\n  push 3 12 0.5    joint 3 (counted from 1) is pushed by 12 N·m for 0.5 s\n  \
+                            hand lead.csv    a hand leads the arm along the positions of a trajectory file while it is taught"
     )]
     Sim(SimArgs),
     /// Serial ports found, and why one cannot be used

@@ -183,11 +183,63 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     assert_eq!(said.json()["status"]["state"], "HoldPos", "{}", said.out);
 }
 
+#[test]
+fn typed_events_happen_and_mistakes_are_named() {
+    let mut sim = Sim::start(&["--speed", "max"]);
+    let lead = sim.path("lead.csv");
+    std::fs::write(&lead, motion(0.2)).unwrap();
+    let lines = [
+        ("push 3 12 0.5", "push: joint 3 by 12 N·m for 0.5 s".to_owned()),
+        ("# a comment, then an empty line\n\npush 0 12 0.5", "joint `0` is none of 1..6".to_owned()),
+        ("shove", "there is no event `shove`; events are push".to_owned()),
+        (&format!("hand {lead}"), format!("hand: leads along {lead}")),
+        ("hand /no/such/file.csv", "/no/such/file.csv".to_owned()),
+    ];
+    assert!(sim.error_line().contains("holding brakes"), "announced at the start");
+    for (line, said) in lines {
+        sim.say(line);
+        let answer = sim.error_line();
+        assert!(answer.contains(&said), "{line}\n→ {answer}");
+    }
+    sim.jtc(&["status"]).ends(0);
+}
+
+#[test]
+fn the_arm_can_be_taught_by_hand() {
+    let mut sim = Sim::start(&["--speed", "max"]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    // To 0.3 rad in 2 s. Joint 1 turns about the vertical: let go, it stays.
+    let rows = (0..=200).map(|i| {
+        let q = 0.15 - 0.15 * (std::f64::consts::PI * f64::from(i) / 200.0).cos();
+        format!("{:.2},{q},0,0,0,0,0\n", f64::from(i) * 0.01)
+    });
+    let lead = sim.path("lead.csv");
+    std::fs::write(&lead, "t,q1,q2,q3,q4,q5,q6\n".to_owned() + &rows.collect::<String>()).unwrap();
+    sim.say(&format!("hand {lead}"));
+    sim.jtc(&["teach", "on"]).ends(0);
+    let position = |sim: &Sim| {
+        sim.jtc(&["--json", "status"]).ends(0).json()["joints"][0]["position_rad"].as_f64().unwrap()
+    };
+    let led = (0..100).any(|_| position(&sim) > 0.25);
+    assert!(led, "joint 1 is at {} rad", position(&sim));
+    sim.jtc(&["teach", "off"]).ends(0);
+}
+
+#[test]
+fn a_fault_file_that_counted_from_0_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let faults = dir.path().join("faults.toml");
+    std::fs::write(&faults, FAULT.replace("format = 2", "")).unwrap();
+    let said = jtc(&["sim", "--faults", faults.to_str().unwrap()]).ends(2);
+    assert!(said.err.contains("format = 2") && said.err.contains("add 1 to every `joint`"), "{}", said.err);
+}
+
 /// A drive faults half a second into the motion.
 const FAULT: &str = r#"
+format = 2
 [[fault]]
 kind = "motor-fault"
-joint = 2
+joint = 3
 bits = 4
 at_point = 500
 for_s = 0.1

@@ -5,14 +5,22 @@ use cli_kit::Output;
 use crate::args::SimArgs;
 use crate::failure::Failure;
 
+/// What carries the arm while no drive does.
+#[cfg(unix)]
+const BRAKES: &str =
+    "note: simulated holding brakes keep the arm up after an error; the known drives have none";
+#[cfg(unix)]
+const NO_BRAKES: &str =
+    "note: no holding brakes: without torque the simulated arm falls, as with the known drives";
+
 /// Serves a simulated controller until SIGINT or SIGTERM.
 #[cfg(unix)]
 pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use jtc_host::arm::Arm;
-    use jtc_sim::{SimConfig, World};
+    use jtc_sim::{SimConfig, Support, World};
     use serde_json::json;
 
-    use crate::serve::{Pty, Server};
+    use crate::serve::{Pty, Server, Typed};
     use cli_kit::Stop;
 
     let stop = Stop::listen()?;
@@ -27,12 +35,23 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
         faults,
         ..SimConfig::new(arm.config(), &arm.parameters())
     };
+    let support = config.support;
     let world = World::new(config);
     let pty = Pty::open(args.serial.as_deref()).map_err(Failure::usage)?;
     let name = pty.name().display().to_string();
-    let ready = || out.result(&json!({ "ready": name }), || format!("ready: {name}"));
+    let (brakes, words) = match support {
+        Support::Brakes => (true, BRAKES),
+        Support::Limp | Support::Stand => (false, NO_BRAKES),
+    };
+    out.note(words);
+    let ready = || {
+        let value = json!({ "ready": name, "holding_brakes": brakes, "note": words });
+        out.result(&value, || format!("ready: {name}"))
+    };
     let tap = args.bus.as_deref().map(bus).transpose()?;
-    let time_s = Server::new(world, pty, tap).run(args.speed, &stop, ready).map_err(Failure::usage)?;
+    let time_s = Server::new(world, pty, tap, Typed::listen())
+        .run(args.speed, &stop, ready)
+        .map_err(Failure::usage)?;
     out.note(format!("ended after {time_s:.1} s of virtual time"));
     Ok(())
 }
@@ -41,7 +60,10 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
 fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
     let text =
         std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-    jtc_sim::FaultPlan::from_toml(&text).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
+    // Files of hands are beside the file that names them.
+    let load = |file: &str| crate::serve::hand(&path.with_file_name(file));
+    jtc_sim::FaultPlan::from_toml_with(&text, load)
+        .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
 }
 
 /// The joint bus on a bus that others can join.

@@ -2,6 +2,7 @@
 
 mod frames;
 mod pty;
+mod typed;
 
 use std::time::{Duration, Instant};
 
@@ -12,6 +13,7 @@ use jtc_sim::{BusTap, World};
 use crate::args::SimSpeed;
 use frames::{Frames, Incoming};
 pub use pty::{Pty, PtyError};
+pub use typed::{Typed, hand};
 
 /// Bytes of the host that wait for the line: as much as an adapter's buffer; beyond that its writes block.
 const WAITING_MAX: usize = 4096;
@@ -32,6 +34,7 @@ pub struct Server {
     world: World,
     pty: Pty,
     tap: Option<Tap>,
+    typed: Typed,
     frames: Frames,
     incoming: Incoming,
     /// Bytes of a frame that the terminal did not take at once.
@@ -46,12 +49,13 @@ pub struct Server {
 }
 
 impl Server {
-    /// A world behind a terminal, and its joint bus on `tap`.
-    pub fn new(world: World, pty: Pty, tap: Option<Tap>) -> Self {
+    /// A world behind a terminal, its joint bus on `tap`, and the events that are typed.
+    pub fn new(world: World, pty: Pty, tap: Option<Tap>, typed: Typed) -> Self {
         Self {
             world,
             pty,
             tap,
+            typed,
             frames: Frames::default(),
             incoming: Incoming::default(),
             rest: Vec::new(),
@@ -88,6 +92,7 @@ impl Server {
             if self.stands_still()? {
                 continue;
             }
+            self.typed.act(&mut self.world);
             self.world.step();
             if let Some(tap) = &mut self.tap
                 && let Err(e) = tap.exchange(&mut self.world)

@@ -1,7 +1,7 @@
 //! Runs the `jtc` command as a user does, and a simulated controller for it to talk to.
 #![allow(dead_code)]
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -25,6 +25,7 @@ pub fn jtc_with(words: &[&str], stdin: &str) -> Said {
 /// A simulated controller behind a pseudo-terminal; it ends with the test.
 pub struct Sim {
     child: Child,
+    stderr: BufReader<std::process::ChildStderr>,
     pub port: PathBuf,
     pub dir: tempfile::TempDir,
 }
@@ -41,18 +42,20 @@ impl Sim {
         let mut child = command()
             .args(["sim", "--serial", port.to_str().unwrap()])
             .args(options)
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .expect("jtc sim starts");
+        let mut stderr = BufReader::new(child.stderr.take().expect("stderr"));
         let mut line = String::new();
         BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");
         if line != format!("ready: {}\n", port.display()) {
             let mut err = String::new();
-            child.stderr.take().expect("stderr").read_to_string(&mut err).ok();
+            stderr.read_to_string(&mut err).ok();
             panic!("jtc sim says {line:?}, {err}");
         }
-        Self { child, port, dir }
+        Self { child, stderr, port, dir }
     }
 
     /// Runs `jtc` at its port.
@@ -60,6 +63,18 @@ impl Sim {
         let mut all = words.to_vec();
         all.extend(["--port", self.port.to_str().unwrap()]);
         jtc(&all)
+    }
+
+    /// Types a line on its standard input.
+    pub fn say(&mut self, line: &str) {
+        writeln!(self.child.stdin.as_mut().expect("stdin"), "{line}").expect("it reads");
+    }
+
+    /// The next line of its stderr; waits for it.
+    pub fn error_line(&mut self) -> String {
+        let mut line = String::new();
+        self.stderr.read_line(&mut line).expect("a line");
+        line
     }
 
     /// A path in its directory.

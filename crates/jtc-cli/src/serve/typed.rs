@@ -1,0 +1,107 @@
+//! Events that a person types, or a script writes, on the simulator's standard input.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use jtc_host::trajectory::Loaded;
+use jtc_sim::{HandPath, TypedEvent, World};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+/// How often it is looked whether the program is in the foreground of its terminal.
+const LOOK: Duration = Duration::from_millis(200);
+/// Longest line.
+const LINE_MAX: usize = 4096;
+
+/// Lines of the standard input.
+pub struct Typed {
+    lines: Receiver<String>,
+}
+
+impl Typed {
+    /// Begins to read the standard input, in a thread of its own.
+    pub fn listen() -> Self {
+        let (send, lines) = channel();
+        std::thread::spawn(move || read(|line| send.send(line).is_ok()));
+        Self { lines }
+    }
+
+    /// Makes what was typed since the last call happen in `world`; what cannot be is reported on stderr, and the arm goes on.
+    pub fn act(&self, world: &mut World) {
+        while let Ok(line) = self.lines.try_recv() {
+            match TypedEvent::parse(&line).map_err(|e| e.to_string()) {
+                Ok(None) => {}
+                Ok(Some(event)) => match happen(&event, world) {
+                    Ok(()) => eprintln!("{event}"),
+                    Err(text) => eprintln!("jtc: {text}"),
+                },
+                Err(text) => eprintln!("jtc: {text}"),
+            }
+        }
+    }
+}
+
+fn happen(event: &TypedEvent, world: &mut World) -> Result<(), String> {
+    match event {
+        TypedEvent::Push { joint, torque, seconds } => {
+            world.push(*joint, *torque, (seconds * 1e3).round() as u64);
+        }
+        TypedEvent::Hand { file } => world.lead(hand(&PathBuf::from(file))?),
+    }
+    Ok(())
+}
+
+/// The joint positions of a trajectory file as the path of a hand.
+pub fn hand(path: &Path) -> Result<HandPath, String> {
+    let trajectory = Loaded::load(path, None).map_err(|e| format!("hand: {e}"))?.trajectory;
+    let points = trajectory.points.iter().map(|point| point.position).collect();
+    let step_s = f64::from(trajectory.step_ms) * 1e-3;
+    HandPath::new(points, step_s).ok_or_else(|| format!("hand: {}: the file has no points", path.display()))
+}
+
+/// Gives the lines of the standard input to `take` until it wants no more or the input ends.
+///
+/// A program in the background that reads from its terminal is stopped by the system (SIGTTIN). So nothing is read before there is
+/// something, and not while another program is in the foreground.
+fn read(mut take: impl FnMut(String) -> bool) {
+    let stdin = rustix::stdio::stdin();
+    let (mut line, mut buffer) = (Vec::new(), [0; 512]);
+    loop {
+        let timeout = Timespec { tv_sec: 0, tv_nsec: LOOK.subsec_nanos() as _ };
+        let mut fds = [PollFd::new(&stdin, PollFlags::IN)];
+        match poll(&mut fds, Some(&timeout)) {
+            Ok(0) | Err(rustix::io::Errno::INTR) => continue,
+            Ok(_) => {}
+            Err(_) => return,
+        }
+        if in_background() {
+            std::thread::sleep(LOOK);
+            continue;
+        }
+        let count = match rustix::io::read(stdin, &mut buffer) {
+            Ok(0) | Err(_) => break,
+            Ok(count) => count,
+        };
+        for &byte in &buffer[..count] {
+            if byte != b'\n' {
+                line.push(byte);
+            }
+            if (byte == b'\n' || line.len() == LINE_MAX) && !take(text(&mut line)) {
+                return;
+            }
+        }
+    }
+    // The last line may end without a line feed.
+    take(text(&mut line));
+}
+
+fn text(line: &mut Vec<u8>) -> String {
+    String::from_utf8_lossy(&std::mem::take(line)).into_owned()
+}
+
+/// The standard input is a terminal, and another program is in its foreground.
+fn in_background() -> bool {
+    let stdin = rustix::stdio::stdin();
+    rustix::termios::isatty(stdin)
+        && rustix::termios::tcgetpgrp(stdin).is_ok_and(|group| group != rustix::process::getpgrp())
+}

@@ -1,5 +1,5 @@
 //! The whole world, one millisecond at a time: host line, controller, joint bus, drives, arm.
-use jtc_bus::{Frame, NODES, Scale};
+use jtc_bus::{Frame, JOINTS, NODES, Scale, fsm};
 use jtc_core::{BusState, State};
 
 use crate::board::{Board, Pins, Worked};
@@ -141,7 +141,9 @@ impl World {
     /// The hand's pull of this millisecond.
     fn lead_by_hand(&mut self) {
         let Some(hand) = &mut self.hand else { return };
-        let teaching = self.board.telemetry().state == State::Teaching;
+        // Closed brakes do not yield to a hand: it waits until every drive is enabled.
+        let free = self.plant.node_states()[..JOINTS] == [fsm::ENABLED; JOINTS];
+        let teaching = free && self.board.telemetry().state == State::Teaching;
         let truth = self.plant.truth();
         let pull = hand.torque(teaching, &truth.q, &truth.qd);
         self.plant.hand = pull.unwrap_or_default();

@@ -2,14 +2,18 @@
 //! table for the docs.
 use core::fmt;
 
+mod standstill;
+
 use jtc_core::{JOINTS, State, error, joint_error};
 use jtc_wire::{ExecCommand, FrameType};
 
-use crate::config::SimConfig;
+use crate::config::{SimConfig, Support};
 use crate::faults::{Fault, FaultKind, Trigger};
 use crate::host;
 use crate::invariants::{Invariants, Violation};
 use crate::operator::{Operator, OperatorError};
+
+pub use standstill::standstill_table;
 
 /// Ticks in which a reaction is looked for.
 const WATCH_MS: u64 = 600;
@@ -213,8 +217,8 @@ fn worse(back: Back) -> u8 {
 }
 
 /// A world in which the controller is in `state`.
-fn world_in(state: State) -> Result<Operator, OperatorError> {
-    let mut config = SimConfig { start: START, baud: None, ..SimConfig::default() };
+fn world_in(state: State, support: Support) -> Result<Operator, OperatorError> {
+    let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     for drive in &mut config.drives {
         // Alignment takes seconds in which nothing else happens.
         drive.first_enable_ms = 60;
@@ -250,7 +254,7 @@ fn world_in(state: State) -> Result<Operator, OperatorError> {
 }
 
 fn cell(row: &Row, state: State) -> Result<Cell, MatrixError> {
-    let mut operator = world_in(state)?;
+    let mut operator = world_in(state, Support::Brakes)?;
     let mut watch = Watch::new(&mut operator)?;
     let fault = Fault {
         kind: row.kind,

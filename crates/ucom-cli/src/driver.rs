@@ -4,8 +4,11 @@ use std::cell::RefCell;
 use std::time::Duration;
 
 use cli_kit::{Output, Stop};
+use serde_json::{Value, json};
 use ucom::Profile;
-use ucom::master::{Error, Event, Master, Outcome, ProcedureId, Request, StopLevel, Supervision};
+use ucom::master::{
+    Error, Event, Master, Outcome, ProcedureId, Request, ScanFinding, StopLevel, Supervision,
+};
 
 use crate::args::{Boards, LinkArgs};
 use crate::commands::conformance::told;
@@ -188,17 +191,32 @@ impl Driver {
         }
     }
 
-    /// The numbers of the boards that are meant; `all` asks who is there.
+    /// The numbers of the boards that are meant; `all` asks who is there, and refuses a number that two boards have.
     pub fn numbers(&mut self, boards: &Boards) -> Result<Vec<u8>, Failure> {
+        let numbers = self.numbers_to_stop(boards)?;
+        match self.master.shared_numbers().into_iter().next() {
+            Some(error) if *boards == Boards::All => Err(error.into()),
+            _ => Ok(numbers),
+        }
+    }
+
+    /// The same with the numbers that two boards have: a stop stops both.
+    pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, Failure> {
         match boards {
             Boards::Some(numbers) => Ok(numbers.clone()),
             Boards::None => Ok(Vec::new()),
             Boards::All => {
                 let Outcome::Scan(report) = self.run(Request::Scan)? else { return Ok(Vec::new()) };
-                let numbers: Vec<u8> = report.boards.iter().map(|b| b.number).collect();
+                let mut numbers: Vec<u8> = report.boards.iter().map(|b| b.number).collect();
+                numbers.extend(report.findings.iter().filter_map(|finding| match finding {
+                    ScanFinding::NumberShared { board, .. } => Some(*board),
+                    _ => None,
+                }));
+                numbers.sort_unstable();
                 if !numbers.is_empty() {
                     // Who is there and is not among these numbers is not left out silently.
-                    report.findings.iter().for_each(|finding| self.note(finding.to_string()));
+                    let more = report.findings.iter().filter(|finding| finding.error().is_none());
+                    more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);
                 }
                 let found = report.reports.ids.len();
@@ -243,9 +261,26 @@ pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
         Event::ForeignMaster { function, to } => {
             format!("another PC talks on the bus: {} to {to}", function.name())
         }
+        Event::NumberShared { board, found } => {
+            Error::NumberShared { board: *board, found: found.clone(), given_back: false }.to_string()
+        }
         Event::Overflow { dropped } => format!("{dropped} events were dropped"),
         _ => return None,
     })
+}
+
+/// Numbers that two boards have, as `--json` lists them.
+pub fn shared_numbers(master: &Master) -> Vec<Value> {
+    let value = |e: &Error| {
+        let Error::NumberShared { board, found, .. } = e else { return Value::Null };
+        json!({ "board": board, "flash_numbers": found, "code": e.code(), "message": e.to_string(), "hint": e.hint() })
+    };
+    master.shared_numbers().iter().map(value).collect()
+}
+
+/// Refuses to go on with a bus on which two boards have one number.
+pub fn nothing_shared(master: &Master) -> Result<(), Failure> {
+    master.shared_numbers().into_iter().next().map_or(Ok(()), |error| Err(error.into()))
 }
 
 impl From<Error> for Failure {

@@ -7,7 +7,7 @@ use ucom::master::{BoardSeen, InitOptions, InitReport, Outcome, RawStatus, Repor
 use ucom::{BoardInfo, Profile, Status};
 
 use crate::args::{ActArgs, Boards, BoardsArgs, InitArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
-use crate::driver::{Driver, unexpected};
+use crate::driver::{Driver, nothing_shared, shared_numbers, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
 use crate::shape::{bits, board_table, board_value, info_value, state};
 
@@ -19,11 +19,15 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         Outcome::Scan(report) => report,
         other => return Err(unexpected(&other)),
     };
-    let value = json!({
+    let mut value = json!({
         "reports": report.reports.ids,
         "boards": report.boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>(),
         "findings": texts(&report.findings),
     });
+    let shared = nothing_shared(&driver.master).err();
+    if let Some(f) = &shared {
+        value["error"] = json!({ "code": f.code, "message": f.message, "hint": f.hint, "exit": f.exit });
+    }
     if report.boards.is_empty() && report.reports.ids.is_empty() {
         let failure =
             Failure::new(NO_LINK, "no-boards", "no board answers").hint("ucom doctor looks for the reason");
@@ -42,7 +46,14 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         }
         text + &lines(&report.findings.iter().filter(|f| !is_unnumbered(f)).collect::<Vec<_>>())
     });
-    Ok(())
+    match shared {
+        // stdout has it already.
+        Some(failure) => {
+            out.note(format!("{}\n  {}", failure.message, failure.hint));
+            Err(Failure::printed(failure.exit))
+        }
+        None => Ok(()),
+    }
 }
 
 fn is_unnumbered(finding: &ucom::master::ScanFinding) -> bool {
@@ -360,7 +371,7 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Boards::None => {}
     }
     let (mut all, mut failures) = (Vec::new(), Vec::new());
-    for board in driver.numbers(&args.boards)? {
+    for board in driver.numbers_to_stop(&args.boards)? {
         match driver.run(Request::Stop { board, level, force: true }).and_then(numbers) {
             Ok(stopped) => all.push(stopped),
             Err(failure) => {
@@ -372,8 +383,14 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
             break;
         }
     }
+    // Only said, and only now: both boards of such a number were told to stop.
+    let shared = shared_numbers(&driver.master);
+    for error in driver.master.shared_numbers() {
+        driver.note(format!("{error}; both were told to stop\n  {}", error.hint()));
+    }
     let Some(worst) = failures.iter().map(|(_, failure)| failure.exit).max() else {
-        print(&all, &profile, out);
+        let boards = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
+        out.result(&json!({ "boards": boards, "shared_numbers": shared }), || lines_of(&all));
         return Ok(());
     };
     if let [(_, failure)] = &mut failures[..]
@@ -392,7 +409,7 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         })
     };
     let failed = failures.iter().map(error).collect::<Vec<_>>();
-    out.result(&json!({ "boards": stopped, "failed": failed }), || {
+    out.result(&json!({ "boards": stopped, "failed": failed, "shared_numbers": shared }), || {
         let numbers: Vec<String> = failures.iter().map(|(board, _)| board.to_string()).collect();
         lines_of(&all) + &format!("not stopped for certain: {}\n", numbers.join(", "))
     });

@@ -13,8 +13,8 @@ use super::params::{arrived, become_master, deliver, not_there};
 use super::run::{named, units};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 use crate::cache::{Known, of_several};
-use crate::driver::{Driver, unexpected};
-use crate::failure::Failure;
+use crate::driver::{Driver, nothing_shared, unexpected};
+use crate::failure::{FAULT, Failure};
 use crate::values::{Prepared, Word, only, tell_rounded, with_names, words};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
@@ -212,6 +212,7 @@ fn move_for(
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();
     driver.nobody_lost(&[board])?;
+    nothing_shared(&driver.master).map_err(|failure| Failure { exit: FAULT, ..failure })?;
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
         return Err(Failure::new(

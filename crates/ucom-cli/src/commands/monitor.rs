@@ -11,7 +11,7 @@ use ucom::master::{Board, Event, Life, Request};
 
 use super::monitor_view as view;
 use crate::args::{LinkArgs, MonitorArgs};
-use crate::driver::{Driver, words};
+use crate::driver::{Driver, nothing_shared, shared_numbers, words};
 use crate::failure::Failure;
 use crate::lines::Lines;
 use crate::shape::{bits, info_value, state};
@@ -100,7 +100,11 @@ pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), 
     let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only);
     let full = !out.is_json() && std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
     let left = args.count.unwrap_or(u64::MAX);
-    if full { live(&mut driver, &mut watch, left) } else { lines(&mut driver, &mut watch, left, out) }
+    match full {
+        true => live(&mut driver, &mut watch, left)?,
+        false => lines(&mut driver, &mut watch, left, out)?,
+    }
+    nothing_shared(&driver.master)
 }
 
 fn lines(driver: &mut Driver, watch: &mut Watch, mut left: u64, out: &Output) -> Result<(), Failure> {
@@ -142,6 +146,7 @@ fn value(driver: &Driver, watch: &Watch) -> Value {
         "received": statistics.received,
         "foreign_frames": statistics.foreign_count(),
         "foreign_master": watch.foreign_master,
+        "shared_numbers": shared_numbers(&driver.master),
         "boards": boards.iter().map(board).collect::<Vec<_>>(),
         "events": watch.log.iter().map(|(time_s, text)| json!({ "time_s": time_s, "text": text })).collect::<Vec<_>>(),
     })
@@ -165,6 +170,9 @@ fn text(driver: &Driver) -> String {
             life(b),
             statistics.frames_per_s(number, now)
         );
+    }
+    for error in driver.master.shared_numbers() {
+        text += &format!("  ! {error}\n");
     }
     text
 }

@@ -6,8 +6,10 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::files::recording::{CandumpWriter, Record, Recording, RecordingFormat, RecordingWriter};
+use ucom::master::Master;
 
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
+use crate::driver::shared_numbers;
 use crate::failure::{FAULT, Failure};
 use crate::link::{Link, protocol_frame, recorded, replayed};
 use crate::words::Decoder;
@@ -41,6 +43,8 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     };
     let channel = bus.url().rsplit(['/', ':']).next().unwrap_or("can0").to_owned();
     let mut decoder = Decoder::new(profile);
+    // It only listens: who answers to which number.
+    let mut master = Master::new(profile);
     let start = Instant::now();
     let (mut frames, mut left_out) = (0_u64, 0_u64);
     while !stop.asked() && frames < args.count.unwrap_or(u64::MAX) {
@@ -51,6 +55,8 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         let Some(frame) = bus.receive(rest.min(Duration::from_millis(100)))? else { continue };
         let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let frame = recorded(&frame);
+        master.handle(bus.now_us(), protocol_frame(&frame));
+        while master.take_event().is_some() {}
         let name = decoder.describe(bus.now_us(), &protocol_frame(&frame)).name;
         let record =
             Record { time_ns: time.as_nanos() as u64, channel: channel.clone(), direction: None, frame };
@@ -63,12 +69,14 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
             Err(e) => return Err(Failure::new(FAULT, "recording", e).hint("is the disk full?")),
         }
     }
+    let shared = shared_numbers(&master);
+    master.shared_numbers().iter().for_each(|error| out.note(format!("{error}\n  {}", error.hint())));
     match sink {
         Sink::File(writer) => writer.finish().map_err(Failure::usage)?,
         Sink::Stdout(_) => return Ok(std::io::stdout().flush()?),
     }
     let (file, time_s) = (args.file.display().to_string(), start.elapsed().as_secs_f64());
-    let value = json!({ "file": file, "frames": frames, "left_out": left_out, "time_s": time_s });
+    let value = json!({ "file": file, "frames": frames, "left_out": left_out, "time_s": time_s, "shared_numbers": shared });
     out.result(&value, || {
         let missing =
             if left_out > 0 { format!(", {left_out} foreign ones left out") } else { String::new() };

@@ -16,7 +16,7 @@ use ucom::master::{
 use super::params::Applied;
 use crate::args::{Assignment, Boards, CacheArgs, LinkArgs, OnLost, RunArgs, SoArgs};
 use crate::cache::Known;
-use crate::driver::{Driver, unexpected};
+use crate::driver::{Driver, nothing_shared, unexpected};
 use crate::failure::{FAULT, Failure, NO_LINK};
 use crate::lines::Lines;
 use crate::values::{Prepared, Word, for_board, only, tell_rounded, with_names, words};
@@ -218,6 +218,8 @@ fn supervise(
                 other => driver.tell(&other, None),
             }
         }
+        // What was found while it runs: a fault, not a refusal.
+        nothing_shared(&driver.master).map_err(|failure| Failure { exit: FAULT, ..failure })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {
                 return Ok(());
@@ -383,6 +385,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                 other => driver.tell(&other, None),
             }
         }
+        nothing_shared(&driver.master)?;
         if heard.elapsed() > Duration::from_secs(3) && patient {
             if args.count.is_some() {
                 return Err(Failure::new(

@@ -1,5 +1,6 @@
 //! A board of the simulated chain: the node that real boards run, with simulated parts and faults around it.
 
+use std::collections::VecDeque;
 use std::prelude::v1::*;
 use std::sync::atomic::Ordering;
 
@@ -8,10 +9,13 @@ use super::file::BoardConfig;
 use crate::node::memory::{MemoryFlash, MemoryStore, WirePins};
 use crate::node::{Node, NodeConfig, Phase, Pins, Record};
 use crate::profile::{Endian, HeaderForm};
-use crate::{Checksum, Format, Frame, Function, Status, checksum};
+use crate::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard, checksum};
 
 /// While a frame waits for the bus, time passes inside the board in steps of this, µs.
 const WAIT_US: u64 = 500;
+/// So much later than the other one a board with a number that is not its own reacts, µs: no two boards answer in the same
+/// bit time for long, and frames that do destroy each other.
+const BEHIND_US: u64 = 5_000;
 
 pub(super) struct Board {
     node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
@@ -22,6 +26,10 @@ pub(super) struct Board {
     pub silent: bool,
     pub deaf: bool,
     pub ack_held: bool,
+    /// What it hears reaches it so much later, µs.
+    behind_us: u64,
+    /// What it has still to hear, and when.
+    coming: VecDeque<(u64, u32, Format, Payload)>,
     /// The frame that waits for the bus.
     waiting: Option<Frame>,
     /// An acknowledgement that does not leave.
@@ -58,6 +66,8 @@ impl Board {
             silent: false,
             deaf: false,
             ack_held: false,
+            behind_us: 0,
+            coming: VecDeque::new(),
             waiting: None,
             held: None,
             next_us: 0,
@@ -80,6 +90,10 @@ impl Board {
         {
             self.waiting = Some(frame);
             return Some(frame);
+        }
+        while let Some((_, id, format, payload)) = self.coming.pop_front_if(|(at, ..)| *at <= now_us) {
+            // Frames that are not of this protocol are counted and ignored (D-02).
+            let _ = self.node.receive_any(now_us, id, format, payload.bytes());
         }
         let frame = self.node.poll(now_us);
         let out = frame.and_then(|frame| self.through(now_us, frame));
@@ -111,6 +125,9 @@ impl Board {
             (None, Some(_)) => self.node.next_deadline().max(now_us + WAIT_US),
             (None, None) => self.node.next_deadline().max(now_us + 1),
         };
+        if let Some((at, ..)) = self.coming.front() {
+            self.next_us = self.next_us.min(*at).max(now_us + 1);
+        }
     }
 
     /// Its frame was on the bus.
@@ -138,6 +155,11 @@ impl Board {
     /// A frame of another member was on the bus.
     pub fn hear(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
         if !self.unpowered && !self.deaf {
+            if let (1.., Some(payload)) = (self.behind_us, Payload::new(data)) {
+                self.coming.push_back((now_us + self.behind_us, id, format, payload));
+                self.next_us = self.next_us.min(now_us + self.behind_us);
+                return;
+            }
             // Frames that are not of this protocol are counted and ignored (D-02).
             let _ = self.node.receive_any(now_us, id, format, data);
             self.next_us = now_us;
@@ -161,6 +183,7 @@ impl Board {
         if on == self.unpowered {
             self.unpowered = !on;
             self.waiting = None;
+            self.coming.clear();
             self.held = None;
             if on {
                 self.node.power_up(now_us);
@@ -181,6 +204,24 @@ impl Board {
             self.node.restart(now_us);
             self.next_us = now_us;
         }
+    }
+
+    /// It takes this number, as by a PC_INIT that another board has taken already.
+    pub fn take_number(&mut self, now_us: u64, number: Sequence) {
+        if self.unpowered {
+            return;
+        }
+        self.behind_us = BEHIND_US;
+        let profile = self.node.config().profile;
+        if let Some(own) = self.node.number() {
+            let forget = ToBoard::SetStatus { mask: Status::INIT.0, value: 0 };
+            self.node.receive(now_us, &forget.encode(own, &profile));
+        }
+        // Only for this moment its incoming pin is active.
+        let level = self.node.pins.input.swap(true, Ordering::SeqCst);
+        self.node.receive(now_us, &ToBoard::Init.encode(number, &profile));
+        self.node.pins.input.store(level, Ordering::SeqCst);
+        self.next_us = now_us;
     }
 
     pub fn break_flash(&mut self, broken: bool) {

@@ -20,6 +20,8 @@ pub enum FaultKind {
     Crash,
     /// The init wire behind a board is broken.
     WireBroken,
+    /// A board takes the number of the one before it, as when a PC_INIT was repeated blindly (D-24).
+    SameNumber,
     /// A board's acknowledgement of its number does not leave it (D-24).
     AckHeld,
     /// A board's flash memory cannot be written.
@@ -109,12 +111,13 @@ pub enum FaultError {
     },
 }
 
-const KINDS: [&str; 12] = [
+const KINDS: [&str; 13] = [
     "power-loss",
     "silent",
     "deaf",
     "crash",
     "wire-broken",
+    "same-number",
     "ack-held",
     "flash-broken",
     "foreign-master",
@@ -179,6 +182,7 @@ impl Entry {
             "deaf" => FaultKind::Deaf,
             "crash" => FaultKind::Crash,
             "wire-broken" => FaultKind::WireBroken,
+            "same-number" => FaultKind::SameNumber,
             "ack-held" => FaultKind::AckHeld,
             "flash-broken" => FaultKind::FlashBroken,
             "foreign-master" => FaultKind::ForeignMaster,
@@ -210,7 +214,10 @@ impl Entry {
             (_, Some(_), _) => return Err(range("on_id", "an identifier, 0 to 0x7FF")),
             (_, None, Some(_)) => return Err(superfluous("on_count")),
         };
-        if kind == FaultKind::Crash && self.for_s.is_some() {
+        if kind == FaultKind::SameNumber && board < 2 {
+            return Err(range("board", "2 to 31: it takes the number of the board before it"));
+        }
+        if matches!(kind, FaultKind::Crash | FaultKind::SameNumber) && self.for_s.is_some() {
             return Err(superfluous("for_s"));
         }
         let duration_us = self.for_s.map(|s| time("for_s", s)).transpose()?;
@@ -228,6 +235,7 @@ impl FaultKind {
                 | Self::Deaf
                 | Self::Crash
                 | Self::WireBroken
+                | Self::SameNumber
                 | Self::AckHeld
                 | Self::FlashBroken
         )
@@ -274,6 +282,8 @@ mod tests {
             ("lost share=0.1 board=1", "board means nothing"),
             ("silent board=1 share=0.1", "share means nothing"),
             ("wire-broken board=1 share=0.1", "share means nothing"),
+            ("same-number board=2 for_s=1", "for_s means nothing"),
+            ("same-number board=1", "2 to 31"),
             ("crash board=1 for_s=1", "for_s means nothing"),
             ("silent board=1 at_s=-1", "seconds"),
             ("silent board=1 at_s=1 on_id=1", "on_id means nothing"),

@@ -185,6 +185,14 @@ impl ChainSim {
         }
     }
 
+    /// A board takes the number of the one before it, if that has one.
+    fn share_number(&mut self, i: usize) {
+        let number = self.boards.get(i.wrapping_sub(1)).and_then(|before| before.state().number);
+        if let (Some(number), Some(board)) = (number.and_then(Sequence::new), self.boards.get_mut(i)) {
+            board.take_number(self.now_us, number);
+        }
+    }
+
     /// A number from 0 to below 1.
     fn chance(&mut self) -> f64 {
         // xorshift64, Marsaglia 2003.
@@ -260,6 +268,7 @@ impl ChainSim {
                     FaultKind::AckHeld => board.ack_held = on,
                     FaultKind::FlashBroken => board.break_flash(on),
                     FaultKind::WireBroken => *broken = on,
+                    FaultKind::SameNumber => self.share_number(i),
                     _ => {
                         board.crash(now);
                         self.void.push(i);

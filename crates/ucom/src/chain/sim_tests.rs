@@ -161,3 +161,21 @@ fn faults_between_chain_and_clients_follow_their_shares() {
     assert!((120..280).contains(&twice), "{twice}");
     assert!(line("lost share=0").iter().all(|f| *f == [vec![0x55; 8]]));
 }
+
+/// D-24: a board that takes the number of the one before it answers to it as well, until the chain is numbered anew.
+#[test]
+fn d24_two_boards_with_one_number() {
+    let mut bench = Bench::new(3, "", 1);
+    bench.pass(250);
+    bench.number(3);
+    bench.sim.inject(Fault::from_line("same-number board=2").unwrap());
+    bench.pass(100);
+    let numbers: Vec<Option<u8>> = bench.sim.boards().map(|b| b.number).collect();
+    assert_eq!(numbers, [Some(1), Some(1), Some(3)]);
+    let heads = |said: Vec<String>| said.iter().filter(|f| f.len() == 20 && &f[8..10] == "01").count();
+    assert_eq!(heads(bench.ask("201#", 100)), 2);
+    assert_eq!(bench.ask("202#", 100), Vec::<String>::new());
+    bench.ask("000#", 500);
+    bench.number(3);
+    assert_eq!(heads(bench.ask("201#", 100)), 1);
+}

@@ -2,6 +2,7 @@
 
 use std::prelude::v1::*;
 
+use super::holders::{one_board_each, one_board_for_each_number};
 use super::link::Link;
 use super::raw_status::expected_status;
 use super::request::{TRIES, admin, confirmed, info, numbers, set_status};
@@ -35,6 +36,12 @@ impl AdminChange {
             global_debug: self.global_debug.unwrap_or(old.global_debug),
         }
     }
+
+    /// Whether it only ends something that moves: such a change is neither delayed nor refused.
+    pub fn only_ends(&self) -> bool {
+        let sets = [self.run, self.active, self.debug, self.global_debug].contains(&Some(true));
+        !sets && (self.run == Some(false) || self.active == Some(false))
+    }
 }
 
 /// How far to stop.
@@ -49,7 +56,9 @@ pub enum StopLevel {
 }
 
 pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Error> {
-    info(&link, board).await.map(Outcome::Info)
+    let seen = info(&link, board).await?;
+    one_board_each(&link, &[board]).await?;
+    Ok(Outcome::Info(seen))
 }
 
 /// PC_SETSTATUS with read-back. What takes longer than one answer is waited for.
@@ -62,6 +71,7 @@ pub(crate) async fn set_status_procedure(
 ) -> Result<Outcome, Error> {
     let to = link.board(board)?;
     link.become_master(force).await?;
+    one_board_each(&link, &[board]).await?;
     let value = value & mask;
     if mask.has(Status::INIT) && !value.has(Status::INIT) {
         return forget_number(&link, board, mask, value).await;
@@ -140,8 +150,15 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
     link.become_master(force).await?;
     // Whether there is such a board: a frame to nobody would look like a reset without an answer.
     let before = match board {
-        Some(board) => Some(confirmed(&link, board).await?.info),
-        None => None,
+        Some(board) => {
+            let before = confirmed(&link, board).await?.info;
+            one_board_each(&link, &[board]).await?;
+            Some(before)
+        }
+        None => {
+            one_board_for_each_number(&link).await?;
+            None
+        }
     };
     link.listen(0, &REPORTS);
     link.ask(to, ToBoard::Reset).await;
@@ -198,6 +215,7 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
 pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
+    one_board_each(&link, &[board]).await?;
     let info = enter_exloader(&link, board, None).await?;
     Ok(Outcome::Status { board, info })
 }
@@ -279,6 +297,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let board = before.number;
     let to = link.board(board)?;
     let mut last = before.info.status;
+    one_board_each(link, &[board]).await?;
     if last.has(Status::MSTART) {
         return Ok(before);
     }
@@ -329,8 +348,12 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
 }
 
 /// The flags to change from: those the board told last, else what its status says with outputs off (D-37).
-async fn flags(link: &Link, board: u8) -> Result<Admin, Error> {
+async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
+    // What ends something waits for nothing.
+    if !ends {
+        one_board_each(link, &[board]).await?;
+    }
     if !known.status.has(Status::MSTART) {
         return Err(Error::NoApplication { board, valid: known.has_application() });
     }
@@ -346,7 +369,7 @@ async fn flags(link: &Link, board: u8) -> Result<Admin, Error> {
 
 /// Read-modify-write of the flags.
 pub(crate) async fn change_flags(link: &Link, board: u8, change: AdminChange) -> Result<Admin, Error> {
-    let wanted = change.apply(flags(link, board).await?);
+    let wanted = change.apply(flags(link, board, change.only_ends()).await?);
     admin(link, board, wanted).await
 }
 
@@ -365,8 +388,10 @@ pub(crate) async fn admin_procedure(
 pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
-    let info = stop_board(&link, board, level).await?;
-    Ok(Outcome::Status { board, info })
+    let info = stop_board(&link, board, level).await;
+    // Only said, by its event, and only now: both boards were told to stop.
+    let _ = one_board_each(&link, &[board]).await;
+    Ok(Outcome::Status { board, info: info? })
 }
 
 /// Outputs off, then the loop, then the application: the start order in reverse. A step that gets no answer does not keep

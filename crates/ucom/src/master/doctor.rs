@@ -227,6 +227,10 @@ fn chain(o: &Observation, f: &mut Findings) {
         }
     }
     let Some(scan) = &o.scan else { return };
+    for shared in scan.findings.iter().filter_map(ScanFinding::error) {
+        let (why, next) = super::error::SHARED_CAUSE;
+        f.problem(shared.to_string(), why, next);
+    }
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {
         f.warn(
@@ -245,7 +249,8 @@ fn chain(o: &Observation, f: &mut Findings) {
     } else if !scan.boards.is_empty() {
         f.good(format!("{} boards already have numbers", scan.boards.len()));
     }
-    for finding in scan.findings.iter().filter(|x| !matches!(x, ScanFinding::Unnumbered { .. })) {
+    let told = |x: &&ScanFinding| matches!(x, ScanFinding::Unnumbered { .. }) || x.error().is_some();
+    for finding in scan.findings.iter().filter(|x| !told(x)) {
         let next = match finding {
             ScanFinding::SameFlash { .. } | ScanFinding::Ambiguous { .. } => {
                 "give one of them another flash number"

@@ -107,16 +107,16 @@ pub enum Error {
         /// The one it has.
         found: u16,
     },
-    /// Boards that took a number that is not, or not only, theirs.
+    /// Two boards have one number: whatever it is told, both do.
     #[error(
-        "number {board} was taken by {}{}",
-        Flashes(found),
-        if *given_back { " and taken back from all of them" } else { ", and it is not given back" }
+        "two boards answer to number {board}: {}{}",
+        Sharing(found),
+        if *given_back { "; it was taken back from both" } else { "" }
     )]
     NumberShared {
         /// The number.
         board: u8,
-        /// The flash numbers of those that answered to it.
+        /// The flash numbers of those that answered to it; twice the same one when they cannot be told apart.
         found: Vec<u16>,
         /// Nobody answers to it any more.
         given_back: bool,
@@ -334,14 +334,20 @@ impl fmt::Display for Boards<'_> {
     }
 }
 
-/// `flash number 0x0021`, `flash numbers 0x0021, 0x0042`.
-struct Flashes<'a>(&'a [u16]);
+/// `flash numbers 0x0021 and 0x0042`, or `both with flash number 0x0021`.
+pub(crate) struct Sharing<'a>(pub &'a [u16]);
 
-impl fmt::Display for Flashes<'_> {
+impl fmt::Display for Sharing<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list: Vec<String> = self.0.iter().map(|n| format!("0x{n:04X}")).collect();
-        let s = if self.0.len() == 1 { "" } else { "s" };
-        write!(f, "flash number{s} {}", list.join(", "))
+        match self.0 {
+            [first, rest @ ..] if rest.iter().all(|other| other == first) => {
+                write!(f, "both with flash number 0x{first:04X}")
+            }
+            all => {
+                let list: Vec<String> = all.iter().map(|n| format!("0x{n:04X}")).collect();
+                write!(f, "flash numbers {}", list.join(" and "))
+            }
+        }
     }
 }
 
@@ -352,6 +358,13 @@ impl fmt::Display for Near<'_> {
         if self.0.is_empty() { Ok(()) } else { write!(f, "; there is `{}`", self.0.join("`, `")) }
     }
 }
+
+/// What makes two boards take one number, and what helps.
+pub(crate) const SHARED_CAUSE: (&str, &str) = (
+    "both took it from one PC_INIT: an init pin is strapped or shorted, or a PC repeated it blindly",
+    "`ucom stop all` if anything runs, then `ucom init` numbers all anew; if it comes again, power one of them down and \
+     check the init wires",
+);
 
 impl Error {
     /// Exit code of the commands: 1 the board reported an error, 3 no answer, 4 refused by a check, 5 fault while
@@ -428,7 +441,8 @@ impl Error {
             Self::Incomplete { .. } => {
                 "frames get lost: `ucom doctor` looks at bus load, error counters and termination".into()
             }
-            Self::Contradiction { .. } | Self::NumberShared { .. } => "number the boards anew: `ucom init`".into(),
+            Self::Contradiction { .. } => "number the boards anew: `ucom init`".into(),
+            Self::NumberShared { .. } => format!("{}; {}", SHARED_CAUSE.0, SHARED_CAUSE.1),
             Self::MayTakeNumber { other, .. } => {
                 format!("`ucom repair {other}` first, or number all boards anew: `ucom init`")
             }

@@ -86,6 +86,13 @@ pub enum Event {
         /// To which number.
         to: u8,
     },
+    /// Two boards have one number (D-24); said once, until numbers are given anew.
+    NumberShared {
+        /// The number.
+        board: u8,
+        /// Their flash numbers; twice the same one when they cannot be told apart.
+        found: Vec<u16>,
+    },
     /// So many events were dropped because nobody took them.
     Overflow {
         /// How many.

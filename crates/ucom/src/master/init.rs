@@ -7,7 +7,9 @@
 use std::collections::BTreeSet;
 use std::prelude::v1::*;
 
+use super::holders::one_board_each;
 use super::link::Link;
+use super::repair::given_back;
 pub(crate) use super::repair::{repair, repair_procedure};
 use super::request::{Answer, TRIES, ask_info, confirmed, info, set_status};
 use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
@@ -149,6 +151,9 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
         match next_board(&link, number.number()).await {
             Ok(Some(seen)) => report.boards.push(seen),
             Ok(None) => break,
+            Err(error @ Error::NumberShared { .. }) => {
+                return Err(given_back(&link, number.number(), error).await?);
+            }
             Err(error) => {
                 report.findings.push(InitFinding::Refused { board: number.number(), error });
                 break;
@@ -187,6 +192,7 @@ async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error>
         return Ok(None);
     }
     let seen = info(link, number).await?;
+    one_board_each(link, &[number]).await?;
     // Raised also when the board says that it did so itself: harmless, and the read-back is needed anyway.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {

@@ -155,7 +155,8 @@ impl Link {
     }
 
     /// Ends `work` with [`Error::Cancelled`] when the caller asks to, with [`Error::Bus`] when he says that the bus is
-    /// gone; its queued frames do not leave then.
+    /// gone, with [`Error::NumberShared`] once when two boards with one number show, unless it bears that; its queued frames
+    /// do not leave then.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -166,7 +167,12 @@ impl Link {
                 let inbox = core.inboxes.get_mut(&self.id)?;
                 let gone = inbox.bus_gone.clone().map(|reason| Error::Bus { reason });
                 let cancelled = core::mem::take(&mut inbox.cancel).then_some(Error::Cancelled);
-                let ended = gone.or(cancelled);
+                let mut ended = gone.or(cancelled);
+                if ended.is_none() && !inbox.bears_shared_numbers {
+                    ended = core.holders.shared(inbox.claims);
+                    // What follows undoes something.
+                    inbox.bears_shared_numbers = ended.is_some();
+                }
                 if ended.is_some() {
                     core.forget_queued(self.id);
                 }
@@ -234,9 +240,18 @@ impl Link {
             let answer = numbers(self, board).await;
             let stopped = |core: &Core| core.boards.get(board).is_some_and(|b| b.stopped_at.is_some());
             if answer.is_ok() && self.with(|core| stopped(core)) {
-                self.with(|core| core.foreign_pc(Function::Alive, board));
+                self.with(|core| core.foreign_pc(Function::Alive, board, &[]));
             }
         }
+    }
+
+    /// From now on two boards with one number do not end this procedure, or do.
+    pub(crate) fn bear_shared_numbers(&self, bears: bool) {
+        self.with(|core| {
+            if let Some(inbox) = core.inboxes.get_mut(&self.id) {
+                inbox.bears_shared_numbers = bears;
+            }
+        });
     }
 
     /// The board's number, checked against the profile.

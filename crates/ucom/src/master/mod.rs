@@ -42,6 +42,7 @@ mod event;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
+mod holders;
 mod init;
 pub mod io;
 mod link;
@@ -118,7 +119,8 @@ impl Master {
                 let boards = (0..32).filter(|b| shared >> b & 1 == 1).collect();
                 return Err(Error::Busy { boards, with: other.name });
             }
-            core.inboxes.insert(id, Inbox { name, claims, ..Default::default() });
+            let bears_shared_numbers = request.bears_shared_numbers();
+            core.inboxes.insert(id, Inbox { name, claims, bears_shared_numbers, ..Default::default() });
         }
         self.next_id += 1;
         let link = Link { core: self.core.clone(), id };
@@ -228,6 +230,11 @@ impl Master {
     /// The boards as last seen.
     pub fn boards(&self) -> Boards {
         lock(&self.core).boards.clone()
+    }
+
+    /// Numbers that two boards have, each as the error that procedures end with.
+    pub fn shared_numbers(&self) -> Vec<Error> {
+        lock(&self.core).holders.all_shared()
     }
 
     /// Counters of the bus.

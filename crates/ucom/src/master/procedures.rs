@@ -3,6 +3,7 @@
 use std::prelude::v1::*;
 
 use super::control::{self, AdminChange, StopLevel};
+use super::holders;
 use super::init::{self, InitOptions, InitReport};
 use super::io::{self, IoDescription};
 use super::link::Link;
@@ -146,6 +147,16 @@ impl Request {
         }
     }
 
+    /// Whether two boards with one number do not end it: a stop stops both, and must not wait; the others find them
+    /// themselves and say more.
+    pub(super) fn bears_shared_numbers(&self) -> bool {
+        match self {
+            Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,
+            Self::Admin { change, .. } => change.only_ends(),
+            _ => false,
+        }
+    }
+
     /// The boards that it works with, by bit: one procedure at a time works with a board.
     pub(super) fn claims(&self) -> u32 {
         let one = |board: &u8| 1_u32.checked_shl((*board).into()).unwrap_or(0);
@@ -230,7 +241,8 @@ pub(super) type Work = core::pin::Pin<Box<dyn Future<Output = Result<Outcome, Er
 
 /// The procedure of a request.
 pub(super) fn work(link: Link, request: Request) -> Work {
-    let outer = link.clone();
+    let (outer, end, boards) = (link.clone(), link.clone(), request.claims());
+    let looks = !request.bears_shared_numbers() && boards != u32::MAX;
     let inner: Work = match request {
         // These have something to undo when they are cancelled.
         Request::Update(options) => return Box::pin(update::update(link, options)),
@@ -259,5 +271,12 @@ pub(super) fn work(link: Link, request: Request) -> Work {
             Box::pin(raw_status::raw_status(link, board, seen, (mask, value), force))
         }
     };
-    Box::pin(async move { outer.or_cancel(inner).await })
+    let whole = async move {
+        let outcome = inner.await?;
+        if looks {
+            holders::last_answers(&end, boards).await;
+        }
+        Ok(outcome)
+    };
+    Box::pin(async move { outer.or_cancel(whole).await })
 }

@@ -2,6 +2,7 @@
 
 use std::prelude::v1::*;
 
+use super::holders::one_board_each;
 use super::link::Link;
 use super::request::numbers;
 use super::{Error, Outcome};
@@ -71,6 +72,7 @@ pub(crate) async fn raw_status(
         return Err(Error::LoopRuns { boards: running });
     }
     link.become_master(force).await?;
+    one_board_each(&link, &seen).await?;
     // Never repeated: it is to do what it says, once.
     link.send(address, ToBoard::SetStatus { mask, value }).await;
     let limit = link.now() + link.times().start;

@@ -7,13 +7,14 @@
 use std::collections::BTreeMap;
 use std::prelude::v1::*;
 
+use super::holders::{head, one_board_each};
 use super::init::take_number;
 use super::link::Link;
 use super::request::{TRIES, confirmed, set_status};
 use super::scan::statuses;
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
-use crate::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
+use crate::{FromBoard, Function, Sequence, Status, ToBoard};
 
 /// Most rounds of PC_INFO that find out who has a number.
 const ROUNDS: u32 = 6;
@@ -23,12 +24,15 @@ const ROUNDS: u32 = 6;
 pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
     link.board(number)?;
     let mut lowered = Vec::new();
+    // Two boards that take the number are found here, and do not keep it.
+    link.bear_shared_numbers(true);
     let given = give(link, number, flash_number, &mut lowered).await;
     for board in lowered {
         if set_status(link, board, Status::OPINIT, Status::OPINIT).await.is_err() {
             link.note(format!("board {board} did not confirm that its outgoing pin is on again"));
         }
     }
+    link.bear_shared_numbers(false);
     let seen = given?;
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     Ok(BoardSeen { info: raised, ..seen })
@@ -43,16 +47,21 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
     }
     let found: Vec<u16> = holders(link, number).await?;
     match found.as_slice() {
-        [found] if *found == flash_number => confirmed(link, number).await,
+        [found] if *found == flash_number => match one_board_each(link, &[number]).await {
+            Ok(()) => confirmed(link, number).await,
+            Err(shared) => Err(given_back(link, number, shared).await?),
+        },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since)),
         // Whoever took it must not keep it, or the next command means the wrong board.
-        [other] => match take_back(link, number).await? {
-            true => Err(Error::WrongBoard { board: number, wanted: flash_number, found: *other }),
-            false => Err(Error::NumberShared { board: number, found, given_back: false }),
-        },
+        [other] => {
+            if !take_back(link, number).await? {
+                link.note(format!("board 0x{other:04X} does not give number {number} back"));
+            }
+            Err(Error::WrongBoard { board: number, wanted: flash_number, found: *other })
+        }
         _ => {
-            let given_back = take_back(link, number).await?;
-            Err(Error::NumberShared { board: number, found, given_back })
+            let shared = Error::NumberShared { board: number, found, given_back: false };
+            Err(given_back(link, number, shared).await?)
         }
     }
 }
@@ -107,7 +116,7 @@ async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
 
 /// One PC_INFO, and the flash number of every answer to it, not only of the first.
 async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
-    let (to, times, endian) = (link.board(number)?, link.times(), link.profile().endian);
+    let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
     link.listen(1 << number, &[Function::DspInfo]);
     link.ask(to, ToBoard::Info).await;
     let mut until = link.now() + times.info;
@@ -115,12 +124,7 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let mut found = Vec::new();
     while let Some(heard) = link.next(until).await {
         if let (FromBoard::Info(payload), true) = (&heard.message, heard.from == number) {
-            // A description's package does not carry the board's number and a possible status at these places.
-            let head = BoardInfo::parse(payload, endian).filter(|info| {
-                let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);
-                possible && info.sequence == number
-            });
-            found.extend(head.map(|info| info.flash_number));
+            found.extend(head(number, payload, &profile).map(|info| info.flash_number));
         }
         until = (link.now() + times.gap).min(limit);
         if link.now() >= limit {
@@ -130,6 +134,13 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     found.sort_unstable();
     found.dedup();
     Ok(found)
+}
+
+/// A number that two boards took: nobody keeps it.
+pub(super) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
+    let Error::NumberShared { board, found, .. } = error else { return Ok(error) };
+    let given_back = take_back(link, number).await?;
+    Ok(Error::NumberShared { board, found, given_back })
 }
 
 /// Takes a number from whoever has it; `true`: nobody answers to it any more.
@@ -161,11 +172,12 @@ pub(crate) async fn repair_procedure(
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
         // It is well: nothing is changed but its pin, which must be on.
         [found] if *found == flash_number => {
+            one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;
             let info = set_status(&link, number, Status::OPINIT, Status::OPINIT).await?;
             Ok(Outcome::Repaired(BoardSeen { info, ..seen }))
         }
         [found] => Err(Error::WrongBoard { board: number, wanted: flash_number, found: *found }),
-        _ => Err(Error::Contradiction { board: number, tries: ROUNDS }),
+        found => Err(Error::NumberShared { board: number, found: found.to_vec(), given_back: false }),
     }
 }

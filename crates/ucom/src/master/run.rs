@@ -6,6 +6,7 @@ use std::prelude::v1::*;
 
 use super::boards::Life;
 use super::control::{AdminChange, StopLevel, change_flags, start_from, stop_board};
+use super::holders::one_board_each;
 use super::io::{DescriptionKey, IoDescription, Kind, describe, read_initial_inputs};
 use super::link::Link;
 use super::load::LoadForecast;
@@ -63,6 +64,7 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
     if let Err(error) = &result
         && !matches!(error, Error::Bus { .. })
     {
+        link.bear_shared_numbers(true);
         let undone = link.or_cancel(async {
             undo(&link, &begun).await;
             Ok(())
@@ -108,6 +110,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         }
         found.push(seen);
     }
+    one_board_each(link, &options.boards.iter().map(|plan| plan.board).collect::<Vec<_>>()).await?;
     for (plan, seen) in options.boards.iter().zip(found) {
         // What does not run yet is stopped as far as it was; what runs is not ours to stop.
         let status = seen.info.status;

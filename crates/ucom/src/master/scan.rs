@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::prelude::v1::*;
 
+use super::holders::one_board_each;
 use super::link::Link;
 use super::request::{Answer, InfoCollector, TRIES, identity, remember};
 use super::{BoardSeen, Error, Outcome};
@@ -101,6 +102,16 @@ pub enum ScanFinding {
         /// Its number.
         board: u8,
     },
+    /// Two boards have one number (D-24).
+    #[error("{}", shared(*board, [*first, *second]))]
+    NumberShared {
+        /// The number.
+        board: u8,
+        /// Flash number of one.
+        first: u16,
+        /// Flash number of another; the same when they cannot be told apart.
+        second: u16,
+    },
     /// A status that cannot be.
     #[error("board {board}: {problem}")]
     Status {
@@ -115,6 +126,20 @@ pub enum ScanFinding {
         /// Its number.
         board: u8,
     },
+}
+
+fn shared(board: u8, found: [u16; 2]) -> Error {
+    Error::NumberShared { board, found: found.to_vec(), given_back: false }
+}
+
+impl ScanFinding {
+    /// As the error that other commands end with, where they refuse to work with such a chain.
+    pub fn error(&self) -> Option<Error> {
+        match self {
+            Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),
+            _ => None,
+        }
+    }
 }
 
 /// PC_REPORT, and who answers within the window.
@@ -248,12 +273,21 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     ask_reports(&link, &mut report.reports).await;
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let slots = ask_all(&link, &numbers).await;
+    // What is in doubt is asked again; what is certain is found below.
+    let doubtful = link.with(|core| core.holders.doubtful());
+    let _ = one_board_each(&link, &doubtful).await;
     // Who answered but did not report may have been missed.
     let missing = |boards: &[BoardSeen], reports: &Reports| {
         boards.iter().any(|b| !reports.ids.contains(&(b.info.flash_number as u8)))
     };
     for (number, slot) in &slots {
         let board = *number;
+        if let Some(Error::NumberShared { found, .. }) = link.with(|core| core.holders.shared(1 << board))
+            && let [first, second, ..] = found[..]
+        {
+            report.findings.push(ScanFinding::NumberShared { board, first, second });
+            continue;
+        }
         match slot.seen(board) {
             Some(seen) if slot.confirmed => {
                 remember(&link, board, &seen.info, seen.description.as_deref());
@@ -281,7 +315,12 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
 }
 
 fn judge(report: &mut ScanReport) {
-    let numbered: BTreeSet<u8> = report.boards.iter().map(|b| b.info.flash_number as u8).collect();
+    let mut numbered: BTreeSet<u8> = report.boards.iter().map(|b| b.info.flash_number as u8).collect();
+    for finding in &report.findings {
+        if let ScanFinding::NumberShared { first, second, .. } = finding {
+            numbered.extend([*first as u8, *second as u8]);
+        }
+    }
     let reports = &report.reports;
     let findings = &mut report.findings;
     for ucom_id in reports.ids.difference(&numbered) {

@@ -5,6 +5,7 @@ use std::prelude::v1::*;
 
 use super::boards::Boards;
 use super::error::LastHeard;
+use super::holders::Holders;
 use super::io::{DescriptionKey, IoDescription, ProcessData};
 use super::statistics::Statistics;
 use super::times::Times;
@@ -58,6 +59,8 @@ pub(crate) struct Inbox {
     pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
+    /// Two boards with one number do not end it: a stop, what undoes something, or what sees to numbers itself.
+    pub bears_shared_numbers: bool,
     /// Nothing can be sent or heard any more, and why.
     pub bus_gone: Option<String>,
 }
@@ -123,6 +126,8 @@ pub(crate) struct Core {
     /// When inputs may be repeated again.
     pub inputs_from: u64,
     pub boards: Boards,
+    /// Who answers to which number.
+    pub holders: Holders,
     pub data: BTreeMap<u8, ProcessData>,
     pub descriptions: BTreeMap<DescriptionKey, IoDescription>,
     pub statistics: Statistics,
@@ -155,6 +160,7 @@ impl Core {
             stops: Vec::new(),
             inputs_from: 0,
             boards: Boards::default(),
+            holders: Holders::default(),
             data: BTreeMap::new(),
             descriptions: BTreeMap::new(),
             statistics: Statistics::new(profile.bitrate),
@@ -279,6 +285,7 @@ impl Core {
         let now = self.now;
         self.statistics.sent(now, frame);
         let Ok((function, to)) = frame.address() else { return };
+        self.holders_may_change(function, to, frame.data());
         let starts = |status: &u8| Status(*status).has(Status::MSTART);
         match function {
             Function::Start => self.may_start(to),
@@ -366,8 +373,11 @@ impl Core {
     }
 
     /// A frame that only a PC sends.
-    pub(crate) fn foreign_pc(&mut self, function: Function, to: u8) {
+    pub(crate) fn foreign_pc(&mut self, function: Function, to: u8, data: &[u8]) {
         self.statistics.foreign_pc += 1;
+        if let Some(to) = Sequence::new(to) {
+            self.holders_may_change(function, to, data);
+        }
         if let Some(to) = Sequence::new(to)
             && matches!(function, Function::Start | Function::SetStatus)
         {

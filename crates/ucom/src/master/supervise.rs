@@ -230,7 +230,7 @@ impl Core {
             Ok((frame, (function, number))) => {
                 self.statistics.received(self.now, &frame);
                 if self.is_pc(function, number, &frame) {
-                    return self.foreign_pc(function, number.number());
+                    return self.foreign_pc(function, number.number(), frame.data());
                 }
                 frame
             }
@@ -268,6 +268,7 @@ impl Core {
             Some(board) => {
                 let was_running =
                     self.boards.get(board).is_some_and(|b| b.life != Life::Unarmed || b.running(self.now));
+                self.holders.forget(board);
                 let known = self.boards.of(board);
                 if core::mem::replace(&mut known.rebooted, true) && !was_running {
                     return;
@@ -302,6 +303,9 @@ impl Core {
             return self.deliver(from, message);
         }
         self.boards.of(from).last = Some((now, message.function()));
+        if let FromBoard::Info(payload) = &message {
+            self.watch_holders(from, payload);
+        }
         match message {
             FromBoard::Alive => {
                 let board = self.boards.of(from);

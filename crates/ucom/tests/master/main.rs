@@ -16,6 +16,7 @@ mod robust;
 mod running;
 mod scripted;
 mod second_pc;
+mod shared_numbers;
 mod starting;
 mod stopping;
 mod update;

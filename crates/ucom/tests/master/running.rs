@@ -304,6 +304,11 @@ fn d26_reboot_of_a_running_board() {
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
+    // From a life sign on.
+    let alive = bench.count("680#");
+    while bench.count("680#") == alive {
+        bench.run(1);
+    }
     bench.master.end_session();
     let sent = bench.sent().len();
     bench.run(1_400);

@@ -123,6 +123,12 @@ fn d50_a_driver_that_is_behind() {
     assert_eq!((alive, asked), (6, 1), "the question is not repeated");
     master.handle(3_000 * MS, Ok(frame("141#2100011B34126E38")));
     master.handle(3_000 * MS, Ok(frame("141#0000")));
+    // Nobody else answers until the time for it has passed.
+    for ms in 3_000..3_200 {
+        while let Some(sent) = master.poll(ms * MS) {
+            assert_ne!(sent, frame("201#"), "the question is not repeated");
+        }
+    }
     let done = core::iter::from_fn(|| master.take_event())
         .find(|e| matches!(e, Event::Done { id: which, result: Ok(_) } if *which == id));
     assert!(done.is_some());

@@ -17,6 +17,7 @@ use std::prelude::v1::*;
 
 use serde::Serialize;
 
+use super::holders::one_board_each;
 use super::link::Link;
 use super::request::confirmed;
 use super::scan::board_states;
@@ -136,6 +137,7 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
     let mut tests = Run::new(&link, &options, &found, strangers);
     let result = link.or_cancel(tests.all()).await;
     link.with(|core| core.tap(link.id, false));
+    link.bear_shared_numbers(true);
     if let Err(error) = result {
         let why = match &error {
             Error::Cancelled => "cancelled".to_owned(),
@@ -173,6 +175,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<(Found, bool)
             Err(e) => return Err(e),
         }
     }
+    one_board_each(link, &boards.iter().map(|b| b.number).collect::<Vec<_>>()).await?;
     let mut running: Vec<u8> =
         boards.iter().filter(|b| b.info.status.has(Status::MCARUN)).map(|b| b.number).collect();
     if let Some(program) = &options.program {

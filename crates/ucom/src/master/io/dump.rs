@@ -4,6 +4,7 @@ use std::prelude::v1::*;
 
 use super::{DescriptionKey, IoDescription, SnapshotAssembler};
 use crate::master::error::Incomplete;
+use crate::master::holders::one_board_each;
 use crate::master::link::Link;
 use crate::master::request::{TRIES, info};
 use crate::master::{Error, Outcome};
@@ -219,6 +220,7 @@ fn missing_packages(seen: &[bool]) -> u32 {
 /// Asks who it is and whether its application runs, then describes it.
 async fn described(link: &Link, board: u8) -> Result<(BoardInfo, IoDescription), Error> {
     let known = info(link, board).await?.info;
+    one_board_each(link, &[board]).await?;
     if !known.status.has(Status::MSTART) {
         return Err(Error::NoApplication { board, valid: known.has_application() });
     }

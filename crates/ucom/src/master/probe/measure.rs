@@ -28,7 +28,9 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
         seen.raised = pin_raised(&link).await?;
         // The chain as a whole; what the base profile reads wrong is judged below.
         let whole = InitOptions { force: options.force, ..Default::default() };
+        link.bear_shared_numbers(true);
         init(link.clone(), whole).await?;
+        link.bear_shared_numbers(false);
     }
     seen.broadcast = [Sequence::ZERO, Sequence::MAX].map(|_| 0);
     for (place, to) in [Sequence::ZERO, Sequence::MAX].into_iter().enumerate() {

@@ -8,6 +8,7 @@ use super::transfer::{Attempt, Broken, Transferred};
 use super::{UpdateFailure, UpdateOutcome};
 use crate::master::Error;
 use crate::master::control::{enter_exloader, start_application};
+use crate::master::holders::one_board_each;
 use crate::master::link::Link;
 use crate::master::request::{confirmed, identity, info, numbers};
 use crate::{BoardInfo, ErrorCode, Status, ToBoard};
@@ -66,6 +67,7 @@ pub(super) async fn enter(link: &Link, run: &Campaign, board: u8) -> Result<(), 
             return Err(Error::WrongBoard { board, wanted, found });
         }
     }
+    one_board_each(link, &[board]).await?;
     let entered = enter_exloader(link, board, flash_number).await;
     if entered.is_err() {
         // Whoever took the XRESET must not take the program data of another board's update.

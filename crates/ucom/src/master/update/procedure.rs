@@ -8,6 +8,7 @@ use super::campaign::{Campaign, Stage};
 use super::group::group;
 use super::{PlanError, UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
 use crate::Status;
+use crate::master::holders::one_board_each;
 use crate::master::link::Link;
 use crate::master::request::{confirmed, numbers, set_status};
 use crate::master::scan::board_states;
@@ -28,8 +29,9 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     let mut run = Campaign::new(options);
     let plan = run.plan(&link, None)?;
     let mut end = link.or_cancel(all(&link, &mut run)).await;
-    if end == Err(Error::Cancelled) {
-        end = link.or_cancel(cancelled(&link, &mut run)).await;
+    link.bear_shared_numbers(true);
+    if let Err(error @ (Error::Cancelled | Error::NumberShared { .. })) = end {
+        end = link.or_cancel(broken_off(&link, &mut run, &error)).await;
     }
     match end {
         Ok(()) => {}
@@ -60,8 +62,9 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     Ok(Outcome::Update(report))
 }
 
-/// The boards at work are told to forget the transfer; nothing half written is ever valid.
-async fn cancelled(link: &Link, run: &mut Campaign) -> Result<(), Error> {
+/// The boards at work are told to forget the transfer; nothing half written is ever valid. `why`: the user ended it, or two
+/// boards have one number.
+async fn broken_off(link: &Link, run: &mut Campaign, why: &Error) -> Result<(), Error> {
     for board in run.active.clone() {
         // PC_START may have been taken already: what this update has started it stops again.
         if run.starting == Some(board) && set_status(link, board, Status::MSTART, Status(0)).await.is_ok() {
@@ -71,7 +74,17 @@ async fn cancelled(link: &Link, run: &mut Campaign) -> Result<(), Error> {
         if set_status(link, board, Status::PROG, Status(0)).await.is_err() {
             link.note(format!("board {board} did not confirm that it left programming"));
         }
-        run.cancel(board);
+        match why {
+            Error::Cancelled => run.cancel(board),
+            why => run.fail_with(board, why.clone()),
+        }
+    }
+    if *why != Error::Cancelled {
+        refuse(run, why);
+        let waiting = core::mem::take(&mut run.to_start);
+        waiting
+            .into_iter()
+            .for_each(|board| run.fail(board, UpdateFailure::NotRunning(Box::new(why.clone()))));
     }
     run.open().into_iter().for_each(|board| run.cancel(board));
     run.cancel_starts();
@@ -160,6 +173,10 @@ async fn check(link: &Link, run: &mut Campaign) {
                 continue;
             }
         };
+        if let Err(error) = one_board_each(link, &[board]).await {
+            run.fail(board, UpdateFailure::Refused(Box::new(error)));
+            continue;
+        }
         let found = known.flash_number;
         if let Some(result) = run.result(board) {
             result.flash_number = Some(found);

@@ -1,0 +1,78 @@
+//! Two boards with one number: every command names it and changes nothing, `stop` stops both.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Sim, image};
+
+/// Board 2 of three has number 1 as well.
+fn sharing() -> Sim {
+    let mut sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x42,0x63"]);
+    sim.ucom(&["init"]).ends(0);
+    sim.fault("same-number board=2");
+    sim
+}
+
+/// D-24: exit code 4, both flash numbers, the next command; nothing is sent but questions and life signs.
+#[test]
+fn d24_every_command_names_it_and_changes_nothing() {
+    let sim = sharing();
+    let file = sim.file("image.bin", &image(1000, 0));
+    let commands: [&[&str]; 18] = [
+        &["scan"],
+        &["info", "1"],
+        &["status", "1"],
+        &["status", "1", "--set", "ASTART"],
+        &["status", "all", "--raw", "40:40"],
+        &["reset", "1"],
+        &["reset", "all"],
+        &["xreset", "1"],
+        &["start", "1"],
+        &["start", "all"],
+        &["run", "1", "--for", "1"],
+        &["io", "1"],
+        &["ci", "1"],
+        &["par", "1"],
+        &["so", "1", "--count", "1"],
+        &["update", "1", &file, "--flash-id", "0x21"],
+        &["repair", "1", "--flash-id", "0x21"],
+        &["monitor", "--count", "1"],
+    ];
+    for words in commands {
+        let mut peer = sim.peer();
+        let said = sim.ucom(&[&["--json"], words].concat()).ends(4);
+        let (out, err) = (said.out.clone(), said.err.clone());
+        let both = out.contains("flash numbers 0x0021 and 0x0042") && out.contains("number-shared");
+        assert!(both && out.contains("ucom init"), "{words:?}: {out} {err}");
+        let changes = |f: &String| {
+            let id = u16::from_str_radix(&f[..3], 16).unwrap();
+            matches!(id >> 6, 0 | 1 | 7 | 10..=13 | 15 | 21)
+        };
+        let sent: Vec<String> = peer.all(50).into_iter().filter(changes).collect();
+        assert!(sent.is_empty(), "{words:?}: {sent:?}");
+    }
+    let doctor = sim.ucom(&["doctor"]).ends(1).out;
+    assert!(
+        doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire behind"),
+        "{doctor}"
+    );
+    // Numbered anew, all is well.
+    sim.ucom(&["init"]).ends(0);
+    sim.ucom(&["info", "all"]).ends(0);
+}
+
+/// D-24: a stop is not refused; it says at its end that two boards were stopped.
+#[test]
+fn d24_stop_stops_both_and_says_so() {
+    let sim = sharing();
+    for words in [["--json", "stop", "1"], ["--json", "stop", "all"]] {
+        let mut peer = sim.peer();
+        let said = sim.ucom(&words).ends(0);
+        assert_eq!(said.json()["shared_numbers"][0]["board"], 1, "{words:?}");
+        assert_eq!(said.json()["shared_numbers"][0]["flash_numbers"], serde_json::json!([0x21, 0x42]));
+        assert!(said.err.contains("both were told to stop"), "{}", said.err);
+        let all = peer.all(50);
+        let first = all.iter().find(|f| !f.starts_with("680"));
+        assert!(first.is_some_and(|f| f.starts_with("60") && f.ends_with("#00000000")), "{all:?}");
+    }
+}

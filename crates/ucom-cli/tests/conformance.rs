@@ -32,7 +32,7 @@ fn simulated_boards_conform() {
         ucom(&["conformance", "1", "--init"]).ends(2);
         // One board that is named, and the one that is meant.
         let image = dir.path().join("image.bin");
-        std::fs::write(&image, [0x5A; 256]).unwrap();
+        std::fs::write(&image, [0xA5; 256]).unwrap();
         let image = image.to_str().unwrap();
         ucom(&["conformance", "--program", image]).ends(2);
         ucom(&["conformance", "1,2", "--program", image]).ends(2);

@@ -14,9 +14,12 @@ pub struct UpdateArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
-    /// Image: raw binary, Intel HEX or S-record
+    /// Image: Intel HEX, S-record, or raw bytes in a .bin (anything else raw needs --raw)
     #[arg(value_name = "IMAGE")]
     pub image: PathBuf,
+    /// Send the files as they are, whatever they hold: text and files not named .bin are refused otherwise
+    #[arg(long, env = "UCOM_RAW_IMAGE", value_parser = FalseyValueParser::new())]
+    pub raw: bool,
     /// The flash number that the board must have
     #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,

@@ -27,6 +27,9 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     };
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
+    // Before anything is asked or sent: what goes where.
+    files.told.iter().for_each(|told| driver.note(told.clone()));
+    driver.note(format!("onto {}", targets.iter().map(target).collect::<Vec<_>>().join(", ")));
     let options = UpdateOptions {
         dry_run: args.dry_run,
         force: args.force.force,
@@ -52,6 +55,13 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         0 => Ok(()),
         code => Err(Failure::printed(code)),
     }
+}
+
+/// A board and who it must be.
+fn target(target: &UpdateTarget) -> String {
+    let who =
+        target.flash_number.map_or_else(|| "any flash number".into(), |f| format!("flash number 0x{f:04X}"));
+    format!("board {} ({who})", target.board)
 }
 
 /// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is told.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use cli_kit::Output;
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
+use ucom::files::image::Format;
 use ucom::files::{Image, ImageOptions};
 use ucom::master::update::UpdateImage;
 use ucom::profile::{HeaderForm, Plan};
@@ -20,6 +21,8 @@ pub struct Files {
     pub second: Option<UpdateImage>,
     /// Where they came from, in that order.
     pub names: Vec<PathBuf>,
+    /// What each holds, in words.
+    pub told: Vec<String>,
 }
 
 impl Files {
@@ -31,24 +34,34 @@ impl Files {
             ));
         }
         let other = second(args, profile.prog_plan)?;
-        let image = image(&args.image, out)?;
-        let second = other.map(|file| self::image(file, out)).transpose()?;
+        let (image, first) = image(&args.image, args.raw, out)?;
+        let second = other.map(|file| self::image(file, args.raw, out)).transpose()?;
+        let (second, more) = second.unzip();
+        let told = [Some(first), more].into_iter().flatten().collect();
         let names = [Some(args.image.as_path()), other].into_iter().flatten().map(Path::to_owned).collect();
-        Ok(Self { image, second, names })
+        Ok(Self { image, second, names, told })
     }
 }
 
-fn image(file: &Path, out: &Output) -> Result<UpdateImage, Failure> {
-    let image = Image::read(file, &ImageOptions::default()).map_err(|e| {
+fn image(file: &Path, raw: bool, out: &Output) -> Result<(UpdateImage, String), Failure> {
+    let options = ImageOptions { format: raw.then_some(Format::Bin), ..Default::default() };
+    let image = Image::read(file, &options).map_err(|e| {
         // Some mistakes name the file themselves.
         let (path, text) = (file.display().to_string(), e.to_string());
         Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") })
-            .hint("formats are raw binary, Intel HEX and S-record")
+            .hint("formats are Intel HEX, S-record, and raw bytes in a .bin; --raw sends a file as it is")
     })?;
     for note in image.notes() {
         out.note(format!("note: {}: {note}", file.display()));
     }
-    Ok(UpdateImage { bytes: image.bytes().to_vec(), address_words: image.address_words() })
+    let told = format!(
+        "{}: {}, {} bytes from word 0x{:X}",
+        file.display(),
+        image.format_name(),
+        image.bytes().len(),
+        image.address_words()
+    );
+    Ok((UpdateImage { bytes: image.bytes().to_vec(), address_words: image.address_words() }, told))
 }
 
 /// The file beside the image that the plan takes.

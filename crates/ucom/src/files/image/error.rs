@@ -23,6 +23,26 @@ pub enum ImageError {
     /// An executable instead of an image.
     #[error("this is an ELF file, not an image; `objcopy -O srec` or `-O binary` makes one")]
     Elf,
+    /// A text, and no record in it.
+    #[error(
+        "line 1, column 1: a text and no image, no line is a record of Intel HEX or S-record: \"{starts}…\""
+    )]
+    Text {
+        /// How it begins.
+        starts: String,
+    },
+    /// An editor has put a mark before the first record.
+    #[error("byte 1: a {mark} byte order mark stands before the text; save it as plain ASCII")]
+    ByteOrderMark {
+        /// The encoding that it stands for.
+        mark: &'static str,
+    },
+    /// Bytes that may be anything.
+    #[error("{name}: no record of Intel HEX or S-record, and no `.bin`")]
+    NotBin {
+        /// The file.
+        name: String,
+    },
     /// No such form.
     #[error("unknown image format `{name}`: one of bin, hex, srec")]
     UnknownFormat {

@@ -1,10 +1,12 @@
-//! Firmware images: raw bytes, Intel HEX and Motorola S-records become the bytes that go on the wire.
+//! Firmware images: raw bytes, Intel HEX and Motorola S-records become the bytes that go on the wire; a text never does
+//! unless it is asked for.
 //!
 //! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of
 //! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Both can be overridden.
 
 use std::prelude::v1::*;
 
+mod detect;
 mod error;
 mod hex;
 mod segments;
@@ -30,21 +32,6 @@ pub enum Format {
     IntelHex,
     /// Motorola S-record (records `S1…`, `S2…`, `S3…`).
     SRecord,
-}
-
-impl Format {
-    /// By content: the first record decides; what is no text of records is raw bytes.
-    pub fn detect(content: &[u8]) -> Self {
-        let start = content.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(content.len());
-        let line = content.get(start..).unwrap_or_default();
-        let line = line.split(|b| matches!(b, b'\r' | b'\n')).next().unwrap_or_default();
-        let hex = |digits: &[u8]| digits.len() >= 4 && digits.iter().all(u8::is_ascii_hexdigit);
-        match line.trim_ascii_end() {
-            [b':', rest @ ..] if hex(rest) => Self::IntelHex,
-            [b'S', b'0'..=b'9', rest @ ..] if hex(rest) => Self::SRecord,
-            _ => Self::Bin,
-        }
-    }
 }
 
 impl fmt::Display for Format {
@@ -93,7 +80,7 @@ pub enum Gaps {
 /// How to read an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
-    /// Form of the file; `None` decides by content.
+    /// Form of the file, whatever it holds; `None` decides by content and name, and takes no text for raw bytes.
     pub format: Option<Format>,
     /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX.
     pub address_unit: Option<AddressUnit>,
@@ -155,9 +142,20 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads a file's content.
+    /// Reads a file's content, as of a `.bin` where the options say nothing and it is none of the others.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
-        let format = options.format.unwrap_or_else(|| Format::detect(content));
+        Self::parse_named(None, content, options)
+    }
+
+    fn parse_named(
+        name: Option<&std::path::Path>,
+        content: &[u8],
+        options: &ImageOptions,
+    ) -> Result<Self, ImageError> {
+        if content.is_empty() {
+            return Err(ImageError::Empty);
+        }
+        let format = options.format.map_or_else(|| Format::of(name, content), Ok)?;
         let unit = |usual| options.address_unit.unwrap_or(usual);
         let mut image = match format {
             Format::Bin => Self::raw(content, options)?,
@@ -199,16 +197,10 @@ impl Image {
         if length > most {
             return Err(ImageError::TooLarge { bytes: length, limit: options.max_bytes });
         }
-        Self::parse(&std::fs::read(path).map_err(io)?, options)
+        Self::parse_named(Some(path), &std::fs::read(path).map_err(io)?, options)
     }
 
     fn raw(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
-        if content.is_empty() {
-            return Err(ImageError::Empty);
-        }
-        if options.format.is_none() && content.starts_with(b"\x7fELF") {
-            return Err(ImageError::Elf);
-        }
         if content.len() > options.max_bytes {
             return Err(ImageError::TooLarge { bytes: content.len() as u64, limit: options.max_bytes });
         }
@@ -234,6 +226,15 @@ impl Image {
     /// Length, words.
     pub fn length_words(&self) -> u32 {
         (self.bytes.len() / 2) as u32
+    }
+
+    /// Form of the file it came from, in words.
+    pub fn format_name(&self) -> &'static str {
+        match self.format {
+            Format::Bin => "raw bytes",
+            Format::IntelHex => "Intel HEX",
+            Format::SRecord => "S-record",
+        }
     }
 
     /// Form of the file it came from.

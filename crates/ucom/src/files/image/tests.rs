@@ -111,6 +111,54 @@ fn raw_bytes_are_whole_words() {
     assert_eq!(Image::parse(b":00000001FF\n", &forced).unwrap().bytes(), b":00000001FF\n");
 }
 
+/// A text is never raw bytes, whatever its name; what is wrong is named with its place.
+#[test]
+fn a_text_is_no_image() {
+    let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
+    let srec = s_line(1, 2, 0, &[1, 2, 3, 4]) + &s_line(9, 2, 0, &[]);
+    let dir = tempfile::tempdir().unwrap();
+    let read = |name: &str, content: &[u8]| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        Image::read(&path, &ImageOptions::default())
+    };
+    for name in ["a.hex", "a.s19", "a.bin", "a.txt", "a"] {
+        assert_eq!(read(name, hex.as_bytes()).unwrap().format(), Format::IntelHex, "{name}: by content");
+        assert_eq!(read(name, srec.as_bytes()).unwrap().format(), Format::SRecord, "{name}: by content");
+        for comment in ["; made by a linker\n", "# x\n", "// x\n"] {
+            let wrong = read(name, (comment.to_owned() + &hex).as_bytes());
+            let place = ImageError::line(1, 1, LineProblem::Start { expected: ':' });
+            assert_eq!(wrong.unwrap_err().to_string(), place.to_string(), "{name} {comment}");
+            let wrong = read(name, (srec.clone() + comment).as_bytes()).unwrap_err().to_string();
+            assert!(wrong.starts_with("line 3, column 1: "), "{name} {comment}: {wrong}");
+        }
+        for mark in [&b"\xEF\xBB\xBF"[..], b"\xFF\xFE"] {
+            let wrong = read(name, &[mark, hex.as_bytes()].concat());
+            assert!(matches!(wrong, Err(ImageError::ByteOrderMark { .. })), "{name}: {wrong:?}");
+        }
+        let texts: [&[u8]; 5] = [
+            b"dear reader, this is no firmware\n",
+            b"par.kp = 3\n",
+            "Gr\u{fc}\u{df}e aus der Werkstatt\n".as_bytes(),
+            b"h\0a\0l\0l\0o\0 \0w\0e\0l\0t\0",
+            b"U",
+        ];
+        for text in texts {
+            assert!(read(name, text).is_err(), "{name}: {text:?}");
+            let raw = ImageOptions { format: Some(Format::Bin), ..Default::default() };
+            assert!(Image::parse(text, &raw).is_ok());
+        }
+    }
+    // A name promises records: their first mistake is told.
+    assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
+    assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
+    let bytes: Vec<u8> = (0..=255).collect();
+    assert_eq!(read("a.bin", &bytes).unwrap().bytes(), bytes);
+    for name in ["a", "a.img", "a.txt"] {
+        assert!(matches!(read(name, &bytes), Err(ImageError::NotBin { .. })), "{name}");
+    }
+}
+
 proptest! {
     /// The same bytes in the three forms, records of any size in any order, give the same image.
     #[test]

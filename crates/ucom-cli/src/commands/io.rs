@@ -9,6 +9,7 @@ use ucom::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
 use ucom::master::io::{IoDescription, Kind};
 use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel};
 
+use super::followed::Followed;
 use super::params::{arrived, become_master, deliver, not_there};
 use super::run::{named, units};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
@@ -197,21 +198,29 @@ fn move_for(
     })?;
     let Some(known) = prepared.known.get(&board) else { return Ok(()) };
     let mut last = None;
+    let mut followed = Followed::new([board].into_iter(), driver.now_us());
     let end = Instant::now() + duration;
     while Instant::now() < end && !driver.stop_asked() {
         driver.turn(Duration::from_millis(10))?;
         while let Some(event) = driver.master.take_event() {
+            followed.see(&event, driver.now_us());
             match event {
                 Event::Snapshot { board: from, snapshot } if from == board => last = Some(snapshot),
                 other => driver.tell(&other, None),
             }
         }
+        let now_us = driver.now_us();
+        for said in followed.look(&mut driver.master, now_us) {
+            driver.note(said.text);
+        }
     }
+    followed.ask_no_more(&mut driver.master);
     // Not as a procedure that Ctrl-C cancels: it is what Ctrl-C asks for.
     driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();
     driver.nobody_lost(&[board])?;
+    followed.nobody_left()?;
     nothing_shared(&driver.master).map_err(|failure| Failure { exit: FAULT, ..failure })?;
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {

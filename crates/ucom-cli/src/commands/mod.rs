@@ -4,6 +4,7 @@ mod boards;
 pub mod conformance;
 mod decode;
 mod doctor;
+mod followed;
 mod help;
 mod io;
 mod monitor;

@@ -13,6 +13,7 @@ use ucom::master::{
     AdminChange, Event, Outcome, Request, RunBoard, RunOptions, RunReport, Setting, StopLevel,
 };
 
+use super::followed::{Followed, Said};
 use super::params::Applied;
 use crate::args::{Assignment, Boards, CacheArgs, LinkArgs, OnLost, RunArgs, SoArgs};
 use crate::cache::Known;
@@ -95,8 +96,10 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         let outputs = if args.active { "outputs active" } else { "outputs safe; `active on` enables them" };
         format!("{} boards run, {outputs}; {}\nCtrl-C stops them", report.boards.len(), report.load)
     }));
+    let mut followed = Followed::new(prepared.known.keys().copied(), driver.now_us());
     let result = want_texts(&mut driver, args, &boards)
-        .and_then(|()| supervise(&mut driver, args, &prepared, &stdout, out));
+        .and_then(|()| supervise(&mut driver, args, &prepared, &mut followed, &stdout, out));
+    followed.ask_no_more(&mut driver.master);
     let running = halt(&mut driver, &boards);
     let list = || running.iter().map(u8::to_string).collect::<Vec<_>>();
     let stopped = match running.is_empty() {
@@ -115,7 +118,8 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
             format!("without life signs they become safe by themselves; ucom stop {}", list().join(","));
         return Err(Failure::new(FAULT, "not-stopped", what).hint(next));
     }
-    driver.nobody_lost(&boards)
+    driver.nobody_lost(&boards)?;
+    followed.nobody_left()
 }
 
 /// Names, plans, and the start of all boards.
@@ -201,22 +205,32 @@ fn supervise(
     driver: &mut Driver,
     args: &RunArgs,
     prepared: &Prepared,
+    followed: &mut Followed,
     stdout: &Lines,
     out: &Output,
 ) -> Result<(), Failure> {
     let typed = typed();
     prepared.known.keys().for_each(|board| driver.master.watch(*board, None, true));
     let (start, mut said) = (Instant::now(), Instant::now());
-    let mut last: BTreeMap<u8, Snapshot> = BTreeMap::new();
+    let say = |driver: &Driver, said: Said| {
+        if !said.text.is_empty() {
+            driver.note(said.text);
+        }
+        if out.is_json() {
+            stdout.push_always(said.value.to_string());
+        }
+    };
     loop {
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
-            match event {
-                Event::Snapshot { board, snapshot } => {
-                    last.insert(board, snapshot);
-                }
-                other => driver.tell(&other, None),
+            if let Some(said) = followed.see(&event, driver.now_us()) {
+                say(driver, said);
             }
+            driver.tell(&event, None);
+        }
+        let now_us = driver.now_us();
+        for said in followed.look(&mut driver.master, now_us) {
+            say(driver, said);
         }
         // What was found while it runs: a fault, not a refusal.
         nothing_shared(&driver.master).map_err(|failure| Failure { exit: FAULT, ..failure })?;
@@ -224,6 +238,7 @@ fn supervise(
             if line.trim() == "stop" {
                 return Ok(());
             }
+            followed.ask_no_more(&mut driver.master);
             if let Err(e) = obey(driver, args, line.trim(), prepared) {
                 driver.note(e.message);
             }
@@ -233,13 +248,15 @@ fn supervise(
         }
         if said.elapsed() >= SAY && out.is_json() {
             said = Instant::now();
-            for (board, snapshot) in &last {
-                let Some(known) = prepared.known.get(board) else { continue };
+            for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
+                let Some(known) = prepared.known.get(&board) else { continue };
                 let so = named(&known.names.so, known.edges.all(Kind::So), &snapshot.words);
                 let units = units(&known.names.so, known.edges.all(Kind::So));
                 let time_s = snapshot.time_us as f64 * 1e-6;
-                let value =
-                    json!({ "event": "so", "board": board, "time_s": time_s, "so": so, "units": units });
+                let value = json!({
+                    "event": "so", "board": board, "time_s": time_s, "age_s": age_s, "stale": stale,
+                    "so": so, "units": units,
+                });
                 stdout.push(out.words(&value, String::new));
             }
         }

@@ -1,0 +1,253 @@
+//! Boards that a run supervises: which of them has left its control loop, and how old their values are.
+//!
+//! A board leaves its loop by itself when it misses the PC, when another PC stops it, or when its application does. It says
+//! so once (MCA_ADMIN_DATA); where that frame is lost its outputs stop, and its status is asked for.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use ucom::Status;
+use ucom::master::io::Snapshot;
+use ucom::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
+
+use crate::failure::{FAULT, Failure};
+
+/// Outputs come every few milliseconds: after so long a silence the last ones are old, µs.
+const OLD_US: u64 = 500_000;
+/// A board that sends no outputs and lives is not asked more often than this, µs.
+const ASK_US: u64 = 1_000_000;
+
+/// Something to say at once, for programs and for people.
+pub struct Said {
+    /// An event of `--json`.
+    pub value: Value,
+    /// The same in words; empty where the driver says it.
+    pub text: String,
+}
+
+/// The boards of a run.
+#[derive(Default)]
+pub struct Followed {
+    boards: BTreeMap<u8, One>,
+    asking: Option<ProcedureId>,
+    /// A board was lost, or has rebooted: by `on_lost` others may have been stopped for it.
+    lost: bool,
+}
+
+#[derive(Default)]
+struct One {
+    last: Option<Snapshot>,
+    out: bool,
+    /// It was out of its loop at some time, and not because another board was lost.
+    left: bool,
+    /// By its status, where its own word was lost.
+    status_out: bool,
+    asked_us: u64,
+}
+
+impl Followed {
+    /// These boards run now.
+    pub fn new(boards: impl Iterator<Item = u8>, now_us: u64) -> Self {
+        let one = || One { asked_us: now_us, ..One::default() };
+        Self { boards: boards.map(|board| (board, one())).collect(), ..Self::default() }
+    }
+
+    /// An event of the bus, beside what the driver says of it.
+    pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Said> {
+        match event {
+            Event::Snapshot { board, snapshot } => {
+                let one = self.boards.get_mut(board)?;
+                one.last = Some(snapshot.clone());
+                one.status_out = false;
+            }
+            Event::Done { id, result } if self.asking == Some(*id) => {
+                self.asking = None;
+                if let Ok(Outcome::Info(seen)) = result
+                    && let Some(one) = self.boards.get_mut(&seen.number)
+                {
+                    one.status_out = !seen.info.status.has(Status::MCARUN);
+                }
+            }
+            Event::Supervision { board, change } => {
+                let event = match change {
+                    Supervision::Late => "late",
+                    Supervision::Lost => "lost",
+                    Supervision::Back => "back",
+                    Supervision::Rebooted { .. } | Supervision::UnknownRebooted { .. } => "rebooted",
+                };
+                let followed = self.boards.contains_key(board);
+                self.lost |= matches!(event, "lost") || (event == "rebooted" && followed);
+                let value = json!({ "event": event, "board": board, "time_s": seconds(now_us) });
+                return Some(Said { value, text: String::new() });
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Who has left its loop, or is in it again, since the last time. Asks boards of which nothing is heard.
+    pub fn look(&mut self, master: &mut Master, now_us: u64) -> Vec<Said> {
+        let boards = master.boards();
+        let (mut said, mut silent) = (Vec::new(), None);
+        for (number, one) in &mut self.boards {
+            let Some(board) = boards.get(*number) else { continue };
+            let out = board.admin.is_some_and(|admin| !admin.run) || one.status_out;
+            if out != one.out {
+                one.out = out;
+                one.left |= out && !self.lost;
+                let age_s = one.last.as_ref().map(|last| age_s(last, now_us));
+                said.push(changed(*number, out, self.lost, age_s, now_us));
+            }
+            let quiet = board.so_at.is_some_and(|at| now_us.saturating_sub(at) > OLD_US);
+            if quiet && !out && board.life == Life::Alive && now_us.saturating_sub(one.asked_us) > ASK_US {
+                silent = silent.or(Some(*number));
+            }
+        }
+        if let Some(board) = silent.filter(|_| self.asking.is_none() && !master.is_busy()) {
+            self.asking = master.start(now_us, Request::Info { board }).ok();
+            self.boards.entry(board).or_default().asked_us = now_us;
+        }
+        said
+    }
+
+    /// Nothing is asked any more: what comes now must not find a board busy.
+    pub fn ask_no_more(&mut self, master: &mut Master) {
+        if let Some(id) = self.asking.take() {
+            master.cancel(id);
+        }
+    }
+
+    /// The last outputs of each board, how old they are in s, and whether they are too old to be taken for new ones.
+    pub fn outputs(&self, master: &Master, now_us: u64) -> Vec<(u8, &Snapshot, f64, bool)> {
+        let boards = master.boards();
+        let rows = self.boards.iter().filter_map(|(number, one)| Some((number, one, one.last.as_ref()?)));
+        rows.map(|(number, one, last)| {
+            let doubtful = one.out || boards.get(*number).is_none_or(in_doubt);
+            let old = now_us.saturating_sub(last.time_us) > OLD_US;
+            (*number, last, age_s(last, now_us), doubtful || old)
+        })
+        .collect()
+    }
+
+    /// A failure if a board has left its loop by itself.
+    pub fn nobody_left(&self) -> Result<(), Failure> {
+        let left: Vec<String> =
+            self.boards.iter().filter(|(_, one)| one.left).map(|(n, _)| n.to_string()).collect();
+        let what = match left.as_slice() {
+            [] => return Ok(()),
+            [one] => format!("board {one} left its control loop by itself"),
+            many => format!("boards {} left their control loops by themselves", many.join(", ")),
+        };
+        Err(Failure::new(FAULT, "left-loop", what).hint(
+            "ucom doctor: another PC on the bus, life signs that did not arrive, an application that stops",
+        ))
+    }
+}
+
+/// Life signs that are missing say nothing good of its values.
+fn in_doubt(board: &Board) -> bool {
+    board.rebooted || matches!(board.life, Life::Late | Life::Lost)
+}
+
+fn seconds(us: u64) -> f64 {
+    us as f64 * 1e-6
+}
+
+fn age_s(last: &Snapshot, now_us: u64) -> f64 {
+    seconds(now_us.saturating_sub(last.time_us))
+}
+
+fn changed(board: u8, out: bool, lost: bool, age_s: Option<f64>, now_us: u64) -> Said {
+    let event = match (out, lost) {
+        (true, false) => "left-loop",
+        (true, true) => "stopped-by-policy",
+        (false, _) => "in-loop",
+    };
+    let age = age_s.map_or_else(|| "none came".to_owned(), |s| format!("{s:.1} s old"));
+    let text = match (out, lost) {
+        (true, false) => {
+            format!("board {board} has left its control loop by itself; its last outputs: {age}, stale")
+        }
+        (true, true) => {
+            format!("board {board} was stopped, as a board was lost; its last outputs: {age}, stale")
+        }
+        (false, _) => format!("board {board} is in its control loop again"),
+    };
+    Said { value: json!({ "event": event, "board": board, "time_s": seconds(now_us), "age_s": age_s }), text }
+}
+
+#[cfg(test)]
+mod tests {
+    use ucom::Profile;
+
+    use super::*;
+
+    /// Frames of board 1 that come at a time; what is said of them.
+    fn hear(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
+        frames.iter().for_each(|text| master.handle(at_us, Ok(text.parse().unwrap())));
+        let mut sent = Vec::new();
+        while let Some(frame) = master.poll(at_us) {
+            sent.push(frame.to_string());
+        }
+        let mut said: Vec<Said> = Vec::new();
+        while let Some(event) = master.take_event() {
+            said.extend(followed.see(&event, at_us));
+        }
+        said.extend(followed.look(master, at_us));
+        let event = |s: Said| s.value["event"].as_str().unwrap_or_default().to_owned();
+        sent.into_iter().filter(|f| f != "680#").chain(said.into_iter().map(event)).collect()
+    }
+
+    /// It runs and has sent its outputs.
+    fn running() -> (Master, Followed) {
+        let (mut master, mut followed) = (Master::new(Profile::default()), Followed::new([1].into_iter(), 0));
+        master.watch(1, Some(3), true);
+        let first = ["681#", "601#01000000", "381#0000640065006600"];
+        assert!(hear(&mut master, &mut followed, 0, &first).is_empty());
+        (master, followed)
+    }
+
+    fn stale(master: &Master, followed: &Followed, now_us: u64) -> Vec<bool> {
+        followed.outputs(master, now_us).into_iter().map(|(.., stale)| stale).collect()
+    }
+
+    #[test]
+    fn d37_a_board_that_leaves_its_loop_is_named_at_once_and_its_values_are_stale() {
+        let (mut master, mut followed) = running();
+        assert_eq!(stale(&master, &followed, 10_000), [false]);
+        assert!(followed.nobody_left().is_ok());
+        assert_eq!(hear(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
+        assert!(hear(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(), "said once");
+        assert_eq!(stale(&master, &followed, 30_000), [true]);
+        // Another PC starts it again: the run was broken all the same.
+        let again = ["601#01000000", "381#0000640065006600"];
+        assert_eq!(hear(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
+        assert_eq!(stale(&master, &followed, 40_000), [false]);
+        assert_eq!(followed.nobody_left().unwrap_err().exit, FAULT);
+    }
+
+    #[test]
+    fn d37_where_its_word_is_lost_its_status_is_asked_for() {
+        let (mut master, mut followed) = running();
+        hear(&mut master, &mut followed, 1_000_000, &["681#"]);
+        let asked = hear(&mut master, &mut followed, 1_010_000, &[]);
+        assert_eq!(stale(&master, &followed, 1_010_000), [true], "no outputs for a second");
+        let asked = [asked, hear(&mut master, &mut followed, 1_020_000, &[])].concat();
+        assert_eq!(asked, ["201#"]);
+        let answer = ["141#2100018B34126E38", "141#0100", "141#78"];
+        hear(&mut master, &mut followed, 1_030_000, &answer);
+        assert_eq!(hear(&mut master, &mut followed, 1_200_000, &[]), ["left-loop"]);
+        assert!(followed.nobody_left().is_err());
+    }
+
+    #[test]
+    fn d51_values_of_a_late_board_are_stale_and_a_stop_by_policy_is_not_its_own() {
+        let (mut master, mut followed) = running();
+        let events = hear(&mut master, &mut followed, 1_600_000, &["381#0000640065006600"]);
+        assert_eq!(events, ["late"]);
+        assert_eq!(stale(&master, &followed, 1_600_000), [true]);
+        assert_eq!(hear(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
+        assert_eq!(hear(&mut master, &mut followed, 3_110_000, &["601#00000000"]), ["stopped-by-policy"]);
+        assert!(followed.nobody_left().is_ok(), "the loss is what failed");
+    }
+}

@@ -2,7 +2,8 @@
 //! computes the same, to the bit (`rig`).
 mod rig;
 
-use jtc_core::{Config, State, Tes};
+use jtc_core::{Config, Parameters, State, Tes};
+use jtc_dynamics::Dynamics;
 use jtc_sim::{SimConfig, host as frames};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, RawPoint, Response, fixed, pid_param};
 use openjtc_emulator::{BoardConfig, Port};
@@ -114,6 +115,51 @@ fn a_whole_session() {
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
 }
 
+/// 3.3 kg at the last link, known to the controller, are lowered through the place where they take 95 % of the shoulder's torque
+/// limit, and a Stop comes there.
+#[test]
+fn j33_a_loaded_arm_stands_within_half_a_second() {
+    const SHOULDER: usize = 1;
+    let mut parameters = Parameters::avena();
+    parameters.model.links[6].mass += 3.3;
+    let pose = |angle: f64| [0.0, angle, 0.3, 0.0, 0.0, 0.0];
+    let torque = |angle: f64| {
+        let dynamics = Dynamics::new(&parameters.model, Config::default().gravity);
+        dynamics.inverse(&pose(angle), &[0.0; 6], &[0.0; 6])[SHOULDER]
+    };
+    let share = 0.95 * Config::default().joints[SHOULDER].torque_max;
+    let place = (0..1_400).map(|mrad| -0.001 * f64::from(mrad)).find(|&angle| torque(angle) >= share);
+    let place = place.expect("somewhere the arm is heavy enough");
+    let sim = SimConfig { start: pose(place + 0.2), ..SimConfig::new(Config::default(), &parameters) };
+    let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
+    rig.wait("the board is up", 50, |rig| rig.ticks > 0);
+    rig.ask(HOST, &fixed::FRICTION_POLYNOMIAL_USE_DEFAULT);
+    rig.ask(HOST, &fixed::PID_PARAM_USE_DEFAULT);
+    rig.ask(HOST, &frames::arm_model(&parameters.model));
+    rig.wait_for_hold(12_000);
+    let here = rig.telemetry().joints.map(|j| j.set_position);
+    rig.upload(&frames::there_and_back(&here, &pose(place - 0.2), 3.6, 1, 10), 10);
+    assert!(accepted(rig.exec(ExecCommand::Execute)));
+    rig.wait("the place", 4_000, |rig| rig.telemetry().joints[SHOULDER].set_position <= place);
+    assert!(accepted(rig.exec(ExecCommand::Stop)));
+    let (mut stopped, mut stands, mut fastest) = (0, 0, 0.0f64);
+    for ms in 1..=700 {
+        rig.step();
+        fastest = fastest.max(rig.speed());
+        if rig.telemetry().tes == Tes::Execute {
+            stopped = ms;
+        }
+        if rig.speed() > 0.01 {
+            stands = ms;
+        }
+    }
+    println!("stop at {place:.3} rad: commanded {stopped} ms, stands after {stands} ms, {fastest:.3} rad/s");
+    assert!(fastest > 0.1, "it moved at {fastest} rad/s");
+    assert!(stopped <= 500 && stands <= 520 && fastest < 0.25, "{stopped} ms, {stands} ms, {fastest} rad/s");
+    assert_eq!((rig.state(), rig.telemetry().tes), (State::HoldPos, Tes::Stop));
+    assert_eq!(rig.status(HOST).occurred, 0);
+}
+
 /// J-40: with a host's own numbers, friction tables, over limits and errors, every torque has the bits that a PC computes,
 /// and every frame and status its bytes. The rig compares them in each tick; here it is seen that there was something to compare.
 #[test]
@@ -187,7 +233,7 @@ fn j12_older_drives_are_not_left_behind() {
 fn j12_one_broadcast_a_tick_and_its_answers() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(HOST);
-    rig.upload(&motion()[..400], 4);
+    rig.upload(&motion(), 4);
     assert!(accepted(rig.exec(ExecCommand::Execute)));
     let mut starts = Vec::new();
     for ms in 0..1_500 {

@@ -36,6 +36,7 @@ mod hand;
 pub mod host;
 mod inbox;
 pub mod invariants;
+pub mod lowering;
 pub mod matrix;
 mod operator;
 mod plant;

@@ -2,74 +2,30 @@
 //! table for the docs.
 use core::fmt;
 
+mod rows;
 mod standstill;
+mod stopping;
 
 use jtc_core::{JOINTS, State, error, joint_error};
 use jtc_wire::{ExecCommand, FrameType};
 
 use crate::config::{SimConfig, Support};
-use crate::faults::{Fault, FaultKind, Trigger};
 use crate::host;
 use crate::invariants::{Invariants, Violation};
 use crate::operator::{Operator, OperatorError};
 
+use rows::{LASTING_MS, ROWS, Row};
+
 pub use standstill::standstill_table;
+pub use stopping::stopping_table;
 
 /// Ticks in which a reaction is looked for.
 const WATCH_MS: u64 = 600;
-/// Ticks after which a fault that lasts is taken away.
-const LASTING_MS: u64 = 300;
 /// Pose in which the arm is held, rad.
 const START: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 
 /// States in which faults are thrown. Start lasts a single tick.
 const STATES: [State; 5] = [State::Init, State::HoldPos, State::Operate, State::Teaching, State::Error];
-
-/// A row: what goes wrong, for how long (ms).
-struct Row {
-    name: &'static str,
-    kind: FaultKind,
-    ms: u64,
-}
-
-const fn row(name: &'static str, kind: FaultKind, ms: u64) -> Row {
-    Row { name, kind, ms }
-}
-
-const ROWS: [Row; 28] = [
-    row("safety input low", FaultKind::SafetyInput, LASTING_MS),
-    row("safety input low for 1 ms", FaultKind::SafetyInput, 1),
-    row("joint silent", FaultKind::NodeSilent { node: 1 }, LASTING_MS),
-    row("joint silent for 4 ms", FaultKind::NodeSilent { node: 1 }, 4),
-    row("joint reboots", FaultKind::NodeReboot { node: 1 }, 1),
-    row("joint: motor-control fault", FaultKind::MotorFault { joint: 1, bits: 0x04 }, LASTING_MS),
-    row("joint: gate driver fault", FaultKind::HardwareFault { joint: 1 }, LASTING_MS),
-    row("joint in fault state, no error bit", FaultKind::FaultState { joint: 1 }, 1),
-    row("joint: safety line", FaultKind::SafetyLine { node: 1 }, LASTING_MS),
-    row("joint: encoder jumps by 0.3 rad", FaultKind::EncoderJump { joint: 1, rad: 0.3 }, LASTING_MS),
-    row("joint: encoder jumps by 0.05 rad", FaultKind::EncoderJump { joint: 1, rad: 0.05 }, LASTING_MS),
-    row("joint: position not accurate", FaultKind::NotAccurate { joint: 1 }, LASTING_MS),
-    row("joint: friction times 3", FaultKind::Friction { joint: 1, factor: 3.0 }, LASTING_MS),
-    row("joint: bearing at 60 °C", FaultKind::Temperature { joint: 1, celsius: 60.0 }, LASTING_MS),
-    row("gripper silent", FaultKind::NodeSilent { node: 6 }, LASTING_MS),
-    row("gripper reboots", FaultKind::NodeReboot { node: 6 }, 1),
-    row("gripper: safety line", FaultKind::SafetyLine { node: 6 }, LASTING_MS),
-    row("1 % of bus receptions lost", FaultKind::FramesLost { probability: 0.01 }, LASTING_MS),
-    row("every bus reception lost for 4 ms", FaultKind::FramesLost { probability: 1.0 }, 4),
-    row(
-        "10 % of bus frames destroyed and repeated",
-        FaultKind::FramesCorrupted { probability: 0.1 },
-        LASTING_MS,
-    ),
-    row("bus cut at the controller", FaultKind::NoAcknowledge, LASTING_MS),
-    row("controller bus-off", FaultKind::BusOff, LASTING_MS),
-    row("controller bus-off for 1 ms", FaultKind::BusOff, 1),
-    row("every byte from the host lost", FaultKind::SerialLost { probability: 1.0 }, LASTING_MS),
-    row("5 % of bytes from the host flipped", FaultKind::SerialFlipped { probability: 0.05 }, LASTING_MS),
-    row("bytes from the host delayed", FaultKind::SerialDelayed, LASTING_MS),
-    row("tick late by 5 ms", FaultKind::TickOverrun, 5),
-    row("tick stops", FaultKind::TickOverrun, LASTING_MS),
-];
 
 /// What became of a fault in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,12 +55,13 @@ pub enum Reaction {
 impl fmt::Display for Reaction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::None => f.write_str("–"),
+            Self::None => f.write_str("no reaction"),
             Self::Reset { tick } => write!(f, "reset, {tick}"),
             Self::Change { state, errors, joints, same, tick } => {
                 write!(f, "{state:?}, {tick}")?;
                 let words = words(errors, joints).join(", ");
                 match (words.is_empty(), same) {
+                    (true, _) if state == State::Error => f.write_str(" (clearing)"),
                     (true, _) => Ok(()),
                     (false, false) => write!(f, " ({words})"),
                     (false, true) => write!(f, " (also {words})"),
@@ -120,6 +77,8 @@ fn words(errors: u16, joints: u16) -> Vec<&'static str> {
         (error::INTERNAL_CAN, "CAN"),
         (error::EXTERNAL_JOINTS, "node"),
     ];
+    let device =
+        errors & error::INTERNAL != 0 && errors & (error::INTERNAL_CAN | error::INTERNAL_JOINTS) == 0;
     let joint = [
         (joint_error::POSITION, "position"),
         (joint_error::VELOCITY, "velocity"),
@@ -131,7 +90,8 @@ fn words(errors: u16, joints: u16) -> Vec<&'static str> {
     let of = |word: u16, names: &[(u16, &'static str)]| -> Vec<_> {
         names.iter().filter(|(bit, _)| word & bit != 0).map(|(_, name)| *name).collect()
     };
-    [of(errors, &jtc), of(joints, &joint)].concat()
+    let internal: &[_] = if device { &["internal"] } else { &[] };
+    [internal, &of(errors, &jtc), &of(joints, &joint)].concat()
 }
 
 /// Why there is no matrix.
@@ -141,6 +101,18 @@ pub enum MatrixError {
     Operator(OperatorError),
     /// An invariant was broken.
     Invariant(Violation),
+    /// The arm did not come to rest in the time that a pause or stop may take.
+    NoStop {
+        /// How long it took, ms; `None`: it ended in an error, or the motion was not begun.
+        ms: Option<u64>,
+    },
+    /// Nothing happened where something should have.
+    NoReaction {
+        /// Row of the table.
+        row: &'static str,
+        /// State.
+        state: State,
+    },
 }
 
 impl fmt::Display for MatrixError {
@@ -148,6 +120,11 @@ impl fmt::Display for MatrixError {
         match self {
             Self::Operator(error) => error.fmt(f),
             Self::Invariant(violation) => violation.fmt(f),
+            Self::NoStop { ms: Some(ms) } => write!(f, "the arm stands after {ms} ms only"),
+            Self::NoStop { ms: None } => f.write_str("the arm was not stopped"),
+            Self::NoReaction { row, state } => {
+                write!(f, "{row} in {state:?}: no reaction, and no reason why")
+            }
         }
     }
 }
@@ -179,10 +156,23 @@ enum Back {
 pub fn fault_matrix() -> Result<String, MatrixError> {
     let mut out = format!(
         "A cell says which state the controller goes to, in which tick, and why; tick 1 is the first that begins\n\
-         after the fault. In that tick the torque is zero already. “–”: no reaction within {WATCH_MS} ms. Faults\n\
-         without a time last {LASTING_MS} ms. The last column says what the host has to send, once the cause is\n\
-         gone, until the arm is held again: nothing (–), ClearCurrentErrors, or all parameters. Start lasts a\n\
-         single tick.\n\n| fault |"
+         after the fault. In that tick the torque is zero already. Faults without a time last {LASTING_MS} ms;\n\
+         *clearing* means that no error is left, and that the nodes are being cleared. Where nothing happens within\n\
+         {WATCH_MS} ms, the cell says why:\n\n\
+         - *bridged*: up to four missing or impossible answers running are allowed, the motion is predicted meanwhile\n  \
+           (J-63). The fifth is the error, so that an encoder that jumps for 10 ms is one.\n\
+         - *controlled*: the control law makes up for it, no limit is reached.\n\
+         - *latched*: the arm is in Error because of the very same thing, until the host clears it (J-21).\n\
+         - *no torque*: it matters, and is looked at, while there is torque only.\n\
+         - *not asked*: the drive is already in the state that is wanted of it.\n\
+         - *shown*: the gripper stops no arm; it is shown, and brought up again beside it (J-23).\n\
+         - *repeated*: the bus hardware repeats the frame within the tick.\n\
+         - *refused*: damaged frames are answered with a record, and change nothing (J-06).\n\
+         - *bounded*: a tick does a bounded part of the host's work, however much there is (J-07).\n\
+         - *no supervision*: a host that falls silent is no error.\n\
+         - *late ticks*: fewer than ten late or missing ticks within a second are borne (J-12).\n\n\
+         The last column says what the host has to send, once the cause is gone, until the arm is held again: nothing,\n\
+         ClearCurrentErrors, or all parameters. Start lasts a single tick.\n\n| fault |"
     );
     for state in STATES {
         out += &format!(" {state:?} |");
@@ -193,11 +183,13 @@ pub fn fault_matrix() -> Result<String, MatrixError> {
         let mut back = Back::ByItself;
         for state in STATES {
             let cell = cell(row, state)?;
-            out += &format!(" {} |", cell.reaction);
+            let quiet = || row.quiet(state).ok_or(MatrixError::NoReaction { row: row.name, state });
+            let text = if cell.reaction == Reaction::None { quiet()? } else { cell.reaction.to_string() };
+            out += &format!(" {text} |");
             back = if worse(cell.back) > worse(back) { cell.back } else { back };
         }
         let words = match back {
-            Back::ByItself => "–",
+            Back::ByItself => "nothing",
             Back::Clear => "clear",
             Back::Parameters => "parameters again",
             Back::Never => "never",
@@ -256,18 +248,13 @@ fn world_in(state: State, support: Support) -> Result<Operator, OperatorError> {
 fn cell(row: &Row, state: State) -> Result<Cell, MatrixError> {
     let mut operator = world_in(state, Support::Brakes)?;
     let mut watch = Watch::new(&mut operator)?;
-    let fault = Fault {
-        kind: row.kind,
-        trigger: Trigger::At(operator.world.now_us() / 1000),
-        duration_ms: Some(row.ms),
-    };
-    operator.world.inject(fault);
     let mut reaction = Reaction::None;
     for tick in 1..=WATCH_MS {
         if tick % 50 == 1 {
             // Something for faults of the line to meet; it changes nothing.
             operator.world.host_write(&host::frame(FrameType::GripperControl, &[0; 4]));
         }
+        row.act.before(&mut operator, tick);
         let seen = watch.step(&mut operator)?;
         if reaction == Reaction::None && seen.is_some() {
             reaction = seen.map_or(Reaction::None, |seen| seen.at(tick));

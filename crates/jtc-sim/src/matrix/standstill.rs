@@ -1,12 +1,9 @@
 //! How far and how fast the arm goes after a fault in motion until it stands, with holding brakes and without.
-use jtc_core::{JOINTS, State};
-use jtc_wire::ExecCommand;
+use jtc_core::{JOINTS, State, Tes};
 
-use super::{MatrixError, ROWS, world_in};
+use super::rows::{Act, ROWS, STOPS};
+use super::{MatrixError, words, world_in};
 use crate::config::Support;
-use crate::faults::{Fault, Trigger};
-use crate::host;
-use crate::operator::Operator;
 
 /// Speed below which a joint stands, rad/s.
 const STANDS: f64 = 2e-3;
@@ -18,7 +15,8 @@ const WATCH_MS: u64 = 700;
 const LONGEST_MS: u64 = 10_000;
 
 /// What becomes of the motion.
-enum Motion {
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Motion {
     GoesOn,
     Stands { ms: u64, distance: f64, speed: f64 },
     Moves,
@@ -34,39 +32,57 @@ impl core::fmt::Display for Motion {
     }
 }
 
-/// The table, as Markdown: each fault of the matrix, and the commands Pause and Stop, in Operate.
+/// The table, as Markdown: each fault of the matrix in Operate.
 pub fn standstill_table() -> Result<String, MatrixError> {
     let mut out = String::from(
-        "Each fault, and each command that stops, in the middle of a motion: milliseconds until every joint stands, the longest\n\
-         way of a joint until then and the peak speed. Without brakes an arm without torque falls until it lies on its end stops.\n\n\
-         | in Operate | with holding brakes | without brakes |\n|---|---|---|\n",
+        "Each fault in the middle of a motion: the state that the controller is in when every joint stands, milliseconds until\n\
+         then, the longest way of a joint and the peak speed. Without brakes an arm without torque falls until it lies on its end\n\
+         stops; what falls trips the over-speed of its drive on the way, an error of a node. A drive that ignores its state\n\
+         command keeps its brake open.\n\n\
+         | in Operate | state then | with holding brakes | without brakes |\n|---|---|---|---|\n",
     );
-    for (name, command) in [("Pause", ExecCommand::Pause), ("Stop", ExecCommand::Stop)] {
-        let act = |operator: &mut Operator| operator.world.host_write(&host::exec(command));
-        out += &line(name, act)?;
-    }
     for row in &ROWS {
-        let act = |operator: &mut Operator| {
-            let trigger = Trigger::At(operator.world.now_us() / 1000);
-            operator.world.inject(Fault { kind: row.kind, trigger, duration_ms: Some(row.ms) });
-        };
-        out += &line(row.name, act)?;
+        out += &line(row.name, row.act)?;
     }
     Ok(out)
 }
 
-fn line(name: &str, act: impl Fn(&mut Operator)) -> Result<String, MatrixError> {
-    let brakes = motion(Support::Brakes, &act)?;
-    let stand = motion(Support::Stand, &act)?;
-    Ok(format!("| {name} | {brakes} | {stand} |\n"))
+/// Rows of the commands that stop.
+pub(super) fn stop_lines() -> Result<String, MatrixError> {
+    let mut out = String::new();
+    for (name, act) in STOPS {
+        for support in [Support::Brakes, Support::Stand] {
+            stood_in_time(&motion(support, act)?.1)?;
+        }
+        out += &line(name, act)?;
+    }
+    Ok(out)
 }
 
-fn motion(support: Support, act: impl Fn(&mut Operator)) -> Result<Motion, MatrixError> {
+/// J-33, and 20 ms in which what was commanded comes to rest.
+pub(super) fn stood_in_time(motion: &Motion) -> Result<(), MatrixError> {
+    match *motion {
+        Motion::Stands { ms, .. } if ms <= 520 => Ok(()),
+        Motion::Stands { ms, .. } => Err(MatrixError::NoStop { ms: Some(ms) }),
+        Motion::GoesOn | Motion::Moves => Err(MatrixError::NoStop { ms: None }),
+    }
+}
+
+fn line(name: &str, act: Act) -> Result<String, MatrixError> {
+    let (then, brakes) = motion(Support::Brakes, act)?;
+    let (also, stand) = motion(Support::Stand, act)?;
+    let then = if then == also { then } else { format!("{then}; without brakes {also}") };
+    Ok(format!("| {name} | {then} | {brakes} | {stand} |\n"))
+}
+
+/// State and motion after `act`.
+fn motion(support: Support, act: Act) -> Result<(String, Motion), MatrixError> {
     let mut operator = world_in(State::Operate, support)?;
     let from = operator.world.truth().q;
-    act(&mut operator);
     let (mut still, mut distance, mut speed) = (0, 0.0f64, 0.0f64);
+    let mut motion = Motion::Moves;
     for ms in 1..=LONGEST_MS {
+        act.before(&mut operator, ms);
         operator.step();
         let truth = operator.world.truth();
         for j in 0..JOINTS {
@@ -75,13 +91,27 @@ fn motion(support: Support, act: impl Fn(&mut Operator)) -> Result<Motion, Matri
         }
         still = if truth.qd.iter().all(|v| v.abs() < STANDS) { still + 1 } else { 0 };
         if still == STANDS_MS {
-            return Ok(Motion::Stands { ms: ms + 1 - STANDS_MS, distance, speed });
+            motion = Motion::Stands { ms: ms + 1 - STANDS_MS, distance, speed };
+            break;
         }
         let telemetry = operator.world.telemetry();
-        let runs = telemetry.state == State::Operate && telemetry.tes == jtc_core::Tes::Execute;
+        let runs = telemetry.state == State::Operate && telemetry.tes == Tes::Execute;
         if ms == WATCH_MS && runs {
-            return Ok(Motion::GoesOn);
+            motion = Motion::GoesOn;
+            break;
         }
     }
-    Ok(Motion::Moves)
+    let t = operator.world.telemetry();
+    let joints = t.joints.iter().fold(0, |word, joint| word | joint.internal);
+    Ok((state_then(t.state, t.tes, t.errors, joints), motion))
+}
+
+/// State, execution state where there is a path, and errors.
+pub(super) fn state_then(state: State, tes: Tes, errors: u16, joints: u16) -> String {
+    let words = words(errors, joints).join(", ");
+    match (state, tes) {
+        _ if !words.is_empty() => format!("{state:?} ({words})"),
+        (State::HoldPos, Tes::Pause | Tes::Stop) => format!("{state:?}, {tes:?}"),
+        _ => format!("{state:?}"),
+    }
 }

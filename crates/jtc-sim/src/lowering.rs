@@ -1,0 +1,181 @@
+//! An arm that is lowered through a place where its shoulder carries much of what it can, and is stopped there (J-33): for tests
+//! and for the tables of docs/safety.md.
+use jtc_core::{Config, JOINTS, Parameters, State, Tes};
+use jtc_dynamics::{ArmModel, Dynamics, JointVec};
+use jtc_wire::ExecCommand;
+
+use crate::config::{ModelError, SimConfig, Support};
+use crate::host;
+use crate::operator::{Operator, OperatorError};
+
+/// The joint that lowers: the shoulder, which carries most.
+pub const LOADED: usize = 1;
+/// Speed below which a joint stands, rad/s.
+const STANDS: f64 = 0.01;
+/// The arm is watched until it has stood for this long, ms, or
+const STOOD_MS: u64 = 1_000;
+/// for this long.
+const LONGEST_MS: u64 = 10_000;
+
+/// The arm in front of the shoulder, at angles of the shoulder from upright to nearly horizontal.
+fn pose(shoulder: f64) -> JointVec {
+    [0.0, shoulder, 0.3, 0.0, 0.0, 0.0]
+}
+
+/// Torque that holds the shoulder at an angle, N·m.
+pub fn holding_torque(model: &ArmModel, shoulder: f64) -> f64 {
+    let dynamics = Dynamics::new(model, Config::avena().gravity);
+    dynamics.inverse(&pose(shoulder), &[0.0; JOINTS], &[0.0; JOINTS])[LOADED]
+}
+
+/// The default arm with `mass` kg more at the centre of its last link.
+pub fn with_payload(mass: f64) -> ArmModel {
+    let mut model = Parameters::avena().model;
+    model.links[JOINTS].mass += mass;
+    model
+}
+
+/// The angle of the shoulder, rad, at which holding it takes `torque` (N·m).
+pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
+    let (mut high, mut low) = (0.0, -1.4);
+    for _ in 0..60 {
+        let middle = 0.5 * (high + low);
+        if holding_torque(model, middle) < torque { high = middle } else { low = middle }
+    }
+    low
+}
+
+/// The arm is lowered through `shoulder`, where the command comes.
+#[derive(Clone, Debug)]
+pub struct Lowering {
+    /// The arm.
+    pub model: ArmModel,
+    /// What the controller is given as its model.
+    pub known: ArmModel,
+    /// Torque limit of the shoulder, N·m.
+    pub torque_max: f64,
+    /// Angle of the shoulder at which the command comes, rad.
+    pub shoulder: f64,
+    /// Its speed there, rad/s.
+    pub speed: f64,
+    /// Pause or Stop.
+    pub command: ExecCommand,
+    /// How far the true arm is from `model`.
+    pub model_error: ModelError,
+    /// What carries it without torque.
+    pub support: Support,
+}
+
+/// What came of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Longest way of a joint in the half second after every joint was enabled, and before, rad.
+    pub sag: f64,
+    /// From the last byte of the command until the trajectory state is no more Execute, ms.
+    pub commanded_ms: u64,
+    /// Until no joint moves, ms.
+    pub standing_ms: u64,
+    /// State at the end.
+    pub state: State,
+    /// Trajectory state at the end.
+    pub tes: Tes,
+    /// Error word at the end.
+    pub errors: u16,
+    /// Internal errors of all joints at the end.
+    pub joints: u16,
+    /// Longest way of a joint from where the command came, rad.
+    pub way: f64,
+    /// Highest true speed of a joint after the command, rad/s.
+    pub peak: f64,
+    /// Largest position error of any joint until the trajectory state is no more Execute, rad.
+    pub error: f64,
+}
+
+impl Lowering {
+    /// The default arm, the shoulder's torque limit such that holding it where the command comes takes `share` of it.
+    pub fn at_share(share: f64, speed: f64) -> Self {
+        let model = Parameters::avena().model;
+        let shoulder = -0.9;
+        Self { torque_max: holding_torque(&model, shoulder) / share, ..Self::new(model, shoulder, speed) }
+    }
+
+    /// An arm that the controller knows, with the limit of the default arm, and a Stop.
+    pub fn new(model: ArmModel, shoulder: f64, speed: f64) -> Self {
+        Self {
+            known: model.clone(),
+            model,
+            torque_max: Config::avena().joints[LOADED].torque_max,
+            shoulder,
+            speed,
+            command: ExecCommand::Stop,
+            model_error: ModelError::NONE,
+            support: Support::Brakes,
+        }
+    }
+
+    /// The world with the arm on its stand or brakes, above the place, switched on.
+    fn operator(&self, from: JointVec) -> Operator {
+        let mut controller = Config::avena();
+        controller.joints[LOADED].torque_max = self.torque_max;
+        let parameters = Parameters { model: self.model.clone(), ..Parameters::avena() };
+        Operator::new(SimConfig {
+            start: from,
+            baud: None,
+            model_error: self.model_error,
+            support: self.support,
+            ..SimConfig::new(controller, &parameters)
+        })
+    }
+
+    /// Lower the arm and stop it.
+    pub fn run(&self) -> Result<Outcome, OperatorError> {
+        // The quintic passes its middle at 15/8 of the mean speed.
+        let reach = 0.3;
+        let seconds = 15.0 / 8.0 * 2.0 * reach / self.speed;
+        let (from, to) = (pose(self.shoulder + reach), pose(self.shoulder - reach));
+        let mut operator = self.operator(from);
+        operator.world.host_write(&host::use_defaults());
+        operator.world.host_write(&host::arm_model(&self.known));
+        operator.wait_for_hold(12_000)?;
+        let mut sag = 0.0f64;
+        for _ in 0..500 {
+            operator.step();
+            let q = operator.world.truth().q;
+            sag = q.iter().zip(from).fold(sag, |sag, (q, from)| sag.max((q - from).abs()));
+        }
+        operator.upload(&host::there_and_back(&from, &to, seconds, 1, 10), 10)?;
+        operator.ask(&host::exec(ExecCommand::Execute))?;
+        let middle = (seconds * 500.0) as u32;
+        operator.wait("the place of the stop", 20_000, |w| w.telemetry().point >= middle)?;
+        Ok(self.stop(&mut operator, sag))
+    }
+
+    fn stop(&self, operator: &mut Operator, sag: f64) -> Outcome {
+        let before = operator.world.truth().q;
+        operator.world.host_write(&host::exec(self.command));
+        let (mut commanded_ms, mut standing_ms) = (0, 0);
+        let (mut way, mut peak, mut error) = (0.0f64, 0.0f64, 0.0f64);
+        for ms in 1..=LONGEST_MS {
+            operator.step();
+            let (truth, t) = (operator.world.truth(), operator.world.telemetry());
+            if t.tes == Tes::Execute {
+                commanded_ms = ms;
+                error = t.joints.iter().fold(error, |e, j| e.max(j.position_error().abs()));
+            }
+            if truth.qd.iter().any(|v| v.abs() > STANDS) {
+                standing_ms = ms;
+            }
+            for (q, (before, qd)) in truth.q.iter().zip(before.iter().zip(&truth.qd)) {
+                way = way.max((q - before).abs());
+                peak = peak.max(qd.abs());
+            }
+            if ms >= standing_ms.max(commanded_ms) + STOOD_MS {
+                break;
+            }
+        }
+        let t = operator.world.telemetry();
+        let (state, tes, errors) = (t.state, t.tes, t.errors);
+        let joints = t.joints.iter().fold(0, |word, joint| word | joint.internal);
+        Outcome { sag, commanded_ms, standing_ms, state, tes, errors, joints, way, peak, error }
+    }
+}

@@ -1,0 +1,191 @@
+//! What goes wrong in a row of the tables, and why nothing happens where nothing happens.
+use jtc_bus::GRIPPER;
+use jtc_core::State;
+use jtc_wire::{FrameType, fixed};
+
+use crate::faults::{Fault, FaultKind, Trigger};
+use crate::host;
+use crate::operator::Operator;
+
+/// Ticks after which a fault that lasts is taken away.
+pub(super) const LASTING_MS: u64 = 300;
+/// Short frames that come in front of a Stop.
+const FLOOD: usize = 4_000;
+
+/// What is done to the world.
+#[derive(Clone, Copy)]
+pub(super) enum Act {
+    /// A fault, for so many ms.
+    Fault(FaultKind, u64),
+    /// The same, and the host clears all errors so that it is executed in this tick.
+    Cleared(FaultKind, u64, u64),
+    /// Two faults at once, for so many ms.
+    Both(FaultKind, FaultKind, u64),
+    /// Every second tick does not come.
+    EverySecondTick,
+    /// The host resets the gripper.
+    ResetGripper,
+    /// A frame from the host.
+    Frame(&'static [u8]),
+    /// A frame directly behind one byte of noise, which comes every 6 ms.
+    InNoise(&'static [u8]),
+    /// A frame behind thousands of short ones, all in the same millisecond.
+    Behind(&'static [u8]),
+}
+
+impl Act {
+    /// What happens before the step of tick `tick`, counted from 1.
+    pub fn before(self, operator: &mut Operator, tick: u64) {
+        let world = &mut operator.world;
+        let trigger = Trigger::At(world.now_us() / 1000);
+        let mut inject = |kind, ms| world.inject(Fault { kind, trigger, duration_ms: Some(ms) });
+        match self {
+            Self::Fault(kind, ms) | Self::Cleared(kind, ms, _) if tick == 1 => inject(kind, ms),
+            Self::Both(one, other, ms) if tick == 1 => {
+                inject(one, ms);
+                inject(other, ms);
+            }
+            Self::EverySecondTick if tick % 2 == 1 && tick < LASTING_MS => {
+                inject(FaultKind::TickOverrun, 1);
+            }
+            _ => {}
+        }
+        match self {
+            Self::Cleared(.., clear) if tick == clear => world.host_write(&host::clear_all()),
+            Self::ResetGripper if tick == 1 => {
+                world.host_write(&host::frame(FrameType::ResetCanDevices, &[1 << GRIPPER, 0, 0, 0]));
+            }
+            Self::Frame(frame) if tick == 1 => world.host_write(frame),
+            Self::InNoise(frame) if tick == 1 => world.host_write(&[&[NOISE], frame].concat()),
+            Self::InNoise(_) if tick % 6 == 1 => world.host_write(&[NOISE]),
+            Self::Behind(frame) if tick == 1 => {
+                world.host_write(&fixed::CLEAR_OCCURRED_ERRORS.repeat(FLOOD));
+                world.host_write(frame);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// A byte of noise: the worst one, which begins a frame.
+const NOISE: u8 = jtc_wire::HEADER;
+
+/// A row of the fault matrix.
+pub(super) struct Row {
+    pub name: &'static str,
+    pub act: Act,
+    /// Why there is no reaction while the arm is held or moves.
+    held: Option<&'static str>,
+    /// Why there is none in Init and Error.
+    parked: Option<&'static str>,
+}
+
+impl Row {
+    /// What the cell says where there is no reaction; `None`: there should be one.
+    pub fn quiet(&self, state: State) -> Option<String> {
+        match state {
+            State::HoldPos | State::Operate | State::Teaching => {
+                self.held.map(|why| format!("goes on: {why}"))
+            }
+            _ => self.parked.map(|why| format!("no effect: {why}")),
+        }
+    }
+}
+
+/// A fault that has an effect in every state.
+const fn seen(name: &'static str, act: Act) -> Row {
+    Row { name, act, held: None, parked: None }
+}
+
+/// One that the error state has already, where it was caused by the safety input.
+const fn latched(name: &'static str, act: Act) -> Row {
+    Row { name, act, held: None, parked: Some("latched") }
+}
+
+/// One that matters to an arm with torque only.
+const fn powered(name: &'static str, act: Act) -> Row {
+    Row { name, act, held: None, parked: Some("no torque") }
+}
+
+/// One that is borne in every state, and why.
+const fn borne(name: &'static str, act: Act, why: &'static str) -> Row {
+    Row { name, act, held: Some(why), parked: Some(why) }
+}
+
+const fn fault(kind: FaultKind) -> Act {
+    Act::Fault(kind, LASTING_MS)
+}
+
+const SILENT: FaultKind = FaultKind::NodeSilent { node: 1 };
+const GLITCH: FaultKind = FaultKind::EncoderJump { joint: 1, rad: 0.3 };
+const IGNORES: FaultKind = FaultKind::IgnoresState { joint: 1 };
+const ALL_LOST: FaultKind = FaultKind::FramesLost { probability: 1.0 };
+
+pub(super) const ROWS: [Row; 39] = [
+    latched("safety input low", fault(FaultKind::SafetyInput)),
+    latched("safety input low for 1 ms", Act::Fault(FaultKind::SafetyInput, 1)),
+    latched("safety input low for 1 ms, cleared in its tick", Act::Cleared(FaultKind::SafetyInput, 1, 1)),
+    latched("safety input low, joint ignores its state command", {
+        Act::Both(FaultKind::SafetyInput, IGNORES, LASTING_MS)
+    }),
+    borne("joint ignores its state command", fault(IGNORES), "not asked"),
+    seen("joint silent", fault(SILENT)),
+    borne("joint silent for 4 ms", Act::Fault(SILENT, 4), "bridged"),
+    seen("joint reboots", Act::Fault(FaultKind::NodeReboot { node: 1 }, 1)),
+    seen("joint: motor-control fault", fault(FaultKind::MotorFault { joint: 1, bits: 0x04 })),
+    seen("joint: gate driver fault", fault(FaultKind::HardwareFault { joint: 1 })),
+    seen("joint in fault state, no error bit", Act::Fault(FaultKind::FaultState { joint: 1 }, 1)),
+    seen(
+        "the same, cleared in the tick that finds it",
+        Act::Cleared(FaultKind::FaultState { joint: 1 }, 1, 2),
+    ),
+    seen("joint: safety line", fault(FaultKind::SafetyLine { node: 1 })),
+    seen("joint: encoder jumps by 0.3 rad", fault(GLITCH)),
+    borne("joint: encoder jumps by 0.3 rad for 1 ms", Act::Fault(GLITCH, 1), "bridged"),
+    borne("joint: encoder jumps by 0.3 rad for 3 ms", Act::Fault(GLITCH, 3), "bridged"),
+    seen("joint: encoder jumps by 0.3 rad for 10 ms", Act::Fault(GLITCH, 10)),
+    seen("joint: encoder jumps by 0.05 rad", fault(FaultKind::EncoderJump { joint: 1, rad: 0.05 })),
+    powered("joint: position not accurate", fault(FaultKind::NotAccurate { joint: 1 })),
+    borne("joint: friction times 3", fault(FaultKind::Friction { joint: 1, factor: 3.0 }), "controlled"),
+    borne("joint: bearing at 60 °C", fault(FaultKind::Temperature { joint: 1, celsius: 60.0 }), "controlled"),
+    borne("gripper silent", fault(FaultKind::NodeSilent { node: 6 }), "shown"),
+    borne("gripper reboots", Act::Fault(FaultKind::NodeReboot { node: 6 }, 1), "shown"),
+    borne("gripper reset by the host", Act::ResetGripper, "shown"),
+    borne("gripper: safety line", fault(FaultKind::SafetyLine { node: 6 }), "shown"),
+    borne("1 % of bus receptions lost", fault(FaultKind::FramesLost { probability: 0.01 }), "bridged"),
+    borne("every bus reception lost for 4 ms", Act::Fault(ALL_LOST, 4), "bridged"),
+    borne(
+        "10 % of bus frames destroyed and repeated",
+        fault(FaultKind::FramesCorrupted { probability: 0.1 }),
+        "repeated",
+    ),
+    seen("bus cut at the controller", fault(FaultKind::NoAcknowledge)),
+    seen("controller bus-off", fault(FaultKind::BusOff)),
+    seen("controller bus-off for 1 ms", Act::Fault(FaultKind::BusOff, 1)),
+    seen("the same, cleared in the tick that finds it", Act::Cleared(FaultKind::BusOff, 1, 2)),
+    borne(
+        "every byte from the host lost",
+        fault(FaultKind::SerialLost { probability: 1.0 }),
+        "no supervision",
+    ),
+    borne(
+        "5 % of bytes from the host flipped",
+        fault(FaultKind::SerialFlipped { probability: 0.05 }),
+        "refused",
+    ),
+    borne("bytes from the host delayed", fault(FaultKind::SerialDelayed), "no supervision"),
+    borne("tick late by 5 ms", Act::Fault(FaultKind::TickOverrun, 5), "late ticks"),
+    seen("every second tick missing", Act::EverySecondTick),
+    seen("tick stops", fault(FaultKind::TickOverrun)),
+    borne("4,000 frames ClearOccurredErrors at once", Act::Behind(&[]), "bounded"),
+];
+
+/// Commands that stop, which make sense in a motion only.
+pub(super) const STOPS: [(&str, Act); 6] = [
+    ("Pause", Act::Frame(&fixed::PAUSE)),
+    ("Stop", Act::Frame(&fixed::STOP)),
+    ("Pause directly behind a byte of noise, and one every 6 ms", Act::InNoise(&fixed::PAUSE)),
+    ("Stop directly behind a byte of noise, and one every 6 ms", Act::InNoise(&fixed::STOP)),
+    ("Pause behind 4,000 short frames", Act::Behind(&fixed::PAUSE)),
+    ("Stop behind 4,000 short frames", Act::Behind(&fixed::STOP)),
+];

@@ -1,0 +1,91 @@
+//! What makes sense in a motion only: commands that stop, on a bad line, near the torque limit, and with a payload.
+use jtc_core::{Parameters, State};
+
+use super::MatrixError;
+use super::standstill::{Motion, state_then, stood_in_time, stop_lines};
+use crate::config::Support;
+use crate::lowering::{LOADED, Lowering, holding_torque, with_payload};
+
+/// Share of the shoulder's torque limit that holding it takes, speed (rad/s), and whether the torque suffices for the time that a
+/// stop has.
+const LOADS: [(f64, f64, bool); 6] = [
+    (0.90, 0.2, true),
+    (0.95, 0.2, true),
+    (0.99, 0.2, true),
+    (0.99, 0.4, false),
+    (1.02, 0.2, false),
+    (1.02, 0.4, false),
+];
+/// kg.
+const PAYLOADS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
+/// Angle of the shoulder at which the arm with a payload is stopped, and its speed, rad and rad/s.
+const WITH_PAYLOAD: (f64, f64) = (-0.9, 0.3);
+
+/// The table, as Markdown.
+pub fn stopping_table() -> Result<String, MatrixError> {
+    let mut out = format!(
+        "From the last byte of the command. The loaded arm is one whose shoulder (joint {}) is lowered through a place where\n\
+         holding it takes that share of its torque limit, which is lower than the default one for this. Where the torque that is left\n\
+         does not suffice, all of it brakes for a second; what moves then is an error. `jtc traj check` refuses such a path. The\n\
+         payloads are at the centre of the last link of the default arm, lowered at {} rad/s: in the arm model of the controller,\n\
+         or unknown to it. The sag is how far a joint moves in the half second after the brakes have opened.\n\n\
+         | in Operate | state then | with holding brakes | without brakes |\n|---|---|---|---|\n",
+        LOADED + 1,
+        WITH_PAYLOAD.1
+    );
+    out += &stop_lines()?;
+    for (share, speed, suffices) in LOADS {
+        let name = format!("Stop at {:.0} % of the torque limit, {speed} rad/s", 100.0 * share);
+        out += &Line::of(&Lowering::at_share(share, speed), suffices)?.row(&name);
+    }
+    let (shoulder, speed) = WITH_PAYLOAD;
+    for known in [true, false] {
+        for mass in PAYLOADS {
+            let mut lowering = Lowering::new(with_payload(mass), shoulder, speed);
+            let load = 100.0 * holding_torque(&lowering.model, shoulder) / lowering.torque_max;
+            if !known {
+                lowering.known = Parameters::avena().model;
+            }
+            let line = Line::of(&lowering, true)?;
+            let word = if known { "known" } else { "unknown" };
+            let name = format!("Stop with {mass} kg, {word}, at {load:.0} %, sag {:.3} rad", line.sag);
+            out += &line.row(&name);
+        }
+    }
+    Ok(out)
+}
+
+/// What came of a lowering, with holding brakes and without.
+struct Line {
+    then: [String; 2],
+    motion: [Motion; 2],
+    /// The longer one, rad.
+    sag: f64,
+}
+
+impl Line {
+    /// Where the torque `suffices`, the arm must be held when it stands, and stand in time.
+    fn of(lowering: &Lowering, suffices: bool) -> Result<Self, MatrixError> {
+        let mut sag = 0.0f64;
+        let mut one = |support| -> Result<(String, Motion), MatrixError> {
+            let o = Lowering { support, ..lowering.clone() }.run()?;
+            sag = sag.max(o.sag);
+            let motion = Motion::Stands { ms: o.standing_ms, distance: o.way, speed: o.peak };
+            if suffices {
+                stood_in_time(&motion)?;
+            }
+            if suffices != (o.state == State::HoldPos) {
+                return Err(MatrixError::NoStop { ms: None });
+            }
+            Ok((state_then(o.state, o.tes, o.errors, o.joints), motion))
+        };
+        let (brakes, stand) = (one(Support::Brakes)?, one(Support::Stand)?);
+        Ok(Self { then: [brakes.0, stand.0], motion: [brakes.1, stand.1], sag })
+    }
+
+    fn row(&self, name: &str) -> String {
+        let [then, also] = &self.then;
+        let also = if then == also { String::new() } else { format!("; without brakes {also}") };
+        format!("| {name} | {then}{also} | {} | {} |\n", self.motion[0], self.motion[1])
+    }
+}

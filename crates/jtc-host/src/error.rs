@@ -105,6 +105,16 @@ pub enum Error {
         /// The status that says so.
         status: Box<Status>,
     },
+    /// The controller paused the motion because of an error that it could still act upon (J-66).
+    #[error("the controller paused the motion at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::occurred_since(before, status))]
+    PausedByController {
+        /// Index of the 1 ms point where it is paused.
+        point: u32,
+        /// Errors of each joint that had occurred before the motion.
+        before: [u16; 6],
+        /// The status that says so.
+        status: Box<Status>,
+    },
     /// Resume was asked for, and nothing is paused.
     #[error("nothing is paused (state {}, trajectory {}): resume would start a motion, not go on with one", words::state(*state), words::tes(*tes))]
     NotPaused {
@@ -180,7 +190,7 @@ impl Error {
             | Error::NotPaused { .. }
             | Error::NoParameters { .. }
             | Error::IncompleteArm { .. } => 4,
-            Error::RunFault { .. } | Error::Cancelled => 5,
+            Error::RunFault { .. } | Error::PausedByController { .. } | Error::Cancelled => 5,
         }
     }
 
@@ -200,6 +210,7 @@ impl Error {
             Error::Parameter(_) => "parameter",
             Error::Check(_) => "check",
             Error::RunFault { .. } => "run-fault",
+            Error::PausedByController { .. } => "paused-by-controller",
             Error::NotPaused { .. } => "not-paused",
             Error::NoParameters { .. } => "no-parameters",
             Error::IncompleteArm { .. } => "incomplete-arm",
@@ -235,6 +246,11 @@ impl Error {
             Error::Parameter(e) => e.hint(),
             Error::Check(v) => v.hint(),
             Error::RunFault { .. } => "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos".into(),
+            Error::PausedByController { .. } => {
+                "look what keeps the arm from its path: it is held where it gave way, with little torque. `jtc traj resume` goes on \
+                 once each joint is back within 0.02 rad of the path, `jtc traj stop` gives it up"
+                    .into()
+            }
             Error::NotPaused { tes: 3, .. } => {
                 "it is being executed, or still slowing down after a pause: `jtc status`, then try again".into()
             }

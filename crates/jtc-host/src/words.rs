@@ -121,6 +121,16 @@ pub fn errors_line(s: &Status) -> String {
     }
 }
 
+/// Errors of the joints that have occurred since those of `before`, in one line.
+pub fn occurred_since(before: &[u16; 6], s: &Status) -> String {
+    let joints = s.joints.iter().zip(before).enumerate();
+    let words = joints.flat_map(|(j, (joint, before))| {
+        let new = joint_errors(joint.internal_occurred & !before);
+        new.into_iter().map(move |word| format!("joint {}: {word}", j + 1))
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
 /// Why the controller is not further than it is.
 pub fn waiting_for(s: &Status) -> String {
     let head = format!("state {}, trajectory {}", state(s.fsm), tes(s.tes));

@@ -394,3 +394,27 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
 }
+
+/// Soft gains, so that a push is a position error before it is too much torque: the arm gives way, and the run ends with that.
+#[test]
+fn j66_a_motion_that_the_controller_paused_is_no_success() {
+    let mut s = session(None);
+    let mut arm = Arm::avena();
+    let gains = &mut arm.pid.as_mut().unwrap()[4];
+    (gains.kp, gains.ki, gains.kd) = (150.0, 0.0, 15.0);
+    s.push(&arm.parameter_set(), |_| {}).unwrap();
+    s.wait_hold(Duration::from_secs(15)).unwrap();
+    upload(&mut s, &trajectory(2_000)).unwrap();
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::Push { joint: 4, torque: 38.0 },
+        trigger: Trigger::AtPoint(500),
+        duration_ms: Some(400),
+    });
+    s.execute().unwrap();
+    let error = s.follow(|_| Flow::Continue).unwrap_err();
+    assert_eq!((error.code(), error.exit_code()), ("paused-by-controller", 5));
+    let text = error.to_string();
+    assert!(text.contains("joint 5: position error"), "{text}");
+    assert!(error.hint().contains("jtc traj resume"));
+    assert_eq!(s.fresh_status().unwrap().fsm, 2, "it is held");
+}

@@ -45,6 +45,7 @@ impl<P: Port> Session<P> {
         let (mut begun, mut stopping) = (false, false);
         // On an error the controller forgets the trajectory, and its point with it.
         let mut point = 0;
+        let mut occurred = None;
         loop {
             let status = match self.next_status() {
                 Ok(status) => status,
@@ -57,6 +58,10 @@ impl<P: Port> Session<P> {
             let flow = each(&status);
             if status.fsm == 5 || status.errors != 0 {
                 return Err(Error::RunFault { point, status: Box::new(status) });
+            }
+            let before = *occurred.get_or_insert(errors_occurred(&status));
+            if status.tes == 2 && errors_occurred(&status) != before {
+                return Err(Error::PausedByController { point, before, status: Box::new(status) });
             }
             match (status.tes, status.fsm) {
                 (4, _) if begun => return Ok(Outcome::Finished(status)),
@@ -89,6 +94,11 @@ impl<P: Port> Session<P> {
         }
         self.link_lost(error)
     }
+}
+
+/// Errors of the joints that have occurred: what the controller acted upon by itself adds to them (J-66).
+fn errors_occurred(status: &Status) -> [u16; 6] {
+    status.joints.map(|joint| joint.internal_occurred)
 }
 
 /// A pause or stop may cross with the end of the motion: it is refused then, and that is no failure.

@@ -1,21 +1,22 @@
 //! The controller: state machine and tick (section 4).
 use jtc_dynamics::Dynamics;
-use jtc_wire::{DataStatus, ExecCommand, GripperStatus, JointStatus, RawPoint, Response, STATUS_LEN, Status};
+use jtc_wire::{RawPoint, Response, STATUS_LEN};
 
 use crate::check::{TrajectoryCheck, Violation};
 use crate::config::{Config, PidGains, TableOf};
 use crate::defaults;
 use crate::errors::Errors;
+use crate::execution::Path;
 use crate::host::{Overtaking, Work};
 use crate::io::{Inputs, Outputs};
 use crate::late::LateTicks;
 use crate::motion::{Gains, Law, Motion};
-use crate::nodes::{GRIPPER, Goal, Nodes};
+use crate::nodes::{Goal, Nodes};
 use crate::path::PathClock;
 use crate::records::{HOST_LINES, ResponseQueues};
 use crate::store::Store;
-use crate::telemetry::{JointTelemetry, Telemetry};
-use crate::{JOINTS, State, Tes, joint_error};
+use crate::telemetry::Telemetry;
+use crate::{JOINTS, State, Tes};
 
 /// Which parameters the host has given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,22 +32,9 @@ impl Given {
     }
 
     /// The byte of the status: 1 = missing.
-    fn missing(self) -> u8 {
+    pub fn missing(self) -> u8 {
         !self.0 & (Self::FRICTION | Self::PID | Self::MODEL)
     }
-}
-
-/// Where in Operate the controller is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Path {
-    /// Waits until every joint is enabled.
-    Waiting,
-    /// On the way from where the arm is held to the first point, or to the one where the path was paused.
-    Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<Tes> },
-    /// At point 0, which the next tick commands.
-    AtStart,
-    /// On the path; `leave` says where to when it stands.
-    Running { leave: Option<Tes> },
 }
 
 /// The joint trajectory controller. `M` is the memory of its trajectory: [`crate::POINTS_MAX`] points.
@@ -84,10 +72,10 @@ pub struct Controller<M> {
     pub(crate) work: Work,
     pub(crate) overtaking: [Overtaking; HOST_LINES],
     pub(crate) records: ResponseQueues,
-    since_status_ms: u16,
+    pub(crate) since_status_ms: u16,
     late_ticks: LateTicks,
     status_frame: [u8; STATUS_LEN],
-    telemetry: Telemetry,
+    pub(crate) telemetry: Telemetry,
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
@@ -295,73 +283,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Execute from Stop or Finish.
-    pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
-        let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
-        if !self.near(&first) {
-            return Err(DataStatus::StartPositionMismatch);
-        }
-        self.clock = PathClock::default();
-        self.path = Path::Waiting;
-        self.braking_ms = None;
-        self.motion.stand_firm();
-        self.set_tes(Tes::Execute);
-        Ok(())
-    }
-
-    /// Every measured position is within the start tolerance of `position`.
-    fn near(&self, position: &[f64; JOINTS]) -> bool {
-        let tolerance = self.config.start_tolerance_rad;
-        (0..JOINTS).all(|j| (self.nodes.positions()[j] - position[j]).abs() <= tolerance)
-    }
-
-    /// Execute from Pause: at the paused point only.
-    pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
-        let paused = self.path_point();
-        if !self.near(&paused) {
-            return Err(DataStatus::StartPositionMismatch);
-        }
-        self.braking_ms = None;
-        if self.motion.yielding() {
-            // It is held somewhere beside the path; its way back begins where it is.
-            self.motion.begin_at(self.nodes.positions());
-            self.motion.stand_firm();
-        }
-        self.path = if self.clock.time == 0.0 {
-            Path::Waiting
-        } else if self.motion.set.position == paused {
-            self.go_on();
-            Path::Running { leave: None }
-        } else {
-            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None }
-        };
-        self.set_tes(Tes::Execute);
-        Ok(())
-    }
-
-    /// From standstill on the path to full speed.
-    fn go_on(&mut self) {
-        self.clock.go();
-        self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
-    }
-
-    /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
-    pub(crate) fn leave_path(&mut self, command: ExecCommand) {
-        let to = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
-        match &mut self.path {
-            Path::Running { leave } => {
-                if leave.replace(to).is_none() {
-                    self.clock.halt();
-                    self.braking_ms = Some(0);
-                    self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
-                }
-            }
-            // It comes to rest at point 0 by itself.
-            Path::Gliding { leave, .. } => *leave = Some(to),
-            Path::Waiting | Path::AtStart => self.set_tes(to),
-        }
-    }
-
     fn hold(&mut self) -> [f64; JOINTS] {
         self.motion.latch(&self.nodes, &self.config);
         self.motion.hold(&self.config);
@@ -380,111 +301,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.latch(&self.nodes, &self.config);
         self.walk();
         self.control(Law::Follow)
-    }
-
-    /// Set values of Operate.
-    fn walk(&mut self) {
-        match self.path {
-            Path::Waiting => {
-                // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
-                self.motion.hold(&self.config);
-                if self.motion.all_holding() {
-                    if self.near(&self.path_point()) {
-                        self.path =
-                            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
-                    } else {
-                        self.set_tes(Tes::Stop);
-                    }
-                }
-            }
-            Path::Gliding { from, elapsed_ms, leave } => {
-                let length = f64::from(self.config.ramp_ms.max(1));
-                let elapsed_ms = elapsed_ms + 1.0;
-                self.motion.glide(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
-                if elapsed_ms < length {
-                    self.path = Path::Gliding { from, elapsed_ms, leave };
-                } else if let Some(tes) = leave {
-                    self.set_tes(tes);
-                } else if self.clock.time == 0.0 {
-                    self.path = Path::AtStart;
-                } else {
-                    self.go_on();
-                    self.path = Path::Running { leave: None };
-                }
-            }
-            Path::AtStart => {
-                self.clock = PathClock::start();
-                self.path = Path::Running { leave: None };
-                self.follow();
-                self.finish_at_end();
-            }
-            Path::Running { leave } => {
-                self.clock.advance(f64::from(self.store.duration_ms()));
-                self.follow();
-                match leave {
-                    // The last point is at rest: there the arm stands whatever the ramp says.
-                    Some(tes) if self.clock.standing() || self.at_end() || self.crawls() => {
-                        self.clock.rest();
-                        self.set_tes(tes);
-                    }
-                    Some(_) => {}
-                    None => self.finish_at_end(),
-                }
-            }
-        }
-    }
-
-    /// Set values at the present path time.
-    fn follow(&mut self) {
-        let Some(at) = self.store.at(self.clock.time) else { return };
-        if self.clock.ramping() {
-            let bounds = self.motion.slope_bounds(&at, self.clock.rate, self.clock.slope, &self.config);
-            let ramp_ms = f64::from(self.config.ramp_ms);
-            if self.clock.halting() {
-                self.clock.slow_down(ramp_ms, f64::from(self.config.stop_ms), &bounds);
-            } else {
-                self.clock.speed_up(ramp_ms, bounds.easy);
-            }
-        } else {
-            self.clock.slope = 0.0;
-        }
-        self.motion.follow(&at, self.clock.rate, self.clock.slope);
-    }
-
-    /// Positions at the present path time; without a trajectory (which Execute refuses) where the arm is held.
-    fn path_point(&self) -> [f64; JOINTS] {
-        self.store.at(self.clock.time).map_or(self.motion.set.position, |at| at.position)
-    }
-
-    /// The last point was commanded in this tick (J-31).
-    fn at_end(&self) -> bool {
-        self.clock.time >= f64::from(self.store.duration_ms())
-    }
-
-    fn finish_at_end(&mut self) {
-        if self.at_end() {
-            self.set_tes(Tes::Finish);
-        }
-    }
-
-    /// A pause or stop has taken its time, and what is left of the motion is too slow to be one.
-    fn crawls(&self) -> bool {
-        self.braking_ms.is_some_and(|ms| ms >= self.config.stop_ms)
-            && self.motion.moving_joints(&self.nodes, joint_error::TORQUE) == [0; JOINTS]
-    }
-
-    /// One more tick of a pause or stop, until the arm stands. Returns whether it goes on: meanwhile all the torque there is may
-    /// brake. An arm that still moves when its time is over cannot be stopped by torque: an error of the joints that move.
-    fn brake(&mut self) -> bool {
-        let Some(ms) = self.braking_ms else { return false };
-        let moving = self.motion.moving_joints(&self.nodes, joint_error::TORQUE);
-        let still = self.tes != Tes::Execute && moving == [0; JOINTS];
-        let over = ms >= self.config.braking_ms_max;
-        if over {
-            self.errors.raise_joints(&moving);
-        }
-        self.braking_ms = if over || still { None } else { Some(ms + 1) };
-        self.braking_ms.is_some()
     }
 
     /// The control law; returns the torque to command. Errors of the joints are acted upon, or raised.
@@ -513,92 +329,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             table: self.friction_is_table.then_some(&self.tables),
         };
         self.motion.control(law, braking, &self.nodes, &self.config, &gains)
-    }
-
-    fn observe(&mut self, torque: &[f64; JOINTS]) {
-        let (q, v) = (self.nodes.positions(), self.nodes.velocities());
-        let t = &mut self.telemetry;
-        t.tick += 1;
-        (t.state, t.tes, t.errors) = (self.state, self.tes, self.errors.word());
-        // Index of the current 1 ms point.
-        t.point = self.clock.time as u32;
-        t.records_lost = self.records.lost();
-        for (j, out) in t.joints.iter_mut().enumerate() {
-            let (set, parts, report) = (&self.motion.set, &self.motion.torque[j], &self.nodes.node(j).report);
-            *out = JointTelemetry {
-                set_position: set.position[j],
-                set_velocity: set.velocity[j],
-                set_acceleration: set.acceleration[j],
-                position: q[j],
-                velocity: v[j],
-                temperature: f64::from(report.temperature),
-                torque_model: parts.model,
-                torque_p: parts.pid.p,
-                torque_i: parts.pid.i,
-                torque_d: parts.pid.d,
-                torque_friction: parts.friction,
-                torque_other: parts.payload + parts.brake + parts.blend,
-                torque: torque[j],
-                fsm: report.fsm,
-                internal: self.errors.joint(j).0,
-            };
-        }
-    }
-
-    /// A JtcStatus is due: at once for a response, else every period (J-04).
-    fn status_due(&mut self, free: bool) -> bool {
-        self.since_status_ms = self.since_status_ms.saturating_add(1);
-        let due = free && (!self.records.is_empty() || self.since_status_ms >= self.config.status_period_ms);
-        if due {
-            self.since_status_ms = 0;
-        }
-        due
-    }
-
-    fn status(&self, response: Response) -> Status {
-        let (can_current, can_occurred) = self.errors.can();
-        let (q, v) = (self.nodes.positions(), self.nodes.velocities());
-        let joints = core::array::from_fn(|j| {
-            let report = &self.nodes.node(j).report;
-            let (internal, internal_occurred) = self.errors.joint(j);
-            JointStatus {
-                fsm: report.fsm,
-                mc_current: report.mc_current,
-                mc_occurred: report.mc_occurred,
-                errors: report.errors,
-                warnings: report.warnings,
-                internal,
-                internal_occurred,
-                position: q[j] as f32,
-                velocity: v[j] as f32,
-                torque: report.torque as f32,
-                temperature: report.temperature,
-            }
-        });
-        let gripper = &self.nodes.node(GRIPPER).report;
-        Status {
-            response,
-            fsm: self.state as u8,
-            errors: self.errors.word(),
-            occurred: self.errors.occurred(),
-            jtc_init: self.given.missing(),
-            node_init: self.nodes.init_word(&self.config),
-            tes: self.tes as u8,
-            point: self.telemetry.point,
-            friction_type: u8::from(self.friction_is_table),
-            can_error: u8::from(self.errors.can_error()),
-            can_current,
-            can_occurred,
-            joints,
-            gripper: Some(GripperStatus {
-                fsm: gripper.fsm,
-                pump: u8::from(self.nodes.pump),
-                pressure1: u8::from(self.nodes.pressure[0]),
-                pressure2: u8::from(self.nodes.pressure[1]),
-                errors: gripper.errors,
-                warnings: gripper.warnings,
-            }),
-        }
     }
 }
 

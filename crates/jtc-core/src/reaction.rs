@@ -5,7 +5,8 @@
 //! fails, and for every other error, the torque becomes zero (J-21).
 use jtc_wire::{ExecCommand, RawPoint};
 
-use crate::controller::{Controller, Path};
+use crate::controller::Controller;
+use crate::execution::Path;
 use crate::motion::Law;
 use crate::{JOINTS, Tes, joint_error};
 

@@ -1,0 +1,193 @@
+//! The execution of a trajectory (section 5): from Execute to standstill, wherever that comes about.
+use jtc_wire::{DataStatus, ExecCommand, RawPoint};
+
+use crate::controller::Controller;
+use crate::path::PathClock;
+use crate::{JOINTS, Tes, joint_error};
+
+/// Where in Operate the controller is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Path {
+    /// Waits until every joint is enabled.
+    Waiting,
+    /// On the way from where the arm is held to the first point, or to the one where the path was paused.
+    Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<Tes> },
+    /// At point 0, which the next tick commands.
+    AtStart,
+    /// On the path; `leave` says where to when it stands.
+    Running { leave: Option<Tes> },
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// Execute from Stop or Finish.
+    pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
+        let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
+        if !self.near(&first) {
+            return Err(DataStatus::StartPositionMismatch);
+        }
+        self.clock = PathClock::default();
+        self.path = Path::Waiting;
+        self.braking_ms = None;
+        self.motion.stand_firm();
+        self.set_tes(Tes::Execute);
+        Ok(())
+    }
+
+    /// Every measured position is within the start tolerance of `position`.
+    fn near(&self, position: &[f64; JOINTS]) -> bool {
+        let tolerance = self.config.start_tolerance_rad;
+        (0..JOINTS).all(|j| (self.nodes.positions()[j] - position[j]).abs() <= tolerance)
+    }
+
+    /// Execute from Pause: at the paused point only.
+    pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
+        let paused = self.path_point();
+        if !self.near(&paused) {
+            return Err(DataStatus::StartPositionMismatch);
+        }
+        self.braking_ms = None;
+        if self.motion.yielding() {
+            // It is held somewhere beside the path; its way back begins where it is.
+            self.motion.begin_at(self.nodes.positions());
+            self.motion.stand_firm();
+        }
+        self.path = if self.clock.time == 0.0 {
+            Path::Waiting
+        } else if self.motion.set.position == paused {
+            self.go_on();
+            Path::Running { leave: None }
+        } else {
+            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None }
+        };
+        self.set_tes(Tes::Execute);
+        Ok(())
+    }
+
+    /// From standstill on the path to full speed.
+    fn go_on(&mut self) {
+        self.clock.go();
+        self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
+    }
+
+    /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
+    pub(crate) fn leave_path(&mut self, command: ExecCommand) {
+        let to = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
+        match &mut self.path {
+            Path::Running { leave } => {
+                if leave.replace(to).is_none() {
+                    self.clock.halt();
+                    self.braking_ms = Some(0);
+                    self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
+                }
+            }
+            // It comes to rest at point 0 by itself.
+            Path::Gliding { leave, .. } => *leave = Some(to),
+            Path::Waiting | Path::AtStart => self.set_tes(to),
+        }
+    }
+
+    /// Set values of Operate.
+    pub(crate) fn walk(&mut self) {
+        match self.path {
+            Path::Waiting => {
+                // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
+                self.motion.hold(&self.config);
+                if self.motion.all_holding() {
+                    if self.near(&self.path_point()) {
+                        self.path =
+                            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
+                    } else {
+                        self.set_tes(Tes::Stop);
+                    }
+                }
+            }
+            Path::Gliding { from, elapsed_ms, leave } => {
+                let length = f64::from(self.config.ramp_ms.max(1));
+                let elapsed_ms = elapsed_ms + 1.0;
+                self.motion.glide(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
+                if elapsed_ms < length {
+                    self.path = Path::Gliding { from, elapsed_ms, leave };
+                } else if let Some(tes) = leave {
+                    self.set_tes(tes);
+                } else if self.clock.time == 0.0 {
+                    self.path = Path::AtStart;
+                } else {
+                    self.go_on();
+                    self.path = Path::Running { leave: None };
+                }
+            }
+            Path::AtStart => {
+                self.clock = PathClock::start();
+                self.path = Path::Running { leave: None };
+                self.follow();
+                self.finish_at_end();
+            }
+            Path::Running { leave } => {
+                self.clock.advance(f64::from(self.store.duration_ms()));
+                self.follow();
+                match leave {
+                    // The last point is at rest: there the arm stands whatever the ramp says.
+                    Some(tes) if self.clock.standing() || self.at_end() || self.crawls() => {
+                        self.clock.rest();
+                        self.set_tes(tes);
+                    }
+                    Some(_) => {}
+                    None => self.finish_at_end(),
+                }
+            }
+        }
+    }
+
+    /// Set values at the present path time.
+    fn follow(&mut self) {
+        let Some(at) = self.store.at(self.clock.time) else { return };
+        if self.clock.ramping() {
+            let bounds = self.motion.slope_bounds(&at, self.clock.rate, self.clock.slope, &self.config);
+            let ramp_ms = f64::from(self.config.ramp_ms);
+            if self.clock.halting() {
+                self.clock.slow_down(ramp_ms, f64::from(self.config.stop_ms), &bounds);
+            } else {
+                self.clock.speed_up(ramp_ms, bounds.easy);
+            }
+        } else {
+            self.clock.slope = 0.0;
+        }
+        self.motion.follow(&at, self.clock.rate, self.clock.slope);
+    }
+
+    /// Positions at the present path time; without a trajectory (which Execute refuses) where the arm is held.
+    fn path_point(&self) -> [f64; JOINTS] {
+        self.store.at(self.clock.time).map_or(self.motion.set.position, |at| at.position)
+    }
+
+    /// The last point was commanded in this tick (J-31).
+    fn at_end(&self) -> bool {
+        self.clock.time >= f64::from(self.store.duration_ms())
+    }
+
+    fn finish_at_end(&mut self) {
+        if self.at_end() {
+            self.set_tes(Tes::Finish);
+        }
+    }
+
+    /// A pause or stop has taken its time, and what is left of the motion is too slow to be one.
+    fn crawls(&self) -> bool {
+        self.braking_ms.is_some_and(|ms| ms >= self.config.stop_ms)
+            && self.motion.moving_joints(&self.nodes, joint_error::TORQUE) == [0; JOINTS]
+    }
+
+    /// One more tick of a pause or stop, until the arm stands. Returns whether it goes on: meanwhile all the torque there is may
+    /// brake. An arm that still moves when its time is over cannot be stopped by torque: an error of the joints that move.
+    pub(crate) fn brake(&mut self) -> bool {
+        let Some(ms) = self.braking_ms else { return false };
+        let moving = self.motion.moving_joints(&self.nodes, joint_error::TORQUE);
+        let still = self.tes != Tes::Execute && moving == [0; JOINTS];
+        let over = ms >= self.config.braking_ms_max;
+        if over {
+            self.errors.raise_joints(&moving);
+        }
+        self.braking_ms = if over || still { None } else { Some(ms + 1) };
+        self.braking_ms.is_some()
+    }
+}

@@ -1,0 +1,95 @@
+//! What the controller reports: the telemetry of the tick and the JtcStatus frame (section 2).
+use jtc_wire::{GripperStatus, JointStatus, RawPoint, Response, Status};
+
+use crate::JOINTS;
+use crate::controller::Controller;
+use crate::nodes::GRIPPER;
+use crate::telemetry::JointTelemetry;
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    pub(crate) fn observe(&mut self, torque: &[f64; JOINTS]) {
+        let (q, v) = (self.nodes.positions(), self.nodes.velocities());
+        let t = &mut self.telemetry;
+        t.tick += 1;
+        (t.state, t.tes, t.errors) = (self.state, self.tes, self.errors.word());
+        // Index of the current 1 ms point.
+        t.point = self.clock.time as u32;
+        t.records_lost = self.records.lost();
+        for (j, out) in t.joints.iter_mut().enumerate() {
+            let (set, parts, report) = (&self.motion.set, &self.motion.torque[j], &self.nodes.node(j).report);
+            *out = JointTelemetry {
+                set_position: set.position[j],
+                set_velocity: set.velocity[j],
+                set_acceleration: set.acceleration[j],
+                position: q[j],
+                velocity: v[j],
+                temperature: f64::from(report.temperature),
+                torque_model: parts.model,
+                torque_p: parts.pid.p,
+                torque_i: parts.pid.i,
+                torque_d: parts.pid.d,
+                torque_friction: parts.friction,
+                torque_other: parts.payload + parts.brake + parts.blend,
+                torque: torque[j],
+                fsm: report.fsm,
+                internal: self.errors.joint(j).0,
+            };
+        }
+    }
+
+    /// A JtcStatus is due: at once for a response, else every period (J-04).
+    pub(crate) fn status_due(&mut self, free: bool) -> bool {
+        self.since_status_ms = self.since_status_ms.saturating_add(1);
+        let due = free && (!self.records.is_empty() || self.since_status_ms >= self.config.status_period_ms);
+        if due {
+            self.since_status_ms = 0;
+        }
+        due
+    }
+
+    pub(crate) fn status(&self, response: Response) -> Status {
+        let (can_current, can_occurred) = self.errors.can();
+        let (q, v) = (self.nodes.positions(), self.nodes.velocities());
+        let joints = core::array::from_fn(|j| {
+            let report = &self.nodes.node(j).report;
+            let (internal, internal_occurred) = self.errors.joint(j);
+            JointStatus {
+                fsm: report.fsm,
+                mc_current: report.mc_current,
+                mc_occurred: report.mc_occurred,
+                errors: report.errors,
+                warnings: report.warnings,
+                internal,
+                internal_occurred,
+                position: q[j] as f32,
+                velocity: v[j] as f32,
+                torque: report.torque as f32,
+                temperature: report.temperature,
+            }
+        });
+        let gripper = &self.nodes.node(GRIPPER).report;
+        Status {
+            response,
+            fsm: self.state as u8,
+            errors: self.errors.word(),
+            occurred: self.errors.occurred(),
+            jtc_init: self.given.missing(),
+            node_init: self.nodes.init_word(&self.config),
+            tes: self.tes as u8,
+            point: self.telemetry.point,
+            friction_type: u8::from(self.friction_is_table),
+            can_error: u8::from(self.errors.can_error()),
+            can_current,
+            can_occurred,
+            joints,
+            gripper: Some(GripperStatus {
+                fsm: gripper.fsm,
+                pump: u8::from(self.nodes.pump),
+                pressure1: u8::from(self.nodes.pressure[0]),
+                pressure2: u8::from(self.nodes.pressure[1]),
+                errors: gripper.errors,
+                warnings: gripper.warnings,
+            }),
+        }
+    }
+}

@@ -102,7 +102,7 @@ impl Lowering {
     /// An arm that the controller knows, with the limit of the default arm, and a Stop.
     pub fn new(model: ArmModel, shoulder: f64, speed: f64) -> Self {
         Self {
-            known: model.clone(),
+            known: model,
             model,
             torque_max: Config::avena().joints[LOADED].torque_max,
             shoulder,
@@ -117,7 +117,7 @@ impl Lowering {
     fn operator(&self, from: JointVec) -> Operator {
         let mut controller = Config::avena();
         controller.joints[LOADED].torque_max = self.torque_max;
-        let parameters = Parameters { model: self.model.clone(), ..Parameters::avena() };
+        let parameters = Parameters { model: self.model, ..Parameters::avena() };
         Operator::new(SimConfig {
             start: from,
             baud: None,

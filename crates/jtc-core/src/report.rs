@@ -14,6 +14,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (t.state, t.tes, t.errors) = (self.state, self.tes, self.errors.word());
         // Index of the current 1 ms point.
         t.point = self.clock.time as u32;
+        t.braking = self.braking_ms.is_some();
         t.records_lost = self.records.lost();
         for (j, out) in t.joints.iter_mut().enumerate() {
             let (set, parts, report) = (&self.motion.set, &self.motion.torque[j], &self.nodes.node(j).report);
@@ -23,6 +24,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 set_acceleration: set.acceleration[j],
                 position: q[j],
                 velocity: v[j],
+                fresh: self.nodes.node(j).fresh(),
                 temperature: f64::from(report.temperature),
                 torque_model: parts.model,
                 torque_p: parts.pid.p,

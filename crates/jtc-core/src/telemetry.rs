@@ -14,6 +14,8 @@ pub struct JointTelemetry {
     pub position: f64,
     /// Measured velocity, rad/s.
     pub velocity: f64,
+    /// Position and velocity were measured for this tick; else they are predicted (J-63).
+    pub fresh: bool,
     /// Bearing temperature, °C.
     pub temperature: f64,
     /// Model torque (inverse dynamics and rotor), N·m.
@@ -54,6 +56,8 @@ pub struct Telemetry {
     pub tes: Tes,
     /// Index of the current 1 ms point.
     pub point: u32,
+    /// A pause or stop brakes with all the torque there is (J-33).
+    pub braking: bool,
     /// Current error word.
     pub errors: u16,
     /// Response records lost since boot because too many waited (J-04).

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use jtc_bus::Frame;
 use jtc_core::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX, Telemetry};
 use jtc_wire::{
-    EVENTS_MAX, EventBatch, FRAME_MAX, FrameStatus, LinkEvent, RawPoint, ReceivedEvent, Receiver, STATUS_LEN,
-    UrgentWatch,
+    EVENTS_MAX, EventBatch, FRAME_MAX, FrameStatus, FrameType, LinkEvent, RawPoint, ReceivedEvent, Receiver,
+    STATUS_LEN, UrgentWatch,
 };
 
 /// The host's line: the world has one.
@@ -26,8 +26,22 @@ const POLLS: usize = 64;
 pub enum Worked {
     /// A good one, by its type byte.
     Frame(u8),
+    /// A good one that executes, pauses or stops, by its command byte.
+    Exec(u8),
     /// Something that was none.
     Bad(FrameStatus),
+}
+
+impl From<&LinkEvent<'_>> for Worked {
+    fn from(event: &LinkEvent<'_>) -> Self {
+        match event {
+            LinkEvent::Frame(frame) => match (frame.frame_type, frame.body()) {
+                (FrameType::TrajSetExecStatus, [command]) => Self::Exec(*command),
+                (frame_type, _) => Self::Frame(frame_type as u8),
+            },
+            LinkEvent::Bad(response) | LinkEvent::Noise(response) => Self::Bad(response.status),
+        }
+    }
 }
 
 /// What a tick needs beside the host link.
@@ -172,10 +186,7 @@ impl Board {
             status_free: pins.status_free,
         });
         self.worked.clear();
-        self.worked.extend(host.iter().take(outputs.host_done).map(|host| match host.event {
-            LinkEvent::Frame(frame) => Worked::Frame(frame.frame_type as u8),
-            LinkEvent::Bad(response) | LinkEvent::Noise(response) => Worked::Bad(response.status),
-        }));
+        self.worked.extend(host.iter().take(outputs.host_done).map(|host| Worked::from(&host.event)));
         self.batch.done(outputs.host_done);
         outputs
     }

@@ -2,8 +2,12 @@
 use core::fmt;
 
 use jtc_bus::{Frame, Request, Target};
-use jtc_core::{JOINTS, State, Telemetry, Tes};
-use jtc_wire::FrameType;
+use jtc_core::{Config, JOINTS, State, Telemetry, Tes};
+use jtc_wire::{ExecCommand, FrameType};
+
+mod motion;
+
+use motion::{MotionWatch, powered};
 
 use crate::board::Worked;
 use crate::world::{Truth, World};
@@ -28,8 +32,8 @@ pub struct Moment<'a> {
     pub worked: &'a [Worked],
     /// Level of its safety output.
     pub safety_output: bool,
-    /// Largest torque per joint, N·m.
-    pub torque_max: [f64; JOINTS],
+    /// Settings of the controller: the limits.
+    pub config: &'a Config,
 }
 
 /// An invariant that was broken.
@@ -105,6 +109,27 @@ pub enum Broken {
         /// Its id.
         id: u16,
     },
+    /// A pause or stop took too long, though no error intervened (J-33).
+    NoStop {
+        /// Ticks since it was commanded.
+        ticks: u32,
+    },
+    /// A joint with torque was too fast for too long (J-35).
+    Speed {
+        /// Joint.
+        joint: usize,
+        /// Measured velocity, rad/s.
+        velocity: f64,
+        /// Consecutive measurements above the limit.
+        ticks: u16,
+    },
+    /// A torque was at its limit too often, though the arm did not brake (J-43).
+    Saturated {
+        /// Joint.
+        joint: usize,
+        /// So many of the last 100 ticks.
+        ticks: u32,
+    },
     /// The safety output is not what the errors say.
     SafetyOutput {
         /// Its level.
@@ -142,6 +167,7 @@ pub struct Invariants {
     cleared: bool,
     execute: bool,
     teach: bool,
+    motion: MotionWatch,
 }
 
 impl Default for Invariants {
@@ -155,6 +181,7 @@ impl Default for Invariants {
             cleared: false,
             execute: false,
             teach: false,
+            motion: MotionWatch::default(),
         }
     }
 }
@@ -190,6 +217,7 @@ impl Invariants {
         self.finite(moment)?;
         self.states(moment)?;
         self.frame(moment)?;
+        self.motion.check(moment, self.tes)?;
         let internal = telemetry.errors & jtc_core::error::INTERNAL != 0;
         if moment.safety_output != (telemetry.state != State::Start && !internal) {
             return Err(Broken::SafetyOutput { level: moment.safety_output, errors: telemetry.errors });
@@ -204,12 +232,12 @@ impl Invariants {
     fn hear(&mut self, moment: &Moment<'_>) {
         const CLEAR_CURRENT: u8 = FrameType::ClearCurrentErrors as u8;
         const CLEAR_OCCURRED: u8 = FrameType::ClearOccurredErrors as u8;
-        const EXECUTE: u8 = FrameType::TrajSetExecStatus as u8;
+        const EXECUTE: u8 = ExecCommand::Execute as u8;
         const TEACH: u8 = FrameType::TeachingModeEnable as u8;
         for worked in moment.worked {
             match *worked {
                 Worked::Frame(CLEAR_CURRENT | CLEAR_OCCURRED) => self.cleared = true,
-                Worked::Frame(EXECUTE) => self.execute = true,
+                Worked::Exec(EXECUTE) => self.execute = true,
                 Worked::Frame(TEACH) => self.teach = true,
                 _ => {}
             }
@@ -291,12 +319,12 @@ impl Invariants {
             return self.targets(state, &request);
         };
         self.since_other = self.since_other.saturating_add(1);
-        let powered = matches!(state, State::HoldPos | State::Operate | State::Teaching);
+        let powered = powered(state);
         for joint in 0..JOINTS {
             if torque[joint] != 0.0 && !powered {
                 return Err(Broken::Torque { state, joint, torque: torque[joint] });
             }
-            let limit = moment.torque_max[joint];
+            let limit = moment.config.joints[joint].torque_max;
             // A step of the bus' grid may round up.
             if torque[joint].abs() > limit + 0.02 {
                 return Err(Broken::TorqueLimit { joint, torque: torque[joint], limit });
@@ -307,7 +335,7 @@ impl Invariants {
 
     fn targets(&self, state: State, request: &Request) -> Result<(), Broken> {
         let Request::ChangeFsm { target } = request else { return Ok(()) };
-        let powered = matches!(state, State::HoldPos | State::Operate | State::Teaching);
+        let powered = powered(state);
         match target.iter().position(|&t| t == Target::Enable) {
             Some(node) if !powered => Err(Broken::Enabled { state, node }),
             _ => Ok(()),

@@ -26,6 +26,7 @@ impl Script {
     fn tick(&mut self, state: State, tes: Tes) -> Option<Broken> {
         self.telemetry.tick += 1;
         (self.telemetry.state, self.telemetry.tes) = (state, tes);
+        let config = Config::avena();
         let frame = self.request.emit();
         let worked = std::mem::take(&mut self.worked);
         let moment = Moment {
@@ -36,9 +37,13 @@ impl Script {
             sent: Some(&frame),
             worked: &worked,
             safety_output: self.safety_output && state != State::Start,
-            torque_max: [80.0; JOINTS],
+            config: &config,
         };
         self.checker.check_moment(&moment).err().map(|violation| violation.broken)
+    }
+
+    fn exec(&mut self, command: ExecCommand) {
+        self.worked.push(Worked::Exec(command as u8));
     }
 
     fn command(&mut self, frame_type: FrameType) {
@@ -60,7 +65,7 @@ fn j21_torque_outside_the_powered_states_is_found() {
         (State::Error, false),
     ] {
         let mut script = Script::new();
-        script.command(FrameType::TrajSetExecStatus);
+        script.exec(ExecCommand::Execute);
         let tes = if state == State::Operate { Tes::Execute } else { Tes::Null };
         if state == State::Teaching {
             script.command(FrameType::TeachingModeEnable);
@@ -93,7 +98,7 @@ fn j24_leaving_error_or_moving_without_a_command_is_found() {
 
     // A command from before the error permits nothing after it.
     let mut script = Script::new();
-    script.command(FrameType::TrajSetExecStatus);
+    script.exec(ExecCommand::Execute);
     assert_eq!(script.tick(State::HoldPos, Tes::Stop), None);
     assert_eq!(script.tick(State::Error, Tes::Null), None);
     script.command(FrameType::ClearCurrentErrors);
@@ -105,7 +110,7 @@ fn j24_leaving_error_or_moving_without_a_command_is_found() {
 #[test]
 fn j31_an_index_that_goes_back_is_found() {
     let mut script = Script::new();
-    script.command(FrameType::TrajSetExecStatus);
+    script.exec(ExecCommand::Execute);
     for point in [1, 2, 3] {
         script.telemetry.point = point;
         assert_eq!(script.tick(State::Operate, Tes::Execute), None);
@@ -158,4 +163,95 @@ fn j22_a_wrong_safety_output_is_found() {
     let mut script = Script::new();
     script.safety_output = false;
     assert!(matches!(script.tick(State::HoldPos, Tes::Null), Some(Broken::SafetyOutput { .. })));
+}
+
+/// A joint on the path, at this speed; Stop is executed in the next tick.
+fn stopped_at(speed: f64) -> Script {
+    let mut script = Script::new();
+    script.exec(ExecCommand::Execute);
+    script.truth.qd[2] = speed;
+    assert_eq!(script.tick(State::Operate, Tes::Execute), None);
+    script.exec(ExecCommand::Stop);
+    script
+}
+
+#[test]
+fn j33_a_stop_that_takes_too_long_is_found() {
+    // Set values that do not come to their end, and an arm that does not follow them.
+    for (state, tes) in [(State::Operate, Tes::Execute), (State::HoldPos, Tes::Stop)] {
+        let mut script = stopped_at(0.3);
+        let found = (0..600).find_map(|ms| script.tick(state, tes).map(|broken| (ms, broken)));
+        assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{tes:?}");
+    }
+    // One that was given before it could be executed begins when the arm brakes.
+    let mut script = stopped_at(0.3);
+    script.worked.clear();
+    script.telemetry.braking = true;
+    assert!((0..600).any(|_| script.tick(State::Operate, Tes::Execute).is_some()));
+}
+
+#[test]
+fn j33_a_stop_that_ends_is_none_and_an_error_ends_it() {
+    let mut script = stopped_at(0.3);
+    assert!((0..500).all(|_| script.tick(State::Operate, Tes::Execute).is_none()));
+    script.truth.qd[2] = 0.0;
+    assert_eq!(script.tick(State::HoldPos, Tes::Stop), None);
+    script.truth.qd[2] = 0.3;
+    assert!((0..600).all(|_| script.tick(State::HoldPos, Tes::Stop).is_none()), "pushed, later");
+
+    let mut script = stopped_at(0.3);
+    assert!((0..600).all(|_| script.tick(State::Error, Tes::Null).is_none()));
+    // Without a command it may move for as long as it likes.
+    let mut script = stopped_at(0.3);
+    script.worked.clear();
+    assert!((0..600).all(|_| script.tick(State::Operate, Tes::Execute).is_none()));
+}
+
+#[test]
+fn j35_a_joint_that_races_is_found() {
+    let limit = 1.2 * Config::avena().joints[3].velocity_max;
+    let fast = || {
+        let mut script = Script::new();
+        let joint = &mut script.telemetry.joints[3];
+        (joint.fsm, joint.fresh, joint.velocity) = (jtc_bus::fsm::ENABLED, true, -1.01 * limit);
+        script
+    };
+    let mut script = fast();
+    let found = (1..=10).find_map(|ms| script.tick(State::HoldPos, Tes::Null).map(|broken| (ms, broken)));
+    assert_eq!(found, Some((6, Broken::Speed { joint: 3, velocity: -1.01 * limit, ticks: 6 })));
+    // Predicted ones do not count, and do not end it.
+    let mut script = fast();
+    assert!((0..5).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()));
+    script.telemetry.joints[3].fresh = false;
+    assert!((0..4).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()));
+    script.telemetry.joints[3].fresh = true;
+    assert!(script.tick(State::HoldPos, Tes::Null).is_some());
+    // Without torque, or slower, it is none.
+    let mut script = fast();
+    assert!((0..10).all(|_| script.tick(State::Error, Tes::Null).is_none()));
+    let mut script = fast();
+    script.telemetry.joints[3].velocity = 0.99 * limit;
+    assert!((0..10).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()));
+}
+
+#[test]
+fn j43_torque_that_stays_at_its_limit_is_found() {
+    let limit = Config::avena().joints[0].torque_max;
+    // One tick of nine, and one of ten.
+    for (period, allowed) in [(9, false), (10, true)] {
+        let mut script = Script::new();
+        let mut good = true;
+        for ms in 0..400 {
+            script.telemetry.joints[0].torque = if ms % period == 0 { -limit } else { 0.0 };
+            good &= script.tick(State::HoldPos, Tes::Null).is_none();
+        }
+        assert_eq!(good, allowed, "one tick of {period}");
+    }
+    let mut script = Script::new();
+    script.telemetry.joints[0].torque = limit;
+    script.telemetry.braking = true;
+    assert!((0..400).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()), "braking");
+    script.telemetry.braking = false;
+    let found = (1..=20).find_map(|ms| script.tick(State::HoldPos, Tes::Null).map(|broken| (ms, broken)));
+    assert_eq!(found, Some((11, Broken::Saturated { joint: 0, ticks: 11 })));
 }

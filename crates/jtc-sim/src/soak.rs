@@ -1,6 +1,7 @@
 //! Hours of virtual time with random commands and faults, every millisecond checked: the soak run.
 use jtc_core::{JOINTS, State, Tes};
-use jtc_wire::{ExecCommand, FrameType};
+use jtc_dynamics::JointVec;
+use jtc_wire::{ExecCommand, FrameType, RawPoint};
 
 use crate::config::{SimConfig, Support};
 use crate::drive::DriveConfig;
@@ -8,6 +9,17 @@ use crate::faults::{Fault, FaultKind, Trigger};
 use crate::host::{self, Listener};
 use crate::invariants::{Invariants, Violation};
 use crate::world::{Statistics, World};
+
+/// Step time of the paths, ms.
+pub const PATH_STEP_MS: u16 = 10;
+
+/// A path of the soak run: from `from` (rad) to somewhere near and back, drawn from the seed. All of them pass the check of the
+/// host (`jtc traj check`), so that a stop on them must come to its end in time.
+pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let to = from.map(|q| (q + 1.2 * (rng.f64() - 0.5)).clamp(-1.4, 1.4));
+    host::there_and_back(from, &to, 1.0 + 2.0 * rng.f64(), 1, PATH_STEP_MS)
+}
 
 /// What a soak run saw.
 #[derive(Clone, Debug, Default)]
@@ -193,9 +205,7 @@ impl Soak {
     /// From where the arm is to somewhere near and back, in one go.
     fn motion(&mut self) -> Vec<u8> {
         let from = self.world.telemetry().joints.map(|j| j.position);
-        let to = from.map(|q| (q + 1.2 * (self.rng.f64() - 0.5)).clamp(-1.4, 1.4));
-        let points = host::there_and_back(&from, &to, 1.0 + 2.0 * self.rng.f64(), 1, 10);
-        host::trajectory(&points, 10, 113).concat()
+        host::trajectory(&path(&from, self.rng.u64(..)), PATH_STEP_MS, 113).concat()
     }
 
     fn anything(&mut self) -> Vec<u8> {

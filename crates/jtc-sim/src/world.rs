@@ -1,6 +1,7 @@
 //! The whole world, one millisecond at a time: host line, controller, joint bus, drives, arm.
 use jtc_bus::{Frame, JOINTS, NODES, Scale, fsm};
 use jtc_core::{BusState, State};
+use jtc_wire::FrameType;
 
 use crate::board::{Board, Pins, Worked};
 use crate::bus::{Bus, BusFault};
@@ -217,7 +218,9 @@ impl World {
         let now = self.now_us();
         for worked in &self.board.worked {
             match *worked {
-                Worked::Frame(frame_type) => {
+                Worked::Frame(_) | Worked::Exec(_) => {
+                    let exec = FrameType::TrajSetExecStatus as u8;
+                    let frame_type = if let Worked::Frame(other) = *worked { other } else { exec };
                     self.good_frames += 1;
                     self.log.push(now, Event::Frame { frame_type });
                 }

@@ -138,7 +138,7 @@ impl Rig {
             sent: flight.sent.as_ref(),
             worked: &shadow.worked,
             safety_output: level,
-            torque_max: shadow.config().joints.map(|joint| joint.torque_max),
+            config: shadow.config(),
         });
         if let Err(violation) = checked {
             panic!("{violation}");

@@ -60,10 +60,7 @@ impl Shadow {
         });
         self.worked.clear();
         for (event, received) in flight.events.iter().zip(&host).take(outputs.host_done) {
-            self.worked.push(match received.event {
-                LinkEvent::Frame(frame) => Worked::Frame(frame.frame_type as u8),
-                LinkEvent::Bad(response) | LinkEvent::Noise(response) => Worked::Bad(response.status),
-            });
+            self.worked.push(Worked::from(&received.event));
             if event.kind == 1 {
                 hosts[received.line].done(event);
             }

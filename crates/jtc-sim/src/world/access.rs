@@ -191,7 +191,7 @@ impl World {
             sent: self.sent.as_ref(),
             worked: &self.board.worked,
             safety_output: self.safety_output,
-            torque_max: self.config.controller.joints.map(|joint| joint.torque_max),
+            config: &self.config.controller,
         }
     }
 

@@ -1,0 +1,98 @@
+//! How the arm moves: a stop comes to its end, no joint races, and no torque stays at its limit.
+use jtc_bus::fsm;
+use jtc_core::{JOINTS, State, Tes};
+use jtc_wire::ExecCommand;
+
+use super::{Broken, Moment};
+use crate::board::Worked;
+
+/// Ticks from a pause or stop until the arm stands: the time of J-33, and some in which what was commanded comes to rest.
+const REST_MS: u32 = 20;
+/// Speed below which a joint stands, rad/s.
+const STANDS: f64 = 0.02;
+/// Ticks in which torques at their limit are counted.
+const WINDOW: u32 = 100;
+
+/// What it needs from one millisecond to the next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct MotionWatch {
+    /// Ticks since a pause or stop was commanded on the path, until the arm stands.
+    stopping: Option<u32>,
+    /// Per joint: consecutive measurements above the limit.
+    fast: [u16; JOINTS],
+    /// Per joint: in which of the last ticks the torque was at its limit; the last is bit 0.
+    saturated: [u128; JOINTS],
+}
+
+impl MotionWatch {
+    /// Look at a tick before which the execution state was `before`.
+    pub fn check(&mut self, moment: &Moment<'_>, before: Tes) -> Result<(), Broken> {
+        self.stop(moment, before)?;
+        self.speed(moment)?;
+        self.torque(moment)
+    }
+
+    /// J-33: the arm stands in time, unless an error takes the torque away.
+    fn stop(&mut self, moment: &Moment<'_>, before: Tes) -> Result<(), Broken> {
+        let t = moment.telemetry;
+        let ends = |worked: &Worked| {
+            let pause = Worked::Exec(ExecCommand::Pause as u8);
+            *worked == pause || *worked == Worked::Exec(ExecCommand::Stop as u8)
+        };
+        let commanded = before == Tes::Execute && (t.braking || moment.worked.iter().any(ends));
+        let executes_again = before != Tes::Execute && t.tes == Tes::Execute;
+        let powered = matches!(t.state, State::HoldPos | State::Operate);
+        let stands = t.tes != Tes::Execute && moment.truth.qd.iter().all(|v| v.abs() < STANDS);
+        self.stopping = match self.stopping {
+            _ if !powered || stands || executes_again => None,
+            None => commanded.then_some(0),
+            Some(ticks) => Some(ticks + 1),
+        };
+        match self.stopping {
+            Some(ticks) if ticks > u32::from(moment.config.stop_ms) + REST_MS => {
+                Err(Broken::NoStop { ticks })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// J-35. Predicted velocities neither add to the time nor end it.
+    fn speed(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
+        let config = moment.config;
+        for (joint, t) in moment.telemetry.joints.iter().enumerate() {
+            let powered = powered(moment.telemetry.state) && t.fsm == fsm::ENABLED;
+            let within = t.velocity.abs() <= config.overspeed_factor * config.joints[joint].velocity_max;
+            let ticks = self.fast[joint];
+            self.fast[joint] = match (powered, t.fresh) {
+                (false, _) => 0,
+                (true, false) => ticks,
+                (true, true) if within => 0,
+                (true, true) => ticks + 1,
+            };
+            if self.fast[joint] > config.overspeed_ms {
+                return Err(Broken::Speed { joint, velocity: t.velocity, ticks: self.fast[joint] });
+            }
+        }
+        Ok(())
+    }
+
+    /// J-43.
+    fn torque(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
+        let t = moment.telemetry;
+        for joint in 0..JOINTS {
+            let full = t.joints[joint].torque.abs() >= moment.config.joints[joint].torque_max;
+            let counted = full && powered(t.state) && !t.braking;
+            self.saturated[joint] = self.saturated[joint] << 1 | u128::from(counted);
+            let ticks = (self.saturated[joint] << (u128::BITS - WINDOW)).count_ones();
+            if ticks > u32::from(moment.config.torque_over_ms) {
+                return Err(Broken::Saturated { joint, ticks });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The state commands torque.
+pub(super) fn powered(state: State) -> bool {
+    matches!(state, State::HoldPos | State::Operate | State::Teaching)
+}

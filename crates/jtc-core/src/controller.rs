@@ -31,6 +31,11 @@ impl Given {
         self.0 |= bit;
     }
 
+    /// It has to be given again.
+    pub fn take_back(&mut self, bit: u8) {
+        self.0 &= !bit;
+    }
+
     /// The byte of the status: 1 = missing.
     pub fn missing(self) -> u8 {
         !self.0 & (Self::FRICTION | Self::PID | Self::MODEL)
@@ -99,7 +104,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             friction_is_new: false,
             tes: Tes::Null,
             clock: PathClock::default(),
-            path: Path::Waiting,
+            path: Path::BEGIN,
             braking_ms: None,
             motion: Motion::default(),
             work: Work::Begin,
@@ -235,6 +240,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let initialised = self.given.missing() == 0
             && !self.nodes.clearing()
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
+        if initialised && !self.powered() && !self.holdable(&self.dynamics) {
+            // Sent before the positions were known: it is asked for again.
+            self.given.take_back(Given::MODEL);
+            return self.enter(if self.errors.any() { State::Error } else { State::Init });
+        }
         let next = if self.errors.any() || (self.state == State::Error && self.nodes.clearing()) {
             State::Error
         } else if !initialised {
@@ -259,11 +269,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.store.clear();
             self.set_tes(Tes::Null);
         }
+        if !matches!(next, State::HoldPos | State::Operate) {
+            self.braking_ms = None;
+        }
         match next {
             State::Error | State::Init | State::Start => {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
-                self.braking_ms = None;
                 // A pump that does not run on is off until it is commanded again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
@@ -299,8 +311,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     #[inline(never)]
     fn operate(&mut self) -> [f64; JOINTS] {
         self.motion.latch(&self.nodes, &self.config);
+        let law = self.path.law();
         self.walk();
-        self.control(Law::Follow)
+        self.control(law)
     }
 
     /// The control law; returns the torque to command. Errors of the joints are acted upon, or raised.

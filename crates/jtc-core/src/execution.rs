@@ -2,20 +2,42 @@
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
 use crate::controller::Controller;
+use crate::motion::Law;
 use crate::path::PathClock;
 use crate::{JOINTS, Tes, joint_error};
 
 /// Where in Operate the controller is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Path {
-    /// Waits until every joint is enabled.
-    Waiting,
+    /// Waits until every joint is enabled, and for how long it has, ms.
+    Waiting { elapsed_ms: u32 },
     /// On the way from where the arm is held to the first point, or to the one where the path was paused.
     Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<Tes> },
     /// At point 0, which the next tick commands.
     AtStart,
     /// On the path; `leave` says where to when it stands.
     Running { leave: Option<Tes> },
+}
+
+impl Path {
+    /// Nothing was waited for yet.
+    pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
+
+    /// The part of the control law that acts here.
+    pub fn law(&self) -> Law {
+        match self {
+            Self::Waiting { .. } | Self::Gliding { .. } => Law::Approach,
+            Self::AtStart | Self::Running { .. } => Law::Follow,
+        }
+    }
+
+    /// The state that an accepted Pause or Stop leads to.
+    pub fn leave(&self) -> Option<Tes> {
+        match self {
+            Self::Gliding { leave, .. } | Self::Running { leave } => *leave,
+            Self::Waiting { .. } | Self::AtStart => None,
+        }
+    }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
@@ -26,7 +48,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Err(DataStatus::StartPositionMismatch);
         }
         self.clock = PathClock::default();
-        self.path = Path::Waiting;
+        self.path = Path::BEGIN;
         self.braking_ms = None;
         self.motion.stand_firm();
         self.set_tes(Tes::Execute);
@@ -45,6 +67,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !self.near(&paused) {
             return Err(DataStatus::StartPositionMismatch);
         }
+        if self.motion.yielding() && !self.motion.all_holding() {
+            // It still comes to rest.
+            return Err(DataStatus::NotAllowed);
+        }
         self.braking_ms = None;
         if self.motion.yielding() {
             // It is held somewhere beside the path; its way back begins where it is.
@@ -52,7 +78,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.motion.stand_firm();
         }
         self.path = if self.clock.time == 0.0 {
-            Path::Waiting
+            Path::BEGIN
         } else if self.motion.set.position == paused {
             self.go_on();
             Path::Running { leave: None }
@@ -82,23 +108,27 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             // It comes to rest at point 0 by itself.
             Path::Gliding { leave, .. } => *leave = Some(to),
-            Path::Waiting | Path::AtStart => self.set_tes(to),
+            Path::Waiting { .. } | Path::AtStart => self.set_tes(to),
         }
     }
 
     /// Set values of Operate.
     pub(crate) fn walk(&mut self) {
         match self.path {
-            Path::Waiting => {
+            Path::Waiting { elapsed_ms } => {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
                 self.motion.hold(&self.config);
-                if self.motion.all_holding() {
-                    if self.near(&self.path_point()) {
-                        self.path =
-                            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
-                    } else {
+                if !self.motion.all_holding() {
+                    // It does not wait for ever: nobody expects a motion then (J-16).
+                    self.path = Path::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
+                    if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_tes(Tes::Stop);
                     }
+                } else if self.near(&self.path_point()) {
+                    self.path =
+                        Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
+                } else {
+                    self.set_tes(Tes::Stop);
                 }
             }
             Path::Gliding { from, elapsed_ms, leave } => {
@@ -178,13 +208,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// One more tick of a pause or stop, until the arm stands. Returns whether it goes on: meanwhile all the torque there is may
-    /// brake. An arm that still moves when its time is over cannot be stopped by torque: an error of the joints that move.
+    /// brake. Path time that still runs when its time is over cannot be stopped by torque: an error of the joints that move. An
+    /// arm that is held by then and moved by something else is a matter of the ordinary limits.
     pub(crate) fn brake(&mut self) -> bool {
         let Some(ms) = self.braking_ms else { return false };
         let moving = self.motion.moving_joints(&self.nodes, joint_error::TORQUE);
         let still = self.tes != Tes::Execute && moving == [0; JOINTS];
         let over = ms >= self.config.braking_ms_max;
-        if over {
+        if over && self.tes == Tes::Execute {
             self.errors.raise_joints(&moving);
         }
         self.braking_ms = if over || still { None } else { Some(ms + 1) };

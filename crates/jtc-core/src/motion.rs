@@ -27,8 +27,17 @@ pub(crate) enum Law {
     Hold,
     /// Everything, with commanded velocity and acceleration.
     Follow,
+    /// The same on the way to the path. Limits of the path do not bear on it: it begins where the arm was found.
+    Approach,
     /// Gravity and a brake above the speed limit.
     Teach,
+}
+
+impl Law {
+    /// Commanded velocity and acceleration are part of it.
+    fn moves(self) -> bool {
+        matches!(self, Self::Follow | Self::Approach)
+    }
 }
 
 /// Parameters that the law uses.
@@ -323,8 +332,7 @@ impl Motion {
         let v = nodes.velocities();
         // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere.
         let zero = [0.0; JOINTS];
-        let (qd, qdd) =
-            if law == Law::Follow { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
+        let (qd, qdd) = if law.moves() { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
         let model = gains.dynamics.inverse(q, &qd, &qdd);
         let payload =
             if law == Law::Teach { self.payload.torque(gains.dynamics, q, config) } else { [0.0; JOINTS] };
@@ -342,14 +350,19 @@ impl Motion {
                 let saturated = self.saturation[j].saturated;
                 torque.pid = self.pid[j].step(&gains.pid[j], error, saturated, encoder_step);
             }
-            if law == Law::Follow {
+            if law.moves() {
                 let t = celsius(nodes.node(j).report.temperature);
                 torque.friction = match gains.table {
                     None => friction::polynomial(&gains.polynomial[j], qd[j], t, config.friction_sign_width),
-                    Some(tables) => friction::table(&tables[j], qd[j], t).unwrap_or_else(|| {
-                        errors[j] |= joint_error::FRICTION_TABLE;
-                        0.0
-                    }),
+                    Some(tables) => {
+                        let (slowest, fastest) = friction::velocities(&tables[j]);
+                        let nearest = qd[j].max(slowest).min(fastest);
+                        let v = if law == Law::Approach { nearest } else { qd[j] };
+                        friction::table(&tables[j], v, t).unwrap_or_else(|| {
+                            errors[j] |= joint_error::FRICTION_TABLE;
+                            0.0
+                        })
+                    }
                 };
             }
             self.torque[j] = torque;

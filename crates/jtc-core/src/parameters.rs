@@ -105,18 +105,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         model.check().map_err(|_| DataStatus::IncorrectValue)?;
         self.config.parameter_bounds.check_masses(model)?;
         let dynamics = Dynamics::new(model, self.config.gravity);
-        // An arm that could not be held where it is. Before every position is known there is nothing to hold either.
-        if !self.nodes.fallen_back() {
-            let gravity = dynamics.gravity_torque(self.nodes.positions());
-            let held = |(torque, joint): (&f64, &JointConfig)| torque.abs() <= joint.torque_max;
-            if !gravity.iter().zip(&self.config.joints).all(held) {
-                return Err(DataStatus::IncorrectValue);
-            }
+        // Before every position is known it cannot be said; it is asked again when Init ends.
+        if !self.nodes.fallen_back() && !self.holdable(&dynamics) {
+            return Err(DataStatus::IncorrectValue);
         }
         self.dynamics = dynamics;
         self.given.set(Given::MODEL);
         self.motion.change_model();
         Ok(())
+    }
+
+    /// An arm like this can be held where it is, by the torque limits (J-06).
+    pub(crate) fn holdable(&self, dynamics: &Dynamics) -> bool {
+        let gravity = dynamics.gravity_torque(self.nodes.positions());
+        // Written so that NaN is too much.
+        let held = |(torque, joint): (&f64, &JointConfig)| torque.abs() <= joint.torque_max;
+        gravity.iter().zip(&self.config.joints).all(held)
     }
 
     pub(crate) fn take_polynomial(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {

@@ -29,7 +29,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.clock.rest();
         self.braking_ms = None;
         if self.tes == Tes::Execute {
-            self.set_tes(Tes::Pause);
+            // Where a Pause or Stop was on its way, that is what it ends in (J-33).
+            self.set_tes(self.path.leave().unwrap_or(Tes::Pause));
         }
         true
     }

@@ -205,14 +205,25 @@ fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
 }
 
 #[test]
-fn j14_a_silent_node_is_a_receive_timeout_of_that_node() {
-    for node in [0, 3, 6] {
+fn j14_a_silent_joint_is_a_receive_timeout_of_that_node() {
+    for node in [0, 3, 5] {
         let mut rig = Rig::new(BOARDS[0]);
         rig.bring_up(Port::Usart2);
         let (ticks, flags) = ticks_to_error(&mut rig, FaultKind::NodeSilent { node });
         assert!((5..=7).contains(&ticks), "{ticks} ticks");
         assert_eq!(flags, 1 << (8 + node), "{flags:#x}");
     }
+}
+
+#[test]
+fn j14_j23_a_silent_gripper_is_shown_and_takes_nothing_away() {
+    let mut rig = Rig::new(BOARDS[0]);
+    rig.bring_up(Port::Usart2);
+    rig.inject(FaultKind::NodeSilent { node: 6 });
+    rig.run(50);
+    assert_eq!((rig.state(), rig.telemetry().errors), (State::HoldPos, 0));
+    let status = rig.status(Port::Usart2);
+    assert_eq!((status.can_error, status.can_current), (0, 1 << 14));
 }
 
 /// J-15: what is too short for its identifier is ignored, whoever sends it.

@@ -291,6 +291,7 @@ fn j04_a_stop_waits_for_nothing() {
                 rig.step();
             }
             rig.wait("standstill", 500, |rig| rig.telemetry().tes == jtc_core::Tes::Stop);
+            rig.run(1);
             assert_eq!((rig.state(), rig.telemetry().errors), (jtc_core::State::HoldPos, 0));
         }
     }

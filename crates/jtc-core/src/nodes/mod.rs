@@ -244,15 +244,21 @@ impl Nodes {
             let (answered, usable) = (answered & (1 << n) != 0, usable & (1 << n) != 0);
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
             let unanswered = !answered && self.sent_move && on_the_bus && node.boot_left == 0;
+            // Nobody was there to answer, and the bus is not given up yet: the joint is predicted all the same (J-63).
+            let predicted = !on_the_bus
+                && self.sent_move
+                && node.valid
+                && (1..config.missed_moves_max).contains(&self.unacknowledged);
             let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
             if answered {
                 node.silent = 0;
             } else if unanswered {
                 node.silent = more(node.silent);
             }
-            if usable {
+            if usable || self.unacknowledged >= config.missed_moves_max {
+                // Or the transmit timeout stands for all of them.
                 node.missed = 0;
-            } else if answered || unanswered {
+            } else if answered || unanswered || predicted {
                 node.missed = more(node.missed);
             }
             let enabled_gripper = n == GRIPPER && node.report.fsm == fsm::ENABLED;
@@ -261,7 +267,8 @@ impl Nodes {
                 // by its state when it answers again; if it is enabled still, it has held its part meanwhile.
                 node.lose_configuration();
             } else if node.missed == config.missed_moves_max && n < JOINTS {
-                // J-35: it answers, but not with positions that it can have.
+                // J-35: it answers, but not with positions that it can have. Or too few of its Moves were acknowledged to say
+                // whether it would have answered: for longer than this it is not to be predicted (J-63).
                 node.misbehaved = true;
                 node.missed = 0;
                 node.measured.forget();

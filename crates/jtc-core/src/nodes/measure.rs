@@ -4,13 +4,26 @@
 //! without a usable answer takes the *prediction*: the last one, carried on at the rate at which the joint moved, and the
 //! change of the commanded velocity since. The first usable answer after missing ones differs from the prediction by an
 //! *offset*, which fades, so that neither the loss nor the return makes a step of position, nor of the derivative of its error.
+//! The offset has no part in the prediction: what is predicted depends on answers and commands alone, so that the position loop
+//! stays closed however often answers are lost.
 use crate::config::Config;
-use crate::motion::smooth;
 
 /// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
-/// Ticks over which the rate of a joint is taken.
+/// Usable answers that are kept, and milliseconds over which the rate of a joint is taken at least.
 const WINDOW: usize = 5;
+const WINDOW_MS: u32 = 5;
+/// Distance from the prediction, in what is implausible, from which on an answer says nothing of the rate: an encoder that
+/// jumps has not moved the joint.
+const UNEXPECTED: f64 = 0.1;
+/// Most that the rate carried on differs from the reported velocity, rad/s.
+const DISAGREEMENT: f64 = 0.2;
+/// Most that is carried on, in velocity limits.
+const FASTEST: f64 = 1.2;
+/// Double pole of a fading offset times the setting: a fifth is left when that is over, a fiftieth after twice as long.
+const FADING: f64 = 3.0;
+/// What is left of it when it ends, rad or rad/s.
+const FADED: f64 = 1e-9;
 /// Length of a tick, s.
 const DT: f64 = 0.001;
 
@@ -51,15 +64,56 @@ pub(crate) struct Measurement {
     age_ms: u32,
     /// Commanded velocity then, rad/s.
     commanded: f64,
-    /// Rate of the used position then, rad/s.
+    /// Rate of the answered positions then, rad/s.
     rate: f64,
-    /// Used positions of the last ticks, oldest first, rad.
-    history: [f64; WINDOW],
+    /// That rate as far as the reported velocity bears it out, rad/s: what a prediction carries on.
+    carried: f64,
+    /// The last usable answers, newest first.
+    history: [Answered; WINDOW],
     /// An answer has been missing since then.
     missing: bool,
-    /// Prediction less answer at the last return, and how long ago that was.
-    offset: Reading,
-    offset_ms: u32,
+    /// Prediction less answer, as much as has not faded.
+    position_offset: Fading,
+    velocity_offset: Fading,
+}
+
+/// A usable answer.
+#[derive(Clone, Copy, Debug, Default)]
+struct Answered {
+    /// rad.
+    position: f64,
+    /// Milliseconds since then.
+    age_ms: u32,
+    /// It was about where it had been predicted.
+    as_predicted: bool,
+    /// There was such an answer.
+    known: bool,
+}
+
+/// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. It goes on fading
+/// whatever is added to it; where it began anew instead, it would never fade while every other answer is lost.
+#[derive(Clone, Copy, Debug, Default)]
+struct Fading {
+    /// rad or rad/s.
+    left: f64,
+    /// Change in a millisecond.
+    slope: f64,
+}
+
+impl Fading {
+    /// One tick.
+    fn step(&mut self, elapsed_ms: u32, config: &Config) {
+        let ms = f64::from(elapsed_ms);
+        let pole = FADING / f64::from(config.blend_ms.max(1));
+        let x = pole * ms;
+        // 1/eˣ by its series, which is stable however long the tick was.
+        let decay = 1.0 / (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)));
+        let both = self.slope + pole * self.left;
+        (self.left, self.slope) = ((self.left + both * ms) * decay, (self.slope - pole * both * ms) * decay);
+        if self.left.abs() < FADED && self.slope.abs() < FADED {
+            *self = Self::default();
+        }
+    }
 }
 
 impl Measurement {
@@ -83,41 +137,58 @@ impl Measurement {
     pub fn step(&mut self, tick: &Tick, config: &Config) -> bool {
         let change = tick.commanded - self.commanded;
         self.age_ms = self.age_ms.saturating_add(tick.elapsed_ms);
-        self.offset_ms = self.offset_ms.saturating_add(tick.elapsed_ms);
-        self.answer.position += (self.rate + change) * f64::from(tick.elapsed_ms) * DT;
-        let mut left = 1.0 - smooth(f64::from(self.offset_ms) / f64::from(config.blend_ms.max(1)));
+        for answered in &mut self.history {
+            answered.age_ms = answered.age_ms.saturating_add(tick.elapsed_ms);
+        }
+        self.answer.position += (self.carried + change) * f64::from(tick.elapsed_ms) * DT;
+        self.position_offset.step(tick.elapsed_ms, config);
+        self.velocity_offset.step(tick.elapsed_ms, config);
 
         let reach = IMPLAUSIBLE * tick.velocity_max * f64::from(self.age_ms) * DT;
         let usable = tick
             .answer
             .filter(|answer| !self.known || (answer.position - self.answer.position).abs() <= reach);
         if let Some(answer) = usable {
+            let off = self.answer.position - answer.position;
             if !self.known {
-                *self = Self { known: true, history: [answer.position; WINDOW], ..Self::default() };
+                *self = Self { known: true, ..Self::default() };
             } else if self.missing {
-                self.offset = Reading {
-                    position: self.answer.position + self.offset.position * left - answer.position,
-                    velocity: self.answer.velocity + change + self.offset.velocity * left - answer.velocity,
-                };
-                (self.offset_ms, left) = (0, 1.0);
+                self.position_offset.left += off;
+                self.velocity_offset.left += self.answer.velocity + change - answer.velocity;
             }
             self.answer = answer;
             (self.age_ms, self.commanded, self.missing) = (0, tick.commanded, false);
+            self.take_rate(off.abs() <= UNEXPECTED * reach, tick.velocity_max);
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
         }
 
         let change = tick.commanded - self.commanded;
         self.used = Reading {
-            position: self.answer.position + self.offset.position * left,
-            velocity: self.answer.velocity + change + self.offset.velocity * left,
+            position: self.answer.position + self.position_offset.left,
+            velocity: self.answer.velocity + change + self.velocity_offset.left,
         };
-        let [oldest, a, b, c, d] = self.history;
-        self.history = [a, b, c, d, self.used.position];
-        if usable.is_some() {
-            self.rate = (self.used.position - oldest) / (WINDOW as f64 * DT);
-        }
         usable.is_some()
+    }
+
+    /// The rate at an answer, since the youngest one that is old enough. It is of answers alone: a rate that came from
+    /// predictions would carry itself on, whatever the joint does, while every other answer is lost. `as_predicted`: the answer
+    /// was about where the motion so far had led.
+    fn take_rate(&mut self, as_predicted: bool, velocity_max: f64) {
+        let Reading { position, velocity } = self.answer;
+        let (mut rate, mut steady) = (None, as_predicted);
+        for before in self.history.iter().filter(|before| before.known) {
+            if rate.is_none() && before.age_ms >= WINDOW_MS {
+                rate = Some((position - before.position) / (f64::from(before.age_ms) * DT));
+            }
+            steady &= rate.is_some() || before.as_predicted;
+        }
+        self.rate = rate.unwrap_or_default();
+        let [a, b, c, d, _] = self.history;
+        self.history = [Answered { position, age_ms: 0, as_predicted, known: true }, a, b, c, d];
+        let most = FASTEST * velocity_max;
+        let rate = rate.filter(|_| steady).unwrap_or(velocity);
+        self.carried = rate.max(velocity - DISAGREEMENT).min(velocity + DISAGREEMENT).max(-most).min(most);
     }
 }
 
@@ -191,14 +262,23 @@ mod tests {
             joint.step(&tick(None, 0.0), &Config::avena());
         }
         let mut last = joint.used();
-        for k in 0..200 {
+        let mut after_100_ms = last;
+        for k in 0..1000 {
             joint.step(&Tick { commanded: 0.0, ..tick(Some(0.01), 0.5) }, &Config::avena());
             let now = joint.used();
             assert!((now.position - last.position).abs() < 1.6 * 0.01 / 100.0, "{k}: {last:?} {now:?}");
             assert!((now.velocity - last.velocity).abs() < 1.6 * 0.5 / 100.0, "{k}: {last:?} {now:?}");
             last = now;
+            if k == 100 {
+                after_100_ms = now;
+            }
         }
         assert_eq!(last, Reading { position: 0.01, velocity: 0.5 });
+        // Most of it within the setting, 100 ms.
+        assert!(
+            (0.01 - after_100_ms.position).abs() < 0.2 * 0.01
+                && (0.5 - after_100_ms.velocity).abs() < 0.2 * 0.5
+        );
     }
 
     #[test]

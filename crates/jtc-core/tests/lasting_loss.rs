@@ -1,0 +1,190 @@
+//! Answers of one joint that are lost again and again, never so many running that it is an error: the position loop stays
+//! closed, and the arm does what it does with every answer (J-14, J-63).
+mod plant;
+mod rig;
+
+use jtc_core::{Config, Parameters, State, Tes, error};
+use jtc_wire::{ExecCommand, FrameType, RawPoint};
+use plant::{LuGre, Plant, loaded};
+use rig::Rig;
+
+const JOINT: usize = 1;
+
+/// Which answers of the joint are lost.
+#[derive(Clone, Copy, Debug)]
+enum Loss {
+    /// One good answer, then so many lost ones, for ever.
+    Periodic(u32),
+    /// Every second one by chance, at most four running; the seed.
+    Random(u32),
+}
+
+const LOSSES: [Loss; 7] = [
+    Loss::Periodic(1),
+    Loss::Periodic(2),
+    Loss::Periodic(3),
+    Loss::Periodic(4),
+    Loss::Random(12345),
+    Loss::Random(1),
+    Loss::Random(77),
+];
+
+impl Loss {
+    /// The lost ones of the next `ticks` answers.
+    fn pattern(self, ticks: u32) -> Vec<bool> {
+        match self {
+            Self::Periodic(lost) => (0..ticks).map(|k| k % (1 + lost) < lost).collect(),
+            Self::Random(mut x) => {
+                let mut running = 0;
+                (0..ticks)
+                    .map(|_| {
+                        x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                        let lost = (x >> 8) % 100 < 50 && running < 4;
+                        running = if lost { running + 1 } else { 0 };
+                        lost
+                    })
+                    .collect()
+            }
+        }
+    }
+}
+
+fn arm(mass: f64, q: [f64; 6]) -> Plant {
+    let friction = core::array::from_fn(|j| LuGre::avena(j, 1.2));
+    Plant::new(&loaded(Parameters::avena().model, mass), friction, q)
+}
+
+/// A point every 10 ms: 0.2 s up to 0.25 rad/s, 2 s at it, 0.2 s down.
+fn path() -> Vec<RawPoint> {
+    const LAST: i32 = 240;
+    let share = |k: i32| (f64::from(k.min(LAST - k)) / 20.0).clamp(0.0, 1.0);
+    let mut position = 0.0;
+    (0..=LAST)
+        .map(|k| {
+            let mut point = RawPoint::default();
+            point.position[JOINT] = (position / 3.141592 * 32767.0) as i16;
+            point.velocity[JOINT] = (0.25 * share(k) / 6.283185 * 32767.0) as i16;
+            position += 0.25 * 0.5 * (share(k) + share(k + 1)) * 0.01;
+            point
+        })
+        .collect()
+}
+
+/// Largest true error on the path, rad.
+fn on_the_path(lost: &[bool]) -> f64 {
+    let mut arm = arm(0.0, [0.0; 6]);
+    let mut rig = arm.holding(Config::avena());
+    arm.run(&mut rig, 500);
+    rig.upload(&path(), 10);
+    rig.send(FrameType::TrajSetExecStatus, &[3]);
+    let mut worst: f64 = 0.0;
+    for (k, &lost) in lost.iter().enumerate() {
+        rig.nodes[JOINT].silent = lost;
+        arm.tick(&mut rig);
+        assert_ne!(rig.state(), State::Error, "after {k} ms: {:?}", rig.controller.telemetry());
+        worst = worst.max((rig.controller.telemetry().joints[JOINT].set_position - arm.q[JOINT]).abs());
+    }
+    assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Finish), "{:?}", rig.controller.telemetry());
+    worst
+}
+
+/// Held with 1 kg that the model has not, and pushed with 20 N·m for 100 ms: how far it is moved, rad.
+fn pushed(lost: &[bool]) -> f64 {
+    let mut arm = arm(1.0, [0.3, 0.8, -0.9, 0.4, 0.7, 0.2]);
+    let mut rig = arm.holding(Config::avena());
+    arm.run(&mut rig, 2000);
+    let from = arm.q[JOINT];
+    let mut worst: f64 = 0.0;
+    for (k, &lost) in lost.iter().enumerate() {
+        arm.push[JOINT] = if (1000..1100).contains(&k) { 20.0 } else { 0.0 };
+        rig.nodes[JOINT].silent = lost;
+        arm.tick(&mut rig);
+        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0), "after {k} ms");
+        worst = worst.max((arm.q[JOINT] - from).abs());
+    }
+    worst
+}
+
+#[test]
+fn j63_a_path_is_followed_while_answers_are_lost_for_ever() {
+    const TICKS: u32 = 3200;
+    let clean = on_the_path(&vec![false; TICKS as usize]);
+    for loss in LOSSES {
+        let worst = on_the_path(&loss.pattern(TICKS));
+        assert!(worst < 1.5 * clean, "{loss:?}: {worst} rad, without loss {clean} rad");
+    }
+}
+
+#[test]
+fn j63_a_push_is_answered_while_answers_are_lost_for_ever() {
+    const TICKS: u32 = 6000;
+    let clean = pushed(&vec![false; TICKS as usize]);
+    for loss in LOSSES {
+        let worst = pushed(&loss.pattern(TICKS));
+        assert!(worst < 1.5 * clean, "{loss:?}: {worst} rad, without loss {clean} rad");
+    }
+}
+
+/// Milliseconds until a joint that is blocked on the path is seen to be, and how far the position that the
+/// control law used was off till then, rad.
+fn blocked(velocity: f64, lost: &[bool]) -> (usize, f64) {
+    const FROM: usize = 200;
+    let mut rig = Rig::holding();
+    rig.upload(&path(), 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(2000, |r| r.controller.telemetry().point >= 600);
+    let mut off: f64 = 0.0;
+    for (k, &lost) in lost.iter().enumerate() {
+        rig.apart[JOINT] = k >= FROM;
+        rig.nodes[JOINT].report.velocity = if k >= FROM { 0.0 } else { velocity };
+        rig.nodes[JOINT].silent = lost;
+        rig.tick();
+        if rig.tes() != Tes::Execute {
+            return (k - FROM, off);
+        }
+        let used = rig.controller.telemetry().joints[JOINT].position;
+        off = off.max((used - rig.nodes[JOINT].report.position).abs());
+    }
+    panic!("the block is not seen: {:?}", rig.controller.telemetry());
+}
+
+#[test]
+fn j66_a_blocked_joint_is_seen_as_early_while_answers_are_lost_for_ever() {
+    const TICKS: u32 = 1700;
+    let (clean, _) = blocked(0.25, &vec![false; TICKS as usize]);
+    for loss in LOSSES {
+        let (ms, off) = blocked(0.25, &loss.pattern(TICKS));
+        assert!(ms <= clean + 5, "{loss:?}: {ms} ms, without loss {clean} ms");
+        assert!(off < 2e-3, "{loss:?}: {off} rad");
+    }
+}
+
+/// Acknowledges missing in four of five ticks are no transmit timeout. A joint that is dead meanwhile is not predicted for
+/// longer than otherwise.
+#[test]
+fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
+    for start in 0..5 {
+        for dead in [false, true] {
+            let mut rig = Rig::holding();
+            rig.run(3);
+            let mut seen = None;
+            for tick in 0..100 {
+                rig.acknowledged = (tick + start) % 5 == 4;
+                rig.nodes[JOINT].silent = dead;
+                rig.tick();
+                if rig.errors() != 0 {
+                    seen = Some(tick);
+                    break;
+                }
+            }
+            if dead {
+                // One tick on the bus, then five Moves.
+                assert_eq!(seen, Some(5), "{start}");
+                assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+                assert_eq!(rig.torque, [0.0; 6]);
+            } else {
+                assert_eq!(seen, None, "{start}");
+            }
+        }
+    }
+}

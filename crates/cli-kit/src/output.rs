@@ -1,10 +1,14 @@
 //! Where words go: results to stdout as text or JSON, progress and logs to stderr.
 
 use std::io::{IsTerminal, Write};
+use std::sync::OnceLock;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use serde_json::json;
+
+/// Why the first result that was lost could not be printed. A command goes on without its output; its exit code says so in the end.
+static LOST: OnceLock<String> = OnceLock::new();
 
 /// How a command speaks.
 #[derive(Clone, Copy, Debug)]
@@ -38,9 +42,18 @@ impl Output {
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
         let line = self.words(value, text);
         let mut stdout = std::io::stdout().lock();
+        let done = writeln!(stdout, "{}", line.trim_end()).and_then(|()| stdout.flush());
         // A reader that has gone (`… | head`) is no error.
-        let _ = writeln!(stdout, "{}", line.trim_end());
-        let _ = stdout.flush();
+        if let Err(e) = done
+            && e.kind() != std::io::ErrorKind::BrokenPipe
+        {
+            let _ = LOST.set(e.to_string());
+        }
+    }
+
+    /// Why a result could not be printed, where that was so: the command did its work, and nobody can read of it.
+    pub fn lost() -> Option<&'static str> {
+        LOST.get().map(String::as_str)
     }
 
     /// One line of a log. A terminal that has gone is no reason to leave a machine alone: what cannot be printed is dropped.

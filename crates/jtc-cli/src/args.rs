@@ -118,8 +118,10 @@ pub enum Command {
     Gripper(GripperArgs),
     /// The whole way back to HoldPos, saying each step and whose numbers it uses; resumes no motion
     #[command(
-        after_help = "A controller that has friction, gains and arm model keeps them. One that has not is given all three, those of\n\
-                            --arm FILE or, with --defaults, of the arm that is built into it; without either it is refused.\n\nExamples:\n  \
+        after_help = "--arm FILE gives friction, gains and arm model of that file to a controller that does not hold the arm, also\n\
+                            in place of others that it was given before; where the arm is held, those given before stay, and it is said.\n\
+                            --defaults gives those of the arm that is built into the controller, only where some are missing. Without\n\
+                            either, a controller that has all three keeps them, and one that has not is refused.\n\nExamples:\n  \
                             jtc recover\n  jtc recover --arm my-arm.toml\n  jtc recover --defaults"
     )]
     Recover(RecoverArgs),
@@ -271,6 +273,18 @@ pub struct CheckArgs {
     /// Run slower, in percent of the trajectory's own speed
     #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
     pub speed: f64,
+}
+
+impl Command {
+    /// It moves the arm, or records a person moving it: its result cannot be had again.
+    pub fn moves(&self) -> bool {
+        matches!(
+            self,
+            Command::Demo(_)
+                | Command::Traj(TrajCommand::Run(_))
+                | Command::Teach(TeachCommand::Record { .. })
+        )
+    }
 }
 
 /// `jtc traj …`

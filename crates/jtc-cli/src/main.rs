@@ -24,8 +24,16 @@ fn main() -> ExitCode {
     // clap itself ends wrong usage with exit code 2.
     let cli = Cli::parse();
     let out = Output::new("jtc", cli.json);
+    let moves = cli.command.moves();
     match commands::run(cli.command, &out) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => match Output::lost() {
+            None => ExitCode::SUCCESS,
+            Some(why) => {
+                let exit = if moves { failure::FAULT } else { failure::USAGE };
+                out.note(format_args!("jtc: the result could not be printed: {why}"));
+                ExitCode::from(exit)
+            }
+        },
         Err(failure) => {
             if !failure.printed {
                 out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);

@@ -236,3 +236,13 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
         assert!((rms(a) - rms(b)).abs() < 1e-6);
     }
 }
+
+/// A result that went nowhere is no success; a reader that has gone is.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_result_that_cannot_be_printed_is_an_error() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let done = common::command().args(["--json", "ports"]).stdout(full).output().unwrap();
+    assert_eq!(done.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&done.stderr).contains("No space left"));
+}

@@ -72,8 +72,21 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         out.note(step);
         steps.push(step.to_string());
     });
-    let s = done?;
+    let s = done.map_err(not_itself)?;
     let value = json!({ "steps": steps, "differences": differences, "status": status::as_json(&s) });
     out.result(&value, || format!("state {}: ready", words::state(s.fsm)));
     Ok(())
+}
+
+/// A recovery that failed is not mended by the same command: what keeps the error is to be looked at.
+fn not_itself(e: jtc_host::Error) -> Failure {
+    let failure = Failure::of(&e);
+    // Without numbers for the arm it is the same command with an option that helps.
+    if matches!(e, jtc_host::Error::NoParameters { .. }) || !failure.hint.contains("jtc recover") {
+        return failure;
+    }
+    failure.hint(
+        "what causes the error is still there: release the emergency stop, look at power, cable and drive of what is named, then \
+         `jtc doctor`; `jtc explain CODE` tells about each error",
+    )
 }

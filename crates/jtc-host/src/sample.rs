@@ -135,6 +135,13 @@ impl From<&Telemetry> for Sample {
     }
 }
 
+/// The numbers of joint `j` (from 0) in a status are measured ones. The controller reports zero for a joint that it does not know:
+/// silent, or not ready.
+pub fn is_measured(status: &Status, j: usize) -> bool {
+    let unknown = (status.can_current >> (8 + j) | u32::from(status.node_init) >> j) & 1 == 1;
+    !unknown || status.joints.get(j).is_some_and(|s| s.position != 0.0 || s.velocity != 0.0)
+}
+
 impl Sample {
     /// What a status says, received at `time_s`. Commanded values and the torque split are unknown.
     pub fn from_status(time_s: f64, status: &Status) -> Self {
@@ -156,10 +163,7 @@ impl Sample {
                     internal: s.internal,
                     ..JointSample::UNKNOWN
                 };
-                // The controller reports zero for a joint that it does not know: silent, or not ready.
-                let unknown = (status.can_current >> (8 + j) | u32::from(status.node_init) >> j) & 1 == 1;
-                let lost = unknown && s.position == 0.0 && s.velocity == 0.0;
-                if lost { sample.not_measured() } else { sample }
+                if is_measured(status, j) { sample } else { sample.not_measured() }
             }),
         }
     }

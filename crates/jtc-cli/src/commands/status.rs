@@ -1,6 +1,7 @@
 //! `jtc status`, and a status as text and as JSON for all commands that show one.
 
 use cli_kit::{Output, table};
+use jtc_host::sample::is_measured;
 use jtc_host::words;
 use jtc_wire::Status;
 use serde_json::{Value, json};
@@ -22,14 +23,15 @@ pub fn as_json(s: &Status) -> Value {
         .iter()
         .enumerate()
         .map(|(i, j)| {
+            let measured = is_measured(s, i);
             json!({
                 "joint": i + 1,
-                "state": words::node_state(j.fsm),
+                "state": joint_state(s, i),
                 "fsm": j.fsm,
-                "position_rad": j.position,
-                "velocity_rad_s": j.velocity,
-                "torque_nm": j.torque,
-                "temperature_c": j.temperature,
+                "position_rad": measured.then_some(j.position),
+                "velocity_rad_s": measured.then_some(j.velocity),
+                "torque_nm": measured.then_some(j.torque),
+                "temperature_c": measured.then_some(j.temperature),
                 "internal_errors": words::joint_errors(j.internal),
                 "internal_errors_occurred": words::joint_errors(j.internal_occurred),
                 "node_errors": words::node_errors(j.errors),
@@ -72,6 +74,14 @@ pub fn as_json(s: &Status) -> Value {
     })
 }
 
+/// State of joint `j` (from 0): what it said last, unless it says nothing any more.
+fn joint_state(s: &Status, j: usize) -> &'static str {
+    let fsm = s.joints[j].fsm;
+    // A joint that is not ready may answer; one that is enabled and not measured does not.
+    let silent = !is_measured(s, j) && (s.can_current >> (8 + j) & 1 == 1 || fsm == 3);
+    if silent { "does not answer" } else { words::node_state(fsm) }
+}
+
 /// A status as text.
 pub fn as_text(s: &Status) -> String {
     let mut text = format!(
@@ -87,13 +97,14 @@ pub fn as_text(s: &Status) -> String {
         .iter()
         .enumerate()
         .map(|(i, j)| {
+            let figure = |text: String| if is_measured(s, i) { text } else { "-".into() };
             vec![
                 format!("joint {}", i + 1),
-                words::node_state(j.fsm).into(),
-                format!("{:.4}", j.position),
-                format!("{:.4}", j.velocity),
-                format!("{:.2}", j.torque),
-                j.temperature.to_string(),
+                joint_state(s, i).into(),
+                figure(format!("{:.4}", j.position)),
+                figure(format!("{:.4}", j.velocity)),
+                figure(format!("{:.2}", j.torque)),
+                figure(j.temperature.to_string()),
             ]
         })
         .collect();
@@ -116,4 +127,26 @@ pub fn as_text(s: &Status) -> String {
     }
     text += &format!("next: {}\n", words::next_step(s).replace('`', ""));
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_that_does_not_answer_is_at_no_position() {
+        let mut s = Status { fsm: 5, errors: 0x20, can_current: 1 << 10, ..Status::default() };
+        for joint in &mut s.joints {
+            joint.fsm = 3;
+        }
+        s.joints[1].position = 0.5;
+        let json = as_json(&s);
+        assert_eq!(json["joints"][2]["state"], "does not answer");
+        assert!(json["joints"][2]["position_rad"].is_null() && json["joints"][2]["torque_nm"].is_null());
+        assert_eq!(json["joints"][1]["position_rad"], 0.5);
+        assert_eq!(json["joints"][0]["position_rad"], 0.0);
+        let text = as_text(&s);
+        let row = text.lines().find(|line| line.starts_with("joint 3")).unwrap();
+        assert!(row.contains("does not answer") && !row.contains("0.0"), "{row}");
+    }
 }

@@ -138,10 +138,12 @@ pub enum Error {
         missing: Vec<&'static str>,
     },
     /// The link was lost while the arm moves, or may move.
-    #[error("{source}. {}", where_the_arm_is(last.as_deref()))]
+    #[error("{source}. {}", where_the_arm_is(last.as_deref(), *stop_sent))]
     LinkLost {
         /// The last status that came.
         last: Option<Box<Status>>,
+        /// A stop was written to the port afterwards.
+        stop_sent: bool,
         /// What happened to the link.
         source: Box<Error>,
     },
@@ -151,18 +153,23 @@ pub enum Error {
 }
 
 /// What is known about the motion when the link is gone.
-fn where_the_arm_is(last: Option<&Status>) -> String {
+fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     match last {
         Some(s) if s.tes == 2 => format!(
             "The trajectory was paused at point {}: the arm should stand there, but nothing confirms it any more",
             s.point
         ),
         Some(s) if s.tes == 3 => format!(
-            "THE ARM MAY BE MOVING: at the last status it was at point {} ({:.3} s) of its trajectory, and the controller goes on \
-             without this program",
+            "THE ARM MAY BE MOVING: at the last status it was at point {} ({:.3} s) of its trajectory, and {}",
             s.point,
-            f64::from(s.point) * 1e-3
+            f64::from(s.point) * 1e-3,
+            if stop_sent {
+                "a stop was sent; whether it arrived is not known"
+            } else {
+                "the controller goes on without this program"
+            }
         ),
+        _ if stop_sent => "THE ARM MAY BE MOVING: a stop was sent; whether it arrived is not known".into(),
         _ => "THE ARM MAY BE MOVING: whether the command arrived is not known".into(),
     }
 }

@@ -108,7 +108,9 @@ impl<P: Port> Session<P> {
     /// Without a confirmation nobody knows whether the arm moves: such errors say so.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let retries = self.statistics.retries;
-        let record = self.request(&fixed::exec(command)).map_err(|e| self.link_lost(e))?;
+        let record = self
+            .request(&fixed::exec(command))
+            .map_err(|e| self.link_lost(e, matches!(command, ExecCommand::Stop)))?;
         if accepted(&record) {
             return Ok(());
         }
@@ -121,10 +123,10 @@ impl<P: Port> Session<P> {
     }
 
     /// An error of the link while the arm moves or may move, with what is known about the motion; other errors as they are.
-    pub(super) fn link_lost(&self, error: Error) -> Error {
+    pub(super) fn link_lost(&self, error: Error, stop_sent: bool) -> Error {
         match error {
             Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } => {
-                Error::LinkLost { last: self.last.map(Box::new), source: Box::new(error) }
+                Error::LinkLost { last: self.last.map(Box::new), stop_sent, source: Box::new(error) }
             }
             other => other,
         }

@@ -89,10 +89,9 @@ impl<P: Port> Session<P> {
 
     /// Nothing comes back any more; what goes out may still arrive, and an arm that nobody follows had better stand.
     fn lost_in_motion(&mut self, error: Error) -> Error {
-        if self.last.is_none_or(|s| s.tes == 3) {
-            let _ = self.write(&fixed::exec(ExecCommand::Stop));
-        }
-        self.link_lost(error)
+        let sent =
+            self.last.is_none_or(|s| s.tes == 3) && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
+        self.link_lost(error, sent)
     }
 }
 

@@ -31,7 +31,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         // A CSV file says nothing about limits.
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
-    let failure = RunFailure::find(&info, &recording.samples);
+    let failure = RunFailure::of_recording(&info, &recording.samples, &recording.ending);
     let input =
         ReportInput { info: &info, samples: &recording.samples, facts: &[], failure: failure.as_ref() };
     page_file.write(&html(&input))?;

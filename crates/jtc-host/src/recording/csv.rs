@@ -1,9 +1,10 @@
-//! CSV files: a header with units, then one row a sample; an unknown value is an empty field.
+//! CSV files: a header with units, then one row a sample; an unknown value is an empty field. A run that was not finished says so in
+//! lines that begin with `#`, behind all rows: readers that know no comments have the whole table before them.
 
 use std::io::Write;
 use std::path::PathBuf;
 
-use super::RecordingError;
+use super::{Ending, Recording, RecordingError};
 use crate::sample::{JointSample, Sample};
 
 /// A number of a joint: column name after `q1_`…, and how to reach it.
@@ -26,21 +27,26 @@ const COLUMNS: [Column; 12] = [
 
 const SAMPLE_COLUMNS: [&str; 6] = ["time_s", "state", "tes", "point", "errors", "can_current"];
 
+/// How the comments at the end begin.
+const OUTCOME: &str = "# outcome: ";
+const REASON: &str = "# reason: ";
+
 /// Writes samples as rows.
 pub(super) struct CsvWriter<W: Write> {
     out: W,
     row: String,
+    ending: Ending,
 }
 
 impl<W: Write> CsvWriter<W> {
-    pub(super) fn new(mut out: W) -> Result<Self, RecordingError> {
+    pub(super) fn new(mut out: W, ending: Ending) -> Result<Self, RecordingError> {
         let mut header: Vec<String> = SAMPLE_COLUMNS.map(String::from).to_vec();
         for j in 1..=6 {
             header.extend(COLUMNS.map(|(name, _)| format!("q{j}_{name}")));
             header.extend([format!("q{j}_fsm"), format!("q{j}_internal")]);
         }
         writeln!(out, "{}", header.join(","))?;
-        Ok(Self { out, row: String::new() })
+        Ok(Self { out, row: String::new(), ending })
     }
 
     pub(super) fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
@@ -62,6 +68,13 @@ impl<W: Write> CsvWriter<W> {
     }
 
     pub(super) fn finish(mut self) -> Result<(), RecordingError> {
+        let Ending { outcome, reason } = &self.ending;
+        if !matches!(outcome.as_str(), "" | "finished") {
+            writeln!(self.out, "{OUTCOME}{outcome}")?;
+            if !reason.is_empty() {
+                writeln!(self.out, "{REASON}{}", reason.replace(['\r', '\n'], " "))?;
+            }
+        }
         Ok(self.out.flush()?)
     }
 }
@@ -76,7 +89,7 @@ fn number(row: &mut String, value: f64) {
 }
 
 /// Reads rows back; columns may stand in any order, unknown ones are passed over, missing ones leave values unknown.
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, RecordingError> {
+pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     let text = String::from_utf8_lossy(bytes);
     let mut lines = text.lines().enumerate();
     let fail = |line, column: Option<&str>, problem| RecordingError::Line {
@@ -93,7 +106,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, RecordingError> {
         return Err(fail(1, None, "no recording: its header has no column time_s"));
     }
     let mut samples = Vec::new();
+    let mut ending = Ending::default();
     for (i, row) in lines.filter(|(_, row)| !row.trim().is_empty()) {
+        if row.starts_with('#') {
+            for (head, value) in [(OUTCOME, &mut ending.outcome), (REASON, &mut ending.reason)] {
+                if let Some(text) = row.strip_prefix(head) {
+                    *value = text.trim().to_owned();
+                }
+            }
+            continue;
+        }
         let mut sample = Sample::default();
         let mut fields = row.split(',');
         for name in &names {
@@ -103,7 +125,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, RecordingError> {
         }
         samples.push(sample);
     }
-    Ok(samples)
+    Ok(Recording { info: None, samples, ending })
 }
 
 fn put(sample: &mut Sample, name: &str, field: &str) -> Option<()> {

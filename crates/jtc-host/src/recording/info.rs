@@ -35,6 +35,22 @@ impl Default for JointInfo {
     }
 }
 
+/// How the run ended that a recording is of; empty where nobody wrote it down.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Ending {
+    /// `finished`, `stopped` or `fault`.
+    pub outcome: String,
+    /// Why it did not come to its end, in words.
+    pub reason: String,
+}
+
+impl Ending {
+    /// The run failed.
+    pub fn is_fault(&self) -> bool {
+        self.outcome == "fault"
+    }
+}
+
 /// Where samples come from and what they belong to.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordingInfo {
@@ -50,6 +66,8 @@ pub struct RecordingInfo {
     pub joints: [JointInfo; 6],
     /// Origin of the flange in the last joint's frame, as in [`JointInfo::origin`].
     pub flange: [f64; 6],
+    /// How the run ended.
+    pub ending: Ending,
 }
 
 impl RecordingInfo {
@@ -70,6 +88,11 @@ impl RecordingInfo {
         put("trajectory".into(), self.trajectory.clone());
         put("start_unix_ns".into(), self.start_unix_ns.to_string());
         put("flange_origin".into(), join(&self.flange));
+        for (key, value) in [("outcome", &self.ending.outcome), ("reason", &self.ending.reason)] {
+            if !value.is_empty() {
+                put(key.into(), value.clone());
+            }
+        }
         for (i, joint) in self.joints.iter().enumerate() {
             let n = i + 1;
             put(format!("joint{n}_name"), self.joint_name(i));
@@ -110,6 +133,7 @@ impl RecordingInfo {
             start_unix_ns: text("start_unix_ns").parse().unwrap_or(0),
             joints,
             flange: split(&text("flange_origin")),
+            ending: Ending { outcome: text("outcome"), reason: text("reason") },
         }
     }
 }

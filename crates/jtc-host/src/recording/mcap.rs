@@ -166,7 +166,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     })?;
     let samples =
         samples.into_iter().map(|(time_ns, sample)| Sample { time_s: seconds(&info, time_ns), ..sample });
-    Ok(Recording { samples: samples.collect(), info })
+    let ending = info.as_ref().map_or_else(Default::default, |i| i.ending.clone());
+    Ok(Recording { samples: samples.collect(), info, ending })
 }
 
 /// Shows the records of a file that we write, those in chunks too. Attachments and indices are passed over unread: the

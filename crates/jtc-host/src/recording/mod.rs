@@ -2,7 +2,8 @@
 //!
 //! An MCAP file holds `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so that
 //! Foxglove, PlotJuggler and Rerun plot it at once, the torque split on `/jtc/control` and states on `/jtc/state`. A CSV file
-//! has one row a sample and a header that names the units.
+//! has one row a sample and a header that names the units; lines that begin with `#` at its end say how a run ended that was not
+//! finished.
 
 mod cdr;
 mod csv;
@@ -18,7 +19,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 pub use error::RecordingError;
-pub use info::{JointInfo, RecordingInfo};
+pub use info::{Ending, JointInfo, RecordingInfo};
 
 use crate::sample::Sample;
 
@@ -67,7 +68,7 @@ impl Recorder {
         let file = BufWriter::with_capacity(1 << 16, file);
         let writer = match format {
             Format::Mcap => mcap::McapWriter::new(file, info).map(|w| Writer::Mcap(Box::new(w))),
-            Format::Csv => csv::CsvWriter::new(file).map(Writer::Csv),
+            Format::Csv => csv::CsvWriter::new(file, info.ending.clone()).map(Writer::Csv),
         };
         Ok(Self { writer: writer.map_err(|e| e.at(path))?, path: path.to_owned(), samples: 0 })
     }
@@ -120,8 +121,10 @@ pub fn write_into(
 /// A recording that was read back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Arm, limits and origin; defaults for a CSV file, which does not carry them.
+    /// Arm, limits and origin; none for a CSV file, which does not carry them.
     pub info: Option<RecordingInfo>,
+    /// How the run ended.
+    pub ending: Ending,
     /// Oldest first.
     pub samples: Vec<Sample>,
 }
@@ -133,7 +136,7 @@ impl Recording {
         let bytes = std::fs::read(path).map_err(|e| RecordingError::io(path, e))?;
         match format {
             Format::Mcap => mcap::read(&bytes),
-            Format::Csv => csv::read(&bytes).map(|samples| Recording { info: None, samples }),
+            Format::Csv => csv::read(&bytes),
         }
         .map_err(|e| e.at(path))
     }

@@ -143,3 +143,17 @@ fn a_damaged_index_takes_nothing_away() {
     let recording = mcap::read(&file).unwrap();
     assert_eq!((recording.samples.len(), recording.info.unwrap().arm), (3, "avena".to_owned()));
 }
+
+#[test]
+fn how_the_run_ended_comes_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let ending = Ending { outcome: "fault".into(), reason: "no status, for 2 s\nand more".into() };
+    let info = RecordingInfo { ending: ending.clone(), ..Default::default() };
+    for name in ["a.mcap", "a.csv"] {
+        let path = dir.path().join(name);
+        write_all(&path, &info, &samples(3)).unwrap();
+        let read = Recording::read(&path).unwrap();
+        assert_eq!((read.samples.len(), read.ending.outcome.as_str()), (3, "fault"), "{name}");
+        assert_eq!(read.ending.reason.replace('\n', " "), "no status, for 2 s and more", "{name}");
+    }
+}

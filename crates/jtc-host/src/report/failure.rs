@@ -5,7 +5,7 @@ use std::fmt::Write;
 use jtc_wire::Status;
 use serde::Serialize;
 
-use crate::recording::RecordingInfo;
+use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 use crate::words;
 
@@ -17,6 +17,8 @@ const EXECUTE: u8 = 3;
 /// Samples shown before and after the one that shows the failure.
 const BEFORE: usize = 3;
 const AFTER: usize = 2;
+/// A step of the measured position counts above this share of what the velocity limit allows: noise and jitter of the time stay below.
+const STEP_SHARE: f64 = 1.2;
 
 /// One joint at one moment near the failure; numbers are NaN where they are not known.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -66,8 +68,32 @@ impl RunFailure {
         let begin = begin(samples);
         let bad = |s: &Sample| s.errors != 0 || s.state == ERROR;
         let at = begin + samples.get(begin..)?.iter().position(bad)?;
-        let (causes, joint) = causes(&Words::of_sample(&samples[at]));
+        let (mut causes, mut joint) = causes(&Words::of_sample(&samples[at]));
+        if joint.is_none()
+            && let Some((j, step)) = stepped(info, samples, at)
+        {
+            joint = Some(j + 1);
+            causes.insert(0, step);
+        }
         Some(Self::at(info, samples, at, causes, joint))
+    }
+
+    /// What a recording shows and says of its run: an error in its samples; or what ended it, as was written down; or that its end
+    /// was not seen.
+    pub fn of_recording(info: &RecordingInfo, samples: &[Sample], ending: &Ending) -> Option<Self> {
+        if let Some(found) = Self::find(info, samples) {
+            return Some(found);
+        }
+        let unseen = samples.last().is_some_and(|s| s.state == OPERATE && s.tes == EXECUTE);
+        let reason = match (ending.is_fault(), ending.reason.as_str()) {
+            (true, "") => "the run ended in a fault that the recording does not name".to_owned(),
+            (true, reason) => reason.to_owned(),
+            (false, _) if unseen && ending.outcome.is_empty() => {
+                "the end of the motion was not seen: the last sample is in the middle of it".to_owned()
+            }
+            (false, _) => return None,
+        };
+        Some(Self::ended_by(info, samples, reason))
     }
 
     /// A run that ended without an error in its samples: at the last of them, for the reason given.
@@ -112,13 +138,16 @@ impl RunFailure {
                 first: i == at,
             }
         };
-        // Of the joint that broke a piece of its history; where no joint did, all of them at that moment.
+        // Of the joint that broke a piece of its history; where no joint did, all of them up to that moment.
         let moments = match joint {
             Some(joint) => (at.saturating_sub(BEFORE)..samples.len().min(at + AFTER + 1))
                 .map(|i| moment(i, joint - 1))
                 .collect(),
             None if samples.is_empty() => Vec::new(),
-            None => (0..6).map(|j| moment(at, j)).collect(),
+            None => (at.saturating_sub(BEFORE)..=at)
+                .flat_map(|i| (0..6).map(move |j| (i, j)))
+                .map(|(i, j)| moment(i, j))
+                .collect(),
         };
         let within_ms = (time(at) - time(at.saturating_sub(1))) * 1e3;
         Self { causes, joint, at_ms: into_ms(at), time_s: time(at), within_ms, moments }
@@ -168,15 +197,11 @@ impl RunFailure {
             let others: Vec<String> = self.causes[1..].iter().map(|c| super::escape(c)).collect();
             let _ = writeln!(out, "<p>with it: {}</p>", others.join(", "));
         }
-        let whose = match self.joint {
-            Some(joint) => format!("Joint {joint} around it"),
-            None => "All joints then".to_owned(),
+        let (whose, before) = match self.joint {
+            Some(joint) => (format!("Joint {joint} around it"), "the marked line"),
+            None => ("All joints up to it".to_owned(), "the last of these moments"),
         };
-        let _ = writeln!(
-            out,
-            "<p>{whose}; it happened in the {:.0} ms before the marked line.</p>",
-            self.within_ms
-        );
+        let _ = writeln!(out, "<p>{whose}; it happened in the {:.0} ms before {before}.</p>", self.within_ms);
         out.push_str("<div class=\"scroll\"><table><tr>");
         for head in Self::HEAD {
             let _ = write!(out, "<th>{head}</th>");
@@ -192,6 +217,31 @@ impl RunFailure {
         out.push_str("</table></div>\n</section>\n");
         out
     }
+}
+
+/// The joint (from 0) whose measured position went further from one sample to the next than its velocity limit allows, around the
+/// sample `at`, where the status names no joint: words for it.
+fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(usize, String)> {
+    let mut worst: Option<(f64, usize, String)> = None;
+    for i in at.max(1)..samples.len().min(at + 2) {
+        let since = |i: usize| samples[i].time_s - samples[i.saturating_sub(1)].time_s;
+        // Behind the fault the time is that of arrival: what came together was not measured together.
+        let span_s = (1..=i).rev().take(3).map(since).fold(0.0, f64::max);
+        for (j, limits) in info.joints.iter().enumerate() {
+            let step = (samples[i].joints[j].position - samples[i - 1].joints[j].position).abs();
+            let allowed = limits.velocity_max_rad_s * span_s;
+            let share = step / allowed;
+            if allowed > 0.0 && share > STEP_SHARE && worst.as_ref().is_none_or(|w| share > w.0) {
+                let words = format!(
+                    "joint {}: measured position went {step:.3} rad in {:.0} ms, its velocity limit allows {allowed:.3} rad",
+                    j + 1,
+                    span_s * 1e3
+                );
+                worst = Some((share, j, words));
+            }
+        }
+    }
+    worst.map(|(_, j, words)| (j, words))
 }
 
 /// The first sample of the execution, or the first of all.

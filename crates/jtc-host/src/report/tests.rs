@@ -151,7 +151,7 @@ fn a_failed_run_leads_with_what_broke_first() {
 fn a_run_without_its_own_error_says_why_it_ended() {
     let (info, samples) = run(1000);
     let failure = RunFailure::ended_by(&info, &samples, "the link was lost".into());
-    assert_eq!((failure.joint, failure.moments.len(), failure.at_ms.round()), (None, 6, 999.0));
+    assert_eq!((failure.joint, failure.moments.len(), failure.at_ms.round()), (None, 24, 999.0));
     assert_eq!(RunFailure::ended_by(&info, &[], "early".into()).moments, []);
 }
 
@@ -162,4 +162,45 @@ fn drives_name_their_own_faults() {
     status.joints[4].mc_current = 4;
     let failure = RunFailure::find(&info, &samples).unwrap().with_status(&status);
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
+}
+
+/// The status names no joint: the one that went where no joint can go in the time is named, with the rows before.
+#[test]
+fn an_encoder_that_jumps_is_named_by_its_step() {
+    let (mut info, mut samples) = run(1000);
+    for joint in &mut info.joints {
+        joint.velocity_max_rad_s = 3.0;
+    }
+    for s in &mut samples[600..] {
+        (s.state, s.tes, s.errors) = (5, 0, 0x20);
+        s.joints[3].position += 0.4;
+    }
+    let failure = RunFailure::find(&info, &samples).unwrap();
+    assert_eq!((failure.joint, failure.moments[0].time_ms.round()), (Some(4), 597.0));
+    assert!(failure.causes[0].starts_with("joint 4: measured position went "), "{:?}", failure.causes);
+
+    for s in &mut samples[600..] {
+        s.joints[3].position -= 0.4;
+    }
+    let failure = RunFailure::find(&info, &samples).unwrap();
+    assert_eq!((failure.joint, failure.moments[0].time_ms.round()), (None, 597.0));
+    let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
+    assert!(!page.contains("marked line") && !page.contains("<tr class=\"first\">"));
+}
+
+#[test]
+fn a_recording_without_its_end_is_no_success() {
+    use crate::recording::Ending;
+    let (info, mut samples) = run(1000);
+    let of = |samples: &[Sample], outcome: &str, reason: &str| {
+        RunFailure::of_recording(&info, samples, &Ending { outcome: outcome.into(), reason: reason.into() })
+    };
+    assert_eq!(of(&samples, "fault", "the link was lost").unwrap().causes, ["the link was lost"]);
+    let unseen = of(&samples, "", "").expect("a failure");
+    assert!(unseen.headline().starts_with("FAILED 999 ms") && unseen.causes[0].contains("was not seen"));
+    assert_eq!(of(&samples, "finished", ""), None);
+    let last = samples.len() - 1;
+    samples[last].tes = 1;
+    assert_eq!(of(&samples, "", ""), None);
+    assert_eq!(of(&samples, "stopped", ""), None);
 }

@@ -1,7 +1,8 @@
 //! The person who watches an arm move: keys, Ctrl-C, and the words at a sudden end.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
 
 use cli_kit::{Output, Stop};
 use jtc_host::session::Flow;
@@ -9,10 +10,26 @@ use jtc_wire::Status;
 
 use crate::failure::{FAULT, Failure};
 use crate::keys::{HELP, Key, Keys, Terminal};
+use crate::output_file;
 
 /// Trajectory execution states, as on the wire.
 const PAUSE: u8 = 2;
 const EXECUTE: u8 = 3;
+
+/// How long the last words may take: a reader that takes nothing holds no command.
+const LAST_WORDS: Duration = Duration::from_millis(300);
+
+/// At the second signal: leaves no empty file, says why it ended, and returns the exit code.
+pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> u8 {
+    output_file::abandon();
+    let (done, said) = mpsc::channel();
+    std::thread::spawn(move || {
+        out.failure(FAULT, "ended-at-once", message, hint);
+        let _ = done.send(());
+    });
+    let _ = said.recv_timeout(LAST_WORDS);
+    FAULT
+}
 
 /// Wishes of the person, asked for at each status.
 pub struct Operator<'a> {
@@ -36,14 +53,15 @@ impl<'a> Operator<'a> {
         let (its_terminal, its_moving, its_out) = (terminal.clone(), Arc::clone(&moving), *out);
         let stop = Stop::listen_with(move || {
             its_terminal.restore();
-            if its_moving.load(Ordering::Relaxed) {
-                its_out.note(
-                    "jtc: ended at once: THE ARM MAY BE MOVING\n     `jtc traj stop` stops it on its path; the emergency stop always",
-                );
+            let (message, hint) = if its_moving.load(Ordering::Relaxed) {
+                (
+                    "ended at once: THE ARM MAY BE MOVING",
+                    "`jtc traj stop` stops it on its path; the emergency stop always",
+                )
             } else {
-                its_out.note("jtc: ended at once; this command moves nothing any more");
-            }
-            FAULT
+                ("ended at once; this command moves nothing any more", "")
+            };
+            ended_at_once(its_out, message, hint)
         })?;
         Ok(Self { out, stop, terminal, keys: None, moving, stopping: false, said: 0 })
     }

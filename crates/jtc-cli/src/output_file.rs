@@ -3,11 +3,27 @@
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use jtc_host::Sample;
 use jtc_host::recording::{RecordingInfo, write_into};
 
 use crate::failure::{Failure, REFUSED};
+
+/// Outputs that this process made and has not written yet.
+static UNWRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes outputs that were made and never written, before the process is ended without any `Drop`.
+pub fn abandon() {
+    for path in UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+/// The output at `path` is written or gone.
+fn settled(path: &Path) {
+    UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).retain(|p| p != path);
+}
 
 /// An output that is open and still empty, or still what it was. Dropped before it was written, it leaves no trace.
 pub struct OutputFile {
@@ -32,7 +48,10 @@ impl OutputFile {
             ..Failure::usage(format!("{}: {e}; nothing was sent", path.display()))
         };
         match OpenOptions::new().write(true).create_new(true).open(path) {
-            Ok(file) => return Ok(Self { path: path.to_owned(), file, made: true, written: false }),
+            Ok(file) => {
+                UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+                return Ok(Self { path: path.to_owned(), file, made: true, written: false });
+            }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
             Err(e) => return Err(io(e)),
         }
@@ -70,6 +89,7 @@ impl OutputFile {
     /// What was in the file goes only now.
     fn begin(&mut self) -> std::io::Result<File> {
         self.written = true;
+        settled(&self.path);
         if self.file.metadata()?.is_file() {
             self.file.set_len(0)?;
         }
@@ -84,6 +104,7 @@ impl OutputFile {
 impl Drop for OutputFile {
     fn drop(&mut self) {
         if self.made && !self.written {
+            settled(&self.path);
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -100,7 +121,21 @@ fn refused(code: &str, message: String) -> Failure {
 
 /// Both names lead to the same file that is there.
 fn same(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b) || one_inode(a, b)
+}
+
+/// A file of two names (a hard link) is one file.
+#[cfg(unix)]
+fn one_inode(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let number = |path: &Path| path.metadata().ok().map(|m| (m.dev(), m.ino()));
+    number(a).is_some_and(|n| number(b) == Some(n))
+}
+
+/// Only Unix has numbers for files that the standard library shows.
+#[cfg(not(unix))]
+fn one_inode(_: &Path, _: &Path) -> bool {
+    false
 }
 
 #[cfg(test)]
@@ -119,6 +154,12 @@ mod tests {
         let around = dir.path().join(".").join("input");
         assert_eq!(code(OutputFile::open(&around, true, &[&input])), Some((4, "same-file".into())));
         assert_eq!(code(OutputFile::open(&dir.path().join("no/where"), false, &[])), Some((2, "io".into())));
+        #[cfg(unix)]
+        {
+            let link = dir.path().join("link");
+            std::fs::hard_link(&input, &link).unwrap();
+            assert_eq!(code(OutputFile::open(&link, true, &[&input])), Some((4, "same-file".into())));
+        }
         drop(OutputFile::open(&old, true, &[]).unwrap());
         assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
         let opened = OutputFile::open(&new, false, &[]).unwrap();

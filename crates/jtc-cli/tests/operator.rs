@@ -152,7 +152,52 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     let mut rest = String::new();
     err.read_to_string(&mut rest).unwrap();
     // On a slow computer the first one may have come to its end already.
-    let at_once = value.is_null();
-    assert!(code == 5 && (!at_once || rest.contains("MAY BE MOVING")), "{code} {rest}");
+    let at_once = value["error"]["code"] == "ended-at-once";
+    assert!(code == 5 && (at_once || value["outcome"] == "stopped"), "{code} {value}");
+    let words = rest.contains("MAY BE MOVING") || rest.contains("moves nothing any more");
+    assert!(!at_once || words, "{rest}");
+    // No file that was never written is left.
+    assert_eq!(std::path::Path::new(&sim.path("run.csv")).exists(), !at_once);
     sim.jtc(&["traj", "stop"]);
+}
+
+/// Teaching: a terminal and a wrapper may both send a signal, which is one; a second press ends it with words about the controller.
+#[test]
+fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching() {
+    for close in [true, false] {
+        let sim = Sim::start(&["--no-throttle"]);
+        sim.jtc(&["recover", "--defaults"]).ends(0);
+        let file = sim.path("taught.csv");
+        let mut child = command()
+            .args(["--json", "teach", "record", &file, "--port", sim.port.to_str().unwrap()])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut err = BufReader::new(child.stderr.take().unwrap());
+        let mut line = String::new();
+        while !line.contains("Ctrl-C ends") {
+            line.clear();
+            assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it recorded");
+        }
+        cli_kit::trial::signal(&child, "-INT");
+        if !close {
+            std::thread::sleep(std::time::Duration::from_millis(150));
+        }
+        cli_kit::trial::signal(&child, "-INT");
+        let code = child.wait().unwrap().code();
+        let mut out = String::new();
+        child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
+        let value: serde_json::Value = serde_json::from_str(out.trim()).unwrap_or_default();
+        assert!(!std::path::Path::new(&file).exists(), "an empty file is left");
+        let state = sim.jtc(&["--json", "status"]).ends(0).json()["state"].clone();
+        if value["error"]["code"] == "ended-at-once" {
+            assert!(!close && code == Some(5), "{code:?} {value}");
+            assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
+        } else {
+            // The first one did its work before the second came: the arm was not moved, and is held again.
+            assert_eq!((code, state.as_str()), (Some(2), Some("HoldPos")), "{value}");
+        }
+    }
 }

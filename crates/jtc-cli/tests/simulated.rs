@@ -183,6 +183,49 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     assert_eq!(said.json()["status"]["state"], "HoldPos", "{}", said.out);
 }
 
+/// A fault on the way to the first point is recorded and reported like any other, and named.
+#[test]
+fn a_fault_on_the_approach_is_recorded_and_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let faults = dir.path().join("faults.toml");
+    std::fs::write(&faults, FAULT.replace("at_point = 500", "at_point = 200")).unwrap();
+    let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let (file, record, page) = (sim.path("away.csv"), sim.path("run.csv"), sim.path("run.html"));
+    let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
+    for i in 0..=120 {
+        let q = 0.2 * (std::f64::consts::PI * f64::from(i) / 120.0).sin().powi(4);
+        text += &format!("{:.3},{},{q},{q},{q},{q},{q}\n", f64::from(i) * 0.01, 0.3 + q);
+    }
+    std::fs::write(&file, text).unwrap();
+    let words = [
+        "--json",
+        "traj",
+        "run",
+        &file,
+        "--approach",
+        "--speed",
+        "50",
+        "--record",
+        &record,
+        "--report",
+        &page,
+    ];
+    let value = sim.jtc(&words).ends(5).json();
+    assert_eq!(
+        (value["outcome"].as_str(), value["phase"].as_str()),
+        (Some("fault"), Some("approach")),
+        "{value}"
+    );
+    assert_eq!(value["failure"]["joint"], 3, "{value}");
+    assert!(value["error"]["message"].as_str().unwrap().starts_with("on the approach"), "{value}");
+    assert!(std::fs::read_to_string(&page).unwrap().contains("<title>FAILED: "));
+    let recording = std::fs::read_to_string(&record).unwrap();
+    assert!(
+        recording.lines().count() > 5 && recording.contains("\n# outcome: fault\n# reason: on the approach")
+    );
+}
+
 #[test]
 fn typed_events_happen_and_mistakes_are_named() {
     let mut sim = Sim::start(&["--speed", "max"]);

@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use cli_kit::Output;
 use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
-use jtc_host::recording::Format;
+use jtc_host::recording::{Ending, Format};
 use jtc_host::report::{self, ReportInput, RunFailure, Summary};
 use jtc_host::session::{Flow, Outcome, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
@@ -51,27 +51,31 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     let outputs = Outputs::open(args)?;
     let mut operator = Operator::listen(out)?;
     let mut session = args.link.session()?;
-    let status = ready(&mut session, out)?;
+    let status = ready(&mut session, &operator)?;
     let here = status.joints.map(|j| f64::from(j.position));
     let verdict = job.verdict(&job.trajectory, Some(here), options);
+    let mut broken_off = None;
     if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose) {
         if !args.approach {
             return Err(refuse(&verdict, out));
         }
-        approach(&mut session, &job, here, args, &mut operator)?;
+        let path = approach(&job, here, args, out)?;
+        let leg = Leg::run(&mut session, &path, "approach", &UploadOptions::default(), &mut operator)?;
+        if !matches!(leg.outcome, Ok(Outcome::Finished(_))) {
+            broken_off = Some(leg);
+        }
     }
-
-    let upload = upload(&mut session, &job.trajectory, &options, "upload", &operator)?;
-    let start_unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
-    let samples = observe(&mut session, &job.trajectory);
-    let outcome = execute(&mut session, &job.trajectory, "motion", &mut operator);
-    session.stop_observing();
+    let leg = match broken_off {
+        Some(leg) => leg,
+        None => Leg::run(&mut session, &job.trajectory, "motion", &options, &mut operator)?,
+    };
     drop(operator);
+    let Leg { phase, upload, start_unix_ns, samples, outcome } = leg;
 
     let link = session.statistics();
     let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let info = run_report::info(&job.arm, &session.port().name(), &name, start_unix_ns);
-    let samples = samples.take();
+    let name = if phase == APPROACH { format!("{name}, approach") } else { name };
+    let mut info = run_report::info(&job.arm, &session.port().name(), &name, start_unix_ns);
     // A run that ended in a fault is what one wants to look at most: it is recorded and reported as well.
     let facts = [run_report::link_facts(&upload, &link, session.port().baud())];
     let broken = match &outcome {
@@ -82,21 +86,31 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
             Some(if let Error::RunFault { status, .. } = e { found.with_status(status) } else { found })
         }
     };
-    let input = ReportInput { info: &info, samples: &samples, facts: &facts, failure: broken.as_ref() };
-    let (files, lost) = outputs.write(&input);
-    let summary = Summary::of(&info, &samples);
     let word = match &outcome {
         Ok(Outcome::Finished(_)) => "finished",
         Ok(Outcome::Stopped(_)) => "stopped",
         Err(_) => "fault",
     };
+    let where_ = if phase == APPROACH { " on the approach to the first point" } else { "" };
+    let reason = match &outcome {
+        Ok(_) => where_.trim_start().to_owned(),
+        Err(e) if where_.is_empty() => e.to_string(),
+        Err(e) => format!("{}: {e}", where_.trim_start()),
+    };
+    info.ending = Ending { outcome: word.into(), reason };
+    let input = ReportInput { info: &info, samples: &samples, facts: &facts, failure: broken.as_ref() };
+    let (files, lost) = outputs.write(&input);
+    let summary = Summary::of(&info, &samples);
     // A file that is lost is said even when the run failed, but the run comes first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }
-    let failure = outcome.as_ref().err().map(Failure::of).or(lost.into_iter().next());
+    let of_run =
+        outcome.as_ref().err().map(|e| Failure { message: info.ending.reason.clone(), ..Failure::of(e) });
+    let failure = of_run.or(lost.into_iter().next());
     let value = json!({
         "outcome": word,
+        "phase": phase,
         "recorded_s": summary.recorded_s,
         "executed_s": summary.executed_s,
         "samples": summary.samples,
@@ -112,7 +126,7 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         let made: String = files.iter().map(|f| format!("\n{f}")).collect();
         let line = run_report::link_line(&upload, &link);
         format!(
-            "\n{word}: {:.2} s\n{}\n{line}{made}",
+            "\n{word}{where_}: {:.2} s\n{}\n{line}{made}",
             summary.executed_s,
             run_report::verdict(broken.as_ref(), &summary)
         )
@@ -128,33 +142,78 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     }
 }
 
+/// The phase that a run begins with where the arm stands elsewhere.
+const APPROACH: &str = "approach";
+
+/// One motion of a run, with what was seen of it.
+struct Leg {
+    phase: &'static str,
+    upload: UploadReport,
+    start_unix_ns: u64,
+    samples: Vec<Sample>,
+    outcome: Result<Outcome, Error>,
+}
+
+impl Leg {
+    /// Uploads and executes. An error before the motion begins is the command's own; one in motion is the outcome.
+    fn run(
+        session: &mut Session<SerialPort>,
+        trajectory: &Trajectory,
+        phase: &'static str,
+        options: &UploadOptions,
+        operator: &mut Operator,
+    ) -> Result<Self, Failure> {
+        let what = if phase == APPROACH { APPROACH } else { "upload" };
+        let upload = upload(session, trajectory, options, what, operator)?;
+        if operator.wants_the_end() {
+            return Err(cancelled("upload"));
+        }
+        let start_unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
+        let samples = observe(session, trajectory);
+        let outcome = execute(session, trajectory, phase, operator);
+        session.stop_observing();
+        Ok(Self { phase, upload, start_unix_ns, samples: samples.take(), outcome })
+    }
+}
+
+/// The person ended the command before it moved anything; `during` names what went on.
+fn cancelled(during: &str) -> Failure {
+    let message = format!("cancelled during the {during}; the motion was not started");
+    Failure { message, ..Failure::of(&Error::Cancelled) }
+}
+
 /// Waits until the controller holds the arm with all drives enabled.
-fn ready(session: &mut Session<SerialPort>, out: &Output) -> Result<Status, Failure> {
+fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Status, Failure> {
     let mut status = session.fresh_status()?;
     if status.fsm <= 1 && status.jtc_init == 0 && status.errors == 0 {
-        out.note("waiting until the drives hold the arm");
-        status = session.wait_hold(BRING_UP)?;
+        operator.out.note("waiting until the drives hold the arm");
+        status =
+            session.wait_for("HoldPos", BRING_UP, |s| matches!(s.fsm, 2 | 5) || operator.wants_the_end())?;
+        if status.fsm == 5 {
+            return Err(Error::Device { status: Box::new(status) }.into());
+        }
+    }
+    if operator.wants_the_end() {
+        return Err(cancelled("wait for the drives"));
     }
     if status.fsm != 2 {
         let failure =
             Failure { exit: 1, code: "not-ready".into(), ..Failure::usage(words::waiting_for(&status)) };
         return Err(failure.hint(words::next_step(&status)));
     }
-    if status.joints.iter().any(|j| j.fsm != 3) {
-        status = session.wait_for("all drives enabled", BRING_UP, |s| s.joints.iter().all(|j| j.fsm == 3))?;
+    let enabled = |s: &Status| s.joints.iter().all(|j| j.fsm == 3);
+    if !enabled(&status) {
+        let reached = |s: &Status| enabled(s) || operator.wants_the_end();
+        status = session.wait_for("all drives enabled", BRING_UP, reached)?;
+        if operator.wants_the_end() {
+            return Err(cancelled("wait for the drives"));
+        }
     }
     Ok(status)
 }
 
-/// Moves the arm to the first point.
-fn approach(
-    session: &mut Session<SerialPort>,
-    job: &Job,
-    here: [f64; 6],
-    args: &RunArgs,
-    operator: &mut Operator,
-) -> Result<(), Failure> {
-    let out = operator.out;
+/// A motion to the first point, checked.
+fn approach(job: &Job, here: [f64; 6], args: &RunArgs, out: &Output) -> Result<Trajectory, Failure> {
     let refused =
         |e: plan::PlanError| Failure { exit: REFUSED, code: "approach".into(), ..Failure::usage(e) };
     let first = job.trajectory.points.first().map_or(here, |p| p.position);
@@ -166,13 +225,7 @@ fn approach(
         return Err(refuse(&verdict, out));
     }
     out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
-    upload(session, &path, &UploadOptions::default(), "approach", operator)?;
-    match execute(session, &path, "approach", operator)? {
-        Outcome::Finished(_) => Ok(()),
-        Outcome::Stopped(_) => {
-            Err(Failure { exit: FAULT, code: "stopped".into(), ..Failure::usage("stopped on the approach") })
-        }
-    }
+    Ok(path)
 }
 
 fn upload(
@@ -190,7 +243,10 @@ fn upload(
         if operator.wants_the_end() { Flow::Cancel } else { Flow::Continue }
     });
     bar.finish_and_clear();
-    Ok(report?)
+    match report {
+        Err(Error::Cancelled) => Err(cancelled("upload")),
+        other => Ok(other?),
+    }
 }
 
 fn execute(
@@ -199,9 +255,6 @@ fn execute(
     what: &str,
     operator: &mut Operator,
 ) -> Result<Outcome, Error> {
-    if operator.wants_the_end() {
-        return Err(Error::Cancelled);
-    }
     let bar = operator.out.bar((trajectory.duration_s() * 1e3) as u64, what);
     operator.motion_begins();
     let outcome = session.execute().and_then(|()| {

@@ -2,7 +2,7 @@
 
 use cli_kit::table;
 use jtc_host::arm::Arm;
-use jtc_host::recording::{JointInfo, RecordingInfo};
+use jtc_host::recording::{Ending, JointInfo, RecordingInfo};
 use jtc_host::report::{Facts, RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 
@@ -27,6 +27,7 @@ pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> Re
             origin: origin(j),
         }),
         flange: origin(6),
+        ending: Ending::default(),
     }
 }
 

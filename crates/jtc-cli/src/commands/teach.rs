@@ -1,6 +1,8 @@
 //! `jtc teach`: moving the arm by hand, and recording it.
 
 use std::fmt::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use cli_kit::{Output, Stop};
 use jtc_host::trajectory::Loaded;
@@ -10,6 +12,7 @@ use serde_json::json;
 
 use crate::args::{LinkArgs, TeachCommand};
 use crate::failure::{FAULT, Failure};
+use crate::operator::ended_at_once;
 use crate::output_file::OutputFile;
 
 /// Movement below this is standing still, rad.
@@ -39,10 +42,21 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
 }
 
 fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output) -> Result<(), Failure> {
-    let stop = Stop::listen()?;
+    let (teaching, its_out) = (Arc::new(AtomicBool::new(false)), *out);
+    let its_teaching = Arc::clone(&teaching);
+    let stop = Stop::listen_with(move || {
+        if its_teaching.load(Ordering::Relaxed) {
+            let message = "ended at once, nothing was recorded; the controller stays in Teaching: the arm can be moved by hand";
+            ended_at_once(its_out, message, "`jtc teach off` holds the arm")
+        } else {
+            ended_at_once(its_out, "ended at once, nothing was recorded", "")
+        }
+    })?;
     let mut session = link.session()?;
     let status = session.fresh_status()?;
     let was_on = status.fsm == 4;
+    // Before it is asked for: a confirmation that does not come may be that of a request that was taken.
+    teaching.store(true, Ordering::Relaxed);
     if !was_on {
         session.teach(true)?;
     }
@@ -80,6 +94,7 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
     let written = write(file, &poses, out);
     if failed.is_none() && !was_on {
         session.teach(false)?;
+        teaching.store(false, Ordering::Relaxed);
     }
     failed.map_or(written, Err)
 }

@@ -1,0 +1,173 @@
+//! On the way to the path, and on the way from it: what is remembered of a motion must not outlive its place.
+mod rig;
+
+use jtc_core::{Config, Parameters, State, Tes, joint_error};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
+use rig::{Rig, floats, segment_body};
+
+/// A motion at 0.1 rad/s at most, at rest at both ends.
+fn points() -> Vec<RawPoint> {
+    (0..200)
+        .map(|k| {
+            let mut p = RawPoint::default();
+            let v = if k == 0 || k == 199 { 0.0 } else { 0.1 };
+            p.position[1] = (0.001 * f64::from(k) / 3.141592 * 32767.0) as i16;
+            p.velocity[1] = (v / 6.283185 * 32767.0) as i16;
+            p
+        })
+        .collect()
+}
+
+/// A pause that has not been seen to end is none once the arm is taught: a hand moves the joints then.
+#[test]
+fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
+    let mut rig = Rig::holding();
+    rig.upload(&points(), 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(2_000, |r| r.controller.telemetry().point >= 500);
+    rig.urgent(0, UrgentCommand::Pause);
+    // The arm still moves a little when the path stands.
+    rig.nodes[1].report.velocity = 0.05;
+    rig.until(600, |r| r.tes() == Tes::Pause);
+    rig.run(2);
+    rig.send(FrameType::TeachingModeEnable, &[]);
+    rig.run(3);
+    assert_eq!(rig.state(), State::Teaching);
+    rig.follow = false;
+    rig.nodes[1].report.velocity = 0.4;
+    for ms in 0..2_000 {
+        rig.nodes[1].report.position += 0.0004;
+        rig.tick();
+        assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0), "{ms} ms");
+    }
+}
+
+/// An arm that is touched after a pause is held; only path time that cannot be stopped is an error.
+#[test]
+fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
+    let mut rig = Rig::holding();
+    rig.upload(&points(), 10);
+    rig.exec(ExecCommand::Execute);
+    rig.until(2_000, |r| r.controller.telemetry().point >= 500);
+    rig.exec(ExecCommand::Pause);
+    rig.nodes[1].report.velocity = 0.05;
+    rig.run(2_000);
+    assert_eq!((rig.state(), rig.tes(), rig.errors()), (State::HoldPos, Tes::Pause, 0));
+}
+
+/// The way to the first point is faster than the path, and than its friction table.
+#[test]
+fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
+    let mut rig = Rig::new(Config::avena());
+    rig.follow = false;
+    rig.nodes[1].report.position = 0.0195;
+    rig.defaults();
+    rig.run(300);
+    rig.follow = true;
+    let mut table = Vec::new();
+    for _ in 0..6 {
+        table.extend((0..20).map(|i| -0.15 + 0.3 * i as f32 / 19.0));
+        table.extend((0..20).map(|i| 5.0 * i as f32));
+        table.extend([0.0; 400]);
+    }
+    assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table)), DataStatus::NoError);
+    rig.upload(&points(), 10);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(5_000, |r| r.tes() == Tes::Finish);
+    assert_eq!(rig.errors(), 0);
+}
+
+/// An arm that is found a little beyond a position limit goes to a path inside.
+#[test]
+fn j43_an_arm_beyond_a_limit_can_go_to_a_path_inside() {
+    let mut config = Config::avena();
+    config.joints[1].position_max = 0.0;
+    let mut rig = Rig::new(config);
+    rig.follow = false;
+    rig.nodes[1].report.position = 0.015;
+    rig.defaults();
+    rig.run(300);
+    rig.follow = true;
+    let down = |mut p: RawPoint| {
+        (p.position[1], p.velocity[1], p.acceleration[1]) =
+            (-p.position[1], -p.velocity[1], -p.acceleration[1]);
+        p
+    };
+    let points: Vec<_> = points().into_iter().map(down).collect();
+    rig.upload(&points, 10);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.until(5_000, |r| r.tes() == Tes::Finish);
+    assert_eq!(rig.status().joints[1].internal_occurred & joint_error::POSITION, 0);
+}
+
+/// J-16: an Execute waits for joints that are being enabled, but not for ever.
+#[test]
+fn j16_an_execute_does_not_wait_for_ever() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.follow = false;
+    rig.run(5);
+    // One joint swings in a hand, too fast to be enabled.
+    let mut phase = 0.0f64;
+    let mut swing = |rig: &mut Rig| {
+        phase += 0.001;
+        rig.nodes[1].report.position = 0.12 * (4.0 * phase).sin();
+        rig.nodes[1].report.velocity = 0.3;
+    };
+    for _ in 0..400 {
+        swing(&mut rig);
+        rig.tick();
+    }
+    let points = points();
+    for (i, part) in points.chunks(100).enumerate() {
+        let count = points.len().div_ceil(100) as u16;
+        rig.send(FrameType::Trajectory, &segment_body(1, i as u16, count, 10, part));
+    }
+    let (mut sent, mut waited) = (false, 0);
+    for _ in 0..30_000 {
+        swing(&mut rig);
+        if !sent && rig.tes() == Tes::Stop && rig.nodes[1].report.position.abs() < 0.005 {
+            rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
+            sent = true;
+        }
+        rig.tick();
+        waited += u32::from(rig.tes() == Tes::Execute);
+    }
+    assert!(sent && (9_900..=10_100).contains(&waited), "{waited} ms");
+    assert_eq!((rig.tes(), rig.errors()), (Tes::Stop, 0));
+}
+
+/// J-06: a model sent before the positions are known is looked at once they are.
+#[test]
+fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
+    let mut rig = Rig::new(Config::avena());
+    let model = Parameters::avena().model;
+    let single =
+        |values: &[f64], factor: f64| -> Vec<f32> { values.iter().map(|x| (x * factor) as f32).collect() };
+    // Millimetres in place of metres.
+    let mut body = Vec::new();
+    for joint in &model.joints {
+        body.extend(single(&joint.xyz, 1000.0));
+        body.extend(single(&joint.rpy, 1.0));
+    }
+    for link in &model.links {
+        for values in [&link.origin.xyz[..], &link.origin.rpy, &link.inertia, &[link.mass]] {
+            body.extend(single(values, 1.0));
+        }
+    }
+    for node in &mut rig.nodes[..6] {
+        node.report.position = 0.6;
+    }
+    rig.follow = false;
+    rig.tick();
+    rig.send(FrameType::FrictionPolynomialUseDefault, &[]);
+    rig.send(FrameType::PidParamUseDefault, &[]);
+    assert_eq!(rig.ask(FrameType::ArmModel, &floats(body)), DataStatus::NoError);
+    for _ in 0..1_000 {
+        rig.tick();
+        assert_eq!((rig.state(), rig.torque), (State::Init, [0.0; 6]));
+    }
+    assert_eq!(rig.status().jtc_init, 0b100, "the model is missing");
+    assert_eq!(rig.ask(FrameType::ArmModelUseDefault, &[]), DataStatus::NoError);
+    rig.until(500, |r| r.state() == State::HoldPos);
+}

@@ -53,14 +53,16 @@ fn answers(request: &Request, state: &mut [u8; 7], position: &[f64; 6]) -> Vec<F
 }
 
 fn main() {
+    // Twice there and back within 1,499 steps of 10 ms, at rest at both ends (J-36).
+    let pace = 2.0 * std::f64::consts::TAU / 14.99;
     let points: Vec<RawPoint> = (0..1500i32)
         .map(|i| {
-            let phase = f64::from(i) * 0.01;
+            let phase = f64::from(i) * 0.01 * pace;
             let wave = |scale: f64, x: f64| [(x / scale * 32767.0) as i16; 6];
             RawPoint {
                 position: wave(3.141592, 0.3 * (1.0 - phase.cos())),
-                velocity: wave(6.283185, 0.3 * phase.sin()),
-                acceleration: wave(12.566370, 0.3 * phase.cos()),
+                velocity: wave(6.283185, 0.3 * pace * phase.sin()),
+                acceleration: wave(12.566370, 0.3 * pace * pace * phase.cos()),
             }
         })
         .collect();
@@ -84,6 +86,7 @@ fn main() {
     let mut bus = Vec::new();
     let mut recorded: Vec<Vec<Frame>> = Vec::new();
     let mut start = None;
+    let mut ticks = 0;
     let bus_state = BusState { acknowledged: true, bus_off: false };
     while recorded.len() < 4_000 {
         // Later commands need HoldPos.
@@ -109,6 +112,8 @@ fn main() {
             status_free: true,
         });
         queue.drain(..outputs.host_done);
+        ticks += 1;
+        assert!(ticks < 60_000, "the trajectory is not executed: {:?}", controller.violation());
         let request = Request::parse(&outputs.bus.expect("a frame each tick")).expect("a request");
         let set = controller.telemetry().joints.map(|j| j.set_position);
         bus = answers(&request, &mut nodes, &set);

@@ -2,8 +2,8 @@
 //!
 //! Between two points (J-32) the commanded velocity is a cubic, the position a quintic and its derivative a quartic: the cubic
 //! and a bump for the way that the velocities do not explain. In Bernstein form each lies within the hull of a few control
-//! points. An interval whose hulls, roughly taken, are within the limits passes at once ([`screen`]); for any other the curves
-//! are halved until the hull is within or the curve itself is seen outside ([`curve`]).
+//! points. An interval whose hulls, roughly taken, are within the limits passes at once (`screen`); for any other the curves
+//! are halved until the hull is within or the curve itself is seen outside (`curve`).
 //!
 //! Positions come in steps of 96 µrad, and what that rounding does to the derivative is no fault of the path: the way of
 //! each interval is judged less one such step.

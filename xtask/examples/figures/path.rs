@@ -5,10 +5,11 @@ use jtc_wire::RawPoint;
 /// ms between points.
 pub const STEP_MS: u16 = 10;
 
-/// A smooth motion of all joints from rest at zero to rest at zero, `points` long, in 10 s swings.
+/// A smooth motion of all joints from rest at zero to rest at zero, `points` long, in whole swings of about 10 s.
 pub fn smooth(points: usize) -> Vec<Point> {
     const AMPLITUDE: [f64; 6] = [0.8, -0.5, 0.9, 0.7, -0.8, 1.0];
-    let omega = std::f64::consts::TAU / 10.0;
+    let seconds = points.saturating_sub(1) as f64 * f64::from(STEP_MS) * 1e-3;
+    let omega = std::f64::consts::TAU * (seconds / 10.0).round().max(1.0) / seconds;
     (0..points)
         .map(|i| {
             // (1 − cos ωt)²/4 starts and ends each swing with velocity and acceleration zero.

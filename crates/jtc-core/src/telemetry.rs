@@ -65,3 +65,15 @@ pub struct Telemetry {
     /// Per joint.
     pub joints: [JointTelemetry; JOINTS],
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Positive where the joint lags behind a motion upwards, as the position part of the torque is.
+    #[test]
+    fn j41_the_position_error_is_commanded_minus_measured() {
+        let joint = JointTelemetry { set_position: 0.5, position: 0.25, ..JointTelemetry::default() };
+        assert_eq!(joint.position_error(), 0.25);
+    }
+}

@@ -1,0 +1,83 @@
+//! `jtc monitor`, `clear`, `reset`, `gripper`, `recover`: looking at a controller and leading it back.
+
+use std::path::PathBuf;
+
+use clap::builder::FalseyValueParser;
+use clap::{Args, ValueEnum};
+
+use super::{AcceptArgs, LinkArgs};
+
+/// Options of `jtc monitor`.
+#[derive(Args, Debug)]
+pub struct MonitorArgs {
+    #[command(flatten)]
+    pub link: LinkArgs,
+    /// End after so many statuses
+    #[arg(long, env = "JTC_COUNT", value_name = "N")]
+    pub count: Option<u64>,
+}
+
+/// Options of `jtc clear`.
+#[derive(Args, Debug)]
+pub struct ClearArgs {
+    #[command(flatten)]
+    pub link: LinkArgs,
+    /// Clear the memory of errors that occurred, too
+    #[arg(long, env = "JTC_OCCURRED", value_parser = FalseyValueParser::new())]
+    pub occurred: bool,
+}
+
+/// Options of `jtc reset`.
+#[derive(Args, Debug)]
+pub struct ResetArgs {
+    /// Joints, counted from 1: 2, or 1,3
+    #[arg(long, env = "JTC_JOINTS", value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
+    pub joints: Vec<u8>,
+    /// The gripper
+    #[arg(long, env = "JTC_GRIPPER", value_parser = FalseyValueParser::new())]
+    pub gripper: bool,
+    /// All joints and the gripper
+    #[arg(long, env = "JTC_ALL", value_parser = FalseyValueParser::new())]
+    pub all: bool,
+    /// Do not ask: the arm may lose torque
+    #[arg(long, env = "JTC_YES", value_parser = FalseyValueParser::new())]
+    pub yes: bool,
+    /// A bit mask, as older versions took it: refused, with what to type instead
+    #[arg(hide = true, value_name = "MASK")]
+    pub mask: Option<String>,
+    #[command(flatten)]
+    pub link: LinkArgs,
+}
+
+/// Options of `jtc gripper`.
+#[derive(Args, Debug)]
+pub struct GripperArgs {
+    /// The pump
+    pub pump: Switch,
+    #[command(flatten)]
+    pub link: LinkArgs,
+}
+
+/// On or off.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub enum Switch {
+    /// On.
+    On,
+    /// Off.
+    Off,
+}
+
+/// Options of `jtc recover`.
+#[derive(Args, Debug)]
+pub struct RecoverArgs {
+    #[command(flatten)]
+    pub link: LinkArgs,
+    /// Arm file whose friction, gains and arm model the controller is given, all three
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: Option<PathBuf>,
+    /// Give the controller's own defaults, those of its built-in arm, when it misses parameters
+    #[arg(long, env = "JTC_DEFAULTS", value_parser = FalseyValueParser::new())]
+    pub defaults: bool,
+    #[command(flatten)]
+    pub accept: AcceptArgs,
+}

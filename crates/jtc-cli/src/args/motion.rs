@@ -1,0 +1,109 @@
+//! `jtc traj` and `jtc teach`: what moves the arm.
+
+use std::path::PathBuf;
+
+use clap::builder::FalseyValueParser;
+use clap::{Args, Subcommand};
+
+use super::{AcceptArgs, ForceArgs, LinkArgs};
+
+/// What a trajectory is checked against.
+#[derive(Args, Clone, Debug)]
+pub struct CheckArgs {
+    /// Arm whose limits and masses count, TOML or URDF; default: the built-in one
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: Option<PathBuf>,
+    /// Run slower, in percent of the trajectory's own speed
+    #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
+    pub speed: f64,
+}
+
+/// `jtc traj …`
+#[derive(Debug, Subcommand)]
+pub enum TrajCommand {
+    /// Limits at and between points, torques by the arm model; nothing is sent
+    #[command(
+        after_help = "Examples:\n  jtc traj check motion.csv\n  jtc --json traj check motion.yaml --arm my-arm.toml"
+    )]
+    Check {
+        /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
+        file: PathBuf,
+        #[command(flatten)]
+        check: CheckArgs,
+    },
+    /// What a file holds
+    #[command(after_help = "Examples:\n  jtc traj info motion.csv")]
+    Info {
+        /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
+        file: PathBuf,
+    },
+    /// Check, upload, execute, follow, report
+    #[command(
+        after_help = "On a terminal space pauses and resumes, s stops. Ctrl-C stops on the path, then ends; a second one ends at once.\n\
+                            Output files are opened before anything moves.\n\nExamples:\n  jtc traj run motion.csv --approach\n  \
+                            jtc traj run motion.csv --speed 10 --record run.mcap"
+    )]
+    Run(RunArgs),
+    /// Pause on the path
+    #[command(after_help = "Examples:\n  jtc traj pause")]
+    Pause(LinkArgs),
+    /// Go on after a pause; refused when nothing is paused
+    #[command(after_help = "Examples:\n  jtc traj resume")]
+    Resume(LinkArgs),
+    /// Stop on the path and end the execution
+    #[command(after_help = "Examples:\n  jtc traj stop")]
+    Stop(LinkArgs),
+}
+
+/// Options of `jtc traj run`.
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub link: LinkArgs,
+    #[command(flatten)]
+    pub check: CheckArgs,
+    /// Move to the first point before
+    #[arg(long, env = "JTC_APPROACH", value_parser = FalseyValueParser::new())]
+    pub approach: bool,
+    /// Points of a segment; default: short enough for the CRC to be strong
+    #[arg(long, env = "JTC_POINTS_PER_SEGMENT", value_name = "N")]
+    pub points_per_segment: Option<usize>,
+    /// Record the motion, .mcap or .csv
+    #[arg(long, env = "JTC_RECORD", value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Write the report page, .html
+    #[arg(long, env = "JTC_REPORT", value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+    #[command(flatten)]
+    pub accept: AcceptArgs,
+}
+
+/// `jtc teach …`
+#[derive(Debug, Subcommand)]
+pub enum TeachCommand {
+    /// Gravity compensation only: the arm can be moved by hand
+    #[command(after_help = "Examples:\n  jtc teach on")]
+    On(LinkArgs),
+    /// Hold the pose
+    #[command(after_help = "Examples:\n  jtc teach off")]
+    Off(LinkArgs),
+    /// Record a motion by hand as a trajectory file, until Ctrl-C
+    #[command(
+        after_help = "Examples:\n  jtc teach record motion.csv\n  jtc teach record motion.csv --duration 20"
+    )]
+    Record {
+        /// Trajectory file to write, CSV
+        file: PathBuf,
+        #[command(flatten)]
+        force: ForceArgs,
+        #[command(flatten)]
+        link: LinkArgs,
+        /// End after so many seconds
+        #[arg(long, env = "JTC_DURATION", value_name = "S")]
+        duration: Option<f64>,
+    },
+}

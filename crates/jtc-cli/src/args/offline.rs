@@ -1,0 +1,78 @@
+//! `jtc dynamics`, `explain`, `report`: what needs no controller.
+
+use std::path::PathBuf;
+
+use clap::builder::FalseyValueParser;
+use clap::{Args, ValueEnum};
+
+use super::ForceArgs;
+
+/// Options of `jtc dynamics`.
+#[derive(Args, Debug)]
+pub struct DynamicsArgs {
+    /// What to compute
+    pub what: DynamicsKind,
+    /// Arm, TOML or URDF; default: the built-in one
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: Option<PathBuf>,
+    /// Gravity in the base frame, m/s²; default: the arm file's
+    #[arg(long, env = "JTC_GRAVITY", value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
+    pub gravity: Option<[f64; 3]>,
+    /// Count the drives' reflected rotor inertias of the arm file, too
+    #[arg(long, env = "JTC_ROTORS", value_parser = FalseyValueParser::new())]
+    pub rotors: bool,
+}
+
+/// Kinds of dynamics.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub enum DynamicsKind {
+    /// Torques of a motion.
+    Inverse,
+    /// Accelerations of torques.
+    Forward,
+    /// Mass matrix, row by row.
+    Mass,
+}
+
+/// Options of `jtc explain`.
+#[derive(Args, Debug)]
+pub struct ExplainArgs {
+    /// Name or number of the code, or `faults` for the form of fault files; without it: the list
+    pub code: Option<String>,
+}
+
+/// Options of `jtc report`.
+#[derive(Args, Debug)]
+pub struct ReportArgs {
+    /// Recording, .mcap or .csv
+    pub file: PathBuf,
+    /// Page to write; default: beside the recording
+    #[arg(long, env = "JTC_OUT", value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+    /// Arm whose limits count, for recordings that do not say (CSV)
+    #[arg(long, env = "JTC_ARM", value_name = "FILE")]
+    pub arm: Option<PathBuf>,
+}
+
+fn gravity(text: &str) -> Result<[f64; 3], String> {
+    let values: Vec<f64> =
+        text.split(',').filter_map(|v| v.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
+    let count = text.split(',').count();
+    match <[f64; 3]>::try_from(values) {
+        Ok(values) if count == 3 => Ok(values),
+        _ => Err("three numbers with commas between them, as 0,0,-9.81".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gravity_is_checked() {
+        assert_eq!(gravity("0,0,-9.81"), Ok([0.0, 0.0, -9.81]));
+        assert!(gravity("0,0").is_err() && gravity("0,0,x").is_err() && gravity("0,0,1,2").is_err());
+    }
+}

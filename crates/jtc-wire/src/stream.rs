@@ -229,11 +229,14 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     }
 
     /// Forgets all that is held, the event too: bytes were lost in front of the next one, which is byte `position` of the
-    /// stream. What comes next continues nothing.
+    /// stream. What was lost is reported as one run that was not received to its end (J-04); what comes next continues no
+    /// frame, and up to the next one it belongs to that run.
     pub fn restart(&mut self, position: u64) {
         (self.base, self.start, self.end) = (position, 0, 0);
         (self.refused, self.gap_before_refused) = (false, false);
-        (self.in_run, self.busy, self.event) = (false, false, None);
+        let lost = Response::bad(0, FrameStatus::DiscontinuousFrame, 0);
+        (self.in_run, self.busy) = (true, false);
+        self.event = Some(Found::Run(Sort::Noise, lost, position));
         (self.gaps, self.registers) = (Gaps::new(), Registers::new());
     }
 

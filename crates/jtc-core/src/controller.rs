@@ -10,7 +10,7 @@ use crate::execution::Path;
 use crate::host::{Overtaking, Work};
 use crate::io::{Inputs, Outputs};
 use crate::late::LateTicks;
-use crate::motion::{Gains, Law, Motion};
+use crate::motion::{ControlParameters, Law, Motion};
 use crate::nodes::{Goal, Nodes};
 use crate::path::PathClock;
 use crate::records::{HOST_LINES, ResponseQueues};
@@ -335,13 +335,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Torques of the control law, and the joint errors found on the way.
     fn compute(&mut self, law: Law) -> ([f64; JOINTS], [u16; JOINTS]) {
         let braking = self.brake();
-        let gains = Gains {
+        let parameters = ControlParameters {
             dynamics: &self.dynamics,
             pid: &self.pid,
             polynomial: &self.polynomial,
             table: self.friction_is_table.then_some(&self.tables),
         };
-        self.motion.control(law, braking, &self.nodes, &self.config, &gains)
+        self.motion.control(law, braking, &self.nodes, &self.config, &parameters)
     }
 }
 

@@ -157,7 +157,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.follow();
                 match leave {
                     // The last point is at rest: there the arm stands whatever the ramp says.
-                    Some(tes) if self.clock.standing() || self.at_end() || self.crawls() => {
+                    Some(tes) if self.clock.standing() || self.at_end() => {
                         self.clock.rest();
                         self.set_tes(tes);
                     }
@@ -201,22 +201,25 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// A pause or stop has taken its time, and what is left of the motion is too slow to be one.
-    fn crawls(&self) -> bool {
-        self.braking_ms.is_some_and(|ms| ms >= self.config.stop_ms)
-            && self.motion.moving_joints(&self.nodes, joint_error::TORQUE) == [0; JOINTS]
-    }
-
     /// One more tick of a pause or stop, until the arm stands. Returns whether it goes on: meanwhile all the torque there is may
-    /// brake. Path time that still runs when its time is over cannot be stopped by torque: an error of the joints that move. An
-    /// arm that is held by then and moved by something else is a matter of the ordinary limits.
+    /// brake. Once it has taken its time, what is left may be too slow to be a motion. Path time that still runs when all its
+    /// time is over cannot be stopped by torque: an error of the joints that move. An arm that is held by then and moved by
+    /// something else is a matter of the ordinary limits.
     pub(crate) fn brake(&mut self) -> bool {
         let Some(ms) = self.braking_ms else { return false };
-        let moving = self.motion.moving_joints(&self.nodes, joint_error::TORQUE);
-        let still = self.tes != Tes::Execute && moving == [0; JOINTS];
+        let moving = self.motion.moving(&self.nodes);
+        let stands = moving == [false; JOINTS];
+        if let (Tes::Execute, Path::Running { leave: Some(tes) }) = (self.tes, self.path)
+            && stands
+            && ms >= self.config.stop_ms
+        {
+            self.clock.rest();
+            self.set_tes(tes);
+        }
+        let still = self.tes != Tes::Execute && stands;
         let over = ms >= self.config.braking_ms_max;
         if over && self.tes == Tes::Execute {
-            self.errors.raise_joints(&moving);
+            self.errors.raise_joints(&moving.map(|moves| if moves { joint_error::TORQUE } else { 0 }));
         }
         self.braking_ms = if over || still { None } else { Some(ms + 1) };
         self.braking_ms.is_some()

@@ -63,6 +63,12 @@ fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Op
     Some(((value - f64::from(start)) / (f64::from(end) - f64::from(start)), cell))
 }
 
+/// Temperature in °C: drives send negative ones modulo 256, and no bearing reaches 200 °C.
+pub(crate) fn celsius(byte: u8) -> f64 {
+    let t = f64::from(byte);
+    if byte >= 200 { t - 256.0 } else { t }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

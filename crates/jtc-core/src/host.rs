@@ -6,8 +6,8 @@ use jtc_wire::{
 use crate::check::{self, TrajectoryCheck, Violation};
 use crate::controller::Controller;
 use crate::defaults;
+use crate::friction::celsius;
 use crate::io::{HostEvent, Inputs};
-use crate::motion::celsius;
 use crate::nodes::GRIPPER;
 use crate::{JOINTS, State, Tes};
 

@@ -1,0 +1,198 @@
+//! The control law: τ = τ_id + τ_pid + τ_fric and its limits, each tick, for each joint (section 6).
+use jtc_dynamics::Dynamics;
+
+use super::Motion;
+use crate::config::{Config, PidGains, TableOf};
+use crate::nodes::Nodes;
+use crate::pid::PidTorque;
+use crate::{JOINTS, friction, joint_error, limits};
+
+/// Which parts of the control law act.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Law {
+    /// Gravity and PID.
+    Hold,
+    /// Everything, with commanded velocity and acceleration.
+    Follow,
+    /// The same on the way to the path. Limits of the path do not bear on it: it begins where the arm was found.
+    Approach,
+    /// Gravity and a brake above the speed limit.
+    Teach,
+}
+
+impl Law {
+    /// Commanded velocity and acceleration are part of it.
+    fn moves(self) -> bool {
+        matches!(self, Self::Follow | Self::Approach)
+    }
+}
+
+/// Parameters that the law uses.
+pub(crate) struct ControlParameters<'a> {
+    pub dynamics: &'a Dynamics,
+    pub pid: &'a [PidGains; JOINTS],
+    pub polynomial: &'a [[f64; 6]; JOINTS],
+    pub table: Option<&'a [TableOf<f32>; JOINTS]>,
+}
+
+/// Parts of one joint's torque, N·m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct JointTorque {
+    pub model: f64,
+    pub pid: PidTorque,
+    pub friction: f64,
+    /// What teaching carries besides the model.
+    pub payload: f64,
+    /// Brake of teaching.
+    pub brake: f64,
+    /// What is left of a step that is being blended out.
+    pub blend: f64,
+}
+
+impl JointTorque {
+    /// All but the model.
+    pub fn correction(&self) -> f64 {
+        self.pid.sum() + self.friction + self.payload + self.brake + self.blend
+    }
+
+    pub fn sum(&self) -> f64 {
+        self.model + self.correction()
+    }
+}
+
+impl Motion {
+    /// The control law and its limits: torques to command, and joint errors found on the way. `braking`: with all the torque
+    /// there is, so that what this does to torque, position error and acceleration is none (J-33).
+    pub fn control(
+        &mut self,
+        law: Law,
+        braking: bool,
+        nodes: &Nodes,
+        config: &Config,
+        parameters: &ControlParameters<'_>,
+    ) -> ([f64; JOINTS], [u16; JOINTS]) {
+        let missing = self.compute(law, nodes, config, parameters);
+        if self.yielding {
+            self.soften(config);
+        }
+        let (torque, mut errors) = self.limit(law, braking, nodes, config);
+        for (j, error) in errors.iter_mut().enumerate() {
+            if nodes.node(j).enabled() {
+                *error |= missing[j];
+            }
+        }
+        (torque, errors)
+    }
+
+    /// Computes the torque of this tick into `self.torque`; returns joint errors found on the way (friction table).
+    fn compute(
+        &mut self,
+        law: Law,
+        nodes: &Nodes,
+        config: &Config,
+        parameters: &ControlParameters<'_>,
+    ) -> [u16; JOINTS] {
+        let mut errors = [0; JOINTS];
+        let before = self.transfer.begin(&self.torque);
+        let q = nodes.positions();
+        let v = nodes.velocities();
+        // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere.
+        let zero = [0.0; JOINTS];
+        let (qd, qdd) = if law.moves() { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
+        let model = parameters.dynamics.inverse(q, &qd, &qdd);
+        let payload = if law == Law::Teach {
+            self.payload.torque(parameters.dynamics, q, config)
+        } else {
+            [0.0; JOINTS]
+        };
+        for j in 0..JOINTS {
+            let limit = &config.joints[j];
+            let mut torque = JointTorque {
+                model: model[j] + limit.rotor_inertia * qdd[j],
+                payload: payload[j],
+                ..JointTorque::default()
+            };
+            if law != Law::Teach {
+                let error = self.set.position[j] - q[j];
+                let at_rest = self.set.velocity[j] == 0.0 && self.set.acceleration[j] == 0.0;
+                let encoder_step = at_rest.then_some(config.encoder_step);
+                let saturated = self.saturation[j].saturated;
+                torque.pid = self.pid[j].step(&parameters.pid[j], error, saturated, encoder_step);
+            }
+            if law.moves() {
+                let t = friction::celsius(nodes.node(j).report.temperature);
+                torque.friction = match parameters.table {
+                    None => {
+                        friction::polynomial(&parameters.polynomial[j], qd[j], t, config.friction_sign_width)
+                    }
+                    Some(tables) => {
+                        let (slowest, fastest) = friction::velocities(&tables[j]);
+                        let nearest = qd[j].max(slowest).min(fastest);
+                        let v = if law == Law::Approach { nearest } else { qd[j] };
+                        friction::table(&tables[j], v, t).unwrap_or_else(|| {
+                            errors[j] |= joint_error::FRICTION_TABLE;
+                            0.0
+                        })
+                    }
+                };
+            }
+            self.torque[j] = torque;
+        }
+        self.transfer.blend(before, &mut self.torque, nodes, config);
+        if law == Law::Hold && !self.yielding {
+            self.payload.observe(&self.torque.map(|t| t.correction()));
+        } else {
+            self.payload.forget();
+        }
+        if law == Law::Teach {
+            for j in 0..JOINTS {
+                if nodes.node(j).enabled() {
+                    self.torque[j].brake =
+                        brake(v[j], self.torque[j].sum(), config, config.joints[j].torque_max);
+                }
+            }
+        }
+        errors
+    }
+
+    /// Bounds what the law adds to the torque of the model (J-66).
+    fn soften(&mut self, config: &Config) {
+        for (torque, joint) in self.torque.iter_mut().zip(&config.joints) {
+            let most = config.yield_torque_share * joint.torque_max;
+            let correction = torque.correction();
+            torque.blend += correction.max(-most).min(most) - correction;
+        }
+    }
+
+    /// The torques to command and the joint errors found, both per joint (J-43).
+    fn limit(
+        &mut self,
+        law: Law,
+        braking: bool,
+        nodes: &Nodes,
+        config: &Config,
+    ) -> ([f64; JOINTS], [u16; JOINTS]) {
+        let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
+        let excused = if braking { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
+        for j in 0..JOINTS {
+            let limits = &config.joints[j];
+            let (limited, torque_error) =
+                self.saturation[j].limit(self.torque[j].sum(), limits, config.torque_over_ms, braking);
+            let joint = (self.set.position[j], self.set.velocity[j], self.set.acceleration[j]);
+            let set_error = limits::check_set(joint, nodes.positions()[j], limits, law == Law::Follow);
+            torque[j] = limited;
+            errors[j] =
+                torque_error | if law != Law::Teach && self.holding[j] { set_error & !excused } else { 0 };
+        }
+        (torque, errors)
+    }
+}
+
+/// Teaching brakes a joint above the speed limit, with what its `torque` so far leaves of the limit (J-25).
+fn brake(velocity: f64, torque: f64, config: &Config, torque_max: f64) -> f64 {
+    let limit = config.teach_velocity_max;
+    let excess = velocity - velocity.max(-limit).min(limit);
+    let wanted = -config.teach_damping * excess;
+    let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
+    wanted.max(low).min(high)
+}

@@ -1,0 +1,95 @@
+//! Bumpless transfer: torque steps at a change of state, of the model or at enabling are blended out (J-25, J-44).
+use super::law::JointTorque;
+use super::smooth;
+use crate::JOINTS;
+use crate::config::Config;
+use crate::nodes::Nodes;
+
+/// Which part of the last torque the next one continues.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Continued {
+    /// All but the model.
+    Correction,
+    /// All of it.
+    Everything,
+}
+
+impl Continued {
+    fn of(self, torque: &JointTorque) -> f64 {
+        match self {
+            Self::Correction => torque.correction(),
+            Self::Everything => torque.sum(),
+        }
+    }
+}
+
+/// The last torque where the next one has to continue it.
+pub(super) type Before = Option<(Continued, [f64; JOINTS])>;
+
+/// Steps that are being blended out.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Transfer {
+    /// Step to blend out, N·m, and how long that has gone on.
+    step: [f64; JOINTS],
+    step_ms: [u16; JOINTS],
+    /// Joints that were latched in this tick: their torque starts from that of the model.
+    just_enabled: [bool; JOINTS],
+    /// The next torque has to continue the last one.
+    next: Option<Continued>,
+}
+
+impl Transfer {
+    /// The state changes: no step but that of the model.
+    pub fn change_law(&mut self) {
+        self.next = Some(Continued::Correction);
+    }
+
+    /// The model changes: no step at all.
+    pub fn change_model(&mut self) {
+        self.next = Some(Continued::Everything);
+    }
+
+    /// Nothing of the last torque is continued.
+    pub fn let_go(&mut self) {
+        (self.next, self.step) = (None, [0.0; JOINTS]);
+    }
+
+    /// Joints that were latched in this tick.
+    pub fn set_just_enabled(&mut self, just_enabled: [bool; JOINTS]) {
+        self.just_enabled = just_enabled;
+    }
+
+    /// Before the torque is computed anew: what of the last one it has to continue, if anything.
+    pub fn begin(&mut self, last: &[JointTorque; JOINTS]) -> Before {
+        self.next.take().map(|continued| (continued, core::array::from_fn(|j| continued.of(&last[j]))))
+    }
+
+    /// Adds what is left of the steps to `torque`, and clears that of joints that are not enabled.
+    pub fn blend(
+        &mut self,
+        before: Before,
+        torque: &mut [JointTorque; JOINTS],
+        nodes: &Nodes,
+        config: &Config,
+    ) {
+        if let Some((continued, before)) = before {
+            for j in 0..JOINTS {
+                (self.step[j], self.step_ms[j]) = (before[j] - continued.of(&torque[j]), 0);
+            }
+        }
+        let per_tick = 1.0 / f64::from(config.blend_ms.max(1));
+        for j in 0..JOINTS {
+            if core::mem::take(&mut self.just_enabled[j]) {
+                (self.step[j], self.step_ms[j]) = (-torque[j].correction(), 0);
+            }
+            let left = 1.0 - smooth(f64::from(self.step_ms[j]) * per_tick);
+            self.step_ms[j] = self.step_ms[j].saturating_add(1);
+            if nodes.node(j).enabled() {
+                torque[j].blend = self.step[j] * left;
+            } else {
+                torque[j] = JointTorque::default();
+                self.step[j] = 0.0;
+            }
+        }
+    }
+}

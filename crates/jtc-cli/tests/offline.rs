@@ -152,6 +152,32 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     }
 }
 
+/// What a URDF cannot say is not zero: no difference to the controller, and a check that leaves it out says so.
+#[test]
+fn j55_what_a_urdf_cannot_say_is_not_given() {
+    let dir = tempfile::tempdir().unwrap();
+    let (urdf, motion_file) = (dir.path().join("arm.urdf"), dir.path().join("motion.csv"));
+    let arm = jtc_host::Arm::avena();
+    std::fs::write(&urdf, arm.to_urdf()).unwrap();
+    std::fs::write(&motion_file, motion(0.3)).unwrap();
+    let (urdf, file) = (urdf.to_str().unwrap(), motion_file.to_str().unwrap());
+    // Its limits are the controller's own: it goes on to the port, which is not there.
+    let said = jtc(&["params", "push", urdf, "--port", "/nowhere/tty"]).ends(3);
+    assert!(!said.err.contains("rotor_inertia"), "{}", said.err);
+
+    let said = jtc(&["traj", "check", file, "--arm", urdf]).ends(0);
+    let line = said.out.lines().find(|line| line.contains("friction and rotor inertia")).expect("named");
+    assert!(line.contains("arms/avena.toml") && line.contains("--arm"), "{line}");
+    let left_out =
+        |arm: &str| jtc(&["--json", "traj", "check", file, "--arm", arm]).ends(0).json()["left_out"].clone();
+    assert_eq!(left_out(urdf), serde_json::json!(["friction", "rotor inertia"]));
+    let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
+    assert_eq!(left_out(whole), serde_json::json!([]));
+    // A run counts the rotors that the controller computes with.
+    let said = jtc(&["traj", "run", file, "--arm", urdf, "--port", "/nowhere/tty"]).ends(3);
+    assert!(said.err.contains("without friction, which"), "{}", said.err);
+}
+
 /// J-55: a URDF has neither friction nor gains, and those of another arm are not filled in.
 #[test]
 fn j55_recover_refuses_an_arm_that_is_not_whole() {

@@ -16,6 +16,11 @@ pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
     for warning in &arm.warnings {
         out.note(format!("note: {warning}"));
     }
+    if args.rotors && arm.rotors_given.contains(&false) {
+        out.note(
+            "note: the arm file does not give every rotor inertia: 0 counts for those that it leaves out",
+        );
+    }
     let gravity = args.gravity.unwrap_or_else(|| arm.config().gravity);
     let dynamics = Dynamics::new(&arm.model, gravity);
     let rotor: JointVec =

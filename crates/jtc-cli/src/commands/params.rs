@@ -54,8 +54,9 @@ fn push(
     let missing = words::missing_parameters(status.jtc_init);
     // What was neither sent nor is missing: the controller had it before, from whom is not known.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
+    let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
-        "pushed": pushed, "kept": kept, "differences": differences,
+        "pushed": pushed, "kept": kept, "differences": differences, "not_given": not_given,
         "state": words::state(status.fsm), "missing_parameters": missing,
     });
     out.result(&value, || {
@@ -68,6 +69,9 @@ fn push(
             let whose =
                 if differences.is_empty() { "the same as in the file" } else { "other ones, listed above" };
             text += &format!("in no frame: {NOT_CARRIED}; the controller uses its own, {whose}\n");
+            if !not_given.is_empty() {
+                text += &format!("not given by the file, so not compared: {}\n", not_given.join(", "));
+            }
         }
         text += &if missing.is_empty() {
             format!("all parameters given; {}", words::waiting_for(&status))

@@ -36,9 +36,10 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         Format::of(path)?; // a wrong ending is said before anything moves
     }
     let mut job = Job::load(&args.file, &args.check, out)?;
-    if !limits::accept(&job.arm, args.accept.accept_device_limits, out)?.is_empty() {
-        job.config = job.arm.config_on_device();
-    }
+    limits::accept(&job.arm, args.accept.accept_device_limits, out)?;
+    // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
+    job.config = job.arm.config_on_device();
+    job.say_what_is_left_out(out);
     let options = UploadOptions { points_per_segment: args.points_per_segment, number: 0 };
     let verdict = job.verdict(&job.trajectory, None, options);
     if !verdict.is_ok() {

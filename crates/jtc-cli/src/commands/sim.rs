@@ -28,6 +28,12 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     for warning in &arm.warnings {
         out.note(format!("note: {warning}"));
     }
+    if arm.friction().is_none() {
+        out.note("note: the arm file gives no friction: that of the default arm is simulated");
+    }
+    if arm.rotors_given.contains(&false) {
+        out.note("note: the arm file does not give every rotor inertia: 0 is simulated for those that it leaves out");
+    }
     let faults = args.faults.as_deref().map(faults).transpose()?.unwrap_or_default();
     let config = SimConfig {
         baud: (!args.no_throttle).then_some(args.baud),

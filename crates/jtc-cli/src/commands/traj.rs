@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cli_kit::{Output, table};
-use jtc_core::Config;
+use jtc_core::{Config, JOINTS};
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, Verdict};
 use jtc_host::port::SerialPort;
@@ -89,6 +89,34 @@ impl Job {
         Ok(Self { loaded, trajectory, arm, config })
     }
 
+    /// Parts of the torque that the check leaves out because the arm file does not give them.
+    fn left_out(&self) -> Vec<&'static str> {
+        let arm = &self.arm;
+        let rotors = (0..JOINTS).any(|j| !arm.rotors_given[j] && self.config.joints[j].rotor_inertia == 0.0);
+        let parts = [(arm.friction().is_none(), "friction"), (rotors, "rotor inertia")];
+        parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
+    }
+
+    /// What the torques leave out, and how to give it; none where nothing is left out.
+    fn without(&self) -> Option<String> {
+        let parts = self.left_out();
+        (!parts.is_empty()).then(|| {
+            format!(
+                "torques are computed without {}, which the file of arm {} does not give: the arm needs more. A copy of \
+                 arms/avena.toml with the numbers of this arm gives all, by --arm",
+                parts.join(" and "),
+                self.arm.name
+            )
+        })
+    }
+
+    /// Says what the torques leave out, as a note.
+    pub fn say_what_is_left_out(&self, out: &Output) {
+        if let Some(words) = self.without() {
+            out.note(format!("note: {words}"));
+        }
+    }
+
     /// Limits of every point and between points, torque by the arm model; the start pose, where it is given.
     pub fn verdict(
         &self,
@@ -132,9 +160,12 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
         ));
     }
     let verdict = job.verdict(&job.trajectory, None, UploadOptions::default());
-    let value = json!({ "ok": verdict.is_ok(), "form": job.loaded.form, "notes": job.loaded.notes, "verdict": verdict });
+    let value = json!({
+        "ok": verdict.is_ok(), "form": job.loaded.form, "notes": job.loaded.notes, "left_out": job.left_out(), "verdict": verdict,
+    });
     out.result(&value, || {
-        format!("{verdict}\n{}next: {}", figures(&verdict), verdict.hint().replace('`', ""))
+        let without = job.without().map_or(String::new(), |words| words + "\n");
+        format!("{verdict}\n{}{without}next: {}", figures(&verdict), verdict.hint().replace('`', ""))
     });
     if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(REFUSED)) }
 }

@@ -46,8 +46,11 @@ const JOINT_SETTINGS: [Setting; 7] = [
     ("acceleration_max_rad_s2", "rad/s²", |j| j.acceleration_max),
     ("torque_max_nm", "N·m", |j| j.torque_max),
     ("position_error_max_rad", "rad", |j| j.position_error_max),
-    ("rotor_inertia_kg_m2", "kg·m²", |j| j.rotor_inertia),
+    (ROTOR, "kg·m²", |j| j.rotor_inertia),
 ];
+
+/// The setting that a URDF has no place for.
+const ROTOR: &str = "rotor_inertia_kg_m2";
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
@@ -73,10 +76,20 @@ impl Arm {
         }
         for (i, (file, device)) in own.joints.iter().zip(&device.joints).enumerate() {
             for (name, unit, value) in JOINT_SETTINGS {
-                compare(name, Some(i + 1), value(file), value(device), unit);
+                if name != ROTOR || self.rotors_given[i] {
+                    compare(name, Some(i + 1), value(file), value(device), unit);
+                }
             }
         }
         all
+    }
+
+    /// The settings that no frame carries and that the file does not give either: the controller's own count, and there is nothing
+    /// to compare them with.
+    pub fn settings_not_given(&self) -> Vec<&'static str> {
+        let rotors = self.rotors_given.contains(&false);
+        let parts = [(self.gravity.is_none(), "gravity"), (rotors, "rotor inertia")];
+        parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
     /// Settings to check a motion against that a controller with its built-in settings is to execute: of each limit the tighter
@@ -131,6 +144,24 @@ mod tests {
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
         assert!(arm.device_differences().is_empty());
+    }
+
+    /// A URDF has no place for rotor inertia: that is not 0, and not a difference.
+    #[test]
+    fn j55_a_rotor_inertia_that_no_file_gives_is_no_difference() {
+        let urdf = Arm::parse(&Arm::avena().to_urdf()).unwrap();
+        let names: Vec<_> = urdf.device_differences().iter().map(|d| d.name).collect();
+        assert!(!names.contains(&"rotor_inertia_kg_m2"), "{names:?}");
+        assert_eq!(urdf.settings_not_given(), ["gravity", "rotor inertia"]);
+        // What is checked for a controller counts the rotors that it computes with.
+        assert_eq!(urdf.config_on_device().joints[3].rotor_inertia, Config::avena().joints[3].rotor_inertia);
+        // An arm file that is made of it gives none either; one that says 0 does.
+        let text = urdf.to_toml();
+        assert!(!text.contains("rotor_inertia"), "{text}");
+        assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);
+        let said =
+            Arm::avena().to_toml().replacen("rotor_inertia_kg_m2 = 0.7", "rotor_inertia_kg_m2 = 0.0", 1);
+        assert_eq!(Arm::parse(&said).unwrap().device_differences().len(), 1);
     }
 
     #[test]

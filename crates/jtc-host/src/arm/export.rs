@@ -48,7 +48,9 @@ impl Arm {
                 ("position_error_max_rad", limit.position_error_max),
                 ("rotor_inertia_kg_m2", limit.rotor_inertia),
             ] {
-                let _ = writeln!(out, "{key} = {value:?}");
+                if key != "rotor_inertia_kg_m2" || self.rotors_given[i] {
+                    let _ = writeln!(out, "{key} = {value:?}");
+                }
             }
             if let Some(g) = self.pid.map(|p| p[i]) {
                 let _ = writeln!(

@@ -51,6 +51,8 @@ pub struct Arm {
     pub model: ArmModel,
     /// Limits and rotor inertia, base to wrist.
     pub joints: [JointConfig; JOINTS],
+    /// Joints, base to wrist, whose rotor inertia the file gives. That of the others is 0 in `joints`: nobody said it.
+    pub rotors_given: [bool; JOINTS],
     /// Acceleration of gravity in the base frame, m/s²; `None`: the device's setting.
     pub gravity: Option<[f64; 3]>,
     /// Gains.
@@ -88,7 +90,8 @@ impl Arm {
         Ok(arm)
     }
 
-    /// Settings of a controller for this arm; what the file does not say is as for the default arm.
+    /// Settings of a controller for this arm; what the file does not say is as for the default arm, but a rotor inertia that is
+    /// not given is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
         Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default }

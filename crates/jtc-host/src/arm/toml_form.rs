@@ -116,6 +116,7 @@ impl Arm {
             name: form.name,
             model,
             joints: limits,
+            rotors_given: std::array::from_fn(|i| joints[i].rotor_inertia_kg_m2.is_some()),
             gravity: form.gravity_m_s2,
             warnings,
         })

@@ -38,6 +38,8 @@ impl Arm {
             joint_names: chain.revolute.map(|j| j.name.clone()),
             model,
             joints: limits,
+            // The form has no place for it.
+            rotors_given: [false; JOINTS],
             gravity: None,
             pid: None,
             polynomial: None,

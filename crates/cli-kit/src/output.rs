@@ -2,6 +2,7 @@
 
 use std::io::{IsTerminal, Write};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -9,6 +10,8 @@ use serde_json::json;
 
 /// Why the first result that was lost could not be printed. A command goes on without its output; its exit code says so in the end.
 static LOST: OnceLock<String> = OnceLock::new();
+/// A write to stdout has failed, for whatever reason.
+static GONE: AtomicBool = AtomicBool::new(false);
 
 /// How a command speaks.
 #[derive(Clone, Copy, Debug)]
@@ -41,14 +44,28 @@ impl Output {
     /// Prints a result: `value` as one line of JSON, or the text.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
         let line = self.words(value, text);
+        Self::bytes(format!("{}\n", line.trim_end()).as_bytes());
+    }
+
+    /// Prints a result that is a file of its own, as it is.
+    pub fn bytes(bytes: &[u8]) {
         let mut stdout = std::io::stdout().lock();
-        let done = writeln!(stdout, "{}", line.trim_end()).and_then(|()| stdout.flush());
-        // A reader that has gone (`… | head`) is no error.
-        if let Err(e) = done
-            && e.kind() != std::io::ErrorKind::BrokenPipe
-        {
-            let _ = LOST.set(e.to_string());
+        if let Err(e) = stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+            Self::lose(&e);
         }
+    }
+
+    /// Remembers why something that was meant for stdout was lost. A reader that has gone (`… | head`) has seen what it wanted: that is no loss.
+    pub fn lose(why: &std::io::Error) {
+        GONE.store(true, Ordering::Relaxed);
+        if why.kind() != std::io::ErrorKind::BrokenPipe {
+            let _ = LOST.set(why.to_string());
+        }
+    }
+
+    /// Nothing printed from now on is read: a command that only prints may end.
+    pub fn gone() -> bool {
+        GONE.load(Ordering::Relaxed)
     }
 
     /// Why a result could not be printed, where that was so: the command did its work, and nobody can read of it.

@@ -1,23 +1,28 @@
 //! Shell completions and manual pages, made from the command line's definition.
 
-use std::io::{Result, Write, stdout};
+use std::io::Result;
 use std::path::Path;
 
 use clap::CommandFactory;
 
+use crate::Output;
+
 /// Prints the completions of a shell.
-pub fn completions<Cli: CommandFactory>(shell: clap_complete::Shell) -> Result<()> {
+pub fn completions<Cli: CommandFactory>(shell: clap_complete::Shell) {
     let mut command = Cli::command();
     let name = command.get_name().to_owned();
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut command, name, &mut text);
-    stdout().write_all(&text)
+    Output::bytes(&text);
 }
 
 /// Writes a page for each command into a directory, or prints the main one.
 pub fn man<Cli: CommandFactory>(dir: Option<&Path>) -> Result<()> {
     let Some(dir) = dir else {
-        return clap_mangen::Man::new(Cli::command()).render(&mut stdout());
+        let mut page = Vec::new();
+        clap_mangen::Man::new(Cli::command()).render(&mut page)?;
+        Output::bytes(&page);
+        return Ok(());
     };
     std::fs::create_dir_all(dir)?;
     clap_mangen::generate_to(Cli::command(), dir)

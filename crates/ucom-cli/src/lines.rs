@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use cli_kit::Output;
+
 /// Most lines that wait.
 const WAITING: usize = 1000;
 /// At the end, a reader that takes nothing for so long is not waited for.
@@ -64,7 +66,9 @@ impl Lines {
     fn to(writer: impl Write + Send + 'static, is_stdout: bool) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let of_thread = Arc::clone(&shared);
-        std::thread::Builder::new().name("lines".into()).spawn(move || print(&of_thread, writer))?;
+        std::thread::Builder::new()
+            .name("lines".into())
+            .spawn(move || print(&of_thread, writer, is_stdout))?;
         Ok(Self { shared, is_stdout, finished: false })
     }
 
@@ -92,7 +96,7 @@ impl Lines {
         self.shared.changed.notify_all();
     }
 
-    /// The reader has gone (`ucom so | head`).
+    /// The reader has gone (`ucom so | head`), or what it reads from takes no more.
     pub fn gone(&self) -> bool {
         self.shared.lock().gone
     }
@@ -128,7 +132,7 @@ impl Drop for Lines {
     }
 }
 
-fn print(shared: &Shared, mut writer: impl Write) {
+fn print(shared: &Shared, mut writer: impl Write, is_stdout: bool) {
     let mut state = shared.lock();
     loop {
         if let Some(mut line) = state.waiting.pop_front() {
@@ -140,7 +144,12 @@ fn print(shared: &Shared, mut writer: impl Write) {
             state = shared.lock();
             state.writing = false;
             state.written += 1;
-            state.gone |= result.is_err();
+            if let Err(e) = &result {
+                state.gone = true;
+                if is_stdout {
+                    Output::lose(e);
+                }
+            }
             shared.changed.notify_all();
         } else if state.closed {
             return;

@@ -30,8 +30,17 @@ fn main() -> ExitCode {
     // clap itself ends wrong usage with exit code 2.
     let cli = Cli::parse();
     let out = Output::new("ucom", cli.json);
+    let acts = cli.command.acts();
     match commands::run(cli.command, &cli.link, &out) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => match Output::lost() {
+            None => ExitCode::SUCCESS,
+            Some(why) => {
+                let exit = if acts { failure::FAULT } else { failure::USAGE };
+                let text = format!("ucom: the result could not be printed: {why}");
+                signal::say_at_most(PATIENCE, move || out.note(text));
+                ExitCode::from(exit)
+            }
+        },
         Err(failure) => {
             if !failure.printed {
                 // Nobody reads what stands in stdout already.

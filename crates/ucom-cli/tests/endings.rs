@@ -282,3 +282,44 @@ fn a_blocked_stderr_does_not_keep_the_process() {
         ended(child).ends(if signals > 0 { 5 } else { 3 });
     }
 }
+
+/// What acts on boards ends with 5 where its result was lost, after it has done all of it; what only prints ends at once.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_lost_result_of_what_acts_is_a_fault() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    let mut peer = sim.peer();
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    for (words, code) in [
+        (&["start", "1"][..], 5),
+        (&["--json", "run", "1", "--for", "0.3"], 5),
+        (&["info", "1"], 2),
+        (&["--json", "monitor"], 2),
+        (&["decode", "--live"], 2),
+        (&["record", "-"], 2),
+    ] {
+        let mut command = sim.command();
+        let child = command.args(words).stdin(Stdio::piped()).stdout(full()).stderr(Stdio::piped()).spawn();
+        let child = child.unwrap();
+        // Something is on the bus to be printed.
+        std::thread::sleep(Duration::from_millis(300));
+        peer.send("641#0000");
+        let said = ended(child).ends(code);
+        assert!(said.err.contains("No space left"), "{words:?}: {}", said.err);
+    }
+    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+    assert_eq!(status["boards"][0]["status_byte"], 0x1B, "stopped all the same");
+    // A reader that has gone is no error.
+    for words in [&["decode", "--live"][..], &["record", "-"], &["--json", "monitor"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = sim.command();
+        let child = command.args(words).stdin(Stdio::piped()).stdout(writer).stderr(Stdio::piped()).spawn();
+        let child = child.unwrap();
+        drop(command);
+        std::thread::sleep(Duration::from_millis(300));
+        peer.send("641#0000");
+        ended(child).ends(0);
+    }
+}

@@ -2,6 +2,7 @@
 
 mod common;
 
+use cli_kit::trial::program;
 use common::{ucom, ucom_with};
 
 #[test]
@@ -80,4 +81,23 @@ fn pages_completions_and_manual_are_made() {
 fn a_dbc_without_boards_needs_no_bus() {
     let said = ucom(&["dbc", "none"]).ends(0);
     assert!(said.out.starts_with("VERSION") && said.out.contains("BO_ "), "{}", said.out);
+}
+
+/// A result that went nowhere is no success; a reader that has gone is none that was kept waiting.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_result_that_cannot_be_printed_is_an_error() {
+    for words in [&["help", "profile"][..], &["dbc", "none"], &["completions", "bash"], &["man"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut command = program(env!("CARGO_BIN_EXE_ucom"), "UCOM_");
+        let done = command.args(words).stdout(full).output().unwrap();
+        let err = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(2), "{words:?}: {err}");
+        assert!(err.contains("No space left"), "{words:?}: {err}");
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = program(env!("CARGO_BIN_EXE_ucom"), "UCOM_");
+        let done = command.args(words).stdout(writer).output().unwrap();
+        assert_eq!(done.status.code(), Some(0), "{words:?}: {}", String::from_utf8_lossy(&done.stderr));
+    }
 }

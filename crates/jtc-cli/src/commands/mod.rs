@@ -43,7 +43,10 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Explain(args) => explain::explain(&args, out),
         Command::Decode => decode::decode(out),
         Command::Report(args) => report::report(&args, out),
-        Command::Completions { shell } => Ok(pages::completions::<crate::args::Cli>(shell)?),
+        Command::Completions { shell } => {
+            pages::completions::<crate::args::Cli>(shell);
+            Ok(())
+        }
         Command::Man { out: dir } => Ok(pages::man::<crate::args::Cli>(dir.as_deref())?),
     }
 }

@@ -232,6 +232,29 @@ pub enum Command {
     },
 }
 
+impl Command {
+    /// Whether it changes something on the boards: then a result that nobody can read is a fault of the run, not of the command line.
+    pub fn acts(&self) -> bool {
+        match self {
+            Self::Init(_)
+            | Self::Reset(_)
+            | Self::Xreset(_)
+            | Self::Start(_)
+            | Self::Stop(_)
+            | Self::Repair(_)
+            | Self::Run(_)
+            | Self::Replay(_)
+            | Self::Conformance(_) => true,
+            Self::Status(args) => args.set.is_some() || args.clear.is_some() || args.raw.is_some(),
+            Self::Update(args) => !args.dry_run,
+            Self::Ci(args) => !args.values.is_empty() || args.duration.is_some(),
+            Self::Par(args) => !args.values.is_empty() || (args.apply.is_some() && !args.dry_run),
+            Self::Probe(args) => args.init || args.alive,
+            _ => false,
+        }
+    }
+}
+
 /// Pages of `ucom help`.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum Topic {

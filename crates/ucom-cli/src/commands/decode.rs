@@ -36,7 +36,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let mut start = None;
     for record in records {
         let record = record?;
-        if frames == left {
+        if frames == left || Output::gone() {
             return Ok(());
         }
         frames += 1;
@@ -54,7 +54,7 @@ fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut decoder = Decoder::new(link.profile()?);
     let mut bus = link.open()?;
-    while left > 0 && !stop.asked() {
+    while left > 0 && !stop.asked() && !Output::gone() {
         if let Some(frame) = bus.receive(Duration::from_millis(100))? {
             print(&mut decoder, bus.now_us() * 1000, &recorded(&frame), out);
             left -= 1;

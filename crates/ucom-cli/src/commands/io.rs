@@ -1,6 +1,5 @@
 //! `ucom io`, `ci`, `dbc`: inputs, outputs and parameters by name.
 
-use std::io::Write;
 use std::time::{Duration, Instant};
 
 use cli_kit::{Output, table};
@@ -265,7 +264,7 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let text = dbc_text(&boards, profile.endian);
     match &args.out {
         None if out.is_json() => out.result(&json!({ "text": text }), String::new),
-        None => std::io::stdout().write_all(&windows(&text))?,
+        None => Output::bytes(&windows(&text)),
         Some(path) => {
             std::fs::write(path, windows(&text))
                 .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;

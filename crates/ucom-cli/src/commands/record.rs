@@ -1,11 +1,12 @@
 //! `ucom record` and `ucom replay`: frames of a bus to a file and back.
 
-use std::io::Write;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use cli_kit::{Output, Stop};
 use serde_json::json;
-use ucom::files::recording::{CandumpWriter, Record, Recording, RecordingFormat, RecordingWriter};
+use ucom::files::recording::{
+    CandumpWriter, Record, Recording, RecordingError, RecordingFormat, RecordingWriter,
+};
 use ucom::master::Master;
 
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
@@ -66,6 +67,11 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
             Err(_) if format == RecordingFormat::FziCan && protocol_frame(&record.frame).is_err() => {
                 left_out += 1
             }
+            // `ucom record - | head` has what it wanted.
+            Err(RecordingError::Io { source: e, .. }) if stdout => {
+                Output::lose(&e);
+                break;
+            }
             Err(e) => return Err(Failure::new(FAULT, "recording", e).hint("is the disk full?")),
         }
     }
@@ -73,7 +79,10 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     master.shared_numbers().iter().for_each(|error| out.note(format!("{error}\n  {}", error.hint())));
     match sink {
         Sink::File(writer) => writer.finish().map_err(Failure::usage)?,
-        Sink::Stdout(_) => return Ok(std::io::stdout().flush()?),
+        Sink::Stdout(_) => {
+            Output::bytes(&[]);
+            return Ok(());
+        }
     }
     let (file, time_s) = (args.file.display().to_string(), start.elapsed().as_secs_f64());
     let value = json!({ "file": file, "frames": frames, "left_out": left_out, "time_s": time_s, "shared_numbers": shared });

@@ -2,7 +2,7 @@
 
 use ucom::master::conformance::ConformanceOptions;
 use ucom::master::probe::ProbeOptions;
-use ucom::master::update::{UpdateFailure, UpdateImage, UpdateOptions, UpdateTarget};
+use ucom::master::update::{UpdateFailure, UpdateImage, UpdateOptions, UpdateOutcome, UpdateTarget};
 use ucom::master::{
     AdminChange, Error, Event, InitOptions, Outcome, Request, RunBoard, RunOptions, ScanFinding, StopLevel,
 };
@@ -150,6 +150,55 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
     let error = bench.go(run, 60).unwrap_err();
     assert!(is_shared(&error, [0x21, 0x42]), "{error:?}");
     assert_eq!((bench.count("541#"), bench.count("1C1#8000") > 0), (0, true), "{:?}", bench.sent());
+}
+
+/// A second board takes the number while the first one is programmed, at any place: it complains of program data, or is
+/// flashed with the first one. Either way the reason is named, no board is left in programming, and no success is claimed.
+#[test]
+fn d24_it_is_named_when_it_shows_in_an_update() {
+    let strap = |flash| node(flash, WirePins::chain(1).remove(0), Profile::default());
+    let target = UpdateTarget { board: 1, flash_number: Some(0x21) };
+    let image = UpdateImage { bytes: image(500), address_words: 0 };
+    let options = || UpdateOptions::new(vec![target], image.clone(), 0x3AC1);
+    let frames = {
+        let mut bench = crate::chain::initialised(&[0x21]);
+        assert!(
+            matches!(bench.go(Request::Update(options()), 60), Ok(Outcome::Update(r)) if r.exit_code() == 0)
+        );
+        program_frames(&bench)
+    };
+    for flash in [0x42, 0x21] {
+        for programming in [false, true] {
+            for after in (1..frames).step_by(23).chain([frames - 1, frames]) {
+                let what =
+                    format!("flash number {flash:#x}, programming {programming}, after {after} frames");
+                let mut bench = crate::chain::initialised(&[0x21]);
+                let id = bench.master.start(bench.now, Request::Update(options())).unwrap();
+                while program_frames(&bench) < after {
+                    bench.run(1);
+                }
+                let now = bench.now / 1000;
+                let other = Script::default().at(now, "281#");
+                let other = if programming { other.at(now + 1, "1C1#0404") } else { other };
+                bench.join(Box::new(strap(flash)));
+                bench.join(Box::new(other));
+                let Ok(Outcome::Update(report)) = bench.wait(id, 60) else { panic!("{what}: no report") };
+                let failure = report.boards[0].failure.clone();
+                let code = failure.as_ref().map(UpdateFailure::code);
+                assert_eq!(code, Some("number-shared"), "{what}: {failure:?}");
+                let erased = report.boards[0].outcome != UpdateOutcome::NotStarted;
+                assert_eq!(report.exit_code(), if erased { 5 } else { 4 }, "{what}: {failure:?}");
+                assert_eq!(bench.master.shared_numbers().len(), 1, "{what}");
+                for i in 0..2 {
+                    assert!(!bench.board(i).status().has(Status::PROG), "{what}: board {i}");
+                }
+            }
+        }
+    }
+}
+
+fn program_frames(bench: &Bench) -> usize {
+    bench.log.iter().filter(|(.., f)| f.to_string().starts_with("2C1#")).count()
 }
 
 /// A stop is neither delayed nor refused; both boards stand, and it is said.

@@ -137,6 +137,11 @@ pub(super) async fn judge(
     // The board must not take what comes next for the rest of this transfer. It is told while it still counts as at
     // work: a cancel in this moment tells it, too.
     leave_programming(link, board).await;
+    // Another board that has taken the number since complains of program data, or takes them out of turn.
+    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+        run.fail_with(board, error);
+        return None;
+    }
     run.fail(board, failure);
     // U-7: the image or the board is wrong, another attempt would end the same.
     let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
@@ -151,6 +156,10 @@ pub(super) async fn verify(link: &Link, run: &mut Campaign, board: u8, plan: &Up
         // The board said that it is done; only the read-back is missing.
         Err(e) => return run.fail_with(board, e),
     };
+    // Whoever shares the number was written, too, or is what has just answered.
+    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+        return run.fail_with(board, error);
+    }
     if let Some(result) = run.result(board) {
         result.after = Some(known);
     }

@@ -49,6 +49,10 @@ impl Verdict {
                 .into()
         } else if has(ProblemKind::Position) || has(ProblemKind::PositionScale) {
             "positions do not change with the speed: correct the path (are all numbers in rad?)".into()
+        } else if has(ProblemKind::HoldTorque) {
+            "the speed does not change what standing still takes: begin, rest and end in poses that take less (less stretched out), \
+             or with a lighter payload in the arm model"
+                .into()
         } else if let Some(percent) = self.slower() {
             let load = if has(ProblemKind::NoStop) || has(ProblemKind::Torque) {
                 ", or with a lighter payload in the arm model"

@@ -1,11 +1,12 @@
-//! Verdicts on a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, room to stop,
-//! start pose.
+//! Verdicts on a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, torque in hand
+//! where the arm stands, room to stop, start pose.
 //!
 //! Between points the controller's own interpolation runs, on the numbers as the wire carries them, once a millisecond: what
 //! passes here is what the controller will compute. The controller's own check (J-36) runs on the same numbers, so that what
 //! passes here is not refused there.
 
 mod hint;
+mod holding;
 mod stopping;
 mod verdict;
 
@@ -16,6 +17,7 @@ use jtc_core::{
 };
 use jtc_dynamics::{ArmModel, Dynamics};
 
+pub use holding::HOLD_SHARE;
 pub use verdict::{JointFigures, Problem, ProblemKind, Verdict};
 
 use crate::session::UploadOptions;
@@ -73,6 +75,10 @@ impl<'a> Checker<'a> {
         let dynamics = self.model.map(|m| Dynamics::new(m, self.config.gravity));
         self.path(trajectory.step_ms, &points, dynamics.as_ref(), &mut verdict);
         self.controller(trajectory, &mut verdict);
+        if let Some(dynamics) = &dynamics {
+            let stands_there = self.start.is_some();
+            holding::holds(self.config, dynamics, trajectory.step_ms, &points, stands_there, &mut verdict);
+        }
         // Without a path that can be run there is none to stop on.
         if let Some(dynamics) = dynamics.filter(|_| verdict.problems.iter().all(|p| !p.kind.stops_at_once()))
         {

@@ -220,6 +220,63 @@ fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
 }
 
+/// An arm that stands at nearly all of a torque limit is dropped later, with nothing that moves.
+#[test]
+fn j43_torque_is_in_hand_where_the_arm_stands() {
+    let arm = Arm::avena();
+    let config = arm.config();
+    let (low, high) = ([0.0, 0.7, 0.0, 0.0, 0.0, 0.0], [0.0, 1.1, 0.0, 0.0, 0.0, 0.0]);
+    let zero = [0.0; 6];
+    let holding = Dynamics::new(&arm.model, config.gravity).inverse(&high, &zero, &zero)[1].abs();
+    let below = Dynamics::new(&arm.model, config.gravity).inverse(&low, &zero, &zero)[1].abs();
+    assert!(below < 0.9 * holding);
+    let there = plan::joint_move(&low, &high, &config, 30.0).unwrap();
+    let back = plan::joint_move(&high, &low, &config, 30.0).unwrap();
+    let mut both = there.clone();
+    both.points.extend(back.points.iter().skip(1));
+    let check = |t: &Trajectory, share: f64, start| {
+        let mut config = config.clone();
+        config.joints[1].torque_max = holding / share;
+        Checker { model: Some(&arm.model), start, ..Checker::new(&config) }.check(t)
+    };
+    let refusal = |t: &Trajectory, share, start| {
+        let verdict = check(t, share, start);
+        let found = verdict.refusals().find(|p| p.kind == ProblemKind::HoldTorque).cloned();
+        found.map(|p| (p.joint, p.point, p.value.abs() > p.limit.abs(), verdict.hint()))
+    };
+    let last = there.points.len() - 1;
+    for share in [0.98, 0.975] {
+        let (joint, point, over, hint) = refusal(&there, share, None).expect("at its end");
+        // The last points are so slow that they stand.
+        assert!(joint == Some(2) && over && (last - 5..=last).contains(&point), "{point} of {last}");
+        assert!(hint.contains("poses") && hint.contains("payload") && !hint.contains("--speed"), "{hint}");
+        let (joint, point, ..) = refusal(&both, share, None).expect("where it rests on the way");
+        assert!(joint == Some(2) && (last - 5..=last + 5).contains(&point), "{point} of {last}");
+        assert!(refusal(&back, share, None).is_some(), "at its start");
+        // Where the arm stands there already, to leave is right.
+        assert_eq!(refusal(&back, share, Some(high)), None);
+        assert!(refusal(&there, share, Some(low)).is_some());
+    }
+    for t in [&there, &both, &back] {
+        assert_eq!(refusal(t, 0.965, None), None);
+    }
+    let text = check(&there, 0.98, None).to_string();
+    assert!(
+        text.contains("joint 2: standing still at point") && text.contains("98.0 % of the torque limit"),
+        "{text}"
+    );
+    // While joint 1 turns about the vertical, the arm does not stand there.
+    let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
+    for (i, point) in both.points.iter_mut().enumerate() {
+        let (sin, cos) = (std::f64::consts::PI * i as f64 / n).sin_cos();
+        let omega = std::f64::consts::PI / (n * h);
+        point.position[0] = 0.1 * (1.0 - cos);
+        point.velocity[0] = 0.1 * omega * sin;
+        point.acceleration[0] = 0.1 * omega * omega * cos;
+    }
+    assert_eq!(refusal(&both, 0.98, None), None);
+}
+
 fn load(name: &str) -> Option<Trajectory> {
     let dir = std::env::var("OPENJTC_DATA")
         .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());

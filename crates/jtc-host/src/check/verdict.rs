@@ -5,6 +5,7 @@ use std::fmt;
 use jtc_core::JOINTS;
 use serde::Serialize;
 
+use super::HOLD_SHARE;
 use crate::trajectory::Trajectory;
 
 /// What can be wrong.
@@ -37,6 +38,8 @@ pub enum ProblemKind {
     Acceleration,
     /// Torque by the arm model over its limit.
     Torque,
+    /// Holding the arm where the path stands takes nearly all of a joint's torque: it would fall later.
+    HoldTorque,
     /// A velocity that the friction table does not have (J-36).
     FrictionVelocity,
     /// A place from which Pause or Stop cannot bring the arm to rest in time with the torque that there is (J-33).
@@ -65,7 +68,10 @@ impl ProblemKind {
     /// It ends the motion before anybody could stop it, or leaves no motion to stop.
     pub(super) fn stops_at_once(self) -> bool {
         use ProblemKind::*;
-        !matches!(self, NotAtRest | StartPose | VelocityMismatch | AccelerationMismatch | FrictionVelocity)
+        !matches!(
+            self,
+            NotAtRest | StartPose | VelocityMismatch | AccelerationMismatch | FrictionVelocity | HoldTorque
+        )
     }
 
     fn unit(self) -> &'static str {
@@ -76,7 +82,7 @@ impl ProblemKind {
                 "rad/s"
             }
             Acceleration | AccelerationScale | AccelerationMismatch => "rad/s²",
-            Torque | NoStop => "N·m",
+            Torque | HoldTorque | NoStop => "N·m",
             _ => "",
         }
     }
@@ -97,6 +103,7 @@ impl ProblemKind {
             Velocity => "velocity over its limit",
             Acceleration => "acceleration over its limit",
             Torque => "torque over its limit",
+            HoldTorque => "nearly all torque to stand",
             FrictionVelocity => "velocity outside the friction table",
             NoStop => "no stop in time",
             PositionSpeed => "positions move faster than the velocity limit",
@@ -174,6 +181,16 @@ impl fmt::Display for Problem {
                 "a stop in time from {ms} ms after point {point} needs {value:+.1} N·m, more than the {limit} N·m \
                  that there are"
             )?,
+            HoldTorque => {
+                let most = limit.abs() / HOLD_SHARE;
+                let (share, limit) = (100.0 * value.abs() / most, limit.abs());
+                return write!(
+                    f,
+                    "standing still at point {point} takes {value:+.1} N·m, {share:.1} % of the torque limit ({most:.1} N·m); \
+                     at most {:.0} % ({limit:.1} N·m), or the noise of the encoder drops the arm later",
+                    100.0 * HOLD_SHARE
+                );
+            }
             NotAtRest => write!(f, "{}: {value:+.4} {unit} at point {point}", kind.words())?,
             VelocityMismatch | AccelerationMismatch => write!(
                 f,

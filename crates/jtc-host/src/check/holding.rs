@@ -1,0 +1,64 @@
+//! Whether the arm can be held where a path lets it stand: at its start, its end, and where it rests on the way.
+//!
+//! An arm that is held close to a torque limit falls later, without anything that moves: the noise of the encoders, by the gains,
+//! takes the commanded torque over the limit again and again, and more than 10 ms of that within 100 ms is an error (J-43). A path
+//! that only passes such a pose is not refused for it, although a pause there would stand in it.
+
+use jtc_core::{Config, JOINTS, SetPoint, interpolate};
+use jtc_dynamics::Dynamics;
+
+use super::{ProblemKind, Verdict};
+
+/// Share of a joint's torque limit that holding it may take, friction not counted: 98 % have been seen to fall.
+pub const HOLD_SHARE: f64 = 0.97;
+
+/// Slower than this, rad/s, each joint stands: the wire's least velocity is some 0.1 mrad/s.
+const STANDS: f64 = 0.001;
+
+/// Adds a problem for every joint that takes more than [`HOLD_SHARE`] of its torque limit where the path stands. Where the arm
+/// `stands_at_start` already, its start is left out: it is held there whether it moves or not.
+pub(super) fn holds(
+    config: &Config,
+    dynamics: &Dynamics,
+    step_ms: u16,
+    points: &[SetPoint],
+    stands_at_start: bool,
+    verdict: &mut Verdict,
+) {
+    let last = points.len().saturating_sub(1);
+    let h = f64::from(step_ms) * 1e-3;
+    let mut leaving = stands_at_start;
+    let mut look = |s: &SetPoint, i: usize, ms: u16| {
+        let rests = s.velocity.iter().all(|v| v.abs() <= STANDS);
+        leaving &= rests;
+        let is_end = i == last;
+        if (rests && !leaving) || is_end || (i == 0 && ms == 0 && !stands_at_start) {
+            hold(config, dynamics, s, i, ms, verdict);
+        }
+    };
+    for (i, a) in points.iter().enumerate() {
+        look(a, i, 0);
+        let Some(b) = points.get(i + 1) else { break };
+        for ms in 1..step_ms {
+            look(&interpolate(a, b, h, f64::from(ms) / f64::from(step_ms)), i, ms);
+        }
+    }
+}
+
+fn hold(config: &Config, dynamics: &Dynamics, s: &SetPoint, i: usize, ms: u16, verdict: &mut Verdict) {
+    let zero = [0.0; JOINTS];
+    let torque = dynamics.inverse(&s.position, &zero, &zero);
+    for (j, limit) in config.joints.iter().enumerate() {
+        let most = HOLD_SHARE * limit.torque_max;
+        if torque[j].abs() > most {
+            verdict.add(
+                ProblemKind::HoldTorque,
+                Some(j),
+                i,
+                f64::from(ms),
+                torque[j],
+                most.copysign(torque[j]),
+            );
+        }
+    }
+}

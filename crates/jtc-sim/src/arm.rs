@@ -15,6 +15,12 @@ const STOP_DAMPING: f64 = 200.0;
 const BRAKE_DECELERATION: f64 = 40.0;
 /// Inertia that stands for a closed brake, kg·m².
 const BRAKED: f64 = 1e9;
+/// Least inertia of a rotor, kg·m²: a lighter one would be through its range within a few steps.
+const LIGHTEST: f64 = 0.02;
+/// Largest turn of a joint in a sub-step, rad: a joint of 100 rad/s and more takes several in a millisecond.
+const LARGEST_TURN: f64 = 0.1;
+/// Most sub-steps of a step.
+const MOST_SUBSTEPS: f64 = 32.0;
 /// Seconds between two updates of the temperatures.
 const WARMING: f64 = 0.05;
 /// Heat capacity of a joint's bearing, J/K.
@@ -29,10 +35,12 @@ pub struct SimArm {
     pub model: ArmModel,
     /// Acceleration of gravity in the base frame, m/s².
     pub gravity: [f64; 3],
-    /// Inertia of the drives' rotors at the joints, kg·m².
+    /// Inertia of the drives' rotors at the joints, kg·m²; less than 0.02 counts as 0.02.
     pub rotor_inertia: JointVec,
     /// Friction per joint.
     pub friction: [SimFriction; JOINTS],
+    /// Speed up to which friction polynomials hold, rad/s; beyond it they go on in a straight line that does not fall.
+    pub polynomial_speed: JointVec,
     /// What friction does around standstill.
     pub friction_model: FrictionModel,
     /// End stops per joint, rad.
@@ -57,6 +65,8 @@ impl SimArm {
             // An arm whose file says nothing of its rotors has them all the same.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
+            // Nobody has measured beyond what the arm may do.
+            polynomial_speed: config.joints.map(|j| j.velocity_max),
             friction_model: FrictionModel::default(),
             stops: config.joints.map(|j| (j.position_min - 0.04, j.position_max + 0.04)),
             torque_ceiling: [364.0, 364.0, 364.0, 79.0, 79.0, 79.0],
@@ -106,6 +116,7 @@ impl Arm {
                 parts.friction_model,
                 parts.friction.clone(),
                 &parts.rotor_inertia,
+                &parts.polynomial_speed,
             ),
             bristles: [0.0; JOINTS],
             heat: [0.0; JOINTS],
@@ -128,24 +139,52 @@ impl Arm {
 
     /// Move on by `dt` seconds under the drives' torques `tau` (N·m).
     pub fn step(&mut self, tau: &JointVec, dt: f64) {
-        let mut rotor = self.parts.rotor_inertia;
-        let mut free = false;
-        for j in 0..JOINTS {
-            if self.braked[j] {
-                rotor[j] = BRAKED;
-                let change = BRAKE_DECELERATION * dt;
-                self.qd[j] =
-                    if self.qd[j].abs() <= change { 0.0 } else { self.qd[j] - change.copysign(self.qd[j]) };
-            }
-            free |= !self.braked[j] || self.qd[j] != 0.0;
-        }
-        if free {
-            self.runge_kutta(tau, &rotor, dt);
+        let fastest = self.qd.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let substeps = (fastest * dt / LARGEST_TURN).ceil().clamp(1.0, MOST_SUBSTEPS);
+        for _ in 0..substeps as u32 {
+            self.substep(tau, dt / substeps);
         }
         self.since += dt;
         if self.since >= WARMING {
             self.warm();
         }
+    }
+
+    fn substep(&mut self, tau: &JointVec, dt: f64) {
+        let mut inertia = self.inertia(dt);
+        let mut free = false;
+        for j in 0..JOINTS {
+            if self.braked[j] {
+                self.brake(j, inertia[j], dt);
+                inertia[j] = BRAKED;
+            }
+            free |= !self.braked[j] || self.qd[j] != 0.0;
+        }
+        if free {
+            self.runge_kutta(tau, &inertia, dt);
+        }
+    }
+
+    /// Slow a joint with a closed brake down; at an end stop the stop helps.
+    fn brake(&mut self, j: usize, inertia: f64, dt: f64) {
+        let v = self.qd[j];
+        let stop = self.stop_torque(j, self.q[j], v);
+        let help = if stop * v < 0.0 { stop.abs() / inertia } else { 0.0 };
+        let change = (BRAKE_DECELERATION + help) * dt;
+        self.qd[j] = if v.abs() <= change { 0.0 } else { v - change.copysign(v) };
+    }
+
+    /// Inertia of the rotors for a step of `dt`, kg·m²: more than their own where steep friction or an end stop has a time constant
+    /// below `dt` with a light one. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
+    fn inertia(&self, dt: f64) -> JointVec {
+        let steepness = self.friction.steepness(&self.qd);
+        core::array::from_fn(|j| {
+            let (low, high) = self.parts.stops[j];
+            let reach = 2.0 * self.qd[j].abs() * dt;
+            let stopping = self.q[j] - reach < low || self.q[j] + reach > high;
+            let stop = if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 };
+            self.parts.rotor_inertia[j].max(LIGHTEST).max((steepness[j] + stop) * dt)
+        })
     }
 
     /// Bring temperatures and friction up to date: they change so slowly that not every millisecond has to.

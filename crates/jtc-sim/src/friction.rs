@@ -3,6 +3,9 @@
 //! At speed both models follow the same measured curve (polynomial or table). They differ around zero: [`FrictionModel::LuGre`]
 //! sticks, breaks away and slips as real gears do; [`FrictionModel::Smooth`] lets friction change its sign over a small speed and
 //! can neither stick nor hunt.
+//!
+//! Beyond the speeds for which it was made a curve goes on in a straight line that does not fall: a cubic that is followed further
+//! ends as a motor (c3 < 0) or is too steep for any step.
 use jtc_core::TableOf;
 use jtc_dynamics::{JOINTS, JointVec};
 
@@ -17,9 +20,9 @@ const LEAST_LEVEL: f64 = 1e-9;
 pub enum SimFriction {
     /// None.
     Frictionless,
-    /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = sign(v).
+    /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = sign(v), up to [`SimArm::polynomial_speed`](crate::SimArm).
     Polynomial([f64; 6]),
-    /// A measured table; beyond its velocities it goes on in a straight line.
+    /// A measured table.
     Table(TableOf<f32>),
 }
 
@@ -75,6 +78,9 @@ pub(crate) struct FrictionTorques {
     curves: [SimFriction; JOINTS],
     /// Polynomial coefficients, a row per power; zero for joints with a table.
     k: [JointVec; 4],
+    /// Speed at which the straight line begins, rad/s, and its slope, N·m·s/rad; zero for joints with a table.
+    reach: JointVec,
+    slope: JointVec,
     /// Velocities and torques of joints with a table.
     tables: [Option<Box<Points>>; JOINTS],
     any_table: bool,
@@ -87,12 +93,19 @@ pub(crate) struct FrictionTorques {
 }
 
 impl FrictionTorques {
-    /// `rotor`: inertia of the rotors at the joints, kg·m².
-    pub fn new(model: FrictionModel, curves: [SimFriction; JOINTS], rotor: &JointVec) -> Self {
+    /// `rotor`: inertia of the rotors at the joints, kg·m²; `reach`: speed up to which polynomials hold, rad/s.
+    pub fn new(
+        model: FrictionModel,
+        curves: [SimFriction; JOINTS],
+        rotor: &JointVec,
+        reach: &JointVec,
+    ) -> Self {
         let mut new = Self {
             model,
             curves,
             k: [[0.0; JOINTS]; 4],
+            reach: reach.map(f64::abs),
+            slope: [0.0; JOINTS],
             tables: [const { None }; JOINTS],
             any_table: false,
             table_temperature: [f64::NAN; JOINTS],
@@ -127,6 +140,7 @@ impl FrictionTorques {
                     for (row, c) in self.k.iter_mut().zip(c) {
                         row[j] = k * c;
                     }
+                    self.slope[j] = self.polynomial_slope(j, self.reach[j]).max(0.0);
                 }
                 SimFriction::Table(table) => {
                     // Also from NaN at the start.
@@ -154,11 +168,14 @@ impl FrictionTorques {
     #[inline]
     pub fn at(&self, v: &JointVec, z: &JointVec) -> JointVec {
         let [k0, k1, k2, k3] = &self.k;
+        let viscous = |j: usize| {
+            let u = v[j].max(-self.reach[j]).min(self.reach[j]);
+            u * (k1[j] + k2[j] * u.abs() + k3[j] * u * u) + self.slope[j] * (v[j] - u)
+        };
         let mut out: JointVec = match self.model {
             FrictionModel::Smooth { width } => core::array::from_fn(|j| {
                 let v = v[j];
-                let s = v / (v * v + width * width).sqrt();
-                k0[j] * s + v * (k1[j] + v * (k2[j] * s + k3[j] * v))
+                k0[j] * v / (v * v + width * width).sqrt() + viscous(j)
             }),
             FrictionModel::LuGre(lugre) => {
                 let inverse = 1.0 / lugre.stribeck_speed;
@@ -167,7 +184,7 @@ impl FrictionTorques {
                     let (b, level) = lugre.stribeck(v * inverse, k0[j]);
                     // σ1(v)·dz/dt over one denominator: divisions are what this function costs.
                     let bending = (v * level - v.abs() * load * b) / (b * level);
-                    load + self.damping[j] * bending + v * (k1[j] + k2[j] * v.abs() + k3[j] * v * v)
+                    load + self.damping[j] * bending + viscous(j)
                 })
             }
         };
@@ -179,6 +196,21 @@ impl FrictionTorques {
             }
         }
         out
+    }
+
+    /// How fast the curve rises with speed at velocities `v` (rad/s), N·m·s/rad, no less than 0; without what happens around
+    /// standstill, whose steepness is bounded by itself.
+    pub fn steepness(&self, v: &JointVec) -> JointVec {
+        core::array::from_fn(|j| match &self.tables[j] {
+            Some(table) => table.slope(v[j]).max(0.0),
+            None if v[j].abs() < self.reach[j] => self.polynomial_slope(j, v[j].abs()).max(0.0),
+            None => self.slope[j],
+        })
+    }
+
+    fn polynomial_slope(&self, j: usize, speed: f64) -> f64 {
+        let [_, k1, k2, k3] = &self.k;
+        k1[j] + speed * (2.0 * k2[j] + 3.0 * k3[j] * speed)
     }
 
     /// Bristle deflections `dt` seconds after `z` at velocities `v`.
@@ -236,9 +268,22 @@ impl Points {
 
     /// Straight lines between the points, and on beyond the ends.
     fn at(&self, v: f64) -> f64 {
-        let (x, y) = (&self.velocity, &self.torque);
-        let i = x[1..19].iter().filter(|&&start| v >= start).count();
-        y[i] + (v - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i])
+        let i = self.segment(v);
+        // The line beyond an end begins there.
+        let from = i + usize::from(v > self.velocity[19]);
+        self.torque[from] + (v - self.velocity[from]) * self.slope(v)
+    }
+
+    /// Of the line at `v`, N·m·s/rad.
+    fn slope(&self, v: f64) -> f64 {
+        let (x, y, i) = (&self.velocity, &self.torque, self.segment(v));
+        let slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+        if v < x[0] || v > x[19] { slope.max(0.0) } else { slope }
+    }
+
+    /// Point at which the line at `v` begins.
+    fn segment(&self, v: f64) -> usize {
+        self.velocity[1..19].iter().filter(|&&start| v >= start).count()
     }
 
     /// Coulomb torque: where the lines through the two slowest points of each direction meet standstill, the mean of both, N·m.

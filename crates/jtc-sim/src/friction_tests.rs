@@ -4,7 +4,12 @@ use super::*;
 const RIGID: f64 = 0.7;
 
 fn with(model: FrictionModel, curve: SimFriction) -> FrictionTorques {
-    let mut torques = FrictionTorques::new(model, core::array::from_fn(|_| curve.clone()), &[RIGID; JOINTS]);
+    let mut torques = FrictionTorques::new(
+        model,
+        core::array::from_fn(|_| curve.clone()),
+        &[RIGID; JOINTS],
+        &[1.5; JOINTS],
+    );
     torques.warm(&[20.0; JOINTS], &[1.0; JOINTS]);
     torques
 }
@@ -110,4 +115,38 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
             }
         }
     }
+}
+
+#[test]
+fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
+    // Cubics that end as a motor, and as a wall; a table whose last line falls.
+    let motor = SimFriction::Polynomial([2.7, 12.6, -3.7, -0.65, 0.0, 20.0]);
+    let wall = SimFriction::Polynomial([6.0, 40.0, -30.0, 12.0, 0.0, 20.0]);
+    let SimFriction::Table(mut falling) = table() else { unreachable!("a table") };
+    falling.torque[19] = [3.0; 20];
+    falling.torque[0] = [-3.0; 20];
+    for (curve, end) in [(motor, 1.5), (wall.clone(), 1.5), (SimFriction::Table(falling), 0.95)] {
+        for model in [FrictionModel::Smooth { width: 0.01 }, FrictionModel::LuGre(LuGre::default())] {
+            let torques = with(model, curve.clone());
+            let at = |v: f64| {
+                let z = (0..200).fold([0.0; JOINTS], |z, _| torques.bend(&z, &[v; JOINTS], 1e-3));
+                torques.at(&[v; JOINTS], &z)[0]
+            };
+            let (there, beyond) = (at(end), at(1.001 * end));
+            assert!((there - beyond).abs() < 0.5, "a step at {end} rad/s: {there}, {beyond} N·m");
+            let mut before = there;
+            for v in [1.1 * end, 3.0, 10.0, 300.0] {
+                let torque = at(v);
+                // What is left of the Stribeck curve.
+                assert!(torque > before - 0.01, "{torque} N·m at {v} rad/s after {before}");
+                assert!((at(-v) + torque).abs() < 1e-6, "both ways alike");
+                before = torque;
+            }
+        }
+    }
+    // 40 − 2·30·1.5 + 3·12·1.5² N·m·s/rad, and no more.
+    let torques = with(FrictionModel::Smooth { width: 0.01 }, wall);
+    let rise =
+        torques.at(&[101.5; JOINTS], &[0.0; JOINTS])[0] - torques.at(&[1.5; JOINTS], &[0.0; JOINTS])[0];
+    assert!((rise - 3_100.0).abs() < 0.1, "{rise} N·m for 100 rad/s");
 }

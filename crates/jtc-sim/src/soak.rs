@@ -1,5 +1,5 @@
 //! Hours of virtual time with random commands and faults, every millisecond checked: the soak run.
-use jtc_core::{JOINTS, State, Tes};
+use jtc_core::{JOINTS, JointConfig, JointTelemetry, State, Tes};
 use jtc_dynamics::JointVec;
 use jtc_wire::{ExecCommand, FrameType, RawPoint};
 
@@ -8,6 +8,7 @@ use crate::drive::DriveConfig;
 use crate::faults::{Fault, FaultKind, Trigger};
 use crate::host::{self, Listener};
 use crate::invariants::{Invariants, Violation};
+use crate::typed::PUSH_MAX;
 use crate::world::{Statistics, World};
 
 /// Step time of the paths, ms.
@@ -34,6 +35,8 @@ pub struct SoakReport {
     pub finished: u64,
     /// Faults thrown in.
     pub faults: u64,
+    /// Milliseconds with a torque at its limit.
+    pub limited_ms: u64,
     /// Commands sent.
     pub commands: u64,
     /// Counted by the world.
@@ -52,8 +55,8 @@ impl core::fmt::Display for SoakReport {
         }
         writeln!(
             f,
-            "  {} commands, {} faults, {} motions finished",
-            self.commands, self.faults, self.finished
+            "  {} commands, {} faults, {} motions finished, {} ms with a torque at its limit",
+            self.commands, self.faults, self.finished, self.limited_ms
         )?;
         let s = &self.statistics;
         writeln!(
@@ -162,6 +165,9 @@ impl Soak {
             self.report.entered[self.state as usize] += 1;
         }
         self.report.spent_ms[self.state as usize] += 1;
+        let limits = &self.world.config().controller.joints;
+        let limited = |(t, limit): (&JointTelemetry, &JointConfig)| t.torque.abs() >= limit.torque_max;
+        self.report.limited_ms += u64::from(telemetry.joints.iter().zip(limits).any(limited));
         if telemetry.tes != self.tes {
             self.tes = telemetry.tes;
             self.report.finished += u64::from(self.tes == Tes::Finish);
@@ -250,7 +256,7 @@ impl Soak {
         let joint = rng.u8(0..6);
         let node = rng.u8(0..7);
         let small = rng.f64() * 0.05;
-        let kind = match rng.u8(0..20) {
+        let kind = match rng.u8(0..24) {
             0 => FaultKind::NodeSilent { node },
             1 => FaultKind::NodeReboot { node },
             2 => FaultKind::MotorFault { joint, bits: 1 << rng.u8(0..8) },
@@ -270,7 +276,9 @@ impl Soak {
             16 => FaultKind::SerialLost { probability: small },
             17 => FaultKind::SerialFlipped { probability: small },
             18 => FaultKind::SerialDelayed,
-            _ => FaultKind::TickOverrun,
+            19 => FaultKind::TickOverrun,
+            // Most are weak, some stronger than any torque limit.
+            _ => FaultKind::Push { joint, torque: PUSH_MAX * (2.0 * rng.f64() - 1.0).powi(3) },
         };
         // Short and long ones.
         let duration = if rng.bool() { rng.u64(1..12) } else { rng.u64(12..1500) };

@@ -96,7 +96,7 @@ pub struct SimConfig {
     pub seed: u64,
     /// What goes wrong, and when.
     pub faults: FaultPlan,
-    /// Entries that the event log holds; what comes later is counted only.
+    /// Entries that the event log holds: the last ones; those before them are counted only.
     pub log_entries: usize,
 }
 

@@ -1,5 +1,6 @@
 //! What happened in the world, for reports and for people who read along.
 use core::fmt;
+use std::collections::VecDeque;
 
 use jtc_bus::GRIPPER;
 use jtc_core::{State, Tes};
@@ -95,35 +96,50 @@ impl fmt::Display for LogEntry {
     }
 }
 
-/// The events so far.
+/// The latest events.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
-    entries: Vec<LogEntry>,
+    entries: VecDeque<LogEntry>,
     most: usize,
     dropped: u64,
 }
 
 impl Log {
-    /// A log that keeps the first `most` entries and counts the others.
+    /// A log that keeps the last `most` entries and counts those before them.
     pub fn new(most: usize) -> Self {
-        Self { entries: Vec::new(), most, dropped: 0 }
+        Self { entries: VecDeque::new(), most, dropped: 0 }
     }
 
     pub(crate) fn push(&mut self, time_us: u64, event: Event) {
-        if self.entries.len() < self.most {
-            self.entries.push(LogEntry { time_us, event });
-        } else {
+        self.entries.push_back(LogEntry { time_us, event });
+        if self.entries.len() > self.most {
+            self.entries.pop_front();
             self.dropped += 1;
         }
     }
 
     /// Oldest first.
-    pub fn entries(&self) -> &[LogEntry] {
-        &self.entries
+    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &LogEntry> + ExactSizeIterator {
+        self.entries.iter()
     }
 
-    /// Entries that found no room.
+    /// Entries that made room for later ones.
     pub fn dropped(&self) -> u64 {
         self.dropped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_log_keeps_what_happened_last() {
+        let mut log = Log::new(2);
+        for frame_type in 1..=5 {
+            log.push(u64::from(frame_type), Event::Frame { frame_type });
+        }
+        let times: Vec<u64> = log.entries().map(|entry| entry.time_us).collect();
+        assert_eq!((times, log.dropped()), (vec![4, 5], 3));
     }
 }

@@ -36,6 +36,11 @@ impl Coast {
         Self { length_ms, ..led }
     }
 
+    /// The whole way moves by `way` (rad).
+    pub fn shift(&mut self, way: f64) {
+        self.from += way;
+    }
+
     /// Position and velocity of the next tick, and whether the joint rests then.
     pub fn step(&mut self, limits: &JointConfig) -> (f64, f64, bool) {
         self.elapsed_ms += 1.0;

@@ -86,6 +86,9 @@ pub struct Config {
     /// limit is commanded and the integral held; 0: an error in the tick that finds it. A single point missing in a recorded
     /// trajectory makes a peak of a few milliseconds, for which a loaded arm should not be dropped.
     pub torque_over_ms: u16,
+    /// How long after a joint was enabled at most its torque may stay at the limit without an error, ms (J-43): what it carries
+    /// need not be known before, and has to be caught.
+    pub catch_ms_max: u16,
     /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).
     pub blend_ms: u16,
     /// Joint speed above which teaching brakes, rad/s (J-25).

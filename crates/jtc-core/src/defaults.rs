@@ -47,6 +47,7 @@ impl Config {
             overspeed_ms: 5,
             yield_torque_share: 0.3,
             torque_over_ms: 10,
+            catch_ms_max: 1_000,
             blend_ms: 100,
             teach_velocity_max: 1.0,
             teach_damping: 40.0,

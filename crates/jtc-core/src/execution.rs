@@ -26,7 +26,8 @@ impl Path {
     /// The part of the control law that acts here.
     pub fn law(&self) -> Law {
         match self {
-            Self::Waiting { .. } | Self::Gliding { .. } => Law::Approach,
+            Self::Waiting { .. } => Law::Hold,
+            Self::Gliding { .. } => Law::Approach,
             Self::AtStart | Self::Running { .. } => Law::Follow,
         }
     }

@@ -2,6 +2,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod catch;
 pub mod check;
 mod coast;
 mod config;

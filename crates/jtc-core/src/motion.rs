@@ -6,6 +6,7 @@ mod transfer;
 use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
+use crate::catch::Catch;
 use crate::coast::{Coast, STANDING};
 use crate::config::{Config, PidGains};
 use crate::interpolation::SetPoint;
@@ -31,6 +32,8 @@ pub(crate) struct Motion {
     /// Torque of the last tick.
     pub torque: [JointTorque; JOINTS],
     saturation: [Saturation; JOINTS],
+    /// Joints whose load is being caught.
+    catch: [Catch; JOINTS],
     over_speed: OverSpeed,
     payload: Payload,
     transfer: Transfer,
@@ -112,7 +115,9 @@ impl Motion {
 
     /// Every joint is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
-        self.coast.iter().all(Option::is_none) && self.holding.iter().all(|&h| h)
+        self.coast.iter().all(Option::is_none)
+            && self.holding.iter().all(|&h| h)
+            && !self.catch.iter().any(Catch::busy)
     }
 
     /// Latches the set position of joints that have just been enabled, and brings those to rest that move; joints that are
@@ -125,6 +130,7 @@ impl Motion {
             if !(enabled[j] && self.holding[j]) {
                 self.set.position[j] = measured[j];
                 self.pid[j].reset(0.0);
+                self.catch[j] = if just_enabled[j] { Catch::begin(config) } else { Catch::default() };
                 let moves = just_enabled[j] && velocity[j].abs() > STANDING;
                 self.coast[j] =
                     moves.then_some(Coast::falling(measured[j], velocity[j], config, &config.joints[j]));
@@ -144,6 +150,24 @@ impl Motion {
             if rests {
                 self.coast[j] = None;
             }
+        }
+    }
+
+    /// The set position of a joint whose load is being caught moves on towards it, by as much as the torque is beyond the limit.
+    fn sag(
+        &mut self,
+        j: usize,
+        excess: f64,
+        nodes: &Nodes,
+        config: &Config,
+        parameters: &ControlParameters<'_>,
+    ) {
+        let error = self.set.position[j] - nodes.positions()[j];
+        let step = self.catch[j].sag(excess, parameters.pid[j].kp, error, &config.joints[j]);
+        self.set.position[j] += step;
+        self.pid[j].shift(step);
+        if let Some(coast) = &mut self.coast[j] {
+            coast.shift(step);
         }
     }
 

@@ -58,6 +58,11 @@ impl Pid {
         }
     }
 
+    /// The commanded position moves by `way` (rad) without a motion: the derivative does not see it.
+    pub fn shift(&mut self, way: f64) {
+        self.errors = self.errors.map(|error| error + way);
+    }
+
     /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held. `encoder_step`
     /// (rad): the joint is commanded at rest, and this is what its encoder can tell; `None` in motion.
     ///

@@ -112,7 +112,7 @@ fn j43_an_error_zeroes_the_torque_of_the_same_tick() {
             .all(|r| !matches!(r, jtc_bus::Request::Move { torque, .. } if *torque != [0.0; 6]))
     );
 
-    let mut rig = Rig::holding_with(Config { torque_over_ms: 0, ..Config::avena() });
+    let mut rig = Rig::holding_with(Config { torque_over_ms: 0, catch_ms_max: 0, ..Config::avena() });
     rig.push(5, 0.02); // 80 N·m wanted, 40 N·m allowed
     rig.run(2);
     assert_eq!(rig.status().joints[5].internal, joint_error::TORQUE);
@@ -121,7 +121,7 @@ fn j43_an_error_zeroes_the_torque_of_the_same_tick() {
 
 #[test]
 fn j43_the_torque_saturates_at_its_limit_for_a_while_at_most_and_j41_holds_the_integral() {
-    let mut rig = Rig::holding();
+    let mut rig = Rig::holding_with(Config { catch_ms_max: 0, ..Config::avena() });
     rig.push(5, -0.012);
     rig.run(1);
     assert_eq!(rig.state(), State::HoldPos);

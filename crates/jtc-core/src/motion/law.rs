@@ -75,7 +75,7 @@ impl Motion {
         if self.yielding {
             self.soften(config);
         }
-        let (torque, mut errors) = self.limit(law, braking, nodes, config);
+        let (torque, mut errors) = self.limit(law, braking, nodes, config, parameters);
         for (j, error) in errors.iter_mut().enumerate() {
             if nodes.node(j).enabled() {
                 *error |= missing[j];
@@ -171,16 +171,22 @@ impl Motion {
         braking: bool,
         nodes: &Nodes,
         config: &Config,
+        parameters: &ControlParameters<'_>,
     ) -> ([f64; JOINTS], [u16; JOINTS]) {
         let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
         let excused = if braking { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         for j in 0..JOINTS {
             let limits = &config.joints[j];
+            let computed = self.torque[j].sum();
+            let catching = self.catch[j].step(nodes.velocities()[j]) && law == Law::Hold;
             let (limited, torque_error) =
-                self.saturation[j].limit(self.torque[j].sum(), limits, config.torque_over_ms, braking);
+                self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || catching);
             let joint = (self.set.position[j], self.set.velocity[j], self.set.acceleration[j]);
             let set_error = limits::check_set(joint, nodes.positions()[j], limits, law == Law::Follow);
             torque[j] = limited;
+            if catching && self.saturation[j].saturated {
+                self.sag(j, computed - limited, nodes, config, parameters);
+            }
             errors[j] =
                 torque_error | if law != Law::Teach && self.holding[j] { set_error & !excused } else { 0 };
         }

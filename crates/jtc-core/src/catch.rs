@@ -1,0 +1,122 @@
+//! Catching a load that the model lacks, when the joints are enabled (J-43).
+//!
+//! Such a load begins to fall when its joint is enabled. The joint then swings around where it will be held, and at the end of the
+//! first swing the law asks for up to 1.7 times what the model lacks. Where that is beyond the torque limit, the limit is
+//! commanded, which stops every load that it can hold, and the set position *sags* behind the joint: by as much as the computed
+//! torque exceeds the limit. So the joint comes to rest where the limit has stopped it. Held at its old position instead, it
+//! would be thrown upwards and fall again, for ever when there is little friction.
+use crate::coast::STANDING;
+use crate::config::{Config, JointConfig};
+
+/// How long a joint has to have been at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a
+/// swing.
+const CALM_MS: u16 = 100;
+
+/// A joint whose load may have to be caught.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Catch {
+    /// Time left for it, ms; 0: it is over, or the joint was not enabled.
+    left_ms: u16,
+    /// Time left until the joint counts as caught, ms.
+    busy_ms: u16,
+    /// How far the set position has sagged, rad: in one direction only.
+    sag: f64,
+}
+
+impl Catch {
+    /// The joint was just enabled.
+    pub fn begin(config: &Config) -> Self {
+        Self { left_ms: config.catch_ms_max, busy_ms: CALM_MS, sag: 0.0 }
+    }
+
+    /// The joint is not at rest yet.
+    pub fn busy(&self) -> bool {
+        self.left_ms > 0 && self.busy_ms > 0
+    }
+
+    /// One tick, with the measured `speed` (rad/s): whether a load may still be caught.
+    pub fn step(&mut self, speed: f64) -> bool {
+        if self.left_ms == 0 {
+            return false;
+        }
+        self.left_ms -= 1;
+        self.busy_ms = if speed.abs() > STANDING { CALM_MS } else { self.busy_ms.saturating_sub(1) };
+        self.left_ms > 0
+    }
+
+    /// The computed torque exceeds the limit by `excess` (N·m) at a position error of `error` (rad): returns by how much the set
+    /// position moves, rad. When it would have sagged by more than the position error may be, or a load pulls the other way, as
+    /// in a swing from limit to limit, this is no catch, and it is over.
+    pub fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
+        // At most to where the joint is.
+        let wanted = excess / kp;
+        let step = if error > 0.0 { -wanted.max(0.0).min(error) } else { -wanted.min(0.0).max(error) };
+        let sag = self.sag + step;
+        let good = step * self.sag >= 0.0 && sag.abs() <= limits.position_error_max;
+        if !good {
+            *self = Self::default();
+            return 0.0;
+        }
+        (self.sag, self.busy_ms) = (sag, CALM_MS);
+        step
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KP: f64 = 1_000.0;
+
+    fn limits() -> JointConfig {
+        Config::avena().joints[0]
+    }
+
+    fn begun() -> Catch {
+        Catch::begin(&Config::avena())
+    }
+
+    #[test]
+    fn j43_the_set_position_sags_by_the_excess_and_never_beyond_the_joint() {
+        for sign in [1.0, -1.0] {
+            let mut catch = begun();
+            assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
+            assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
+            // What the derivative asks for alone is no sag; nor is that of a controller without gain.
+            assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
+            assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
+            assert!(catch.step(0.0), "it goes on");
+        }
+    }
+
+    #[test]
+    fn j43_a_catch_ends_at_the_limit_of_the_position_error_and_when_the_load_turns() {
+        let mut catch = begun();
+        let steps = (0..200).take_while(|_| catch.sag(1.0, KP, 0.05, &limits()) != 0.0).count();
+        assert!((89..=90).contains(&steps), "{steps} mrad");
+        assert!(!catch.step(0.0) && !catch.busy());
+        let mut catch = begun();
+        catch.sag(1.0, KP, 0.05, &limits());
+        assert_eq!(catch.sag(-1.0, KP, -0.05, &limits()), 0.0);
+        assert!(!catch.step(0.0));
+    }
+
+    #[test]
+    fn j43_a_catch_takes_a_second_at_most() {
+        let mut catch = begun();
+        assert_eq!((0..2_000).take_while(|_| catch.step(1.0)).count(), 999);
+        assert!(!Catch::default().step(0.0), "a joint that was not enabled");
+    }
+
+    #[test]
+    fn j34_a_joint_is_busy_until_it_has_been_calm_for_a_while() {
+        let mut catch = begun();
+        for k in 0..400 {
+            catch.step(if k == 50 { -0.1 } else { 0.0 });
+            if k == 200 {
+                catch.sag(1.0, KP, 0.05, &limits());
+            }
+            assert_eq!(catch.busy(), k < 150 || (200..300).contains(&k), "{k}");
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Enabling an arm that carries a load which its model lacks (J-43): any that the torque limits hold is caught.
+mod plant;
+mod rig;
+
+use jtc_bus::fsm;
+use jtc_core::{Config, Parameters, State, Tes, joint_error};
+use jtc_dynamics::Dynamics;
+use jtc_wire::{ExecCommand, RawPoint};
+use plant::{LuGre, Plant, loaded};
+use rig::Rig;
+
+const POSES: [[f64; 6]; 4] = [
+    [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
+    // Stretched out: 4 kg are more than joint 2 can hold.
+    [0.0, 1.4, 0.2, 0.0, 0.0, 0.0],
+    [-1.0, -0.7, 1.2, -0.5, 1.0, 2.0],
+    [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
+];
+
+/// Friction from none, which damps no swing, to that of the default arm.
+const FRICTIONS: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
+
+fn friction(factor: f64) -> [LuGre; 6] {
+    core::array::from_fn(|j| {
+        let f = LuGre::avena(j, 1.2);
+        if factor == 0.0 {
+            return LuGre::NONE;
+        }
+        LuGre { coulomb: factor * f.coulomb, stiction: factor * f.stiction, viscous: factor * f.viscous, ..f }
+    })
+}
+
+/// Share of its torque limit that the most loaded joint needs to hold `mass` kg.
+fn share(mass: f64, pose: &[f64; 6]) -> f64 {
+    let model = loaded(Parameters::avena().model, mass);
+    let gravity = Dynamics::new(&model, Config::avena().gravity).gravity_torque(pose);
+    let limits = Config::avena().joints.map(|j| j.torque_max);
+    (0..6).map(|j| gravity[j].abs() / limits[j]).fold(0.0, f64::max)
+}
+
+/// An arm with `mass` kg at the flange that its brakes let go in `pose`, when its joints are enabled.
+struct Let {
+    arm: Plant,
+    rig: Rig,
+    pose: [f64; 6],
+    /// Largest way of a joint, rad, and ticks for which torque was at its limit.
+    sag: f64,
+    saturated: u32,
+}
+
+impl Let {
+    fn new(config: Config, mass: f64, pose: [f64; 6], factor: f64) -> Self {
+        let arm = Plant::new(&loaded(Parameters::avena().model, mass), friction(factor), pose);
+        let mut rig = Rig::new(config);
+        rig.follow = false;
+        arm.report(&mut rig);
+        rig.defaults();
+        Self { arm, rig, pose, sag: 0.0, saturated: 0 }
+    }
+
+    fn enabled(&self) -> bool {
+        self.rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED)
+    }
+
+    fn run(&mut self, ticks: usize) {
+        for _ in 0..ticks {
+            self.arm.tick(&mut self.rig);
+            for j in 0..6 {
+                let (torque, limit) = (self.rig.torque[j].abs(), Config::avena().joints[j].torque_max);
+                assert!(torque <= limit + 0.02, "joint {}: {torque} N·m, {limit} allowed", j + 1);
+                self.saturated += u32::from(torque >= limit - 0.02);
+                self.sag = self.sag.max((self.arm.q[j] - self.pose[j]).abs());
+            }
+        }
+    }
+
+    /// From when its joints are enabled.
+    fn caught(&mut self, ticks: usize) {
+        while !self.enabled() {
+            self.run(1);
+        }
+        self.run(ticks);
+    }
+}
+
+#[test]
+fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
+    let (mut most, mut fought) = (0.0f64, 0);
+    for pose in POSES {
+        for mass in [1.0, 2.0, 3.0, 4.0] {
+            let share = share(mass, &pose);
+            if share > 0.97 {
+                continue;
+            }
+            most = most.max(share);
+            for factor in FRICTIONS {
+                let mut it = Let::new(Config::avena(), mass, pose, factor);
+                it.caught(3000);
+                let about = format!("{mass} kg at {pose:?}, friction times {factor}");
+                assert_eq!((it.rig.state(), it.rig.errors()), (State::HoldPos, 0), "{about}");
+                // The joints sag until P and the integral carry it; at the limit a little further.
+                let sag = if it.saturated > 10 { 0.02 } else { 0.01 };
+                assert!(it.sag < sag, "{about}: {} rad", it.sag);
+                let from = it.arm.q;
+                it.run(2000);
+                let way = (0..6).map(|j| (it.arm.q[j] - from[j]).abs()).fold(0.0, f64::max);
+                assert!(way < 0.002, "{about}: at rest after 3 s, {way} rad");
+                fought += u32::from(it.saturated > 10);
+            }
+        }
+    }
+    assert!(most > 0.93 && fought >= 6, "no load was near the limit: {most}, {fought}");
+}
+
+/// Without brakes, and joint 2 moves when it is enabled, nearly as fast as it may.
+#[test]
+fn j43_an_unknown_payload_is_caught_in_motion() {
+    for velocity in [-0.2, 0.2] {
+        let mut it = Let::new(Config::avena(), 2.5, POSES[1], 0.1);
+        it.arm.brakes = false;
+        while !it.enabled() {
+            // Hands hold it back.
+            (it.arm.q, it.arm.v) = (POSES[1], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
+            it.run(1);
+        }
+        it.run(3000);
+        assert_eq!((it.rig.state(), it.rig.errors()), (State::HoldPos, 0), "{velocity} rad/s");
+        assert!(it.sag < 0.08, "{velocity} rad/s: {} rad", it.sag);
+        assert!(it.saturated > 10 || velocity < 0.0, "{velocity} rad/s: {} ms at the limit", it.saturated);
+    }
+}
+
+#[test]
+fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
+    let mut cases = 0;
+    for pose in POSES {
+        for mass in [4.0, 5.0, 6.0, 8.0, 12.0] {
+            if share(mass, &pose) < 1.01 {
+                continue;
+            }
+            for factor in FRICTIONS {
+                let mut it = Let::new(Config::avena(), mass, pose, factor);
+                it.caught(1000);
+                it.run(20);
+                let about = format!("{mass} kg at {pose:?}, friction times {factor}");
+                assert_eq!(it.rig.state(), State::Error, "{about}");
+                let bits = it.rig.controller.telemetry().joints.map(|j| j.internal);
+                assert_eq!(bits.iter().fold(0, |all, bits| all | bits), joint_error::TORQUE, "{about}");
+                assert!(it.sag < 0.25, "{about}: {} rad", it.sag);
+                cases += 1;
+            }
+        }
+    }
+    assert!(cases > 20, "{cases}");
+}
+
+/// The time for a catch is over a second after a joint was enabled: then a load that comes is one of J-43 again. And it is a
+/// setting.
+#[test]
+fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
+    for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {
+        let config = Config { catch_ms_max, ..Config::avena() };
+        let mut it = Let::new(config, 0.0, POSES[1], 0.3);
+        it.caught(after);
+        it.arm.push[1] = 70.0;
+        it.run(400);
+        assert_eq!(it.rig.state(), State::Error, "{catch_ms_max} ms");
+        assert_eq!(it.rig.controller.telemetry().joints[1].internal, joint_error::TORQUE);
+        assert!(it.saturated <= 11, "{} ms at the limit", it.saturated);
+    }
+}
+
+/// An Execute that waits for a joint waits until its load is caught, too.
+#[test]
+fn j34_an_execute_waits_until_the_load_is_caught() {
+    let mut it = Let::new(Config::avena(), 2.6, POSES[1], 0.1);
+    it.rig.nodes[1].slow_enable = true;
+    while it.rig.state() != State::HoldPos {
+        it.run(1);
+    }
+    it.run(200);
+    let raw = |q: f64| (q / 3.141592 * 32767.0).round() as i16;
+    let points = [RawPoint { position: POSES[1].map(raw), ..RawPoint::default() }; 20];
+    it.rig.send(jtc_wire::FrameType::Trajectory, &rig::segment_body(7, 0, 1, 10, &points));
+    it.rig.send(jtc_wire::FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
+    it.run(100);
+    assert_eq!((it.rig.state(), it.rig.tes()), (State::Operate, Tes::Execute));
+    it.rig.nodes[1].report.fsm = fsm::ENABLED;
+    let mut left = 0;
+    while it.rig.tes() == Tes::Execute {
+        let before = it.saturated;
+        it.run(1);
+        let point = it.rig.controller.telemetry().point;
+        assert!(it.saturated == before || point == 0, "at the limit on the path, point {point}");
+        left += 1;
+        assert!(left < 2000);
+    }
+    it.run(2);
+    assert_eq!((it.rig.state(), it.rig.tes(), it.rig.errors()), (State::HoldPos, Tes::Finish, 0));
+    assert!(it.saturated > 10, "{} ms at the limit", it.saturated);
+}

@@ -1,0 +1,95 @@
+//! What a drive answers to requests.
+use jtc_bus::{Answer, JointReport, Request, fsm, warning};
+
+use super::Drive;
+use super::encoders::floor;
+use crate::request::NodeRequest;
+
+impl Drive {
+    /// A request arrives at `now_us`; the answer, if it gives one.
+    pub fn receive(&mut self, now_us: u64, request: &NodeRequest) -> Option<Answer> {
+        if !self.on_bus() {
+            return None;
+        }
+        match self.inbox.take(now_us, request)? {
+            NodeRequest::ChangeFsm(states) => Some(self.change(states[usize::from(self.node)])),
+            NodeRequest::Other(request) => self.execute(&request),
+        }
+    }
+
+    /// ChangeFsm: any byte is taken; what it means is decided by the tick.
+    fn change(&mut self, state: u8) -> Answer {
+        let before = self.states.state();
+        if !self.fault.ignores_state {
+            self.states.request(state);
+        }
+        if self.config.answers_transition {
+            self.states.accept(&self.config);
+            return Answer::Fsm { node: self.node, fsm: self.states.state() };
+        }
+        Answer::Fsm { node: self.node, fsm: before }
+    }
+
+    fn execute(&mut self, request: &Request) -> Option<Answer> {
+        let n = usize::from(self.node);
+        match *request {
+            Request::Move { torque, .. } => {
+                self.goal = if self.mode == 1 { torque.get(n).copied().unwrap_or(0.0) } else { 0.0 };
+                Some(Answer::Joint { node: self.node, report: self.report() })
+            }
+            // A `NodeRequest` carries it apart.
+            Request::ChangeFsm { .. } => None,
+            Request::ChangeMode { mode, config, .. } => {
+                let accepted = matches!(self.states.state(), fsm::INIT | fsm::READY);
+                if accepted {
+                    self.configured = true;
+                    self.mode = mode[n];
+                    self.bits = config[n];
+                }
+                Some(Answer::Mode { node: self.node, accepted })
+            }
+            Request::ResetAll => {
+                self.reset();
+                None
+            }
+            Request::Reset(node) => {
+                if node == self.node {
+                    self.reset();
+                }
+                None
+            }
+        }
+    }
+
+    fn report(&self) -> JointReport {
+        let mut warnings = 0;
+        if self.fault.not_accurate {
+            warnings |= warning::POSITION_NOT_ACCURATE;
+        }
+        if self.outside() {
+            warnings |= warning::OUTSIDE_WORKING_AREA;
+        }
+        // Also before the first configuration, whatever the line is.
+        if self.safety_line() || !self.configured {
+            warnings |= warning::SAFETY_LINE;
+        }
+        JointReport {
+            position: self.position,
+            velocity: self.velocity,
+            // A magnitude with the sign of the last command: no measurement.
+            torque: if self.goal < 0.0 { -self.torque.abs() } else { self.torque.abs() },
+            temperature: byte(self.temperature),
+            fsm: self.states.state(),
+            mc_current: self.mc_current,
+            mc_occurred: self.mc_occurred,
+            errors: self.errors,
+            warnings,
+            motor_temperature: self.config.long_answers.then(|| byte(self.temperature + 6.0)),
+        }
+    }
+}
+
+/// °C as the bus carries them: negative values wrap.
+fn byte(celsius: f64) -> u8 {
+    floor(celsius) as u8
+}

@@ -1,0 +1,77 @@
+//! What drives differ in, and what faults do to them.
+
+/// What drives differ in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveConfig {
+    /// Silence after power-up and reset, ms.
+    pub boot_ms: u32,
+    /// Motor alignment at the first enable after a reset, ms.
+    pub first_enable_ms: u32,
+    /// Later enables, ms.
+    pub enable_ms: u32,
+    /// Rest of the motor control after a stop, ms.
+    pub rest_ms: u32,
+    /// Speed at 32767, rad/s: 2.0, older drives 6.283185.
+    pub velocity_full_scale: f64,
+    /// Measured speed that trips, rad/s, either way. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times the default
+    /// arm's velocity limit; [`SimConfig::new`](crate::SimConfig::new) sets each joint's to 1.2 times its limit.
+    pub over_speed: f64,
+    /// Half of the working area, rad.
+    pub working_area: f64,
+    /// The drive takes one message per interrupt: requests back to back leave it one behind for good.
+    pub one_message_per_interrupt: bool,
+    /// ChangeFsm is executed in the interrupt and answered with the transition's code; else with the state
+    /// before.
+    pub answers_transition: bool,
+    /// Answers to Move have 20 bytes; else 16.
+    pub long_answers: bool,
+}
+
+impl Default for DriveConfig {
+    fn default() -> Self {
+        Self {
+            boot_ms: 250,
+            first_enable_ms: 4000,
+            enable_ms: 20,
+            rest_ms: 400,
+            velocity_full_scale: 2.0,
+            over_speed: 1.8,
+            working_area: 2.9905,
+            one_message_per_interrupt: false,
+            answers_transition: false,
+            long_answers: true,
+        }
+    }
+}
+
+impl DriveConfig {
+    /// The firmware before the present one: other speed scale, short answers, one message per interrupt.
+    pub fn older() -> Self {
+        Self {
+            velocity_full_scale: 6.283185,
+            one_message_per_interrupt: true,
+            answers_transition: true,
+            long_answers: false,
+            ..Self::default()
+        }
+    }
+}
+
+/// What faults do to a drive at the moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriveFault {
+    /// The node is off the bus; its motor goes on.
+    pub silent: bool,
+    /// Motor-control fault bits.
+    pub motor_control: u8,
+    /// The gate driver reports a fault.
+    pub hardware: bool,
+    /// Added to what the encoder reads, rad.
+    pub encoder_offset: f64,
+    /// The position is reported as not accurate.
+    pub not_accurate: bool,
+    /// The safety line is at the level that means danger.
+    pub safety_line: bool,
+    /// Requests for another state are answered and have no effect.
+    pub ignores_state: bool,
+}

@@ -1,0 +1,42 @@
+//! What a drive knows of its joint: a coarse absolute encoder behind the gear, and a late speed from the motor's own encoder.
+
+/// Full turns of the 16-bit absolute encoder.
+const ENCODER_COUNTS: f64 = 65_536.0;
+/// rad at 32768 encoder counts as the bus scales positions.
+const HALF_TURN: f64 = jtc_wire::POSITION_SCALE;
+/// Counts of the motor's incremental encoder behind the gear of 121.
+const MOTOR_COUNTS_PER_RAD: f64 = 10_000.0 * 121.0 / core::f64::consts::TAU;
+/// Encoder differences of 1 ms that the speed is the mean of.
+const SPEED_WINDOW: usize = 10;
+
+/// Both encoders.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Encoders {
+    /// Motor encoder of the last ticks, counts: a ring.
+    history: [i64; SPEED_WINDOW],
+    oldest: usize,
+}
+
+impl Encoders {
+    /// Speed of a joint at `q` (rad) after another millisecond, rad/s. It comes from the motor's encoder, which is much finer
+    /// than the joint's.
+    pub fn speed(&mut self, q: f64) -> f64 {
+        let motor = floor(q * MOTOR_COUNTS_PER_RAD);
+        let oldest = core::mem::replace(&mut self.history[self.oldest], motor);
+        self.oldest = (self.oldest + 1) % SPEED_WINDOW;
+        (motor - oldest) as f64 / (MOTOR_COUNTS_PER_RAD * SPEED_WINDOW as f64 * 0.001)
+    }
+
+    /// Position of a joint at `q` (rad) as the absolute encoder reads it, rad. Whole turns are lost.
+    pub fn position(&self, q: f64) -> f64 {
+        let turns = q / core::f64::consts::TAU;
+        let count = floor(turns * ENCODER_COUNTS + 0.5) as i16;
+        f64::from(count) * (HALF_TURN / 32_768.0)
+    }
+}
+
+/// The next whole number below; `f64::floor` is a call where the processor's own instruction may not be used.
+pub(super) fn floor(x: f64) -> i64 {
+    let near = x as i64;
+    near - i64::from(near as f64 > x)
+}

@@ -89,7 +89,9 @@ pub enum Command {
     #[command(after_help = "Examples:\n  jtc status\n  jtc --json status | jq .joints[0].position_rad")]
     Status(LinkArgs),
     /// Live view of the controller and the joints
-    #[command(after_help = "Examples:\n  jtc monitor\n  jtc --json monitor --count 100 > statuses.jsonl")]
+    #[command(
+        after_help = "On a terminal q ends and s stops a motion on its path.\n\nExamples:\n  jtc monitor\n  jtc --json monitor --count 100 > statuses.jsonl"
+    )]
     Monitor(MonitorArgs),
     /// Friction, gains and arm model
     #[command(subcommand)]

@@ -91,6 +91,22 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(said.json()["reset"], serde_json::json!(["joint 2"]));
 }
 
+/// A stream whose reader has gone ends, and that is no error.
+#[test]
+fn monitor_ends_with_its_reader() {
+    use std::io::BufRead;
+    let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
+    let mut child = common::command()
+        .args(["monitor", "--port", sim.port.to_str().unwrap()])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    std::io::BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    assert!(line.contains("Init"), "{line}");
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
 /// J-55: defaults only by name.
 #[test]
 fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {

@@ -98,10 +98,10 @@ pub fn missing_nodes(node_init: u8) -> Vec<String> {
     (0..7).filter(|n| node_init >> n & 1 == 1).map(node).collect()
 }
 
-/// All current errors of a status in one line; empty when there are none.
+/// All current errors of a status in one line, nodes that do not answer first: most of the rest follows from it.
 pub fn errors_line(s: &Status) -> String {
-    let mut all: Vec<String> = errors(s.errors).into_iter().map(String::from).collect();
-    all.extend(can_flags(s.can_current));
+    let mut all = can_flags(s.can_current);
+    all.extend(errors(s.errors).into_iter().map(String::from));
     for (j, joint) in s.joints.iter().enumerate() {
         let words = joint_errors(joint.internal)
             .into_iter()

@@ -75,7 +75,7 @@ pub fn as_json(s: &Status) -> Value {
 }
 
 /// State of joint `j` (from 0): what it said last, unless it says nothing any more.
-fn joint_state(s: &Status, j: usize) -> &'static str {
+pub fn joint_state(s: &Status, j: usize) -> &'static str {
     let fsm = s.joints[j].fsm;
     // A joint that is not ready may answer; one that is enabled and not measured does not.
     let silent = !is_measured(s, j) && (s.can_current >> (8 + j) & 1 == 1 || fsm == 3);

@@ -7,6 +7,7 @@ pub mod pages;
 mod signal;
 #[cfg(feature = "trial")]
 pub mod trial;
+pub mod usage;
 
 pub use indicatif::ProgressBar;
 pub use output::{Output, table};

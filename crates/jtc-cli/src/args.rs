@@ -28,6 +28,7 @@ pub use sim::{DemoArgs, SimArgs, SimSpeed};
                   jtc sim --serial /tmp/jtc             a simulated controller behind a serial port\n  \
                   jtc --json status --port /tmp/jtc     one status, for programs\n  \
                   jtc traj run motion.csv --approach    check, upload, execute, report\n\n\
+                  --json, --port and --baud may stand before or after the command.\n\
                   Every option can be set by an environment variable, see `jtc COMMAND --help`.\n\
                   Exit codes: 0 done, 1 the controller reported an error, 2 wrong usage or unreadable input,\n\
                   3 no link, 4 refused by a check (nothing was sent or moved), 5 fault while running.",
@@ -39,6 +40,13 @@ pub struct Cli {
     /// Print one JSON object (streams: one a line) instead of text
     #[arg(long, global = true, env = "JTC_JSON", value_parser = FalseyValueParser::new(), help_heading = "Common")]
     pub json: bool,
+    /// Serial port, for commands that have one; it may stand before the command, too
+    #[arg(long, global = true, hide = true, value_name = "PATH")]
+    pub port: Option<String>,
+    /// Rate of the port, likewise
+    #[arg(long, global = true, hide = true, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(300..=15_000_000))]
+    pub baud: Option<u32>,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,

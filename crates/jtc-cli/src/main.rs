@@ -15,14 +15,15 @@ mod serve;
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use cli_kit::Output;
 
 use args::Cli;
 
 fn main() -> ExitCode {
-    // clap itself ends wrong usage with exit code 2.
-    let cli = Cli::parse();
+    let cli: Cli = match cli_kit::usage::parse("jtc", "JTC_JSON") {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
     let out = Output::new("jtc", cli.json);
     let moves = cli.command.moves();
     match commands::run(cli.command, &out) {

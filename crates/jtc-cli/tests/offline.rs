@@ -20,6 +20,37 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
 }
 
+/// Wrong usage is an answer, too, where JSON was asked for, before the command or after it, or by its variable.
+#[test]
+fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
+    for words in
+        [&["--json", "traj", "rum"][..], &["traj", "run", "--json"], &["reset", "--json", "--joints", "9"]]
+    {
+        let error = jtc(words).ends(2).json()["error"].clone();
+        assert_eq!((error["code"].as_str(), error["exit"].as_u64()), (Some("usage"), Some(2)), "{error}");
+        assert!(!error["message"].as_str().unwrap().is_empty(), "{error}");
+    }
+    let by_variable = common::command().env("JTC_JSON", "1").args(["traj", "rum"]).output().unwrap();
+    assert!(String::from_utf8_lossy(&by_variable.stdout).contains("unrecognized subcommand 'rum'"));
+    assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
+}
+
+/// Options that every command has stand anywhere.
+#[test]
+fn the_port_may_stand_before_the_command() {
+    for words in [
+        &["--port", "/nowhere/tty", "status"][..],
+        &["traj", "--port", "/nowhere/tty", "stop"],
+        &["--baud", "9600", "--port", "/nowhere/tty", "params", "use-defaults"],
+    ] {
+        let said = jtc(words).ends(3);
+        assert!(said.err.contains("/nowhere/tty"), "{}", said.err);
+    }
+    // The nearer one counts.
+    let said = jtc(&["--port", "/far/tty", "status", "--port", "/near/tty"]).ends(3);
+    assert!(said.err.contains("/near/tty"), "{}", said.err);
+}
+
 /// The joint bus is CAN FD: a transport that cannot carry it is refused with one that can.
 #[cfg(unix)]
 #[test]
@@ -267,8 +298,18 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
-    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let done = common::command().args(["--json", "ports"]).stdout(full).output().unwrap();
-    assert_eq!(done.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&done.stderr).contains("No space left"));
+    for words in [&["--json", "ports"][..], &["--help"], &["dynamics", "mass"], &["man"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut child = common::command();
+        child
+            .args(words)
+            .stdin(std::process::Stdio::piped())
+            .stdout(full)
+            .stderr(std::process::Stdio::piped());
+        let mut child = child.spawn().unwrap();
+        std::io::Write::write_all(&mut child.stdin.take().unwrap(), b"0 0 0 0 0 0\n").ok();
+        let said = cli_kit::trial::ended(child);
+        assert_eq!(said.code, 2, "{words:?}");
+        assert!(said.err.contains("No space left"), "{words:?}: {}", said.err);
+    }
 }

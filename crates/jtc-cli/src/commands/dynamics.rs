@@ -41,11 +41,14 @@ pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
             let words: Vec<String> = result.iter().map(|v| format!("{v:.16e}")).collect();
             writeln!(stdout, "{}", words.join(" "))
         };
-        if written.is_err() {
-            return Ok(()); // the reader has gone
+        if let Err(e) = written {
+            Output::lose(&e);
+            return Ok(());
         }
     }
-    stdout.flush().ok();
+    if let Err(e) = stdout.flush() {
+        Output::lose(&e);
+    }
     Ok(())
 }
 

@@ -28,6 +28,25 @@ fn a_stale_link_is_replaced_and_a_file_is_not() {
 }
 
 #[test]
+fn a_port_that_is_served_is_not_taken_over() {
+    let sim = Sim::start(&["--speed", "max"]);
+    let to = std::fs::read_link(&sim.port).unwrap();
+    let said = jtc(&["sim", "--serial", sim.port.to_str().unwrap()]).ends(2);
+    assert!(said.err.contains("another simulator") && said.err.contains("another path"), "{}", said.err);
+    assert_eq!(std::fs::read_link(&sim.port).unwrap(), to);
+    sim.jtc(&["status"]).ends(0);
+    // A terminal that is none of a simulator's got the number of one that was killed.
+    let shell =
+        rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR | rustix::pty::OpenptFlags::NOCTTY).unwrap();
+    rustix::pty::grantpt(&shell).unwrap();
+    rustix::pty::unlockpt(&shell).unwrap();
+    let name = rustix::pty::ptsname(&shell, Vec::new()).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink(name.to_str().unwrap(), dir.path().join("jtc")).unwrap();
+    Sim::start_in(dir, &["--speed", "max"]).jtc(&["status"]).ends(0);
+}
+
+#[test]
 fn from_power_up_to_a_recorded_motion() {
     let sim = Sim::start(&["--speed", "max", "--seed", "3"]);
     let status = sim.jtc(&["--json", "status"]).ends(0).json();

@@ -11,7 +11,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags};
 use rustix::io::Errno;
 use rustix::pty::OpenptFlags;
-use rustix::termios::{OptionalActions, QueueSelector};
+use rustix::termios::{LocalModes, OptionalActions, OutputModes, QueueSelector};
 
 /// Why the terminal cannot be used.
 #[derive(Debug)]
@@ -187,7 +187,7 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     Ok((master, slave))
 }
 
-/// A free path, or a link that a simulator left behind: one to a pseudo-terminal, or to nothing.
+/// A free path, or a link that a simulator left behind: one to nothing, or to a pseudo-terminal that is somebody else's by now.
 fn check_free(path: &Path) -> Result<(), PtyError> {
     let taken = |what| Err(PtyError::Taken { path: path.to_owned(), what });
     match fs::symlink_metadata(path) {
@@ -196,7 +196,21 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
         Ok(meta) if !meta.is_symlink() => taken("a file"),
         Ok(_) => match fs::read_link(path) {
             Ok(to) if !to.starts_with("/dev/pts") && path.exists() => taken("a link to something else"),
+            Ok(to) if serves(&to) => taken("the port of another simulator, which still runs,"),
             _ => Ok(()),
         },
+    }
+}
+
+/// A program holds this pseudo-terminal as a serial port: it is open and raw, which no shell's terminal is. One that a host has
+/// locked is in use, too.
+fn serves(terminal: &Path) -> bool {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
+    match rustix::fs::open(terminal, flags, Mode::empty()) {
+        Ok(slave) => rustix::termios::tcgetattr(&slave).is_ok_and(|settings| {
+            !settings.local_modes.intersects(LocalModes::ICANON | LocalModes::ECHO)
+                && !settings.output_modes.contains(OutputModes::OPOST)
+        }),
+        Err(e) => e == Errno::BUSY,
     }
 }

@@ -282,7 +282,18 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
     }
-    // A second demo may take the place of the first; a report may not.
+    // Neither a second demo nor a report takes the place of what is there, unless told to; refused, nothing is run.
+    std::fs::write(out.join("picture.svg"), "precious").unwrap();
+    let said = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
+    assert!(
+        said.err.contains("report.html is there already") && said.err.contains("--force"),
+        "{}",
+        said.err
+    );
+    assert!(!said.err.contains("parameters:"), "{}", said.err);
+    assert_eq!(std::fs::read_to_string(out.join("picture.svg")).unwrap(), "precious");
+    jtc(&["demo", "--force", "--out", out.to_str().unwrap()]).ends(0);
+    assert!(out.join("picture.svg").metadata().unwrap().len() > 10_000);
     let file = out.join("recording.mcap");
     let page = out.join("report.html");
     jtc(&["report", file.to_str().unwrap(), "--out", page.to_str().unwrap()]).ends(4);

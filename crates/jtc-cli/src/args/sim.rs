@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
 
+use super::ForceArgs;
+
 /// How fast virtual time runs.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum SimSpeed {
@@ -20,6 +22,8 @@ pub struct DemoArgs {
     /// Directory for recording, report and picture
     #[arg(long, env = "JTC_OUT", value_name = "DIR", default_value = "demo")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub force: ForceArgs,
     /// How fast virtual time runs
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Max)]
     pub speed: SimSpeed,

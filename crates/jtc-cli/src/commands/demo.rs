@@ -8,7 +8,7 @@ use cli_kit::Output;
 use jtc_host::arm::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::SimPort;
-use jtc_host::recording::{self, RecordingInfo};
+use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{self, Facts, ReportInput, Summary};
 use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadOptions, UploadReport};
 use jtc_host::trajectory::{Point, Trajectory};
@@ -19,6 +19,7 @@ use serde_json::json;
 use super::run_report;
 use crate::args::{DemoArgs, SimSpeed};
 use crate::failure::{FAULT, Failure};
+use crate::output_file::OutputFile;
 
 /// Seed of the demo: anyone's demo gives the same figures.
 const SEED: u64 = 1;
@@ -26,6 +27,9 @@ const SEED: u64 = 1;
 const MARGIN: Duration = Duration::from_millis(400);
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(30);
+
+/// Files of the demo, in the order in which they are shown.
+const NAMES: [&str; 4] = ["report.html", "recording.mcap", "recording.csv", "picture.svg"];
 
 /// What the run leaves behind.
 struct Run {
@@ -41,6 +45,9 @@ struct Run {
 /// Runs the demo and writes its files.
 pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::usage(format!("{}: {e}", args.out.display())))?;
+    let file = |name: &str| args.out.join(name);
+    let open = |name: &str| OutputFile::open(&file(name), args.force.force, &[]);
+    let (page, mcap, csv, picture) = (open(NAMES[0])?, open(NAMES[1])?, open(NAMES[2])?, open(NAMES[3])?);
     let begin = Instant::now();
     let run = execute(args.speed, out)?;
     let facts = [
@@ -55,17 +62,12 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
         },
     ];
     let summary = Summary::of(&run.info, &run.samples);
-    let file = |name: &str| args.out.join(name);
-    recording::write_all(&file("recording.mcap"), &run.info, &run.samples)?;
-    recording::write_all(&file("recording.csv"), &run.info, &run.samples)?;
+    mcap.record(&run.info, &run.samples).map_err(Failure::output_lost)?;
+    csv.record(&run.info, &run.samples).map_err(Failure::output_lost)?;
     let input = ReportInput { info: &run.info, samples: &run.samples, facts: &facts, failure: None };
-    let save = |name: &str, text: String| {
-        std::fs::write(file(name), text).map_err(|e| Failure::usage(format!("{}: {e}", file(name).display())))
-    };
-    save("report.html", report::html(&input))?;
-    save("picture.svg", report::picture_svg(&input))?;
-    let names = ["report.html", "recording.mcap", "recording.csv", "picture.svg"];
-    let files: Vec<String> = names.iter().map(|n| file(n).display().to_string()).collect();
+    page.write(&report::html(&input)).map_err(Failure::output_lost)?;
+    picture.write(&report::picture_svg(&input)).map_err(Failure::output_lost)?;
+    let files: Vec<String> = NAMES.iter().map(|n| file(n).display().to_string()).collect();
     let value = json!({
         "outcome": "finished",
         "recorded_s": summary.recorded_s,

@@ -1,6 +1,7 @@
 //! The command line: commands, options, their environment variables and examples. The options of each group of commands are in a
 //! file of their own.
 
+mod arm;
 mod maintain;
 mod motion;
 mod offline;
@@ -12,6 +13,7 @@ use std::path::PathBuf;
 use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand};
 
+pub use arm::{ArmCommand, ImportArgs};
 pub use maintain::{ClearArgs, GripperArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
 pub use motion::{CheckArgs, RunArgs, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExplainArgs, ReportArgs};
@@ -101,6 +103,9 @@ pub enum Command {
         after_help = "On a terminal q ends and s stops a motion on its path.\n\nExamples:\n  jtc monitor\n  jtc --json monitor --count 100 > statuses.jsonl"
     )]
     Monitor(MonitorArgs),
+    /// Arm files
+    #[command(subcommand)]
+    Arm(ArmCommand),
     /// Friction, gains and arm model
     #[command(subcommand)]
     Params(ParamsCommand),

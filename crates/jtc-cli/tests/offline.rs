@@ -324,3 +324,34 @@ fn a_result_that_cannot_be_printed_is_an_error() {
         assert!(said.err.contains("No space left"), "{words:?}: {}", said.err);
     }
 }
+
+/// From a description with a gripper on it to an arm file that can be used.
+#[test]
+fn an_arm_file_is_made_from_a_robot_description() {
+    let dir = tempfile::tempdir().unwrap();
+    let (urdf, toml) = (dir.path().join("z1.urdf"), dir.path().join("z1.toml"));
+    let gripper = "<link name=\"finger\"/><joint name=\"grip\" type=\"revolute\"><parent link=\"flange\"/>\
+                   <child link=\"finger\"/><axis xyz=\"0 0 1\"/></joint></robot>";
+    let arm = jtc_host::arm::Arm::avena();
+    std::fs::write(&urdf, arm.to_urdf().replace("</robot>", gripper)).unwrap();
+    let (urdf, toml) = (urdf.to_str().unwrap(), toml.to_str().unwrap());
+
+    let said = jtc(&["params", "show", urdf]).ends(2);
+    let joints = arm.joint_names.join(",");
+    assert!(
+        said.err.contains(&format!("jtc arm import {urdf} --joints {joints} -o arm.toml")),
+        "{}",
+        said.err
+    );
+    jtc(&["arm", "import", urdf, "-o", toml]).ends(2);
+    assert!(!std::path::Path::new(toml).exists());
+
+    let said = jtc(&["--json", "arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(0);
+    assert_eq!(said.json()["missing"], serde_json::json!(["friction", "PID gains"]));
+    assert_eq!(said.json()["warnings"][0]["place"], "joint grip");
+    let read = jtc_host::arm::Arm::load(std::path::Path::new(toml)).unwrap();
+    assert_eq!((read.model, read.joint_names), (arm.model, arm.joint_names));
+    jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(4);
+    let said = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
+    assert!(said.err.contains("is no robot description"), "{}", said.err);
+}

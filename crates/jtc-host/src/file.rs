@@ -35,6 +35,16 @@ pub enum FileError {
         /// What is wrong there, with the value.
         problem: String,
     },
+    /// A robot description of which it has to be said which six joints are the arm.
+    #[error("{}: {problem}", path.display())]
+    Joints {
+        /// The file.
+        path: PathBuf,
+        /// Which joints move.
+        problem: String,
+        /// Six that could be the arm, with commas between them.
+        six: String,
+    },
     /// The file as a whole is none of the known forms.
     #[error("{}: {problem}", path.display())]
     Form {
@@ -96,6 +106,10 @@ impl FileError {
         match self {
             FileError::Io { .. } => "check the name and the rights of the file".into(),
             FileError::TooLarge { .. } => "is it the right file?".into(),
+            FileError::Joints { path, six, .. } => format!(
+                "say which six are the arm, the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
+                path.display()
+            ),
             FileError::At { .. } | FileError::Form { .. } => {
                 "`jtc traj check --help` and `jtc params push --help` show the forms of files".into()
             }
@@ -107,6 +121,7 @@ impl FileError {
         let (FileError::Io { path, .. }
         | FileError::TooLarge { path, .. }
         | FileError::At { path, .. }
+        | FileError::Joints { path, .. }
         | FileError::Form { path, .. }) = &mut self;
         *path = file.to_owned();
         self

@@ -1,5 +1,6 @@
 //! The commands, one file each or one file a family.
 
+mod arm;
 mod decode;
 mod demo;
 mod doctor;
@@ -32,6 +33,7 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Doctor(link) => doctor::doctor(&link, out),
         Command::Status(link) => status::status(&link, out),
         Command::Monitor(args) => monitor::monitor(&args, out),
+        Command::Arm(command) => arm::arm(&command, out),
         Command::Params(command) => params::params(&command, out),
         Command::Traj(command) => traj::traj(&command, out),
         Command::Teach(command) => teach::teach(&command, out),

@@ -19,6 +19,7 @@ use jtc_dynamics::ArmModel;
 pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
 pub use parameters::{ParameterError, ParameterSet};
+pub use urdf::ArmChoice;
 
 use crate::file::{FileError, Place, read_text};
 
@@ -79,8 +80,24 @@ impl Arm {
 
     /// From the text of a TOML or URDF file.
     pub fn parse(text: &str) -> Result<Self, FileError> {
-        let xml = text.trim_start_matches('\u{feff}').trim_start().starts_with('<');
-        let arm = if xml { Self::from_urdf(text)? } else { Self::from_toml(text)? };
+        let arm = if is_xml(text) { Self::from_urdf(text)? } else { Self::from_toml(text)? };
+        arm.checked()
+    }
+
+    /// From a URDF file, of which `choice` says what is the arm.
+    pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
+        let text = read_text(path)?;
+        let arm = if is_xml(&text) {
+            Self::from_urdf_with(&text, choice).and_then(Self::checked)
+        } else {
+            Err(FileError::form("is no robot description: a URDF is XML and begins with <"))
+        };
+        arm.map_err(|e| e.in_file(path))
+    }
+
+    /// The arm, unless its numbers are no arm of these drives.
+    fn checked(self) -> Result<Self, FileError> {
+        let arm = self;
         arm.model.check().map_err(|e| FileError::at(Place::name("arm model"), e.to_string()))?;
         // J-35, J-43: limits that the drives cannot keep, or would stop at by themselves.
         arm.config().check().map_err(|e| {
@@ -117,4 +134,8 @@ impl Arm {
             friction: self.friction().unwrap_or(default.friction),
         }
     }
+}
+
+fn is_xml(text: &str) -> bool {
+    text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
 }

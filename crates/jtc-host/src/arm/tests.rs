@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use jtc_dynamics::Dynamics;
+use jtc_dynamics::{Dynamics, Origin};
 
 use super::*;
 
@@ -105,9 +105,8 @@ fn fixed_bodies_become_part_of_their_link() {
 #[test]
 fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let say = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
-    assert!(say(&urdf("0 0 1", "continuous")).contains("joint j1: continuous"));
     assert!(say(&urdf("0 0 0", "revolute")).contains("no direction"));
-    assert!(say("<robot name=\"x\"></robot>").contains("0 revolute joints"));
+    assert!(say("<robot name=\"x\"></robot>").contains("0 rotary joints"));
     assert!(say(&"<a>".repeat(100_000)).contains("nested"));
     assert!(
         say(&urdf("0 0 1", "revolute").replace("<mass value=\"7.5\"/>", "<mass value=\"-7.5\"/>"))
@@ -123,6 +122,97 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
         say(&toml.replacen("position_min_rad = -2.97", "position_min_rad = 4", 1))
             .contains("position_min_rad")
     );
+}
+
+/// A joint of that kind, with a link of 1 kg on it, on `parent`.
+fn more(name: &str, kind: &str, parent: &str) -> String {
+    format!(
+        "<link name=\"of_{name}\"><inertial><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" \
+         iyz=\"0\" izz=\"0.01\"/></inertial></link><joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/>\
+         <child link=\"of_{name}\"/><axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"1\" effort=\"9\" velocity=\"1\"/></joint>\
+         </robot>"
+    )
+}
+
+#[test]
+fn a_continuous_joint_has_the_working_area_of_its_drive() {
+    let arm = Arm::parse(&urdf("0 0 1", "continuous")).unwrap();
+    assert_eq!(arm.model, Arm::avena().model);
+    assert_eq!((arm.joints[1].position_min, arm.joints[1].position_max), (-2.9905, 2.9905));
+    assert!(arm.warnings.iter().any(|w| w.place == "joint j2" && w.problem.contains("no position limits")));
+}
+
+/// Z1, UR with a gripper, a redundant arm: what is too much is named, and the command that says which six are meant.
+#[test]
+fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
+    let plain = urdf("0 0 1", "revolute");
+    let with = |end: String| plain.replace("</robot>", &end);
+    let say = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
+
+    let seven = with(more("gripper", "revolute", "flange"));
+    let error = Arm::parse(&seven).expect_err("accepted").in_file(Path::new("z1.urdf"));
+    let text = error.to_string();
+    assert!(text.contains("7 rotary joints carry each other (j1, j2, j3, j4, j5, j6, gripper)"), "{text}");
+    let command = "jtc arm import z1.urdf --joints j1,j2,j3,j4,j5,j6 -o arm.toml";
+    assert!(error.hint().contains(command), "{}", error.hint());
+    let finger = with(more("finger", "prismatic", "flange"));
+    assert!(
+        say(&finger).contains("6 rotary joints") && say(&finger).contains("finger (prismatic) moves as well")
+    );
+    let branch = with(more("head", "revolute", "l0"));
+    assert!(say(&branch).contains("head (revolute) moves as well"), "{}", say(&branch));
+    let five = plain.replacen("type=\"revolute\"", "type=\"fixed\"", 1);
+    assert!(
+        say(&five)
+            .contains("5 rotary joints carry each other (j2, j3, j4, j5, j6), the controller drives six")
+    );
+
+    let names = |text: &str| Some(text.split(',').map(String::from).collect());
+    let import = |text: &str, joints, tip: Option<&str>| {
+        Arm::from_urdf_with(text, &ArmChoice { joints, tip: tip.map(String::from) })
+    };
+    for (text, body) in [(&seven, "gripper"), (&finger, "finger")] {
+        let arm = import(text, names("j1,j2,j3,j4,j5,j6"), None).unwrap();
+        assert_eq!(arm.model.joints, Arm::avena().model.joints);
+        assert_eq!(arm.model.links[6].mass, Arm::avena().model.links[6].mass + 1.0, "it is carried");
+        let held = |w: &Warning| w.place == format!("joint {body}") && w.problem.contains("held at 0");
+        assert!(arm.warnings.iter().any(held), "{:?}", arm.warnings);
+    }
+    // Only what lies on the way to the tip is the arm.
+    let arm = import(&seven, None, Some("flange")).unwrap();
+    assert_eq!((arm.joint_names[5].as_str(), arm.model.joints[6]), ("j6", Arm::avena().model.joints[6]));
+    let arm = import(&branch, None, Some("l6")).unwrap();
+    assert_eq!(arm.model.joints[6], Origin::default(), "the flange is the tip");
+    // The tip behind a gripper that is held at zero.
+    let arm = import(&seven, names("j1,j2,j3,j4,j5,j6"), Some("of_gripper")).unwrap();
+    assert_eq!(arm.model.joints[6], Arm::avena().model.joints[6]);
+
+    let refused =
+        |joints: &str, tip: Option<&str>| import(&seven, names(joints), tip).unwrap_err().to_string();
+    assert!(refused("j1,j2,j3,j4,j5,j8", None).contains("no joint j8; those that move are j1, j2"));
+    assert!(refused("j1,j2,j3,j4,j5", None).contains("5 joints are named"));
+    assert!(
+        refused("j2,j1,j3,j4,j5,j6", None).contains("joint j1: is not carried by the one named before it")
+    );
+    assert!(refused("j1,j2,j3,j4,j5,base", None).contains("joint base: is fixed, not rotary"));
+    assert!(refused("j1,j2,j3,j4,j5,j6", Some("l2")).contains("link l2 is not carried by joint j6"));
+    assert!(import(&seven, None, Some("tool")).unwrap_err().to_string().contains("there is no link tool"));
+    assert!(import(&seven, None, Some("l5")).unwrap_err().to_string().contains("is --tip the last link"));
+}
+
+/// A seventh joint in the middle that is held at zero: the arm without it.
+#[test]
+fn a_joint_that_is_held_keeps_its_place() {
+    let plain = urdf("0 0 1", "revolute");
+    let elbow = more("elbow", "revolute", "l3").replace("</robot>", "");
+    let text = plain
+        .replace("<parent link=\"l3\"/>", "<parent link=\"of_elbow\"/>")
+        .replace("</robot>", &format!("{elbow}</robot>"));
+    let choice = ArmChoice { joints: Some((1..7).map(|j| format!("j{j}")).collect()), tip: None };
+    let arm = Arm::from_urdf_with(&text, &choice).unwrap();
+    assert_eq!(arm.model.links[3].mass, Arm::avena().model.links[3].mass + 1.0);
+    let (a, b) = (&arm.model.joints[3], &Arm::avena().model.joints[3]);
+    assert!(a.xyz.iter().zip(b.xyz).all(|(x, y)| (x - y).abs() < 1e-9), "{a:?} {b:?}");
 }
 
 #[test]

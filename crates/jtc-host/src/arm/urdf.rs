@@ -1,15 +1,19 @@
-//! Arms from URDF: six revolute joints in a chain and a fixed flange; what the controller's arm model cannot carry is reported.
+//! Arms from URDF: six rotary joints in a chain and a fixed flange; what the controller's arm model cannot carry is reported.
 //!
 //! Joints about another axis than +z are carried by turning the frames of their links, which changes neither positions nor
-//! torques. Bodies behind fixed joints become part of the link that carries them.
+//! torques. Bodies behind fixed joints, and behind joints that are none of the six, become part of the link that carries them.
+
+mod choice;
 
 use jtc_core::{Config, JOINTS, JointConfig};
 use jtc_dynamics::{ArmModel, Link, Origin};
 use urdf_rs::{Joint, JointType, Robot};
 
+pub use self::choice::ArmChoice;
+use self::choice::{about, choose};
 use super::frames::{Body, Frame};
 use super::{Arm, Warning};
-use crate::file::{FileError, Place};
+use crate::file::FileError;
 
 /// Deeper nesting than any description of an arm has.
 const DEPTH_MAX: usize = 32;
@@ -17,25 +21,31 @@ const DEPTH_MAX: usize = 32;
 /// The chain of joints with what hangs on it.
 struct Chain<'a> {
     robot: &'a Robot,
-    revolute: [&'a Joint; JOINTS],
-    flange: Option<&'a Joint>,
+    rotary: [&'a Joint; JOINTS],
+    /// From the last link to the flange.
+    flange: Vec<&'a Joint>,
     warnings: Vec<Warning>,
 }
 
 impl Arm {
-    /// From the text of a URDF file.
+    /// From the text of a URDF file in which nothing but the arm moves.
     pub fn from_urdf(text: &str) -> Result<Self, FileError> {
+        Self::from_urdf_with(text, &ArmChoice::default())
+    }
+
+    /// From the text of a URDF file, of which `choice` says what is the arm.
+    pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         let depth = depth(text);
         if depth > DEPTH_MAX {
             return Err(FileError::form(format!("XML nested {depth} deep is no description of an arm")));
         }
         let robot = urdf_rs::read_from_string(text).map_err(|e| FileError::form(format!("URDF: {e}")))?;
-        let mut chain = Chain::of(&robot)?;
+        let mut chain = Chain::of(&robot, choice)?;
         let model = chain.model()?;
         let limits = chain.limits()?;
         Ok(Arm {
             name: robot.name.clone(),
-            joint_names: chain.revolute.map(|j| j.name.clone()),
+            joint_names: chain.rotary.map(|j| j.name.clone()),
             model,
             joints: limits,
             // The form has no place for it.
@@ -68,89 +78,68 @@ fn depth(text: &str) -> usize {
     most
 }
 
-fn about(joint: &Joint, problem: impl Into<String>) -> FileError {
-    FileError::at(Place::name(format!("joint {}", joint.name)), problem)
-}
-
 impl<'a> Chain<'a> {
-    fn of(robot: &'a Robot) -> Result<Self, FileError> {
-        let above = |link: &str| robot.joints.iter().find(|j| j.child.link == link);
-        let mut revolute: Vec<(usize, &Joint)> = Vec::new();
+    fn of(robot: &'a Robot, choice: &ArmChoice) -> Result<Self, FileError> {
+        let rotary = choose(robot, choice)?;
+        let mut chain = Self { robot, rotary, flange: Vec::new(), warnings: Vec::new() };
+        chain.find_flange(choice.tip.as_deref());
         for joint in &robot.joints {
-            match joint.joint_type {
-                JointType::Revolute => {}
-                JointType::Fixed => continue,
-                ref other => {
-                    let problem =
-                        format!("{other:?} joints are not possible: six revolute ones and fixed ones are");
-                    return Err(about(joint, problem.to_lowercase()));
-                }
-            }
-            // Joints above it; a loop of joints never ends.
-            let mut depth = 0;
-            let mut at = joint;
-            while let Some(parent) = above(&at.parent.link) {
-                depth += 1;
-                at = parent;
-                if depth > robot.joints.len() {
-                    return Err(about(joint, "its chain of parents is a loop"));
-                }
-            }
-            revolute.push((depth, joint));
-        }
-        revolute.sort_by_key(|(depth, _)| *depth);
-        let joints: Vec<&Joint> = revolute.into_iter().map(|(_, j)| j).collect();
-        let Ok(revolute) = <[&Joint; JOINTS]>::try_from(joints.as_slice()) else {
-            let names: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
-            return Err(FileError::form(format!(
-                "{} revolute joints ({}), not 6",
-                names.len(),
-                names.join(", ")
-            )));
-        };
-        let mut chain = Self { robot, revolute, flange: None, warnings: Vec::new() };
-        for pair in revolute.windows(2) {
-            if chain.fixed_path(&pair[0].child.link, &pair[1].parent.link).is_none() {
-                return Err(about(pair[1], format!("is not carried by joint {}", pair[0].name)));
+            if joint.joint_type != JointType::Fixed && chain.rigid(joint) {
+                let kind = format!("{:?}", joint.joint_type).to_lowercase();
+                chain.warn(format!("joint {}", joint.name), format!("{kind}: is held at 0, none of the six"));
             }
         }
-        chain.find_flange();
         Ok(chain)
+    }
+
+    /// What hangs on it does not move against what carries it.
+    fn rigid(&self, joint: &Joint) -> bool {
+        !self.rotary.iter().any(|r| r.name == joint.name)
     }
 
     fn warn(&mut self, place: impl Into<String>, problem: impl Into<String>) {
         self.warnings.push(Warning { place: place.into(), problem: problem.into() });
     }
 
-    /// The fixed joint behind the last link; of several the one whose name says so, else the first.
-    fn find_flange(&mut self) {
-        let last = &self.revolute[JOINTS - 1].child.link;
-        let behind: Vec<&Joint> = self.robot.joints.iter().filter(|j| &j.parent.link == last).collect();
+    /// What leads from the last link to the flange: the way to `tip`, or else the fixed joint behind it; of several the one whose
+    /// name says so, else the first.
+    fn find_flange(&mut self, tip: Option<&str>) {
+        let last = &self.rotary[JOINTS - 1].child.link;
+        if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
+            self.flange = way;
+            return;
+        }
+        let fixed = |j: &&Joint| &j.parent.link == last && j.joint_type == JointType::Fixed;
+        let behind: Vec<&Joint> = self.robot.joints.iter().filter(fixed).collect();
         let named = |j: &&&Joint| {
             let words = format!("{} {}", j.name, j.child.link).to_lowercase();
             ["flange", "gripper", "tool0", "joint_7"].iter().any(|w| words.contains(w))
         };
-        self.flange = behind.iter().find(named).or(behind.first()).copied();
-        match self.flange {
+        let flange = behind.iter().find(named).or(behind.first()).copied();
+        self.flange = flange.into_iter().collect();
+        match flange {
             None => self
                 .warn(format!("link {last}"), "no fixed flange joint behind it: the flange is its own frame"),
             Some(flange) if behind.len() > 1 => {
                 let others: Vec<&str> =
                     behind.iter().filter(|j| j.name != flange.name).map(|j| j.name.as_str()).collect();
-                let problem = format!("is taken as the flange, not {}", others.join(", "));
+                let problem = format!(
+                    "is taken as the flange, not {}; `jtc arm import` takes another with --tip",
+                    others.join(", ")
+                );
                 self.warn(format!("joint {}", flange.name), problem);
             }
             Some(_) => {}
         }
     }
 
-    /// Fixed joints on the way from link `from` to link `to`, first to last.
-    fn fixed_path(&self, from: &str, to: &str) -> Option<Vec<&'a Joint>> {
+    /// Joints on the way from link `from` to link `to`, first to last, if none of them moves.
+    fn rigid_path(&self, from: &str, to: &str) -> Option<Vec<&'a Joint>> {
         let mut path = Vec::new();
         let mut at = to;
         while at != from {
             let joint = self.robot.joints.iter().find(|j| j.child.link == at)?;
-            if joint.joint_type != JointType::Fixed || path.len() > self.robot.joints.len() {
+            if !self.rigid(joint) || path.len() > self.robot.joints.len() {
                 return None;
             }
             path.push(joint);
@@ -162,15 +151,15 @@ impl<'a> Chain<'a> {
 
     fn model(&mut self) -> Result<ArmModel, FileError> {
         let mut model = ArmModel::default();
-        let base = self.revolute[0].parent.link.clone();
+        let base = self.rotary[0].parent.link.clone();
         self.look_below(&base);
         // Turn of each link's frame against URDF's.
         let mut turn = Frame::IDENTITY;
         model.links[0] = self.link(&base, &turn)?;
-        for (i, joint) in self.revolute.into_iter().enumerate() {
-            let from = if i == 0 { &base } else { &self.revolute[i - 1].child.link };
-            let fixed = self.fixed_path(from, &joint.parent.link).unwrap_or_default();
-            for f in &fixed {
+        for (i, joint) in self.rotary.into_iter().enumerate() {
+            let from = if i == 0 { &base } else { &self.rotary[i - 1].child.link };
+            let fixed = self.rigid_path(from, &joint.parent.link).unwrap_or_default();
+            for f in fixed.iter().filter(|f| f.joint_type == JointType::Fixed) {
                 self.warn(format!("joint {}", f.name), "is fixed: merged into the joint behind it");
             }
             let axis = joint.axis.xyz.0;
@@ -197,10 +186,12 @@ impl<'a> Chain<'a> {
             turn = next;
             model.links[i + 1] = self.link(&joint.child.link, &turn)?;
         }
-        model.joints[JOINTS] = match self.flange {
-            Some(flange) if turn.is_identity() => origin(&flange.origin),
-            Some(flange) => turn.inverse().then(&Frame::of(&origin(&flange.origin))).origin(),
-            None => turn.inverse().origin(),
+        model.joints[JOINTS] = match self.flange.as_slice() {
+            [flange] if turn.is_identity() => origin(&flange.origin),
+            way => {
+                let place = |frame: Frame, joint: &&Joint| frame.then(&Frame::of(&origin(&joint.origin)));
+                way.iter().fold(turn.inverse(), place).origin()
+            }
         };
         Ok(model)
     }
@@ -248,7 +239,7 @@ impl<'a> Chain<'a> {
                 return Err(FileError::form(format!("fixed joints at link {at} are a loop")));
             }
             for joint in &self.robot.joints {
-                if joint.parent.link == at && joint.joint_type == JointType::Fixed {
+                if joint.parent.link == at && self.rigid(joint) {
                     todo.push((joint.child.link.clone(), frame.then(&Frame::of(&origin(&joint.origin)))));
                 }
             }
@@ -266,14 +257,19 @@ impl<'a> Chain<'a> {
     fn limits(&mut self) -> Result<[JointConfig; JOINTS], FileError> {
         let default = super::Arm::avena().joints;
         let mut all = default;
-        for (i, joint) in self.revolute.into_iter().enumerate() {
+        for (i, joint) in self.rotary.into_iter().enumerate() {
             let place = format!("joint {}", joint.name);
             let (to, limit) = (&mut all[i], &joint.limit);
             to.rotor_inertia = 0.0;
-            if limit.lower == 0.0 && limit.upper == 0.0
+            if joint.joint_type == JointType::Continuous
+                || limit.lower == 0.0 && limit.upper == 0.0
                 || !limit.lower.is_finite()
                 || !limit.upper.is_finite()
             {
+                if joint.joint_type == JointType::Continuous {
+                    // As far as the drives go; that the mechanism has a stop is not said.
+                    (to.position_min, to.position_max) = (-jtc_core::WORKING_AREA, jtc_core::WORKING_AREA);
+                }
                 let problem =
                     format!("no position limits: {}..{} rad are used", to.position_min, to.position_max);
                 self.warn(&place, problem);
@@ -301,9 +297,6 @@ impl<'a> Chain<'a> {
             if positive(limit.acceleration) {
                 to.acceleration_max = limit.acceleration;
             }
-            if joint.mimic.is_some() {
-                return Err(about(joint, "follows another joint (mimic): not possible"));
-            }
             if joint.dynamics.is_some() {
                 self.warn(&place, "damping and friction are not carried: friction is a parameter of its own");
             }
@@ -321,7 +314,7 @@ impl<'a> Chain<'a> {
         let drives = Config::avena();
         let area = jtc_core::WORKING_AREA;
         let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
-        for (revolute, to) in self.revolute.into_iter().zip(joints) {
+        for (revolute, to) in self.rotary.into_iter().zip(joints) {
             let place = format!("joint {}", revolute.name);
             if to.position_min < -area || to.position_max > area {
                 let (min, max) = (to.position_min, to.position_max);

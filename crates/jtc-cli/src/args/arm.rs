@@ -1,0 +1,41 @@
+//! `jtc arm`: arm files.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::ForceArgs;
+
+/// `jtc arm …`
+#[derive(Debug, Subcommand)]
+pub enum ArmCommand {
+    /// Make an arm file from a robot description (URDF); what had to be turned or guessed is listed
+    #[command(
+        after_help = "The arm is six revolute or continuous joints in a chain. Where more joints move (a gripper,\n\
+                      a seventh axis, a second arm), --joints or --tip says which six are meant; the others are\n\
+                      held at 0. Gains and friction are in no URDF: they are to be added to the file.\n\nExamples:\n  \
+                      jtc arm import ur5.urdf -o ur5.toml\n  \
+                      jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
+                      jtc arm import two-arms.urdf --tip left_tool0 -o left.toml"
+    )]
+    Import(ImportArgs),
+}
+
+/// Options of `jtc arm import`.
+#[derive(Args, Debug)]
+pub struct ImportArgs {
+    /// Robot description
+    #[arg(value_name = "URDF")]
+    pub urdf: PathBuf,
+    /// Arm file to write
+    #[arg(short, long, env = "JTC_OUT", value_name = "FILE")]
+    pub out: PathBuf,
+    /// The six joints that move, base to wrist
+    #[arg(long, env = "JTC_JOINTS", value_name = "A,B,C,D,E,F", value_delimiter = ',')]
+    pub joints: Option<Vec<String>>,
+    /// The link that is the flange
+    #[arg(long, env = "JTC_TIP", value_name = "LINK")]
+    pub tip: Option<String>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}

@@ -1,0 +1,163 @@
+//! Which joints of a robot description are the arm's six.
+//!
+//! Terms: a *rotary* joint is a revolute or a continuous one; a joint that is not fixed and not among the six is *held* at
+//! zero, as if it were fixed: the finger of a gripper, the wheel of a cart, the seventh joint of a redundant arm.
+
+use std::path::PathBuf;
+
+use jtc_core::JOINTS;
+use urdf_rs::{Joint, JointType, Robot};
+
+use crate::file::{FileError, Place};
+
+/// What a user says of the arm in a robot description that has more than one in it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ArmChoice {
+    /// Names of the six joints that move, base to wrist; `None`: there are no others.
+    pub joints: Option<Vec<String>>,
+    /// The link that is the flange; only joints on the way to it are looked at. `None`: what is fixed to the last joint.
+    pub tip: Option<String>,
+}
+
+/// The six, base to wrist, each carried by the one before it.
+pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Joint; JOINTS], FileError> {
+    no_loops(robot)?;
+    let candidates: Vec<&Joint> = match (&choice.joints, &choice.tip) {
+        (Some(names), _) => named(robot, names)?,
+        (None, Some(tip)) => moving(robot, way_to(robot, tip)?),
+        (None, None) => moving(robot, robot.joints.iter().collect()),
+    };
+    let six = <[&Joint; JOINTS]>::try_from(candidates.as_slice()).ok();
+    let six = six.filter(|six| six.iter().all(|j| rotary(j)) && first_branch(robot, six).is_none());
+    let Some(six) = six else { return Err(not_six(robot, &candidates, choice)) };
+    if let Some(joint) = six.iter().find(|j| j.mimic.is_some()) {
+        return Err(about(joint, "follows another joint (mimic): it is none of the six that are driven"));
+    }
+    if let Some(tip) = &choice.tip
+        && !way_to(robot, tip)?.iter().any(|j| j.name == six[JOINTS - 1].name)
+    {
+        let last = &six[JOINTS - 1].name;
+        return Err(FileError::form(format!(
+            "link {tip} is not carried by joint {last}, the last of the six"
+        )));
+    }
+    Ok(six)
+}
+
+/// An error about a joint.
+pub(super) fn about(joint: &Joint, problem: impl Into<String>) -> FileError {
+    FileError::at(Place::name(format!("joint {}", joint.name)), problem)
+}
+
+fn rotary(joint: &Joint) -> bool {
+    matches!(joint.joint_type, JointType::Revolute | JointType::Continuous)
+}
+
+fn above<'a>(robot: &'a Robot, link: &str) -> Option<&'a Joint> {
+    robot.joints.iter().find(|j| j.child.link == link)
+}
+
+/// Joints between `link` and the root, the nearest to `link` first. No loops are in their way.
+fn way_down<'a>(robot: &'a Robot, link: &str) -> impl Iterator<Item = &'a Joint> {
+    std::iter::successors(above(robot, link), |j| above(robot, &j.parent.link))
+}
+
+/// Every way up ends.
+fn no_loops(robot: &Robot) -> Result<(), FileError> {
+    for joint in &robot.joints {
+        let mut at = joint;
+        for depth in 0.. {
+            let Some(parent) = above(robot, &at.parent.link) else { break };
+            at = parent;
+            if depth > robot.joints.len() {
+                return Err(about(joint, "its chain of parents is a loop"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Joints from the root to `link`, in this order.
+fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError> {
+    if !robot.links.iter().any(|l| l.name == link) {
+        let links: Vec<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
+        return Err(FileError::form(format!("there is no link {link}; there are {}", links.join(", "))));
+    }
+    let mut way: Vec<&Joint> = way_down(robot, link).collect();
+    way.reverse();
+    Ok(way)
+}
+
+/// Those that are not fixed, the ones nearer to the root first.
+fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
+    let mut joints: Vec<&Joint> = joints.into_iter().filter(|j| j.joint_type != JointType::Fixed).collect();
+    joints.sort_by_key(|j| way_down(robot, &j.parent.link).count());
+    joints
+}
+
+/// Those that the user named.
+fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, FileError> {
+    let find = |name: &String| -> Result<&'a Joint, FileError> {
+        let joint = robot.joints.iter().find(|j| &j.name == name).ok_or_else(|| {
+            let others = names(&moving(robot, robot.joints.iter().collect())).join(", ");
+            FileError::form(format!("there is no joint {name}; those that move are {others}"))
+        })?;
+        if rotary(joint) { Ok(joint) } else { Err(about(joint, format!("is {}, not rotary", kind(joint)))) }
+    };
+    let joints = wanted.iter().map(find).collect::<Result<Vec<_>, _>>()?;
+    if joints.len() != JOINTS {
+        return Err(FileError::form(format!("{} joints are named, the controller drives six", joints.len())));
+    }
+    if let Some(joint) = first_branch(robot, &joints) {
+        return Err(about(
+            joint,
+            "is not carried by the one named before it: name them from the base to the wrist",
+        ));
+    }
+    Ok(joints)
+}
+
+/// The first that is not carried by the one before it.
+fn first_branch<'a>(robot: &'a Robot, joints: &[&'a Joint]) -> Option<&'a Joint> {
+    joints.windows(2).map(|pair| (pair[0], pair[1])).find_map(|(below, joint)| {
+        (!way_down(robot, &joint.parent.link).any(|j| j.name == below.name)).then_some(joint)
+    })
+}
+
+fn names<'a>(joints: &[&'a Joint]) -> Vec<&'a str> {
+    joints.iter().map(|j| j.name.as_str()).collect()
+}
+
+fn kind(joint: &Joint) -> String {
+    format!("{:?}", joint.joint_type).to_lowercase()
+}
+
+/// Why these are no six-axis arm, and how to say which joints are meant.
+fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileError {
+    // The longest chain of rotary joints.
+    let chain_to = |end: &Joint| -> Vec<&Joint> {
+        let way = way_to(robot, &end.child.link).unwrap_or_default();
+        way.into_iter().filter(|j| rotary(j) && candidates.iter().any(|c| c.name == j.name)).collect()
+    };
+    let longest = candidates.iter().map(|end| chain_to(end)).max_by_key(Vec::len).unwrap_or_default();
+    let others: Vec<String> = candidates
+        .iter()
+        .filter(|c| !longest.iter().any(|j| j.name == c.name))
+        .map(|c| format!("{} ({})", c.name, kind(c)))
+        .collect();
+    let mut text = format!(
+        "{} rotary joints carry each other ({}), the controller drives six",
+        longest.len(),
+        names(&longest).join(", ")
+    );
+    if !others.is_empty() {
+        text += &format!("; {} move{} as well", others.join(", "), if others.len() == 1 { "s" } else { "" });
+    }
+    if longest.len() < JOINTS {
+        if choice.tip.is_some() {
+            text += "; is --tip the last link of the arm?";
+        }
+        return FileError::form(text);
+    }
+    FileError::Joints { path: PathBuf::new(), problem: text, six: names(&longest[..JOINTS]).join(",") }
+}

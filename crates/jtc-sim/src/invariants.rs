@@ -123,7 +123,7 @@ pub enum Broken {
         /// Consecutive measurements above the limit.
         ticks: u16,
     },
-    /// A torque was at its limit too often, though the arm did not brake (J-43).
+    /// A torque was at its limit too often, though the arm did not brake and no load was caught (J-43).
     Saturated {
         /// Joint.
         joint: usize,

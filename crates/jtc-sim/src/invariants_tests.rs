@@ -191,6 +191,25 @@ fn j33_a_stop_that_takes_too_long_is_found() {
 }
 
 #[test]
+fn j33_a_stop_against_a_push_has_the_time_that_braking_may_take() {
+    let found = |push: f64, torque: f64, (state, tes): (State, Tes)| {
+        let mut script = stopped_at(0.3);
+        script.truth.outside[2] = push;
+        script.telemetry.joints[2].torque = torque;
+        script.telemetry.braking = true;
+        (0..1_100).find(|_| script.tick(state, tes).is_some())
+    };
+    let limit = Config::avena().joints[2].torque_max;
+    let (path, held) = ((State::Operate, Tes::Execute), (State::HoldPos, Tes::Stop));
+    for place in [path, held] {
+        assert_eq!(found(0.0, limit, place), Some(521), "no push");
+        assert_eq!(found(50.0, limit - 1.0, place), Some(521), "a push that leaves torque to brake with");
+    }
+    assert_eq!(found(50.0, -limit, path), Some(1_021));
+    assert_eq!(found(50.0, -limit, held), None, "what moves then is held by the other limits");
+}
+
+#[test]
 fn j33_a_stop_that_ends_is_none_and_an_error_ends_it() {
     let mut script = stopped_at(0.3);
     assert!((0..500).all(|_| script.tick(State::Operate, Tes::Execute).is_none()));
@@ -254,4 +273,13 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
     script.telemetry.braking = false;
     let found = (1..=20).find_map(|ms| script.tick(State::HoldPos, Tes::Null).map(|broken| (ms, broken)));
     assert_eq!(found, Some((11, Broken::Saturated { joint: 0, ticks: 11 })));
+    // A joint that was just enabled has a second to catch its load, and none while it is taught.
+    for (state, last) in [(State::HoldPos, 1_000), (State::Teaching, 0)] {
+        let mut script = Script::new();
+        script.telemetry.joints[0].torque = limit;
+        script.telemetry.joints[0].fsm = jtc_bus::fsm::ENABLED;
+        script.command(FrameType::TeachingModeEnable);
+        let found = (1..=2_000).find(|_| script.tick(state, Tes::Null).is_some());
+        assert_eq!(found, Some(last + 11), "{state:?}");
+    }
 }

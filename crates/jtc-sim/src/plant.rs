@@ -125,7 +125,8 @@ impl Plant {
                 Support::Brakes => !enabled(drive),
             };
         }
-        let total = core::array::from_fn(|j| self.truth.torque[j] + self.push[j] + self.hand[j]);
+        self.truth.outside = core::array::from_fn(|j| self.push[j] + self.hand[j]);
+        let total = core::array::from_fn(|j| self.truth.torque[j] + self.truth.outside[j]);
         self.arm.step(&total, TICK);
         self.read_truth();
     }

@@ -18,8 +18,12 @@ const WINDOW: u32 = 100;
 pub(super) struct MotionWatch {
     /// Ticks since a pause or stop was commanded on the path, until the arm stands.
     stopping: Option<u32>,
+    /// A push brought a torque to its limit meanwhile.
+    overpowered: bool,
     /// Per joint: consecutive measurements above the limit.
     fast: [u16; JOINTS],
+    /// Per joint: ticks for which it has been enabled.
+    enabled: [u16; JOINTS],
     /// Per joint: in which of the last ticks the torque was at its limit; the last is bit 0.
     saturated: [u128; JOINTS],
 }
@@ -32,7 +36,8 @@ impl MotionWatch {
         self.torque(moment)
     }
 
-    /// J-33: the arm stands in time, unless an error takes the torque away.
+    /// J-33: the arm stands in time, unless an error takes the torque away. Where a push leaves the torque limit too little to brake
+    /// with, it has the time of an error.
     fn stop(&mut self, moment: &Moment<'_>, before: Tes) -> Result<(), Broken> {
         let t = moment.telemetry;
         let ends = |worked: &Worked| {
@@ -43,15 +48,18 @@ impl MotionWatch {
         let executes_again = before != Tes::Execute && t.tes == Tes::Execute;
         let powered = matches!(t.state, State::HoldPos | State::Operate);
         let stands = t.tes != Tes::Execute && moment.truth.qd.iter().all(|v| v.abs() < STANDS);
+        let braking = u32::from(moment.config.braking_ms_max);
         self.stopping = match self.stopping {
             _ if !powered || stands || executes_again => None,
             None => commanded.then_some(0),
+            // Once it has had all its time, an arm that is held and pushed is a matter of the other limits.
+            Some(ticks) if self.overpowered && t.tes != Tes::Execute && ticks >= braking => None,
             Some(ticks) => Some(ticks + 1),
         };
+        self.overpowered = self.stopping.is_some() && (self.overpowered || overpowered(moment));
+        let allowed = if self.overpowered { braking } else { u32::from(moment.config.stop_ms) };
         match self.stopping {
-            Some(ticks) if ticks > u32::from(moment.config.stop_ms) + REST_MS => {
-                Err(Broken::NoStop { ticks })
-            }
+            Some(ticks) if ticks > allowed + REST_MS => Err(Broken::NoStop { ticks }),
             _ => Ok(()),
         }
     }
@@ -76,12 +84,15 @@ impl MotionWatch {
         Ok(())
     }
 
-    /// J-43.
+    /// J-43. While a stop brakes, and while the load of a joint that was just enabled is caught, the limit may be commanded.
     fn torque(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let t = moment.telemetry;
         for joint in 0..JOINTS {
-            let full = t.joints[joint].torque.abs() >= moment.config.joints[joint].torque_max;
-            let counted = full && powered(t.state) && !t.braking;
+            let enabled = powered(t.state) && t.joints[joint].fsm == fsm::ENABLED;
+            self.enabled[joint] = if enabled { self.enabled[joint].saturating_add(1) } else { 0 };
+            let caught = (1..=moment.config.catch_ms_max).contains(&self.enabled[joint]);
+            let catching = caught && t.state != State::Teaching;
+            let counted = at_limit(moment, joint) && powered(t.state) && !t.braking && !catching;
             self.saturated[joint] = self.saturated[joint] << 1 | u128::from(counted);
             let ticks = (self.saturated[joint] << (u128::BITS - WINDOW)).count_ones();
             if ticks > u32::from(moment.config.torque_over_ms) {
@@ -90,6 +101,15 @@ impl MotionWatch {
         }
         Ok(())
     }
+}
+
+/// A joint that is pushed has its torque at its limit.
+fn overpowered(moment: &Moment<'_>) -> bool {
+    (0..JOINTS).any(|j| moment.truth.outside[j] != 0.0 && at_limit(moment, j))
+}
+
+fn at_limit(moment: &Moment<'_>, joint: usize) -> bool {
+    moment.telemetry.joints[joint].torque.abs() >= moment.config.joints[joint].torque_max
 }
 
 /// The state commands torque.

@@ -21,6 +21,8 @@ pub struct Truth {
     pub qd: JointVec,
     /// Torque of the drives, N·m.
     pub torque: JointVec,
+    /// Torque of pushes and of a hand, N·m.
+    pub outside: JointVec,
     /// Bearing temperature, °C.
     pub temperature: JointVec,
 }

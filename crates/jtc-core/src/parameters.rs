@@ -5,12 +5,18 @@ use jtc_wire::{DataStatus, Floats, RawPoint};
 use crate::JOINTS;
 use crate::config::{JointConfig, PidGains, TableOf};
 use crate::controller::{Controller, Given};
+use crate::friction;
 use crate::host::{Progress, Work};
 
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
-/// Bounds of gains and masses: what lies beyond is no arm of these drives, and would throw or drop one that is held (J-06).
+/// Share of the velocity limit up to which friction has been measured; a curve fitted to it may do anything beyond.
+const MEASURED: f64 = 0.5;
+/// Speeds at which a friction polynomial is checked: a cubic does not get far between them.
+const SPEEDS: u8 = 16;
+
+/// Bounds of gains, masses and friction: what lies beyond is no arm of these drives, and would throw or drop one (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterBounds {
     /// Highest Kp, N·m/rad. No such drive is known to run with more than 28 000.
@@ -28,6 +34,16 @@ pub struct ParameterBounds {
     pub link_mass_max: f64,
     /// Largest moment or product of inertia of a link, kg·m²: what those 50 kg have at 1.4 m.
     pub link_inertia_max: f64,
+    /// Largest friction torque of a joint at a speed, as a share of its torque limit; of a polynomial without the factor of
+    /// its temperature. Up to 1.19 is in use.
+    pub friction_max: f64,
+    /// The same up to half of the velocity limit. Up to 0.82 is in use.
+    pub slow_friction_max: f64,
+    /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of
+    /// the torque limit: what noise of a measurement may be.
+    pub friction_reversed_max: f64,
+    /// Largest friction torque at standstill, as a share of the torque limit.
+    pub rest_friction_max: f64,
 }
 
 impl ParameterBounds {
@@ -41,6 +57,10 @@ impl ParameterBounds {
             integral_bias_max: 0.25,
             link_mass_max: 50.0,
             link_inertia_max: 100.0,
+            friction_max: 1.5,
+            slow_friction_max: 1.0,
+            friction_reversed_max: 0.05,
+            rest_friction_max: 0.25,
         }
     }
 
@@ -65,6 +85,51 @@ impl ParameterBounds {
             link.mass <= self.link_mass_max && link.inertia.iter().all(|i| i.abs() <= self.link_inertia_max)
         };
         if model.links.iter().all(good) { Ok(()) } else { Err(DataStatus::IncorrectValue) }
+    }
+}
+
+impl ParameterBounds {
+    /// The torque (N·m) that compensates friction of a joint at a velocity (rad/s). Written so that a NaN is refused.
+    fn check_friction(&self, torque: f64, velocity: f64, joint: &JointConfig) -> Result<(), DataStatus> {
+        let (share, speed) = (torque / joint.torque_max, velocity.abs());
+        let along = if velocity < 0.0 { -share } else { share };
+        let (low, high) = if speed == 0.0 {
+            (-self.rest_friction_max, self.rest_friction_max)
+        } else if speed <= MEASURED * joint.velocity_max {
+            (-self.friction_reversed_max, self.slow_friction_max)
+        } else {
+            (-self.friction_max, self.friction_max)
+        };
+        if along >= low && along <= high { Ok(()) } else { Err(DataStatus::IncorrectValue) }
+    }
+
+    /// A polynomial at all speeds that the joint may have. Its temperature factor is bounded by itself (J-42).
+    fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), DataStatus> {
+        let [c0, c1, c2, c3, ..] = *coefficients;
+        let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
+        (1..=SPEEDS).map(|k| joint.velocity_max * f64::from(k) / f64::from(SPEEDS)).try_for_each(|v| {
+            // The sign is smoothed around standstill, where there is no torque.
+            self.check_friction(friction::polynomial(&without_temperature, v, 0.0, v), v, joint)
+        })
+    }
+
+    /// A table at its own velocities, and at standstill.
+    fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), DataStatus> {
+        for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
+            for &torque in row {
+                // Standstill is checked below, where most tables have no row.
+                if velocity != 0.0 {
+                    self.check_friction(torque.into(), velocity.into(), joint)?;
+                }
+            }
+        }
+        for &temperature in &table.temperature {
+            // A table without standstill is good for no path (J-36).
+            if let Some(torque) = friction::table(table, 0.0, temperature.into()) {
+                self.check_friction(torque, 0.0, joint)?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -132,6 +197,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 *c = finite(floats, count * j + i)?;
             }
         }
+        for (coefficients, joint) in polynomial.iter().zip(&self.config.joints) {
+            self.config.parameter_bounds.check_polynomial(coefficients, joint)?;
+        }
         self.polynomial = polynomial;
         self.friction_given(false);
         Ok(())
@@ -152,10 +220,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             work => {
                 let j = if let Work::TableCheck(j) = work { j } else { 0 };
-                match read_table(floats, j) {
+                let table = read_table(floats, j).and_then(|table| {
+                    let joint = self.config.joints.get(j).ok_or(DataStatus::IncorrectValue)?;
+                    self.config.parameter_bounds.check_table(&table, joint)
+                });
+                match table {
                     Err(status) => Progress::Refused(status),
-                    Ok(_) if j + 1 < JOINTS => Progress::Working(Work::TableCheck(j + 1)),
-                    Ok(_) => Progress::Working(Work::TableCopy(0)),
+                    Ok(()) if j + 1 < JOINTS => Progress::Working(Work::TableCheck(j + 1)),
+                    Ok(()) => Progress::Working(Work::TableCopy(0)),
                 }
             }
         }

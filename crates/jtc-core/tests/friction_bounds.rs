@@ -1,0 +1,146 @@
+//! Which friction is taken from a host: any that an arm of such drives has, and none that would throw it (J-06, J-42).
+mod rig;
+
+use jtc_core::{Config, Friction, Parameters, TableOf};
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use rig::{Rig, floats};
+
+type Table = TableOf<f32>;
+
+fn polynomials() -> [[f64; 6]; 6] {
+    let Friction::Polynomial(polynomials) = Parameters::avena().friction else { panic!() };
+    polynomials
+}
+
+fn tables() -> [Table; 6] {
+    let Friction::Table(tables) = Parameters::avena_friction_table() else { panic!() };
+    tables
+}
+
+/// Coefficients c0, c1.. as they go over the wire: highest index first.
+fn wire<const N: usize>(joints: &[[f64; N]; 6]) -> Vec<u8> {
+    floats(joints.iter().flat_map(|c| c.iter().rev().map(|c| *c as f32)))
+}
+
+fn table_wire(tables: &[Table; 6]) -> Vec<u8> {
+    floats(tables.iter().flat_map(|t| {
+        t.velocity.iter().chain(&t.temperature).chain(t.torque.iter().flatten()).copied().collect::<Vec<_>>()
+    }))
+}
+
+/// Torque of a table as `torque` says, from `velocity` on in steps of 0.1 rad/s.
+fn table_of(velocity: f32, torque: impl Fn(f32) -> f32) -> Table {
+    let velocity: [f32; 20] = core::array::from_fn(|i| velocity + 0.1 * i as f32);
+    Table {
+        velocity,
+        temperature: core::array::from_fn(|i| 20.0 + i as f32),
+        torque: velocity.map(|v| [torque(v); 20]),
+    }
+}
+
+/// A path through standstill, and the friction torques of all joints on it.
+fn friction_on_a_path(rig: &mut Rig) -> Vec<[u64; 6]> {
+    let points: Vec<_> = (0..60i16)
+        .map(|i| {
+            let velocity = if i == 0 || i == 59 { 0 } else { 300 };
+            RawPoint { position: [i * 3; 6], velocity: [velocity; 6], ..RawPoint::default() }
+        })
+        .collect();
+    rig.upload(&points, 10);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    let mut torques = Vec::new();
+    // From the first torque on: the ticks until a record comes differ.
+    while torques.len() < 500 {
+        rig.tick();
+        let torque = rig.controller.telemetry().joints.map(|j| j.torque_friction.to_bits());
+        if !torques.is_empty() || torque != [0; 6] {
+            torques.push(torque);
+        }
+    }
+    torques
+}
+
+#[test]
+fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
+    let mut rig = Rig::holding();
+    let known = polynomials();
+    assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&known)), DataStatus::NoError);
+    let four = known.map(|[c0, c1, c2, c3, ..]| [c0, c1, c2, c3]);
+    assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&four)), DataStatus::NoError);
+    // An existing host sends the rows of its file from left to right: everything else way round.
+    let reversed = known.map(|[a, b, c, d, e, f]| [f, e, d, c, b, a]);
+    assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&reversed)), DataStatus::NoError);
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::NoError);
+    // None at all; noise around standstill; one way only.
+    assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&[[0.0; 6]; 6])), DataStatus::NoError);
+    for table in [
+        table_of(-0.95, |_| 0.0),
+        table_of(-0.95, |v| 8.0 * v.signum() + 20.0 * v),
+        table_of(-0.95, |v| if v.abs() < 0.1 { -0.5 * v.signum() } else { 10.0 * v }),
+        table_of(0.0, |v| 5.0 + 10.0 * v),
+    ] {
+        assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&[table; 6])), DataStatus::NoError);
+    }
+}
+
+#[test]
+fn j06_a_polynomial_that_would_throw_the_arm_is_refused_whole() {
+    let good = polynomials();
+    for (what, place, value) in [
+        ("Coulomb friction of 1000 N·m", 0, 1e3),
+        ("negative Coulomb friction", 0, -5.0),
+        ("viscous friction of 1000 N·m·s/rad", 1, 1e3),
+        ("negative viscous friction", 1, -60.0),
+        ("a huge square", 2, 1e30),
+        ("a negative square", 2, -90.0),
+        ("a huge cube", 3, 3e38),
+        ("a huge negative cube", 3, -3e38),
+        ("no number", 1, f64::NAN),
+    ] {
+        // In the last joint only: the others must not be taken either.
+        let mut body = good.map(|c| c.map(|c| 0.5 * c));
+        body[5] = good[5];
+        body[5][place] = value;
+        let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
+        let record = asked.ask(FrameType::FrictionPolynomial, &wire(&body));
+        assert_eq!(record, DataStatus::IncorrectValue, "{what}");
+        quiet.ask(FrameType::ClearCurrentErrors, &[1, 0, 0, 0]);
+        assert!(
+            friction_on_a_path(&mut asked) == friction_on_a_path(&mut quiet),
+            "{what}: something changed"
+        );
+    }
+}
+
+#[test]
+fn j06_a_table_that_would_throw_the_arm_is_refused_whole() {
+    let good = table_of(-0.95, |v| 5.0 * v.signum());
+    for (what, bad) in [
+        ("500 N·m", table_of(-0.95, |v| 500.0 * v.signum())),
+        ("with the motion", table_of(-0.95, |v| -8.0 * v.signum())),
+        ("more than the joint has, slowly", table_of(-0.95, |v| 41.0 * v.signum())),
+        ("more than one and a half times as much, fast", table_of(-0.95, |v| 80.0 * v * v * v)),
+        ("20 N·m at standstill", table_of(-1.0, |v| if v.abs() < 0.01 { 20.0 } else { 0.0 })),
+        ("20 N·m at standstill, between two rows", table_of(-0.03, |v| if v < 0.0 { 0.0 } else { 35.0 })),
+        ("no number", table_of(-0.95, |_| f32::NAN)),
+    ] {
+        let mut tables = [good; 6];
+        tables[5] = bad;
+        let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
+        let record = asked.ask(FrameType::FrictionTable, &table_wire(&tables));
+        assert_eq!(record, DataStatus::IncorrectValue, "{what}");
+        quiet.ask(FrameType::ClearCurrentErrors, &[1, 0, 0, 0]);
+        assert!(
+            friction_on_a_path(&mut asked) == friction_on_a_path(&mut quiet),
+            "{what}: something changed"
+        );
+    }
+}
+
+#[test]
+fn j06_the_bounds_of_friction_are_settings() {
+    let mut config = Config::avena();
+    config.parameter_bounds.friction_max = 0.2;
+    let mut rig = Rig::holding_with(config);
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::IncorrectValue);
+}

@@ -6,7 +6,7 @@ mod common;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::OwnedFd;
-use std::process::{Child, Stdio};
+use std::process::{Child, ChildStderr, Stdio};
 
 use common::{Sim, command};
 use rustix::fs::{Mode, OFlags};
@@ -33,48 +33,85 @@ fn slow_motion() -> String {
     text
 }
 
-/// A run that is just about to move, in real time, with a person at its terminal.
-struct Run {
+/// A command at work in real time, with a person at its terminal.
+struct Session {
     sim: Sim,
     child: Child,
     person: File,
     slave: OwnedFd,
-    err: Option<BufReader<std::process::ChildStderr>>,
+    err: Option<BufReader<ChildStderr>>,
 }
 
-impl Run {
-    fn start() -> Self {
-        let sim = Sim::start(&["--no-throttle"]);
-        sim.jtc(&["params", "use-defaults"]).ends(0);
-        let file = sim.path("motion.csv");
-        std::fs::write(&file, slow_motion()).unwrap();
+impl Session {
+    /// Starts `jtc --json` with these words, and waits until it has said `ready`.
+    fn start(sim: Sim, words: &[&str], ready: &str) -> Self {
         let (person, slave) = terminal();
         let mut child = command()
-            .args(["--json", "traj", "run", &file, "--record", &sim.path("run.csv")])
+            .arg("--json")
+            .args(words)
             .args(["--port", sim.port.to_str().unwrap()])
             .stdin(Stdio::from(slave.try_clone().unwrap()))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        let mut err = BufReader::new(child.stderr.take().unwrap());
-        let mut line = String::new();
-        while !line.contains("space pauses") {
-            line.clear();
-            assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it moved");
-        }
-        Self { sim, child, person, slave, err: Some(err) }
+        let err = child.stderr.take().map(BufReader::new);
+        let mut session = Self { sim, child, person, slave, err };
+        session.until(ready);
+        session
     }
 
-    /// Waits for the end: exit code and what was printed.
-    fn end(mut self) -> (i32, serde_json::Value, Sim) {
+    /// A run that is just about to move.
+    fn run() -> Self {
+        let sim = Sim::start(&["--no-throttle"]);
+        sim.jtc(&["params", "use-defaults"]).ends(0);
+        let (file, record) = (sim.path("motion.csv"), sim.path("run.csv"));
+        std::fs::write(&file, slow_motion()).unwrap();
+        Self::start(sim, &["traj", "run", &file, "--record", &record], "space pauses")
+    }
+
+    /// A recording of a taught arm.
+    fn teaching() -> Self {
+        let sim = Sim::start(&["--no-throttle"]);
+        sim.jtc(&["recover", "--defaults"]).ends(0);
+        let file = sim.path("taught.csv");
+        Self::start(sim, &["teach", "record", &file], "Ctrl-C ends")
+    }
+
+    fn signal(&self, signal: &str) {
+        cli_kit::trial::signal(&self.child, signal);
+    }
+
+    /// Waits until it has said `words`.
+    fn until(&mut self, words: &str) {
+        let mut line = String::new();
+        while !line.contains(words) {
+            line.clear();
+            let err = self.err.as_mut().expect("somebody listens");
+            assert!(err.read_line(&mut line).unwrap() > 0, "it ended before: {words}");
+        }
+    }
+
+    /// Waits for the end.
+    fn end(mut self) -> Ended {
         let code = self.child.wait().unwrap().code().unwrap_or(-1);
-        let mut out = String::new();
+        let (mut out, mut err) = (String::new(), String::new());
         self.child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
+        if let Some(mut rest) = self.err {
+            rest.read_to_string(&mut err).unwrap();
+        }
         let modes = tcgetattr(&self.slave).unwrap().local_modes;
         assert!(modes.contains(LocalModes::ICANON | LocalModes::ECHO), "the terminal was left changed");
-        (code, serde_json::from_str(out.trim()).unwrap_or_default(), self.sim)
+        Ended { code, value: serde_json::from_str(out.trim()).unwrap_or_default(), err, sim: self.sim }
     }
+}
+
+/// Exit code, what was printed on stdout, what was left of stderr, and the simulator.
+struct Ended {
+    code: i32,
+    value: serde_json::Value,
+    err: String,
+    sim: Sim,
 }
 
 fn stands(sim: &Sim) {
@@ -93,13 +130,13 @@ fn stands(sim: &Sim) {
 #[test]
 fn j33_every_signal_stops_on_the_path_and_then_ends() {
     for signal in ["-INT", "-TERM", "-HUP"] {
-        let mut run = Run::start();
+        let mut run = Session::run();
         if signal == "-HUP" {
             // The terminal has gone: nothing that is said reaches anybody.
             run.err = None;
         }
-        cli_kit::trial::signal(&run.child, signal);
-        let (code, value, sim) = run.end();
+        run.signal(signal);
+        let Ended { code, value, sim, .. } = run.end();
         assert_eq!((code, value["outcome"].as_str()), (5, Some("stopped")), "{signal}: {value}");
         stands(&sim);
     }
@@ -108,23 +145,15 @@ fn j33_every_signal_stops_on_the_path_and_then_ends() {
 /// Space pauses, space goes on, `s` stops.
 #[test]
 fn j33_keys_pause_resume_and_stop() {
-    let mut run = Run::start();
-    let mut err = run.err.take().unwrap();
-    let mut until = |words: &str| {
-        let mut line = String::new();
-        while !line.contains(words) {
-            line.clear();
-            assert!(err.read_line(&mut line).unwrap() > 0, "it ended before: {words}");
-        }
-    };
-    until("moving");
+    let mut run = Session::run();
+    run.until("moving");
     run.person.write_all(b" ").unwrap();
-    until("paused");
+    run.until("paused");
     run.person.write_all(b" ").unwrap();
-    until("moving");
+    run.until("moving");
     run.person.write_all(b"s").unwrap();
-    until("stopping");
-    let (code, value, sim) = run.end();
+    run.until("stopping");
+    let Ended { code, value, sim, .. } = run.end();
     assert_eq!((code, value["outcome"].as_str()), (5, Some("stopped")), "{value}");
     let recording = std::fs::read_to_string(sim.path("run.csv")).unwrap();
     let states: Vec<&str> = recording.lines().skip(1).filter_map(|row| row.split(',').nth(2)).collect();
@@ -137,25 +166,18 @@ fn j33_keys_pause_resume_and_stop() {
 /// A second Ctrl-C ends the command at once, says what may be, and leaves the terminal as it was.
 #[test]
 fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
-    let mut run = Run::start();
-    let mut err = run.err.take().unwrap();
-    cli_kit::trial::signal(&run.child, "-INT");
-    let mut line = String::new();
-    while !line.contains("stopping on the path") {
-        line.clear();
-        assert!(err.read_line(&mut line).unwrap() > 0);
-    }
+    let mut run = Session::run();
+    run.signal("-INT");
+    run.until("stopping on the path");
     // Signals within 0.1 s are one.
     std::thread::sleep(std::time::Duration::from_millis(150));
-    cli_kit::trial::signal(&run.child, "-INT");
-    let (code, value, sim) = run.end();
-    let mut rest = String::new();
-    err.read_to_string(&mut rest).unwrap();
+    run.signal("-INT");
+    let Ended { code, value, err, sim } = run.end();
     // On a slow computer the first one may have come to its end already.
     let at_once = value["error"]["code"] == "ended-at-once";
     assert!(code == 5 && (at_once || value["outcome"] == "stopped"), "{code} {value}");
-    let words = rest.contains("MAY BE MOVING") || rest.contains("moves nothing any more");
-    assert!(!at_once || words, "{rest}");
+    let words = err.contains("MAY BE MOVING") || err.contains("moves nothing any more");
+    assert!(!at_once || words, "{err}");
     // No file that was never written is left.
     assert_eq!(std::path::Path::new(&sim.path("run.csv")).exists(), !at_once);
     sim.jtc(&["traj", "stop"]);
@@ -165,39 +187,21 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
 #[test]
 fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching() {
     for close in [true, false] {
-        let sim = Sim::start(&["--no-throttle"]);
-        sim.jtc(&["recover", "--defaults"]).ends(0);
-        let file = sim.path("taught.csv");
-        let mut child = command()
-            .args(["--json", "teach", "record", &file, "--port", sim.port.to_str().unwrap()])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut err = BufReader::new(child.stderr.take().unwrap());
-        let mut line = String::new();
-        while !line.contains("Ctrl-C ends") {
-            line.clear();
-            assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it recorded");
-        }
-        cli_kit::trial::signal(&child, "-INT");
+        let teaching = Session::teaching();
+        teaching.signal("-INT");
         if !close {
             std::thread::sleep(std::time::Duration::from_millis(150));
         }
-        cli_kit::trial::signal(&child, "-INT");
-        let code = child.wait().unwrap().code();
-        let mut out = String::new();
-        child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
-        let value: serde_json::Value = serde_json::from_str(out.trim()).unwrap_or_default();
-        assert!(!std::path::Path::new(&file).exists(), "an empty file is left");
+        teaching.signal("-INT");
+        let Ended { code, value, sim, .. } = teaching.end();
+        assert!(!std::path::Path::new(&sim.path("taught.csv")).exists(), "an empty file is left");
         let state = sim.jtc(&["--json", "status"]).ends(0).json()["state"].clone();
         if value["error"]["code"] == "ended-at-once" {
-            assert!(!close && code == Some(5), "{code:?} {value}");
+            assert!(!close && code == 5, "{code} {value}");
             assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
         } else {
             // The first one did its work before the second came: the arm was not moved, and is held again.
-            assert_eq!((code, state.as_str()), (Some(2), Some("HoldPos")), "{value}");
+            assert_eq!((code, state.as_str()), (2, Some("HoldPos")), "{value}");
         }
     }
 }

@@ -82,6 +82,14 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     let said = jtc(&["--json", "traj", "check", file]).ends(4);
     let problems = said.json()["verdict"]["problems"].clone();
     assert!(problems[0]["joint"].is_u64() && problems[0]["limit"].is_f64(), "{problems}");
+    // The next command is one that can be typed.
+    let spaced = dir.path().join("my motion.csv");
+    std::fs::write(&spaced, motion(0.3)).unwrap();
+    let spaced = spaced.to_str().unwrap();
+    let said = jtc(&["traj", "check", spaced, "--speed", "50"]).ends(0);
+    assert!(said.out.contains(&format!("next: jtc traj run '{spaced}' --speed 50")), "{}", said.out);
+    let said = jtc(&["traj", "check", file]).ends(4);
+    assert!(said.out.contains(&format!("jtc traj check {file} --speed ")), "{}", said.out);
     // Refused before anything is opened: the port is not even there.
     let said = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
     assert_eq!(said.json()["outcome"], "refused");

@@ -13,7 +13,7 @@ pub struct CheckArgs {
     /// Arm whose limits and masses count, TOML or URDF; default: the built-in one
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Run slower, in percent of the trajectory's own speed
+    /// Speed in percent of the file's own, 1 to 200: 50 takes twice the time, with the same path
     #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
     pub speed: f64,
 }
@@ -67,7 +67,7 @@ pub struct RunArgs {
     /// Move to the first point before
     #[arg(long, env = "JTC_APPROACH", value_parser = FalseyValueParser::new())]
     pub approach: bool,
-    /// Points of a segment; default: short enough for the CRC to be strong
+    /// Points of a segment, 1 to 1500, in at most 100 segments; default: short enough for the CRC to be strong
     #[arg(long, env = "JTC_POINTS_PER_SEGMENT", value_name = "N")]
     pub points_per_segment: Option<usize>,
     /// Record the motion, .mcap or .csv

@@ -17,7 +17,7 @@ use jtc_wire::Status;
 use serde_json::json;
 
 use super::run_report;
-use super::traj::{Job, refuse};
+use super::traj::Job;
 use crate::args::RunArgs;
 use crate::failure::{FAULT, Failure, REFUSED};
 use crate::limits;
@@ -40,10 +40,14 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
     job.config = job.arm.config_on_device();
     job.say_what_is_left_out(out);
+    perform(args, &job, out).map_err(|failure| job.named(failure))
+}
+
+fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
     let options = UploadOptions { points_per_segment: args.points_per_segment, number: 0 };
     let verdict = job.verdict(&job.trajectory, None, options);
     if !verdict.is_ok() {
-        return Err(refuse(&verdict, out));
+        return Err(job.refuse(&verdict, out));
     }
     for warning in verdict.warnings() {
         out.note(format!("warning: {warning}"));
@@ -58,9 +62,9 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     let mut broken_off = None;
     if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose) {
         if !args.approach {
-            return Err(refuse(&verdict, out));
+            return Err(job.refuse(&verdict, out));
         }
-        let path = approach(&job, here, args, out)?;
+        let path = approach(job, here, args, out)?;
         let leg = Leg::run(&mut session, &path, "approach", &UploadOptions::default(), &mut operator)?;
         if !matches!(leg.outcome, Ok(Outcome::Finished(_))) {
             broken_off = Some(leg);
@@ -106,8 +110,10 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }
-    let of_run =
-        outcome.as_ref().err().map(|e| Failure { message: info.ending.reason.clone(), ..Failure::of(e) });
+    let of_run = outcome
+        .as_ref()
+        .err()
+        .map(|e| job.named(Failure { message: info.ending.reason.clone(), ..Failure::of(e) }));
     let failure = of_run.or(lost.into_iter().next());
     let value = json!({
         "outcome": word,
@@ -223,7 +229,7 @@ fn approach(job: &Job, here: [f64; 6], args: &RunArgs, out: &Output) -> Result<T
     let path = plan::approach(&here, &first, &job.config, Some(&job.arm.model), speed).map_err(refused)?;
     let verdict = job.verdict(&path, Some(here), UploadOptions::default());
     if !verdict.is_ok() {
-        return Err(refuse(&verdict, out));
+        return Err(job.refuse(&verdict, out));
     }
     out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
     Ok(path)

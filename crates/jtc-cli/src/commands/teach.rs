@@ -1,6 +1,7 @@
 //! `jtc teach`: moving the arm by hand, and recording it.
 
 use std::fmt::Write;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -10,6 +11,7 @@ use jtc_host::words;
 use jtc_wire::Status;
 use serde_json::json;
 
+use super::traj::typed;
 use crate::args::{LinkArgs, TeachCommand};
 use crate::failure::{FAULT, Failure};
 use crate::operator::ended_at_once;
@@ -109,10 +111,11 @@ fn write(file: OutputFile, poses: &[(f64, [f64; 6])], out: &Output) -> Result<()
         out.note(format!("note: {note}"));
     }
     let (t, name) = (&loaded.trajectory, file.name());
+    let typed = typed(Path::new(&name));
     file.write(&t.to_csv()).map_err(Failure::output_lost)?;
     let value = json!({ "file": name, "points": t.points.len(), "duration_s": t.duration_s() });
     out.result(&value, || {
-        format!("{name}: {} points, {:.2} s\nnext: jtc traj check {name}", t.points.len(), t.duration_s())
+        format!("{name}: {} points, {:.2} s\nnext: jtc traj check {typed}", t.points.len(), t.duration_s())
     });
     Ok(())
 }

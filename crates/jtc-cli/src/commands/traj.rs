@@ -57,6 +57,17 @@ fn may_be_moving(failure: Failure) -> Failure {
     Failure { hint, ..failure }
 }
 
+/// A path as it can be typed in a shell.
+pub fn typed(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
 /// A trajectory at the speed asked for, and the arm that it is checked against.
 pub struct Job {
     /// What the file was, and what was derived from it.
@@ -67,6 +78,10 @@ pub struct Job {
     pub arm: Arm,
     /// Limits and settings that count.
     pub config: Config,
+    /// File and arm, as they are typed.
+    words: String,
+    /// Percent of the file's own speed.
+    speed: f64,
 }
 
 impl Job {
@@ -86,7 +101,35 @@ impl Job {
             plan::at_speed(&loaded.trajectory, args.speed).map_err(Failure::usage)?
         };
         let config = arm.config();
-        Ok(Self { loaded, trajectory, arm, config })
+        let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
+        let words = typed(file) + &arm_words;
+        Ok(Self { loaded, trajectory, arm, config, words, speed: args.speed })
+    }
+
+    /// What helps after a verdict, with the names that the person typed.
+    fn hint(&self, verdict: &Verdict) -> String {
+        verdict.hint_for(&self.words, self.speed)
+    }
+
+    /// Prints a verdict that refuses, and ends with exit code 4.
+    pub fn refuse(&self, verdict: &Verdict, out: &Output) -> Failure {
+        let hint = self.hint(verdict);
+        let value = json!({
+            "outcome": "refused",
+            "verdict": verdict,
+            "error": { "code": "check", "message": verdict.to_string(), "hint": hint, "exit": REFUSED },
+        });
+        if out.is_json() {
+            out.result(&value, String::new);
+        }
+        out.note(format!("jtc: {verdict}\n     {hint}"));
+        Failure::printed(REFUSED)
+    }
+
+    /// A failure of this job, with the file's name where its hint leaves it open.
+    pub fn named(&self, failure: Failure) -> Failure {
+        let hint = failure.hint.replace("traj run FILE", &format!("traj run {}", self.words));
+        Failure { hint, ..failure }
     }
 
     /// Parts of the torque that the check leaves out because the arm file does not give them.
@@ -136,20 +179,6 @@ impl Job {
     }
 }
 
-/// Prints a verdict that refuses, and ends with exit code 4.
-pub fn refuse(verdict: &Verdict, out: &Output) -> Failure {
-    let value = json!({
-        "outcome": "refused",
-        "verdict": verdict,
-        "error": { "code": "check", "message": verdict.to_string(), "hint": verdict.hint(), "exit": REFUSED },
-    });
-    if out.is_json() {
-        out.result(&value, String::new);
-    }
-    out.note(format!("jtc: {verdict}\n     {}", verdict.hint()));
-    Failure::printed(REFUSED)
-}
-
 fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
     let job = Job::load(file, args, out)?;
     let differences = job.arm.device_differences();
@@ -165,7 +194,7 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
-        format!("{verdict}\n{}{without}next: {}", figures(&verdict), verdict.hint().replace('`', ""))
+        format!("{verdict}\n{}{without}next: {}", figures(&verdict), job.hint(&verdict).replace('`', ""))
     });
     if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(REFUSED)) }
 }
@@ -215,7 +244,7 @@ fn info(file: &Path, out: &Output) -> Result<(), Failure> {
             t.step_ms,
             t.duration_s(),
             figures(&verdict),
-            file.display(),
+            typed(file),
         )
     });
     Ok(())

@@ -1,10 +1,12 @@
 //! What helps after a verdict: the next command, in words.
 
+use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
+
 use super::verdict::{ProblemKind, Verdict};
 
 impl Verdict {
-    /// The speed (%) at which nothing would be too fast any more; `None` where speed is not what is wrong.
-    fn slower(&self) -> Option<f64> {
+    /// The speed (% of the file's own) at which nothing would be too fast any more; `None` where speed is not what is wrong.
+    fn slower(&self, now_pct: f64) -> Option<f64> {
         use ProblemKind::*;
         let mut speed = 1.0f64;
         for p in self.refusals() {
@@ -23,7 +25,7 @@ impl Verdict {
             });
         }
         // Slower than 1 % is no motion any more.
-        (speed < 1.0).then(|| (100.0 * speed).floor()).filter(|&percent| percent >= 1.0)
+        (speed < 1.0).then(|| (now_pct * speed).floor()).filter(|&percent| percent >= 1.0)
     }
 
     /// Positions far outside of what a joint can have, which would be usual ones were they divided by 57.3.
@@ -33,14 +35,32 @@ impl Verdict {
         far > turn && far <= turn.to_degrees()
     }
 
-    /// The next command or act that helps.
+    /// The next command or act that helps, with `FILE` for the trajectory's file.
     pub fn hint(&self) -> String {
+        self.hint_for("FILE", 100.0)
+    }
+
+    /// The next command or act that helps for a trajectory that was checked at `speed_pct` of its own speed. `file` is its name as it
+    /// is typed, with the options that belong to it.
+    pub fn hint_for(&self, file: &str, speed_pct: f64) -> String {
         let has = |kind| self.problems.iter().any(|p| p.kind == kind);
         let only = |kind| self.refusals().all(|p| p.kind == kind);
+        let speed = if speed_pct == 100.0 { String::new() } else { format!(" --speed {speed_pct}") };
         if self.is_ok() {
-            "`jtc traj run FILE`".into()
+            format!("`jtc traj run {file}{speed}`")
+        } else if has(ProblemKind::TooManyPoints) {
+            format!(
+                "at most {POINTS_MAX} points: give points further apart in time (steps of up to 1000 ms), or run it in parts"
+            )
+        } else if has(ProblemKind::SegmentPoints) || has(ProblemKind::TooManySegments) {
+            let least = self.points.div_ceil(SEGMENTS_MAX).max(1);
+            format!(
+                "`--points-per-segment` from {least} to {SEGMENT_POINTS_MAX} carries these {} points in at most {SEGMENTS_MAX} \
+                 segments; without it the length of the segments is chosen",
+                self.points
+            )
         } else if only(ProblemKind::StartPose) {
-            "`jtc traj run FILE --approach` moves the arm to the first point before".into()
+            format!("`jtc traj run {file}{speed} --approach` moves the arm to the first point before")
         } else if self.seems_degrees() {
             "the positions look like degrees: all numbers of a trajectory are in rad, rad/s and rad/s² (90° = 1.5708)"
                 .into()
@@ -53,15 +73,15 @@ impl Verdict {
             "the speed does not change what standing still takes: begin, rest and end in poses that take less (less stretched out), \
              or with a lighter payload in the arm model"
                 .into()
-        } else if let Some(percent) = self.slower() {
+        } else if let Some(percent) = self.slower(speed_pct) {
             let load = if has(ProblemKind::NoStop) || has(ProblemKind::Torque) {
                 ", or with a lighter payload in the arm model"
             } else {
                 ""
             };
-            format!("`--speed PCT` runs it slower{load}: `jtc traj check FILE --speed {percent}`")
+            format!("`--speed PCT` runs it slower{load}: `jtc traj check {file} --speed {percent}`")
         } else {
-            "correct the file; `jtc traj info FILE` shows its figures".into()
+            format!("correct the file; `jtc traj info {file}` shows its figures")
         }
     }
 }

@@ -114,6 +114,7 @@ fn j30_counts_are_checked() {
     let t = Trajectory { step_ms: 10, points: vec![Point::default(); 10_001] };
     let verdict = Checker { upload: few, ..Checker::new(&config) }.check(&t);
     assert_eq!(verdict.problems[0].kind, ProblemKind::TooManySegments);
+    assert!(verdict.hint().contains("--points-per-segment` from 101 to 1500"), "{}", verdict.hint());
     assert_eq!(check(&Trajectory::default()).problems[0].kind, ProblemKind::Empty);
 }
 
@@ -149,6 +150,13 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     assert!(verdict.hint().contains("--speed 9`"), "{}", verdict.hint());
     let slow = check(&plan::at_speed(&t, 9.0).unwrap());
     assert!(slow.is_ok(), "{slow}");
+    // Already at half of its speed, the percentage is still that of the file.
+    let half = check(&plan::at_speed(&t, 50.0).unwrap());
+    assert!(
+        half.hint_for("my.csv", 50.0).contains("traj check my.csv --speed 9`"),
+        "{}",
+        half.hint_for("my.csv", 50.0)
+    );
 }
 
 #[test]

@@ -22,9 +22,7 @@ fn points() -> Vec<RawPoint> {
 #[test]
 fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     let mut rig = Rig::holding();
-    rig.upload(&points(), 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(2_000, |r| r.controller.telemetry().point >= 500);
+    rig.move_along(&points(), 500);
     rig.urgent(0, UrgentCommand::Pause);
     // The arm still moves a little when the path stands.
     rig.nodes[1].report.velocity = 0.05;
@@ -46,9 +44,7 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
 #[test]
 fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     let mut rig = Rig::holding();
-    rig.upload(&points(), 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(2_000, |r| r.controller.telemetry().point >= 500);
+    rig.move_along(&points(), 500);
     rig.exec(ExecCommand::Pause);
     rig.nodes[1].report.velocity = 0.05;
     rig.run(2_000);

@@ -4,7 +4,7 @@ mod rig;
 use jtc_bus::{Request, fsm, warning};
 use jtc_core::{Config, State, Tes, error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
-use rig::{Rig, floats, rad, rest, segment_body};
+use rig::{Rig, floats, pieces, rad, rest, segment_body};
 
 /// No limits but those under test.
 fn roomy(mut config: Config, acceleration_max: f64) -> Config {
@@ -14,25 +14,6 @@ fn roomy(mut config: Config, acceleration_max: f64) -> Config {
         j.acceleration_max = acceleration_max;
     }
     config
-}
-
-/// A motion of joint 0 as pieces of constant acceleration (rad/s², number of points 10 ms apart).
-fn pieces(list: &[(f64, u32)]) -> Vec<RawPoint> {
-    let (mut p, mut v) = (0.0f64, 0.0f64);
-    let mut points = vec![RawPoint::default()];
-    for &(a, n) in list {
-        for i in 1..=n {
-            let next = v + a * 0.01;
-            p += 0.5 * (v + next) * 0.01;
-            v = next;
-            let mut point = RawPoint::default();
-            point.position[0] = (p / 3.141592 * 32767.0).round() as i16;
-            point.velocity[0] = (v / 6.283185 * 32767.0).round() as i16;
-            point.acceleration[0] = (if i < n { a } else { 0.0 } / 12.566370 * 32767.0).round() as i16;
-            points.push(point);
-        }
-    }
-    points
 }
 
 #[test]
@@ -71,7 +52,7 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     rig.nodes[0].report.velocity = 0.05;
     rig.run(2);
     rig.send(FrameType::TeachingModeDisable, &[]);
-    let points = pieces(&[(0.05, 20), (0.0, 60), (-0.05, 20)]);
+    let points = pieces(0, &[(0.05, 20), (0.0, 60), (-0.05, 20)]);
     rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
     rig.send(FrameType::TrajSetExecStatus, &[3]);
     rig.run(5);
@@ -90,17 +71,15 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
 /// Wherever in a legal motion a pause or a resume falls, it keeps to the acceleration limit, and it stops in the end.
 #[test]
 fn j33_pause_and_resume_keep_to_the_acceleration_limit() {
-    let braking = pieces(&[(10.77, 13), (0.0, 60), (-10.77, 13)]);
-    let stages = pieces(&[(2.0, 20), (0.0, 60), (3.8, 25), (0.0, 60), (-3.8, 35), (0.0, 5)]);
+    let braking = pieces(0, &[(10.77, 13), (0.0, 60), (-10.77, 13)]);
+    let stages = pieces(0, &[(2.0, 20), (0.0, 60), (3.8, 25), (0.0, 60), (-3.8, 35), (0.0, 5)]);
     for (points, limit, at) in [
         (&braking, 12.56637, [50, 100, 400, 650, 690, 710, 725, 735, 780]),
         (&stages, 4.0, [100, 400, 640, 680, 750, 800, 900, 1300, 1700]),
     ] {
         for pause_at in at {
             let mut rig = Rig::holding_with(roomy(Config::avena(), limit));
-            rig.upload(points, 10);
-            rig.exec(ExecCommand::Execute);
-            rig.until(3000, |r| r.controller.telemetry().point >= pause_at);
+            rig.move_along(points, pause_at);
             rig.exec(ExecCommand::Pause);
             rig.until(4000, |r| r.tes() != Tes::Execute);
             assert_eq!(rig.errors(), 0, "pause at {pause_at}");
@@ -115,12 +94,10 @@ fn j33_pause_and_resume_keep_to_the_acceleration_limit() {
 
 #[test]
 fn j33_a_pause_during_a_resume_slows_down() {
-    let points = pieces(&[(3.8, 35), (0.0, 100), (-3.8, 35)]);
+    let points = pieces(0, &[(3.8, 35), (0.0, 100), (-3.8, 35)]);
     for wait in [20, 60, 100, 130, 160] {
         let mut rig = Rig::holding_with(roomy(Config::avena(), 4.0));
-        rig.upload(&points, 10);
-        rig.exec(ExecCommand::Execute);
-        rig.until(2000, |r| r.controller.telemetry().point >= 500);
+        rig.move_along(&points, 500);
         rig.exec(ExecCommand::Pause);
         rig.until(3000, |r| r.tes() == Tes::Pause);
         rig.exec(ExecCommand::Execute);

@@ -2,8 +2,8 @@
 mod rig;
 
 use jtc_core::{Config, JointTelemetry, State, error};
-use jtc_wire::{ExecCommand, FrameType, RawPoint};
-use rig::Rig;
+use jtc_wire::{FrameType, RawPoint};
+use rig::{Rig, pieces};
 
 const JOINT: usize = 1;
 const NODE_ERROR: u16 = error::EXTERNAL | error::EXTERNAL_JOINTS;
@@ -36,30 +36,9 @@ enum Fault {
     Lost { ms: usize },
 }
 
-/// Up to a velocity and down again.
-fn trajectory(velocity: f64) -> Vec<RawPoint> {
-    let (mut position, mut points) = (0.0, Vec::new());
-    for k in 0..120 {
-        let share: f64 = match k {
-            0..20 => f64::from(k) / 20.0,
-            20..80 => 1.0,
-            80..100 => f64::from(100 - k) / 20.0,
-            _ => 0.0,
-        };
-        let acceleration = match k {
-            1..20 => velocity / 0.2,
-            81..100 => -velocity / 0.2,
-            _ => 0.0,
-        };
-        let mut point = RawPoint::default();
-        point.position[JOINT] = (position / 3.141592 * 32767.0) as i16;
-        point.velocity[JOINT] = (velocity * share / 6.283185 * 32767.0) as i16;
-        point.acceleration[JOINT] = (acceleration / 12.566370 * 32767.0) as i16;
-        points.push(point);
-        let next = if k < 20 { (f64::from(k) + 0.5) / 20.0 } else { share };
-        position += velocity * if (80..100).contains(&k) { share - 0.025 } else { next } * 0.01;
-    }
-    points
+/// 0.2 s up to a velocity, 0.6 s at it, 0.2 s down.
+fn path(velocity: f64) -> Vec<RawPoint> {
+    pieces(JOINT, &[(5.0 * velocity, 20), (0.0, 60), (-5.0 * velocity, 20)])
 }
 
 fn roomy() -> Config {
@@ -76,9 +55,7 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     let state = match motion {
         Motion::Held(_) => State::HoldPos,
         Motion::Operate(velocity) => {
-            rig.upload(&trajectory(velocity), 10);
-            rig.exec(ExecCommand::Execute);
-            rig.until(500, |r| r.controller.telemetry().point >= 2);
+            rig.move_along(&path(velocity), 2);
             State::Operate
         }
         Motion::Led(_) => {

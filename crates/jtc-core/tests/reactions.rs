@@ -33,9 +33,7 @@ fn bench(moving: bool) -> Rig {
     // The load of joints that were just enabled may still be caught (J-43).
     rig.run(1_000);
     if moving {
-        rig.upload(&path(), 10);
-        assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-        rig.until(1_000, |r| r.controller.telemetry().point >= 500);
+        rig.move_along(&path(), 500);
     }
     rig
 }

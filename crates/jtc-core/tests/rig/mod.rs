@@ -1,5 +1,5 @@
 //! A bench without physics: nodes that answer at once and joints that are where the test puts them.
-#![allow(dead_code)]
+#![allow(dead_code, unused_imports)]
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
 use jtc_core::{
@@ -9,6 +9,10 @@ use jtc_wire::{
     DataStatus, EVENTS_MAX, ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Response, Status,
     UrgentCommand, UrgentCommands, crc16,
 };
+
+mod paths;
+
+pub use paths::{pieces, rad, rest, segment_body};
 
 pub const SCALE: Scale = Scale { velocity: 2.0 };
 
@@ -97,27 +101,6 @@ pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
 
 pub fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_be_bytes).collect()
-}
-
-/// A Trajectory body.
-pub fn segment_body(number: u16, segment: u16, segments: u16, step: u16, points: &[RawPoint]) -> Vec<u8> {
-    let mut body: Vec<u8> = [number, segment, segments, step].iter().flat_map(|x| x.to_be_bytes()).collect();
-    for p in points {
-        for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
-            body.extend_from_slice(&v.to_be_bytes());
-        }
-    }
-    body
-}
-
-/// A point at rest: `raw` in every joint.
-pub fn rest(raw: i16) -> RawPoint {
-    RawPoint { position: [raw; 6], ..RawPoint::default() }
-}
-
-/// rad of a raw position.
-pub fn rad(raw: i16) -> f64 {
-    f64::from(raw) * (3.141592 / 32767.0)
 }
 
 impl Rig {
@@ -259,16 +242,6 @@ impl Rig {
 
     pub fn clear(&mut self, jtc: bool, nodes: u8) -> DataStatus {
         self.ask(FrameType::ClearCurrentErrors, &[u8::from(jtc), nodes, 0, 0])
-    }
-
-    /// Uploads in segments of at most 100 points.
-    pub fn upload(&mut self, points: &[RawPoint], step: u16) {
-        let chunks: Vec<_> = points.chunks(100).collect();
-        for (i, chunk) in chunks.iter().enumerate() {
-            let body = segment_body(7, i as u16, chunks.len() as u16, step, chunk);
-            assert_eq!(self.ask(FrameType::Trajectory, &body), DataStatus::NoError, "segment {i}");
-        }
-        assert_eq!(self.tes(), Tes::Stop);
     }
 
     pub fn run(&mut self, ticks: usize) {

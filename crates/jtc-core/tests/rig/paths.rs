@@ -1,0 +1,64 @@
+//! Trajectories, and the way to a place on them.
+use jtc_core::Tes;
+use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+
+use super::Rig;
+
+/// A motion of a joint (0..5) in pieces of constant acceleration (rad/s², number of points 10 ms apart).
+pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
+    let (mut p, mut v) = (0.0f64, 0.0f64);
+    let mut points = vec![RawPoint::default()];
+    for &(a, n) in list {
+        for i in 1..=n {
+            let next = v + a * 0.01;
+            p += 0.5 * (v + next) * 0.01;
+            v = next;
+            let mut point = RawPoint::default();
+            point.position[joint] = (p / 3.141592 * 32767.0).round() as i16;
+            point.velocity[joint] = (v / 6.283185 * 32767.0).round() as i16;
+            point.acceleration[joint] = (if i < n { a } else { 0.0 } / 12.566370 * 32767.0).round() as i16;
+            points.push(point);
+        }
+    }
+    points
+}
+
+/// A Trajectory body.
+pub fn segment_body(number: u16, segment: u16, segments: u16, step: u16, points: &[RawPoint]) -> Vec<u8> {
+    let mut body: Vec<u8> = [number, segment, segments, step].iter().flat_map(|x| x.to_be_bytes()).collect();
+    for p in points {
+        for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
+            body.extend_from_slice(&v.to_be_bytes());
+        }
+    }
+    body
+}
+
+/// A point at rest: `raw` in every joint.
+pub fn rest(raw: i16) -> RawPoint {
+    RawPoint { position: [raw; 6], ..RawPoint::default() }
+}
+
+/// rad of a raw position.
+pub fn rad(raw: i16) -> f64 {
+    f64::from(raw) * (3.141592 / 32767.0)
+}
+
+impl Rig {
+    /// Uploads in segments of at most 100 points.
+    pub fn upload(&mut self, points: &[RawPoint], step: u16) {
+        let chunks: Vec<_> = points.chunks(100).collect();
+        for (i, chunk) in chunks.iter().enumerate() {
+            let body = segment_body(7, i as u16, chunks.len() as u16, step, chunk);
+            assert_eq!(self.ask(FrameType::Trajectory, &body), DataStatus::NoError, "segment {i}");
+        }
+        assert_eq!(self.tes(), Tes::Stop);
+    }
+
+    /// Uploads points 10 ms apart, executes them and runs on until `point` ms of the path are done.
+    pub fn move_along(&mut self, points: &[RawPoint], point: u32) {
+        self.upload(points, 10);
+        assert_eq!(self.exec(ExecCommand::Execute), DataStatus::NoError);
+        self.until(4_000, |rig| rig.controller.telemetry().point >= point);
+    }
+}

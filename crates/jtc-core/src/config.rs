@@ -98,6 +98,9 @@ pub struct Config {
     /// Largest mass at the flange, kg, that teaching takes the torque for that HoldPos had found missing (J-25); also of a
     /// negative one, where the modelled arm is too heavy.
     pub teach_payload_max: f64,
+    /// Joint speed, rad/s, from which on the torque for it fades where it drives the joint; at three times that speed none is
+    /// left (J-25). What HoldPos had found missing may have been a contact, and the contact may go.
+    pub teach_payload_velocity: f64,
     /// Time over which teaching fades out the missing torque that no such mass explains, ms (J-25).
     pub teach_fade_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).

@@ -52,6 +52,7 @@ impl Config {
             teach_velocity_max: 1.0,
             teach_damping: 40.0,
             teach_payload_max: 5.0,
+            teach_payload_velocity: 0.2,
             teach_fade_ms: 500,
             friction_sign_width: 0.02,
             parameter_bounds: ParameterBounds::known_drives(),

@@ -63,13 +63,27 @@ impl Payload {
         self.elapsed_ms = 0;
     }
 
-    /// A tick of Teaching at `q` (rad): the torque that carries the mass, and what is left of the rest, N·m.
-    pub fn torque(&mut self, dynamics: &Dynamics, q: &[f64; JOINTS], config: &Config) -> [f64; JOINTS] {
+    /// A tick of Teaching at `q` (rad) and `v` (rad/s): the torque that carries the mass, and what is left of the rest, N·m.
+    pub fn torque(
+        &mut self,
+        dynamics: &Dynamics,
+        q: &[f64; JOINTS],
+        v: &[f64; JOINTS],
+        config: &Config,
+    ) -> [f64; JOINTS] {
         let unit = dynamics.flange_torque(q);
         let left = 1.0 - smooth(f64::from(self.elapsed_ms) / f64::from(config.teach_fade_ms.max(1)));
         self.elapsed_ms = self.elapsed_ms.saturating_add(1);
-        core::array::from_fn(|j| self.mass * unit[j] + self.rest[j] * left)
+        core::array::from_fn(|j| yielding(self.mass * unit[j] + self.rest[j] * left, v[j], config))
     }
+}
+
+/// A torque (N·m) that moves the joint by itself, as after a contact that is gone, fades with the speed (rad/s) that it makes.
+fn yielding(torque: f64, v: f64, config: &Config) -> f64 {
+    let slow = config.teach_payload_velocity;
+    let along = if torque < 0.0 { -v } else { v };
+    // All of it up to that speed and against the motion, nothing from three times as fast on.
+    torque * (1.0 - smooth((along - slow) / (2.0 * slow).max(f64::MIN_POSITIVE)))
 }
 
 #[cfg(test)]
@@ -95,7 +109,7 @@ mod tests {
         let (q, elsewhere) = ([0.3, 0.8, -0.9, 0.4, 0.7, 0.2], [-1.0, 1.2, 0.4, -0.3, 1.0, 2.0]);
         for mass in [-1.5, 0.4, 2.0, 4.5] {
             let mut payload = fitted(dynamics().flange_torque(&q).map(|u| mass * u), &q);
-            let torque = payload.torque(&dynamics(), &elsewhere, &Config::avena());
+            let torque = payload.torque(&dynamics(), &elsewhere, &[0.0; JOINTS], &Config::avena());
             for (t, u) in torque.iter().zip(dynamics().flange_torque(&elsewhere)) {
                 assert!((t - mass * u).abs() < 1e-9, "{t} {}", mass * u);
             }
@@ -107,13 +121,13 @@ mod tests {
         let q = [0.3, 0.8, -0.9, 0.4, 0.7, 0.2];
         let missing = [7.0, 0.0, -3.0, 1.0, 0.0, 2.0];
         let mut payload = fitted(missing, &q);
-        let first = payload.torque(&dynamics(), &q, &Config::avena());
+        let first = payload.torque(&dynamics(), &q, &[0.0; JOINTS], &Config::avena());
         for (t, m) in first.iter().zip(missing) {
             assert!((t - m).abs() < 1e-6, "no step at the beginning: {t} {m}");
         }
         let mut last = first;
         for _ in 0..500 {
-            let torque = payload.torque(&dynamics(), &q, &Config::avena());
+            let torque = payload.torque(&dynamics(), &q, &[0.0; JOINTS], &Config::avena());
             for j in 0..JOINTS {
                 assert!((torque[j] - last[j]).abs() < 0.03, "{} {}", torque[j], last[j]);
             }

@@ -3,7 +3,7 @@ mod plant;
 mod rig;
 
 use jtc_core::{Config, Parameters, State};
-use jtc_dynamics::ArmModel;
+use jtc_dynamics::{ArmModel, Dynamics};
 use jtc_wire::FrameType;
 use plant::{LuGre, Plant, heavier, loaded};
 use rig::Rig;
@@ -138,4 +138,48 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
             assert!(sag < 0.002, "joint {} sags by {sag} rad at {pose:?}", j + 1);
         }
     }
+}
+
+/// Largest speed of a joint after a contact has gone that HoldPos had found, rad/s: it had borne `mass` kg at the flange, or
+/// had pushed against the first joint.
+fn fastest_after_contact(config: Config, pose: [f64; 6], factor: f64, mass: f64) -> f64 {
+    let mut arm = Plant::new(&model(), friction(factor), pose);
+    let mut rig = arm.holding(config);
+    let unit = Dynamics::new(&model(), Config::avena().gravity).flange_torque(&pose);
+    let push = if mass == 0.0 { [30.0, 0.0, 0.0, 5.0, 0.0, 0.0] } else { unit.map(|u| mass * u) };
+    for k in 0..4000 {
+        arm.push = push.map(|p| p * f64::min(f64::from(k) / 500.0, 1.0));
+        arm.tick(&mut rig);
+    }
+    rig.send(FrameType::TeachingModeEnable, &[]);
+    arm.run(&mut rig, 150);
+    arm.push = [0.0; 6];
+    let mut fastest = 0.0f64;
+    for _ in 0..3000 {
+        arm.tick(&mut rig);
+        fastest = arm.v.iter().fold(fastest, |fastest, v| fastest.max(v.abs()));
+    }
+    assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
+    fastest
+}
+
+/// Somebody leaned on the arm, or it lay on something, when teaching began: what was learned as a load drives the arm when
+/// that is gone, but slowly.
+#[test]
+fn j25_a_contact_that_goes_does_not_make_the_arm_jump() {
+    let mut reached = 0.0f64;
+    for factor in [1.0, 0.3] {
+        for pose in POSES {
+            for mass in [-3.0, 0.0, 4.0] {
+                let fastest = fastest_after_contact(Config::avena(), pose, factor, mass);
+                // Nothing drives it at three times the setting.
+                assert!(fastest < 3.0 * 0.2, "{fastest} rad/s after {mass} kg at {pose:?}");
+                reached = reached.max(fastest);
+            }
+        }
+    }
+    assert!(reached > 0.3, "{reached} rad/s: nothing was learned");
+    let free = Config { teach_payload_velocity: 10.0, ..Config::avena() };
+    let fastest = fastest_after_contact(free, POSES[0], 0.3, 4.0);
+    assert!(fastest > 1.3, "{fastest} rad/s: the test above would see nothing");
 }

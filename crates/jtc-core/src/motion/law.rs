@@ -101,7 +101,7 @@ impl Motion {
         let (qd, qdd) = if law.moves() { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
         let model = parameters.dynamics.inverse(q, &qd, &qdd);
         let payload = if law == Law::Teach {
-            self.payload.torque(parameters.dynamics, q, config)
+            self.payload.torque(parameters.dynamics, q, v, config)
         } else {
             [0.0; JOINTS]
         };

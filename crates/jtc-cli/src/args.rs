@@ -146,7 +146,7 @@ pub enum Command {
     Dynamics(DynamicsArgs),
     /// A page about an error or status code
     #[command(
-        after_help = "Examples:\n  jtc explain\n  jtc explain start-position-mismatch\n  jtc explain 8"
+        after_help = "Examples:\n  jtc explain\n  jtc explain start-position-mismatch\n  jtc explain HoldPos\n  jtc explain 8"
     )]
     Explain(ExplainArgs),
     /// Decode frames: hex or a raw serial capture on stdin

@@ -37,7 +37,7 @@ pub enum DynamicsKind {
 /// Options of `jtc explain`.
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
-    /// Name or number of the code, or `faults` for the form of fault files; without it: the list
+    /// Name, number or words of the code as a screen shows them, or `faults` for the form of fault files; without it: the list
     pub code: Option<String>,
 }
 

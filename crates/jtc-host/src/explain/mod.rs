@@ -4,6 +4,10 @@ mod controller;
 mod link;
 mod nodes;
 
+use jtc_wire::{DataStatus, FrameStatus};
+
+use crate::words;
+
 /// Which number a page is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -142,9 +146,57 @@ pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
     controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES)
 }
 
-/// Pages for a name (`joint-position-error`), a number of one family (`can:0x100`, `data:7`), a bare number (looked up in every
-/// family), or words of a name. Empty: nothing fits.
+/// The words that commands print for this code, if it has its own.
+fn shown(page: &Page) -> Option<String> {
+    use jtc_wire::words as w;
+    let at = |names: &[&str]| names.get(page.code as usize).map(|name| (*name).to_owned());
+    let code = u8::try_from(page.code).ok()?;
+    match page.family {
+        Family::Jtc => at(&w::JTC_ERRORS),
+        Family::Joint => at(&w::JOINT_INTERNAL),
+        Family::Motor => at(&w::MC_FAULTS),
+        Family::Node => at(&w::NODE_ERRORS),
+        Family::Warning => at(&w::NODE_WARNINGS),
+        Family::State => at(&w::JTC_FSM),
+        Family::Tes => at(&w::TES),
+        Family::NodeState => Some(w::node_fsm(code).to_owned()),
+        Family::Can => words::can_flags(page.number()).pop(),
+        Family::Data => DataStatus::from_byte(code).map(|code| words::data_status(code).to_owned()),
+        Family::Frame => FrameStatus::from_byte(code).map(|code| words::frame_status(code).to_owned()),
+    }
+}
+
+/// As typed from a screen or from memory: case, spaces and signs do not count.
+fn letters(text: &str) -> String {
+    text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
+/// Pages for a name (`joint-position-error`), the words that a screen shows (`HoldPos`, `over-current`), a number of one family
+/// (`can:0x100`, `data:7`), a bare number (looked up in every family), or words of a name. Empty: nothing fits.
 pub fn find(query: &str) -> Vec<&'static Page> {
+    // A line of errors says of which joint each is.
+    let query = match query.split_once(": ") {
+        Some((node, rest)) if node.starts_with("joint ") || node == "gripper" => rest,
+        _ => query,
+    };
+    let as_shown = letters(query);
+    let on_screen = |fits: fn(&str, &str) -> bool| -> Vec<&'static Page> {
+        pages().filter(|p| shown(p).is_some_and(|text| fits(&letters(&text), &as_shown))).collect()
+    };
+    let exact = on_screen(|text, asked| text == asked);
+    if !exact.is_empty() {
+        return exact;
+    }
+    let by_name = by_name_or_number(query);
+    // Part of what a screen shows: "does not answer".
+    if by_name.is_empty() && as_shown.len() > 3 {
+        on_screen(|text, asked| text.contains(asked))
+    } else {
+        by_name
+    }
+}
+
+fn by_name_or_number(query: &str) -> Vec<&'static Page> {
     let query = query.trim().to_ascii_lowercase().replace([' ', '_'], "-");
     if let Some(page) = pages().find(|p| p.name == query) {
         return vec![page];
@@ -203,6 +255,40 @@ mod tests {
         assert!(find("friction table").iter().any(|p| p.family == Family::Joint));
         assert!(find("tes:").len() >= 5);
         assert!(find("no-such-thing").is_empty() && find("").is_empty() && find("bogus:1").is_empty());
+    }
+
+    /// Each word that a screen shows leads to the page of its code, as it stands there.
+    #[test]
+    fn every_word_on_a_screen_finds_its_page() {
+        use jtc_wire::words as w;
+        let lists: [(Family, &[&str]); 7] = [
+            (Family::State, &w::JTC_FSM),
+            (Family::Tes, &w::TES),
+            (Family::Jtc, &w::JTC_ERRORS),
+            (Family::Joint, &w::JOINT_INTERNAL),
+            (Family::Motor, &w::MC_FAULTS),
+            (Family::Node, &w::NODE_ERRORS),
+            (Family::Warning, &w::NODE_WARNINGS),
+        ];
+        let has = |word: &str, family, code: usize| {
+            let found = find(word);
+            assert!(found.iter().any(|p| p.family == family && p.code as usize == code), "{word}: {found:?}");
+        };
+        for (family, names) in lists {
+            for (code, name) in names.iter().enumerate() {
+                has(name, family, code);
+                has(&format!("joint 3: {name}"), family, code);
+            }
+        }
+        for code in [0, 1, 2, 3, 10, 254, 255] {
+            has(w::node_fsm(code), Family::NodeState, code.into());
+        }
+        has("joint 3 does not answer", Family::Can, 10);
+        has("gripper does not answer", Family::Can, 14);
+        has("no acknowledge on the joint bus", Family::Can, 0);
+        has("does not answer", Family::Can, 8);
+        has("not allowed in this state", Family::Data, 7);
+        assert_eq!(find("HoldPos").len(), 1);
     }
 
     /// No bit and no code without a page, no page twice.

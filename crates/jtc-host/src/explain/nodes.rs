@@ -210,6 +210,17 @@ pub(super) const PAGES: &[Page] = &[
     ),
     page(
         Family::NodeState,
+        10,
+        "node-in-transition",
+        [
+            "The node goes from one state to the next (numbers 10 to 16).",
+            "The controller asked for another state; the first enabling of a drive takes some 4 s.",
+            "Wait; a node that stays there is faulty.",
+            "jtc doctor",
+        ],
+    ),
+    page(
+        Family::NodeState,
         254,
         "node-fault-reaction",
         [

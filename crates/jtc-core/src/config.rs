@@ -93,7 +93,7 @@ pub struct Config {
     pub blend_ms: u16,
     /// Joint speed above which teaching brakes, rad/s (J-25).
     pub teach_velocity_max: f64,
-    /// Braking torque per speed in excess of the limit, N·m·s/rad (J-25).
+    /// Braking torque per speed in excess of the limit, N·m·s/rad (J-25); less where a joint is too light for it.
     pub teach_damping: f64,
     /// Largest mass at the flange, kg, that teaching takes the torque for that HoldPos had found missing (J-25); also of a
     /// negative one, where the modelled arm is too heavy.

@@ -7,6 +7,10 @@ use crate::nodes::Nodes;
 use crate::pid::PidTorque;
 use crate::{JOINTS, friction, joint_error, limits};
 
+/// Most that the brake of teaching takes from a speed, 1/s. Measured speeds are about 8 ms old, being averages of the drives: a
+/// brake above 200 1/s would drive a joint to and fro, and joints that move each other make that less.
+const BRAKE_RATE: f64 = 100.0;
+
 /// Which parts of the control law act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Law {
@@ -145,14 +149,26 @@ impl Motion {
             self.payload.forget();
         }
         if law == Law::Teach {
-            for j in 0..JOINTS {
-                if nodes.node(j).enabled() {
-                    self.torque[j].brake =
-                        brake(v[j], self.torque[j].sum(), config, config.joints[j].torque_max);
-                }
-            }
+            self.brake(nodes, config, parameters);
         }
         errors
+    }
+
+    /// Teaching brakes joints above the speed limit (J-25).
+    fn brake(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) {
+        let limit = config.teach_velocity_max;
+        let excess = nodes.velocities().map(|v| v - v.max(-limit).min(limit));
+        if excess == [0.0; JOINTS] {
+            return;
+        }
+        let mass = parameters.dynamics.mass_matrix(nodes.positions());
+        for (j, torque) in self.torque.iter_mut().enumerate() {
+            let joint = &config.joints[j];
+            let damping = config.teach_damping.min(BRAKE_RATE * (mass[j][j] + joint.rotor_inertia));
+            if nodes.node(j).enabled() {
+                torque.brake = within(-damping * excess[j], torque.sum(), joint.torque_max);
+            }
+        }
     }
 
     /// Bounds what the law adds to the torque of the model (J-66).
@@ -194,11 +210,8 @@ impl Motion {
     }
 }
 
-/// Teaching brakes a joint above the speed limit, with what its `torque` so far leaves of the limit (J-25).
-fn brake(velocity: f64, torque: f64, config: &Config, torque_max: f64) -> f64 {
-    let limit = config.teach_velocity_max;
-    let excess = velocity - velocity.max(-limit).min(limit);
-    let wanted = -config.teach_damping * excess;
+/// As much of the `wanted` torque as a `torque` so far leaves of the limit, N·m.
+fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
     let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)
 }

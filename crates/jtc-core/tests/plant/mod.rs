@@ -70,7 +70,7 @@ impl LuGre {
 /// The arm as it really is.
 pub struct Plant {
     dynamics: Dynamics,
-    rotor: [f64; 6],
+    pub rotor: [f64; 6],
     pub friction: [LuGre; 6],
     bristles: [f64; 6],
     pub q: [f64; 6],

@@ -1,0 +1,103 @@
+//! The brake of teaching above the speed limit, in light joints, too (J-25).
+mod plant;
+mod rig;
+
+use jtc_bus::fsm;
+use jtc_core::{Config, Parameters, State};
+use jtc_dynamics::ArmModel;
+use jtc_wire::{DataStatus, FrameType};
+use plant::{LuGre, Plant};
+use rig::{Rig, floats};
+
+const POSE: [f64; 6] = [0.1, 0.5, -0.9, 0.4, 0.7, 0.2];
+
+/// The default arm with its masses and lengths times these.
+fn scaled(mass: f64, length: f64) -> ArmModel {
+    let mut model = Parameters::avena().model;
+    for joint in &mut model.joints {
+        joint.xyz = joint.xyz.map(|x| x * length);
+    }
+    for link in &mut model.links {
+        link.mass *= mass;
+        link.inertia = link.inertia.map(|i| i * mass * length * length);
+        link.origin.xyz = link.origin.xyz.map(|x| x * length);
+    }
+    model
+}
+
+fn model_body(model: &ArmModel) -> Vec<u8> {
+    let joints = model.joints.iter().flat_map(|j| j.xyz.into_iter().chain(j.rpy));
+    let links = model.links.iter().flat_map(|l| {
+        let origin = l.origin.xyz.into_iter().chain(l.origin.rpy);
+        origin.chain(l.inertia).chain([l.mass])
+    });
+    floats(joints.chain(links).map(|x| x as f32))
+}
+
+/// A hand turns `joint` with `push` N·m for 0.6 s, against grease only, and holds the others back: how the brake acts in the
+/// last 0.4 s.
+struct Braked {
+    /// Highest speed, rad/s.
+    fastest: f64,
+    /// How often the brake has turned from growing to shrinking or back, by more than 0.2 N·m in a tick.
+    turns: u32,
+}
+
+fn braked(model: &ArmModel, rotor: f64, joint: usize, push: f64) -> Braked {
+    let mut config = Config::avena();
+    for j in &mut config.joints {
+        j.rotor_inertia = rotor;
+    }
+    let mut arm = Plant::new(model, [LuGre { viscous: 0.3, ..LuGre::NONE }; 6], POSE);
+    arm.rotor = [rotor; 6];
+    let mut rig = Rig::new(config);
+    rig.follow = false;
+    arm.report(&mut rig);
+    rig.defaults();
+    assert_eq!(
+        rig.ask(FrameType::PidParam, &floats([50.0, 0.0, 0.5, -1.0, 1.0].repeat(6))),
+        DataStatus::NoError
+    );
+    assert_eq!(rig.ask(FrameType::ArmModel, &model_body(model)), DataStatus::NoError);
+    while !rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED) {
+        arm.tick(&mut rig);
+    }
+    rig.send(FrameType::TeachingModeEnable, &[]);
+    arm.run(&mut rig, 3);
+    let mut it = Braked { fastest: 0.0, turns: 0 };
+    let (mut last, mut change) = (0.0, 0.0);
+    for ms in 0..600 {
+        arm.push = arm.v.map(|v| -v);
+        arm.push[joint] = push;
+        arm.tick(&mut rig);
+        assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0), "joint {} after {ms} ms", joint + 1);
+        let brake = rig.controller.telemetry().joints[joint].torque_other;
+        let now = brake - last;
+        it.turns += u32::from(ms > 200 && now * change < 0.0 && now.abs() > 0.2);
+        it.fastest = it.fastest.max(arm.v[joint].abs());
+        (last, change) = (brake, now);
+    }
+    it
+}
+
+#[test]
+fn j25_the_brake_does_not_drive_light_joints_to_and_fro() {
+    let light = scaled(0.5, 0.8);
+    for joint in 3..6 {
+        for push in [-3.0, 3.0] {
+            let it = braked(&light, 0.05, joint, push);
+            assert_eq!(it.turns, 0, "joint {} at {push} N·m", joint + 1);
+            assert!((1.2..1.7).contains(&it.fastest), "joint {}: {} rad/s", joint + 1, it.fastest);
+        }
+    }
+}
+
+#[test]
+fn j25_the_brake_has_its_whole_damping_in_the_joints_of_the_default_arm() {
+    for joint in 3..6 {
+        let it = braked(&Parameters::avena().model, 0.7, joint, 14.0);
+        assert_eq!(it.turns, 0, "joint {}", joint + 1);
+        // 40 N·m·s/rad: 14 N·m less the grease are borne by 0.34 rad/s.
+        assert!((it.fastest - 1.34).abs() < 0.05, "joint {}: {} rad/s", joint + 1, it.fastest);
+    }
+}

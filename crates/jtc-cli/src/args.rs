@@ -16,7 +16,7 @@ use clap::{Args, Parser, Subcommand};
 pub use arm::{ArmCommand, ImportArgs};
 pub use maintain::{ClearArgs, GripperArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
 pub use motion::{CheckArgs, RunArgs, TeachCommand, TrajCommand};
-pub use offline::{DynamicsArgs, DynamicsKind, ExplainArgs, ReportArgs};
+pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
 pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
 pub use sim::{DemoArgs, SimArgs, SimSpeed};
 
@@ -149,6 +149,15 @@ pub enum Command {
         after_help = "Examples:\n  jtc explain\n  jtc explain start-position-mismatch\n  jtc explain HoldPos\n  jtc explain 8"
     )]
     Explain(ExplainArgs),
+    /// Files to try: trajectories, an arm, faults
+    #[command(after_help = "Examples:\n  jtc example\n  jtc example motion\n  jtc example arm -o /tmp")]
+    Example(ExampleArgs),
+    /// The forms of files, or the help of a command
+    #[command(
+        after_help = "Examples:\n  jtc help files      trajectories, arms, friction, recordings, with an example each\n  \
+                            jtc help faults     what can go wrong in the simulator\n  jtc help traj run"
+    )]
+    Help(HelpArgs),
     /// Decode frames: hex or a raw serial capture on stdin
     #[command(after_help = "Examples:\n  echo 9B 0E 00 06 A3 47 | jtc decode\n  jtc decode < capture.bin")]
     Decode,

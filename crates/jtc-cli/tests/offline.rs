@@ -363,3 +363,55 @@ fn an_arm_file_is_made_from_a_robot_description() {
     let said = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
     assert!(said.err.contains("is no robot description"), "{}", said.err);
 }
+
+/// Each example is written, and the command that it names takes it.
+#[test]
+fn examples_are_files_that_the_named_commands_take() {
+    let dir = tempfile::tempdir().unwrap();
+    let to = dir.path().to_str().unwrap();
+    let list = jtc(&["--json", "example"]).ends(0).json();
+    let names: Vec<&str> =
+        list["examples"].as_array().unwrap().iter().map(|e| e["name"].as_str().unwrap()).collect();
+    for name in ["motion", "waypoints", "arm", "faults"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    for name in names {
+        let said = jtc(&["--json", "example", name, "-o", to]).ends(0).json();
+        let file = said["file"].as_str().unwrap();
+        match file.rsplit_once('.').unwrap().1 {
+            "toml" if name == "arm" => drop(jtc(&["params", "show", file]).ends(0)),
+            "toml" => {}
+            _ => drop(jtc(&["traj", "check", file]).ends(0)),
+        }
+        // It may have been changed since.
+        jtc(&["example", name, "-o", to]).ends(4);
+        jtc(&["example", name, "-o", to, "--force"]).ends(0);
+    }
+    let said = jtc(&["example", "nothing"]).ends(2);
+    assert!(said.err.contains("motion, waypoints"), "{}", said.err);
+}
+
+#[test]
+fn help_knows_pages_and_commands() {
+    assert!(jtc(&["help", "files"]).ends(0).out.contains("q1_deg"));
+    assert!(jtc(&["help", "faults"]).ends(0).out.contains("node-silent"));
+    let said = jtc(&["help", "traj", "run"]).ends(0);
+    assert!(said.out.contains("--approach") && said.out.contains("Usage: jtc traj run"), "{}", said.out);
+    assert!(jtc(&["help"]).ends(0).out.contains("Commands:"));
+    let said = jtc(&["help", "trajectory"]).ends(2);
+    assert!(said.err.contains("traj") && said.err.contains("files"), "{}", said.err);
+}
+
+/// A German spreadsheet, and degrees.
+#[test]
+fn decimal_commas_are_named_and_degrees_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("motion.csv");
+    let file = path.to_str().unwrap();
+    std::fs::write(&path, "t;q1;q2;q3;q4;q5;q6\n0;0;0;0;0;0;0\n1;0,1;0;0;0;0;0\n").unwrap();
+    let said = jtc(&["traj", "info", file]).ends(2);
+    assert!(said.err.contains("line 3, column 2, q1: \"0,1\" has a decimal comma"), "{}", said.err);
+    std::fs::write(&path, "t;q1_deg;q2;q3;q4;q5;q6\n0;0;0;0;0;0;0\n1;18;0;0;0;0;0\n").unwrap();
+    let said = jtc(&["--json", "traj", "info", file]).ends(0).json().to_string();
+    assert!(said.contains("0.3141592"), "{said}");
+}

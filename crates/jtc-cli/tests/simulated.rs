@@ -322,3 +322,26 @@ bits = 4
 at_point = 500
 for_s = 0.1
 "#;
+
+/// The example motion runs from where the simulator starts; with the example faults its run ends by the drive that falls silent,
+/// after the push and the noise were borne.
+#[test]
+fn the_examples_run_in_the_simulator() {
+    let dir = tempfile::tempdir().unwrap();
+    let to = dir.path().to_str().unwrap();
+    for name in ["motion", "faults"] {
+        jtc(&["example", name, "-o", to]).ends(0);
+    }
+    let (motion, faults) = (dir.path().join("motion.csv"), dir.path().join("faults.toml"));
+    let motion = motion.to_str().unwrap();
+    let sim = Sim::start(&["--speed", "max"]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    sim.jtc(&["traj", "run", motion]).ends(0);
+    let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let said = sim.jtc(&["traj", "run", motion]).ends(5);
+    assert!(said.err.contains("joint 2"), "{}", said.err);
+    let point = said.err.split("point ").nth(1).and_then(|t| t.split(|c: char| !c.is_ascii_digit()).next());
+    // The last status is from up to 40 ms before.
+    assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", said.err);
+}

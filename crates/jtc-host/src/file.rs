@@ -111,7 +111,7 @@ impl FileError {
                 path.display()
             ),
             FileError::At { .. } | FileError::Form { .. } => {
-                "`jtc traj check --help` and `jtc params push --help` show the forms of files".into()
+                "`jtc help files` shows the forms of files, `jtc example` writes one of each".into()
             }
         }
     }
@@ -152,6 +152,10 @@ pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileE
         Ok(v) if v.is_finite() => Ok(v),
         Ok(v) => Err(FileError::at(place(), format!("{v} is not a finite number"))),
         Err(_) if text.trim().is_empty() => Err(FileError::at(place(), "a number is missing")),
+        Err(_) if text.trim().replacen(',', ".", 1).parse::<f64>().is_ok() => {
+            let problem = format!("\"{}\" has a decimal comma: write a decimal point", short(text));
+            Err(FileError::at(place(), problem))
+        }
         Err(_) => Err(FileError::at(place(), format!("\"{}\" is not a number", short(text)))),
     }
 }
@@ -178,7 +182,8 @@ pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
 }
 
 fn cells(line: &str) -> Vec<&str> {
-    match [',', ';'].into_iter().find(|c| line.contains(*c)) {
+    // Where semicolons separate, a comma is in a number, and said to be wrong there.
+    match [';', ','].into_iter().find(|c| line.contains(*c)) {
         Some(c) => line.split(c).map(str::trim).collect(),
         None => line.split_whitespace().collect(),
     }

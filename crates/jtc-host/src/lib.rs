@@ -5,6 +5,7 @@ pub mod arm;
 pub mod check;
 pub mod doctor;
 pub mod error;
+pub mod example;
 pub mod explain;
 pub mod file;
 pub mod frame;

@@ -41,6 +41,25 @@ pub struct ExplainArgs {
     pub code: Option<String>,
 }
 
+/// Options of `jtc example`.
+#[derive(Args, Debug)]
+pub struct ExampleArgs {
+    /// Name of the example; without it, or `list`: what there is
+    pub name: Option<String>,
+    /// Directory to write it to; default: this one
+    #[arg(short = 'o', long = "out", env = "JTC_OUT", value_name = "DIR")]
+    pub dir: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
+}
+
+/// Options of `jtc help`.
+#[derive(Args, Debug)]
+pub struct HelpArgs {
+    /// A page (files, faults) or the words of a command
+    pub topic: Vec<String>,
+}
+
 /// Options of `jtc report`.
 #[derive(Args, Debug)]
 pub struct ReportArgs {

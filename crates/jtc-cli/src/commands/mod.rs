@@ -5,7 +5,9 @@ mod decode;
 mod demo;
 mod doctor;
 mod dynamics;
+mod example;
 mod explain;
+mod help;
 mod maintain;
 mod monitor;
 mod params;
@@ -43,6 +45,8 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Recover(args) => maintain::recover(&args, out),
         Command::Dynamics(args) => dynamics::dynamics(&args, out),
         Command::Explain(args) => explain::explain(&args, out),
+        Command::Example(args) => example::example(&args, out),
+        Command::Help(args) => help::help(&args, out),
         Command::Decode => decode::decode(out),
         Command::Report(args) => report::report(&args, out),
         Command::Completions { shell } => {

@@ -140,15 +140,19 @@ fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }
 
-/// Which value a header names: 0 time, 1.. the columns of the header-less forms.
-fn column_of(name: &str) -> Option<usize> {
+/// Which value a header names, and its unit in that of the header-less forms: 0 time, 1.. their columns.
+fn column_of(name: &str) -> Option<(usize, f64)> {
     let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
     if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
-        return Some(0);
+        return Some((0, 1.0));
     }
-    // Units may follow: q1_rad, qd1_rad_s, qdd1_rad_s2.
-    let name = name.split_once("_rad").map_or(name.as_str(), |(head, _)| head).to_owned();
-    (0..3 * JOINTS).find(|c| channel_name(*c) == name).map(|c| c + 1)
+    // Units may follow: q1_rad, qd1_rad_s, qdd1_rad_s2, q1_deg, qd1_deg_s, qdd1_deg_s2.
+    let (name, unit) = match (name.split_once("_rad"), name.split_once("_deg")) {
+        (Some((head, _)), _) => (head, 1.0),
+        (None, Some((head, _))) => (head, 1f64.to_radians()),
+        (None, None) => (name.as_str(), 1.0),
+    };
+    (0..3 * JOINTS).find(|c| channel_name(*c) == name).map(|c| (c + 1, unit))
 }
 
 fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded, FileError> {
@@ -160,10 +164,10 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
                 problem.to_owned(),
             )
         };
-        let column = column_of(name).ok_or_else(|| {
-            at("unknown column; known: t, q1..q6 (rad), qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)")
+        let (column, unit) = column_of(name).ok_or_else(|| {
+            at("unknown column; known: t, q1..q6 (rad) or q1_deg..q6_deg, qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)")
         })?;
-        if place_of[column].replace(i).is_some() {
+        if place_of[column].replace((i, unit)).is_some() {
             return Err(at("this column is there twice"));
         }
     }
@@ -191,8 +195,8 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
         width(line, &cells, header.len())?;
         let mut row = [0.0; COLUMNS];
         for (to, place) in row.iter_mut().zip(&place_of) {
-            if let Some(i) = place {
-                *to = number(cells[*i], || Place::cell(line, i + 1).named(header[*i]))?;
+            if let Some((i, unit)) = place {
+                *to = unit * number(cells[*i], || Place::cell(line, i + 1).named(header[*i]))?;
             }
         }
         lines.push(line);

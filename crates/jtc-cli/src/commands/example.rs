@@ -1,0 +1,48 @@
+//! `jtc example`: files to try.
+
+use cli_kit::{Output, table};
+use jtc_host::example::{EXAMPLES, Example};
+use serde_json::json;
+
+use super::traj::typed;
+use crate::args::ExampleArgs;
+use crate::failure::Failure;
+use crate::output_file::OutputFile;
+
+/// Writes an example, or lists them.
+pub fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
+    let name = args.name.as_deref().unwrap_or("list");
+    if name.eq_ignore_ascii_case("list") {
+        list(out);
+        return Ok(());
+    }
+    let Some(example) = Example::named(name) else {
+        let names: Vec<&str> = EXAMPLES.iter().map(|e| e.name).collect();
+        return Err(Failure::usage(format!(
+            "there is no example \"{name}\"; there are {}",
+            names.join(", ")
+        ))
+        .hint("`jtc example` says what they are"));
+    };
+    let dir = args.dir.as_deref().unwrap_or(".".as_ref());
+    std::fs::create_dir_all(dir).map_err(|e| Failure::usage(format!("{}: {e}", dir.display())))?;
+    // Without a name of its own the directory of the terminal is not part of what is typed next.
+    let path = if args.dir.is_some() { dir.join(example.file) } else { example.file.into() };
+    OutputFile::open(&path, args.force.force, &[])?.write(&example.text())?;
+    let next = example.next.replace("{}", &typed(&path));
+    let value = json!({ "file": path, "what": example.what, "next": next });
+    out.result(&value, || format!("{}: {}\ntry: {next}", path.display(), example.what));
+    Ok(())
+}
+
+fn list(out: &Output) {
+    let value = |e: &Example| json!({ "name": e.name, "file": e.file, "what": e.what });
+    out.result(&json!({ "examples": EXAMPLES.iter().map(value).collect::<Vec<_>>() }), || {
+        let rows: Vec<Vec<String>> =
+            EXAMPLES.iter().map(|e| [e.name, e.file, e.what].map(str::to_owned).to_vec()).collect();
+        format!(
+            "{}\njtc example NAME writes one; jtc help files is the page about the forms of files",
+            table(&["name", "file", "what"], &rows)
+        )
+    });
+}

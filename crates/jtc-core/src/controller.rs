@@ -141,8 +141,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // In Start nothing is executed yet; the events are offered again.
         let host_done = if before == State::Start { 0 } else { self.serve_host(inputs) };
 
-        // What state that makes. What persists is raised again, where it was cleared.
-        self.check_errors(inputs);
+        // What state that makes. What persists is raised again, where a host may have cleared it.
+        if !inputs.host.is_empty() {
+            self.check_errors(inputs);
+        }
         self.select_state();
 
         // What to do in it.

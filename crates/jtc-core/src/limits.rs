@@ -29,13 +29,15 @@ impl Saturation {
         braking: bool,
     ) -> (f64, u16) {
         let limit = limits.torque_max;
-        // Written so that NaN is beyond. Choices without branches: the same work in every tick.
+        // Written so that NaN is beyond.
         let within = torque.abs() <= limit;
         self.saturated = !within;
         let counted = self.saturated & !braking;
-        let oldest = (self.history >> (WINDOW - 1)) as u16 & 1;
-        self.history = self.history << 1 | u128::from(counted);
-        self.over_ms = self.over_ms + u16::from(counted) - oldest;
+        if counted | (self.over_ms > 0) {
+            let oldest = (self.history >> (WINDOW - 1)) as u16 & 1;
+            self.history = self.history << 1 | u128::from(counted);
+            self.over_ms = self.over_ms + u16::from(counted) - oldest;
+        }
         let error = torque.is_nan() | (counted & (self.over_ms > over_ms_max));
         let limited = torque.max(-limit).min(limit);
         (if error { 0.0 } else { limited }, bit(!error, joint_error::TORQUE))

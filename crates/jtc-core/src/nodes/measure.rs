@@ -103,6 +103,10 @@ struct Fading {
 impl Fading {
     /// One tick.
     fn step(&mut self, elapsed_ms: u32, config: &Config) {
+        if self.left == 0.0 && self.slope == 0.0 {
+            // Nearly always: nothing is left to fade.
+            return;
+        }
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
         let x = pole * ms;

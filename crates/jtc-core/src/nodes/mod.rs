@@ -132,7 +132,8 @@ impl Nodes {
     pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &[f64; JOINTS]) {
         // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
         let (mut answered, mut configured_before) = (0u8, 0u8);
-        let gripper_before = self.nodes[GRIPPER];
+        let gripper = &self.nodes[GRIPPER];
+        let (gripper_fsm, gripper_configured) = (gripper.report.fsm, gripper.configured);
         for (n, node) in self.nodes.iter_mut().enumerate() {
             node.misbehaved = false;
             node.deaf_left = node.deaf_left.saturating_sub(1);
@@ -172,8 +173,8 @@ impl Nodes {
         let usable = self.measure(answered, commanded, 1 + u32::from(inputs.missed_ticks), config);
         self.count_missing(inputs, config, answered, usable);
         let gripper = &self.nodes[GRIPPER];
-        self.gripper_lost = (gripper_before.report.fsm == fsm::ENABLED && gripper.report.fsm != fsm::ENABLED)
-            || (gripper_before.configured && !gripper.configured);
+        self.gripper_lost = (gripper_fsm == fsm::ENABLED && gripper.report.fsm != fsm::ENABLED)
+            || (gripper_configured && !gripper.configured);
         self.watch(config, goal);
     }
 

@@ -6,6 +6,7 @@ use jtc_core::JOINTS;
 use jtc_dynamics::Origin;
 
 use super::Arm;
+use super::toml_form::FORMAT;
 
 fn list(values: &[f64]) -> String {
     // `{:?}` keeps a fraction, which TOML needs to tell floats from integers.
@@ -29,7 +30,7 @@ fn escaped(text: &str) -> String {
 impl Arm {
     /// As an arm file.
     pub fn to_toml(&self) -> String {
-        let mut out = format!("name = {}\n", quoted(&self.name));
+        let mut out = format!("format = {FORMAT}\nname = {}\n", quoted(&self.name));
         if let Some(g) = &self.gravity {
             let _ = writeln!(out, "gravity_m_s2 = {}", list(g));
         }

@@ -27,6 +27,21 @@ fn the_delivered_arm_is_the_controller_s_default() {
     arm.parameter_set().check().unwrap();
 }
 
+#[test]
+fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
+    let whole = Arm::avena();
+    assert!(AVENA_TOML.contains("\nformat = 2\n") && whole.to_toml().starts_with("format = 2\n"));
+    // Files from before there was a format mean the same.
+    assert_eq!(Arm::parse(&AVENA_TOML.replace("\nformat = 2\n", "\n")).unwrap(), whole);
+    for other in ["3", "1", "\"two\""] {
+        // Also where the rest has keys that are not known.
+        let text = AVENA_TOML.replace("\nformat = 2\n", &format!("\nformat = {other}\nnew_key = 1\n"));
+        let message = Arm::parse(&text).unwrap_err().to_string();
+        assert!(message.contains(&format!("format = {other} is none")), "{message}");
+        assert!(message.contains("it reads `format = 2`"), "{message}");
+    }
+}
+
 /// The six joints in a plain description.
 fn urdf(axis: &str, joint: &str) -> String {
     let arm = Arm::avena();

@@ -7,9 +7,19 @@ use serde::{Deserialize, Serialize};
 use super::{Arm, Warning};
 use crate::file::{FileError, Place};
 
+/// Format of the arm files that are read. Files without it are older and mean the same.
+pub(super) const FORMAT: i64 = 2;
+
+/// What says how the rest is to be read.
+#[derive(Deserialize)]
+struct Head {
+    format: Option<toml::Value>,
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ArmForm {
+    format: Option<i64>,
     name: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     gravity_m_s2: Option<[f64; 3]>,
@@ -68,10 +78,19 @@ struct TableForm {
 impl Arm {
     /// From the TOML form; numbers that the controller would refuse are an error.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
-        let form: ArmForm = toml::from_str(text).map_err(|e| {
+        let wrong = |e: toml::de::Error| {
             let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());
             FileError::at(Place { line, ..Place::default() }, e.message().to_owned())
-        })?;
+        };
+        // Before the keys, which another format may have others of.
+        if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
+            && format.as_integer() != Some(FORMAT)
+        {
+            let problem =
+                format!("format = {format} is none that this program reads; it reads `format = {FORMAT}`");
+            return Err(FileError::at(Place::name("format"), problem));
+        }
+        let form: ArmForm = toml::from_str(text).map_err(wrong)?;
         let (joints, flange) = match form.joint.split_last_chunk::<1>() {
             Some((joints, [flange])) if joints.len() == JOINTS => (joints, flange),
             _ => {

@@ -116,7 +116,7 @@ pub enum Error {
         status: Box<Status>,
     },
     /// Resume was asked for, and nothing is paused.
-    #[error("nothing is paused (state {}, trajectory {}): resume would start a motion, not go on with one", words::state(*state), words::tes(*tes))]
+    #[error("{} (state {}, trajectory {})", not_paused(*tes), words::state(*state), words::tes(*tes))]
     NotPaused {
         /// State of the controller.
         state: u8,
@@ -171,6 +171,15 @@ fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
         ),
         _ if stop_sent => "THE ARM MAY BE MOVING: a stop was sent; whether it arrived is not known".into(),
         _ => "THE ARM MAY BE MOVING: whether the command arrived is not known".into(),
+    }
+}
+
+/// Right after a pause the trajectory state is still Execute, until the arm stands.
+fn not_paused(tes: u8) -> &'static str {
+    if tes == 3 {
+        "nothing is paused yet: the motion is still slowing down after a pause, or nobody paused it"
+    } else {
+        "nothing is paused: resume would start a motion, not go on with one"
     }
 }
 
@@ -259,7 +268,7 @@ impl Error {
                     .into()
             }
             Error::NotPaused { tes: 3, .. } => {
-                "it is being executed, or still slowing down after a pause: `jtc status`, then try again".into()
+                "a pause takes up to half a second: `jtc traj resume` again once `jtc status` shows Pause".into()
             }
             Error::NotPaused { .. } => "`jtc traj run FILE` checks a trajectory and starts it".into(),
             Error::NoParameters { .. } => {

@@ -10,5 +10,5 @@ pub mod trial;
 pub mod usage;
 
 pub use indicatif::ProgressBar;
-pub use output::{Output, table};
+pub use output::{Output, figure, table};
 pub use signal::Stop;

@@ -114,6 +114,15 @@ fn target() -> ProgressDrawTarget {
     if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
 }
 
+/// A number with so many decimals; one that rounds to zero has no sign.
+pub fn figure(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.bytes().all(|b| matches!(b, b'0' | b'.')) => zero.to_owned(),
+        _ => text,
+    }
+}
+
 /// Rows as a text table; words to the left, columns whose head begins with `>` (figures) to the right.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     let right: Vec<bool> = head.iter().map(|h| h.starts_with('>')).collect();
@@ -139,4 +148,15 @@ pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
         text += &(line(row) + "\n");
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_that_rounds_to_zero_has_no_sign() {
+        let all = [(-0.0004, 3), (-0.0, 1), (-0.4, 0), (-0.0006, 3), (-1.0, 0), (2.5, 1)];
+        assert_eq!(all.map(|(v, d)| figure(v, d)), ["0.000", "0.0", "0", "-0.001", "-1", "2.5"]);
+    }
 }

@@ -38,7 +38,7 @@ pub enum DynamicsKind {
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
     /// Name, number or words of the code as a screen shows them, or `faults` for the form of fault files; without it: the list
-    pub code: Option<String>,
+    pub code: Vec<String>,
 }
 
 /// Options of `jtc example`.

@@ -9,10 +9,11 @@ use crate::failure::Failure;
 
 /// Prints the pages that fit, or the list of all.
 pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
-    let Some(code) = &args.code else {
+    let code = &args.code.join(" ");
+    if code.is_empty() {
         list(out);
         return Ok(());
-    };
+    }
     if code == "faults" {
         let text = jtc_sim::FAULT_FILE_HELP;
         out.result(&json!({ "text": text }), || text.trim_end().to_owned());

@@ -5,7 +5,7 @@ mod view;
 use std::io::IsTerminal;
 use std::time::Duration;
 
-use cli_kit::{Output, Stop};
+use cli_kit::{Output, Stop, figure};
 use crossterm::event::{self, Event, KeyCode, KeyModifiers};
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::sample::is_measured;
@@ -33,8 +33,8 @@ fn lines(session: &mut Session<SerialPort>, count: Option<u64>, out: &Output) ->
         value["received_s"] = time_s.into();
         out.result(&value, || {
             let position = |(j, joint): (usize, &jtc_wire::JointStatus)| {
-                let text = format!("{:.4}", joint.position + 0.0);
-                format!("{:>8}", if is_measured(&s, j) { &text } else { "-" })
+                let text = if is_measured(&s, j) { figure(joint.position.into(), 4) } else { "-".into() };
+                format!("{text:>8}")
             };
             let q: Vec<String> = s.joints.iter().enumerate().map(position).collect();
             let errors = if s.errors == 0 { String::new() } else { format!("   {}", words::errors_line(&s)) };

@@ -74,7 +74,7 @@ pub fn figures(summary: &Summary) -> String {
 
 /// A figure with so many decimals, or a dash where it is not known.
 fn figure(value: Option<f64>, digits: usize) -> String {
-    value.map_or("-".into(), |v| format!("{v:.digits$}"))
+    value.map_or("-".into(), |v| cli_kit::figure(v, digits))
 }
 
 /// Upload and link as facts for the report.

@@ -1,6 +1,6 @@
 //! `jtc status`, and a status as text and as JSON for all commands that show one.
 
-use cli_kit::{Output, table};
+use cli_kit::{Output, figure, table};
 use jtc_host::sample::is_measured;
 use jtc_host::words;
 use jtc_wire::Status;
@@ -28,9 +28,9 @@ pub fn as_json(s: &Status) -> Value {
                 "joint": i + 1,
                 "state": joint_state(s, i),
                 "fsm": j.fsm,
-                "position_rad": measured.then_some(j.position),
-                "velocity_rad_s": measured.then_some(j.velocity),
-                "torque_nm": measured.then_some(j.torque),
+                "position_rad": measured.then_some(j.position + 0.0),
+                "velocity_rad_s": measured.then_some(j.velocity + 0.0),
+                "torque_nm": measured.then_some(j.torque + 0.0),
                 "temperature_c": measured.then_some(j.temperature),
                 "internal_errors": words::joint_errors(j.internal),
                 "internal_errors_occurred": words::joint_errors(j.internal_occurred),
@@ -97,14 +97,16 @@ pub fn as_text(s: &Status) -> String {
         .iter()
         .enumerate()
         .map(|(i, j)| {
-            let figure = |text: String| if is_measured(s, i) { text } else { "-".into() };
+            let figure = |value: f32, digits| {
+                if is_measured(s, i) { figure(value.into(), digits) } else { "-".into() }
+            };
             vec![
                 format!("joint {}", i + 1),
                 joint_state(s, i).into(),
-                figure(format!("{:.4}", j.position)),
-                figure(format!("{:.4}", j.velocity)),
-                figure(format!("{:.2}", j.torque)),
-                figure(j.temperature.to_string()),
+                figure(j.position, 4),
+                figure(j.velocity, 4),
+                figure(j.torque, 2),
+                figure(j.temperature.into(), 0),
             ]
         })
         .collect();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cli_kit::{Output, table};
+use cli_kit::{Output, figure, table};
 use jtc_core::{Config, JOINTS};
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, Verdict};
@@ -207,10 +207,10 @@ fn figures(verdict: &Verdict) -> String {
         .map(|(j, f)| {
             vec![
                 format!("joint {}", j + 1),
-                format!("{:.3} .. {:.3}", f.position_min_rad, f.position_max_rad),
-                format!("{:.3}", f.velocity_peak_rad_s),
-                format!("{:.3}", f.acceleration_peak_rad_s2),
-                f.torque_peak_nm.map_or("-".into(), |t| format!("{t:.1}")),
+                format!("{} .. {}", figure(f.position_min_rad, 3), figure(f.position_max_rad, 3)),
+                figure(f.velocity_peak_rad_s, 3),
+                figure(f.acceleration_peak_rad_s2, 3),
+                f.torque_peak_nm.map_or("-".into(), |t| figure(t, 1)),
             ]
         })
         .collect();

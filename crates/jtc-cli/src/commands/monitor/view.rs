@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 
+use cli_kit::figure;
 use jtc_host::sample::is_measured;
 use jtc_host::words;
 use jtc_wire::Status;
@@ -227,8 +228,8 @@ fn joint_table(s: &Status, width: u16, framed: bool) -> Table<'static> {
     let rows = order.into_iter().map(|j| {
         let joint = &s.joints[j];
         let measured = is_measured(s, j);
-        let figure = |text: String, width: usize| {
-            let text = if measured { text } else { "-".into() };
+        let number = |value: f32, digits: usize, width: usize| {
+            let text = if measured { figure(value.into(), digits) } else { "-".into() };
             Cell::from(format!("{text:>width$}"))
         };
         let mut trouble: Vec<&str> = words::joint_errors(joint.internal);
@@ -238,10 +239,10 @@ fn joint_table(s: &Status, width: u16, framed: bool) -> Table<'static> {
         let cells = [
             Cell::from(format!("joint {}", j + 1)).style(Style::new().fg(COLOURS[j])),
             Cell::from(joint_state(s, j)),
-            figure(format!("{:.4}", joint.position + 0.0), 8),
-            figure(format!("{:.2}", joint.torque + 0.0), 7),
-            figure(format!("{:.4}", joint.velocity + 0.0), 9),
-            figure(joint.temperature.to_string(), 4),
+            number(joint.position, 4, 8),
+            number(joint.torque, 2, 7),
+            number(joint.velocity, 4, 9),
+            number(joint.temperature.into(), 0, 4),
             Cell::from(trouble.join(", ")).style(Style::new().red()),
         ];
         let style = if measured { Style::new() } else { Style::new().red().bold() };
@@ -270,7 +271,7 @@ fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16) -> Sparkline
     let old = history.len().saturating_sub(usize::from(width.saturating_sub(4)));
     let heights: Vec<Option<u64>> = history.iter().skip(old).map(height).collect();
     let last = history.back().filter(|v| v.is_finite());
-    let last = last.map_or("-".into(), |v| format!("{v:.2}"));
+    let last = last.map_or("-".into(), |v| figure(*v, 2));
     Sparkline::default()
         .data(heights)
         .max(101)

@@ -4,7 +4,8 @@
 //! HoldPos cannot tell an unknown payload or a wrong mass from stiction: what is fitted contains up to the static friction of
 //! each joint. At the pose where teaching begins that is harmless, because the same friction holds the difference. So that
 //! little friction never becomes a great mass elsewhere, nothing is fitted where a mass at the flange would hardly load the
-//! joints, and the mass is bounded.
+//! joints, and the mass is bounded. Nor can it tell a load from somebody who leans on the arm and will let go: what is fitted
+//! drives no joint faster than slowly.
 use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
@@ -74,12 +75,12 @@ impl Payload {
         let unit = dynamics.flange_torque(q);
         let left = 1.0 - smooth(f64::from(self.elapsed_ms) / f64::from(config.teach_fade_ms.max(1)));
         self.elapsed_ms = self.elapsed_ms.saturating_add(1);
-        core::array::from_fn(|j| yielding(self.mass * unit[j] + self.rest[j] * left, v[j], config))
+        core::array::from_fn(|j| driving(self.mass * unit[j] + self.rest[j] * left, v[j], config))
     }
 }
 
 /// A torque (N·m) that moves the joint by itself, as after a contact that is gone, fades with the speed (rad/s) that it makes.
-fn yielding(torque: f64, v: f64, config: &Config) -> f64 {
+fn driving(torque: f64, v: f64, config: &Config) -> f64 {
     let slow = config.teach_payload_velocity;
     let along = if torque < 0.0 { -v } else { v };
     // All of it up to that speed and against the motion, nothing from three times as fast on.

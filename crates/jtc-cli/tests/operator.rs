@@ -205,3 +205,131 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
         }
     }
 }
+
+/// A command at a simulated controller that was interrupted at the words that are waited for on its stderr: its exit code and answer.
+fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) {
+    let mut child = command()
+        .arg("--json")
+        .args(words)
+        .args(["--port", sim.port.to_str().unwrap()])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut err = BufReader::new(child.stderr.take().unwrap());
+    let (mut line, mut all) = (String::new(), String::new());
+    while !line.contains(at) {
+        line.clear();
+        assert!(err.read_line(&mut line).unwrap() > 0, "it ended before {at:?}: {all}");
+        all += &line;
+    }
+    cli_kit::trial::signal(&child, "-INT");
+    // Nobody reads on: a full pipe must not hold it either.
+    let mut out = String::new();
+    child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
+    let code = child.wait().unwrap().code().unwrap_or(-1);
+    (code, serde_json::from_str(out.trim()).unwrap_or_else(|e| panic!("{e}: {out:?}")))
+}
+
+/// Ctrl-C in each wait before the motion: nothing moves, and that is said, with exit code 5.
+#[test]
+fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
+    let sim = Sim::start(&[]);
+    let file = sim.path("motion.csv");
+    std::fs::write(&file, slow_motion()).unwrap();
+    let run = ["traj", "run", &file];
+    // Parameters first: the drives need some seconds from here.
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let waits = [("waiting until", "wait for the drives"), ("uploading", "upload")];
+    for (at, during) in waits {
+        let (code, value) = interrupted(&sim, &run, at);
+        let message = value["error"]["message"].as_str().unwrap_or_default();
+        assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{value}");
+        assert!(
+            message.contains(&format!("during the {during}")) && message.contains("not started"),
+            "{value}"
+        );
+        let status = sim.jtc(&["--json", "status"]).ends(0).json();
+        assert_ne!(status["trajectory"], "Execute", "{status}");
+        assert_eq!(status["point"], 0, "{status}");
+    }
+}
+
+/// Ctrl-C on the way to the first point stops there, and the motion is not begun.
+#[test]
+fn j33_an_interrupt_on_the_approach_stops_on_it() {
+    let sim = Sim::start(&["--no-throttle"]);
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let file = sim.path("away.csv");
+    let away: String = (0..=10).map(|i| format!("{:.1},0.8,0,0,0,0,0\n", f64::from(i) * 0.1)).collect();
+    std::fs::write(&file, format!("t,q1,q2,q3,q4,q5,q6\n{away}")).unwrap();
+    let (_person, slave) = terminal();
+    let mut child = command()
+        .args(["--json", "traj", "run", &file, "--approach", "--speed", "5"])
+        .args(["--port", sim.port.to_str().unwrap()])
+        .stdin(Stdio::from(slave.try_clone().unwrap()))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut err = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("moving") {
+        line.clear();
+        assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it moved");
+    }
+    cli_kit::trial::signal(&child, "-INT");
+    let said = cli_kit::trial::ended(child).ends(5);
+    let value = said.json();
+    assert_eq!(
+        (value["outcome"].as_str(), value["phase"].as_str()),
+        (Some("stopped"), Some("approach")),
+        "{value}"
+    );
+    stands(&sim);
+    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    assert!(status["joints"][0]["position_rad"].as_f64().unwrap() < 0.7, "{status}");
+}
+
+/// Ctrl-C in the waits of recover: it sends nothing more, but stops what moves; and what it prints in each state.
+#[test]
+fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
+    let dir = tempfile::tempdir().unwrap();
+    let faults = dir.path().join("faults.toml");
+    let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 0\n";
+    std::fs::write(&faults, fault).unwrap();
+    let sim = Sim::start(&["--no-throttle", "--faults", faults.to_str().unwrap()]);
+    let cancelled = |words: &[&str], at: &str| {
+        let (code, value) = interrupted(&sim, words, at);
+        assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
+    };
+    // Fresh: it waits for the drives.
+    cancelled(&["recover", "--defaults"], "waiting for joint 1");
+    sim.jtc(&["recover"]).ends(0);
+    // In motion, of which nobody takes care any more.
+    let file = sim.path("motion.csv");
+    std::fs::write(&file, slow_motion()).unwrap();
+    let (_person, slave) = terminal();
+    let mut run = command()
+        .args(["traj", "run", &file, "--port", sim.port.to_str().unwrap()])
+        .stdin(Stdio::from(slave))
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut err = BufReader::new(run.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("moving") {
+        line.clear();
+        assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it moved");
+    }
+    run.kill().unwrap();
+    run.wait().unwrap();
+    cancelled(&["recover"], "stopping the motion");
+    stands(&sim);
+    // The emergency stop is pressed, and nobody releases it.
+    sim.jtc(&["teach", "on"]).ends(0);
+    cancelled(&["recover"], "release the emergency stop (waiting)");
+    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    assert_eq!(status["state"], "Error", "{status}");
+}

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cli_kit::Output;
+use cli_kit::{Output, Stop};
 use jtc_host::arm::Arm;
 use jtc_host::session::ParameterSource;
 use jtc_host::words;
@@ -12,6 +12,7 @@ use super::status;
 use crate::args::{ClearArgs, GripperArgs, RecoverArgs, Switch};
 use crate::failure::Failure;
 use crate::limits;
+use crate::operator::ended_at_once;
 
 /// All joints and the gripper.
 const ALL_NODES: u8 = 0x7F;
@@ -66,13 +67,32 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         Some(arm) => limits::accept(arm, args.accept.accept_device_limits, out)?,
         None => Vec::new(),
     };
+    let its_out = *out;
+    let stop = Stop::listen_with(move || {
+        ended_at_once(
+            its_out,
+            "ended at once, on the way back to HoldPos",
+            "`jtc status` shows where the controller is",
+        )
+    })?;
     let mut session = args.link.session()?;
     let mut steps = Vec::new();
-    let done = session.recover(source, |step| {
-        out.note(step);
-        steps.push(step.to_string());
-    });
-    let s = done.map_err(not_itself)?;
+    let done = session.recover_until(
+        source,
+        || stop.asked(),
+        |step| {
+            out.note(step);
+            steps.push(step.to_string());
+        },
+    );
+    let s = done.map_err(|e| match &e {
+        jtc_host::Error::Cancelled => {
+            let during = steps.last().map_or("its start", String::as_str);
+            Failure { message: format!("cancelled, after: {during}"), ..Failure::of(&e) }
+                .hint("the rest of the way was not gone: `jtc status`, then `jtc recover` again")
+        }
+        _ => not_itself(e),
+    })?;
     let value = json!({ "steps": steps, "differences": differences, "status": status::as_json(&s) });
     out.result(&value, || format!("state {}: ready", words::state(s.fsm)));
     Ok(())

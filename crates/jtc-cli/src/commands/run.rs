@@ -210,6 +210,7 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
     }
     let enabled = |s: &Status| s.joints.iter().all(|j| j.fsm == 3);
     if !enabled(&status) {
+        operator.out.note("waiting until all drives are enabled");
         let reached = |s: &Status| enabled(s) || operator.wants_the_end();
         status = session.wait_for("all drives enabled", BRING_UP, reached)?;
         if operator.wants_the_end() {
@@ -243,6 +244,7 @@ fn upload(
     operator: &Operator,
 ) -> Result<UploadReport, Failure> {
     let points = trajectory.raw().map_err(Failure::usage)?;
+    operator.out.note(format!("uploading {} points", points.len()));
     let bar = operator.out.bar(1, what);
     let report = session.upload(&points, trajectory.step_ms, options, |p| {
         bar.set_length(p.segments as u64);

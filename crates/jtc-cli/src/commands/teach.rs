@@ -56,6 +56,11 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
     })?;
     let mut session = link.session()?;
     let status = session.fresh_status()?;
+    if stop.asked() {
+        // Teaching would take the hold from an arm that nobody leads any more.
+        let message = "cancelled before teaching was switched on".into();
+        return Err(Failure { message, ..Failure::of(&jtc_host::Error::Cancelled) });
+    }
     let was_on = status.fsm == 4;
     // Before it is asked for: a confirmation that does not come may be that of a request that was taken.
     teaching.store(true, Ordering::Relaxed);

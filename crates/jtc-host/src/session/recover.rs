@@ -93,6 +93,8 @@ const NODE_TIME: Duration = Duration::from_secs(15);
 const START_TIME: Duration = Duration::from_secs(3);
 /// Effect of a command.
 const EFFECT: Duration = Duration::from_millis(500);
+/// How often it is looked whether a person wants it to end.
+const LOOK: Duration = Duration::from_millis(100);
 /// How long a person may take to release the emergency stop.
 const PERSON_TIME: Duration = Duration::from_secs(60);
 
@@ -102,6 +104,17 @@ impl<P: Port> Session<P> {
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,
+        say: impl FnMut(&RecoverStep),
+    ) -> Result<Status, Error> {
+        self.recover_until(parameters, || false, say)
+    }
+
+    /// The same, until `ended` says that a person wants it to end: nothing more is sent then and the error is
+    /// [`Error::Cancelled`], but a motion is stopped and followed to its standstill first.
+    pub fn recover_until(
+        &mut self,
+        parameters: ParameterSource<'_>,
+        ended: impl Fn() -> bool,
         mut say: impl FnMut(&RecoverStep),
     ) -> Result<Status, Error> {
         parameters.check()?;
@@ -117,13 +130,16 @@ impl<P: Port> Session<P> {
         let mut rounds = 0;
         while rounds < 24 {
             rounds += 1;
+            if ended() && status.fsm != 3 {
+                return Err(Error::Cancelled);
+            }
             parameters.enough_for(&status)?;
             match status.fsm {
                 1 | 5 if parameters.due(&status, given) => {
                     say(&RecoverStep::Give(parameters.arm_name()));
                     self.give(parameters)?;
                     given = true;
-                    self.pause_for(Duration::from_millis(60))?;
+                    self.pause_for(Duration::from_millis(60), &ended)?;
                 }
                 // Errors latch: only clearing tells whether the safety input is high again.
                 5 if status.errors & 1 != 0
@@ -140,7 +156,7 @@ impl<P: Port> Session<P> {
                     }
                     rounds -= 1;
                     self.clear(true, 0)?;
-                    self.pause_for(EFFECT)?;
+                    self.pause_for(EFFECT, &ended)?;
                 }
                 5 => {
                     let silent = (status.can_current >> 8 & 0x7F) as u8 & !resets;
@@ -148,30 +164,30 @@ impl<P: Port> Session<P> {
                         resets |= silent;
                         say(&RecoverStep::Reset(names(silent)));
                         self.reset(silent)?;
-                        self.pause_for(Duration::from_secs(1))?;
+                        self.pause_for(Duration::from_secs(1), &ended)?;
                     }
                     let nodes = faulty(&status);
                     say(&RecoverStep::Clear(names(nodes)));
                     self.clear(true, nodes)?;
                     clears += 1;
-                    self.pause_for(EFFECT)?;
+                    self.pause_for(EFFECT, &ended)?;
                     if clears > 6 {
                         return Err(Error::Device { status: Box::new(self.fresh_status()?) });
                     }
                 }
                 0 => {
-                    self.wait_for("the end of the start-up", START_TIME, |s| s.fsm != 0)?;
+                    self.wait_for("the end of the start-up", START_TIME, |s| s.fsm != 0 || ended())?;
                 }
                 1 => {
                     say(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
-                    let reached = self.wait_for("nodes ready", NODE_TIME, |s| s.fsm != 0 && s.fsm != 1);
+                    let reached = self.wait_for("nodes ready", NODE_TIME, |s| s.fsm > 1 || ended());
                     match reached {
                         Ok(_) => {}
                         Err(Error::StateTimeout { status: s, .. }) if !waited => {
                             waited = true;
                             say(&RecoverStep::Reset(names(s.node_init)));
                             self.reset(s.node_init)?;
-                            self.pause_for(Duration::from_secs(1))?;
+                            self.pause_for(Duration::from_secs(1), &ended)?;
                         }
                         Err(e) => return Err(e),
                     }
@@ -179,7 +195,7 @@ impl<P: Port> Session<P> {
                 4 => {
                     say(&RecoverStep::TeachOff);
                     self.teach(false)?;
-                    self.wait_for("teaching off", Duration::from_secs(3), |s| s.fsm != 4)?;
+                    self.wait_for("teaching off", Duration::from_secs(3), |s| s.fsm != 4 || ended())?;
                 }
                 3 => {
                     say(&RecoverStep::Stop);
@@ -195,7 +211,7 @@ impl<P: Port> Session<P> {
                 }
                 _ => {
                     self.clear(true, 0)?;
-                    self.pause_for(EFFECT)?;
+                    self.pause_for(EFFECT, &ended)?;
                 }
             }
             status = self.fresh_status()?;
@@ -211,15 +227,15 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Lets time pass while statuses are taken in.
-    fn pause_for(&mut self, time: Duration) -> Result<(), Error> {
+    /// Lets time pass while statuses are taken in; not longer than until it is `ended`.
+    fn pause_for(&mut self, time: Duration, ended: impl Fn() -> bool) -> Result<(), Error> {
         let end = self.port.now() + time;
         loop {
             let now = self.port.now();
-            if now >= end {
+            if now >= end || ended() {
                 return Ok(());
             }
-            self.poll(end - now)?;
+            self.poll((end - now).min(LOOK))?;
         }
     }
 }

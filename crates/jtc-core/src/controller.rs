@@ -261,7 +261,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.enter(next);
     }
 
-    fn enter(&mut self, next: State) {
+    pub(crate) fn enter(&mut self, next: State) {
         let last = core::mem::replace(&mut self.state, next);
         if last == next {
             return;

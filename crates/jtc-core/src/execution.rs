@@ -226,3 +226,48 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.braking_ms.is_some()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Config, State};
+
+    fn braking(state: State, tes: Tes) -> Controller<[RawPoint; 4]> {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        (controller.state, controller.tes, controller.braking_ms) = (state, tes, Some(5));
+        controller
+    }
+
+    /// What braking excuses (J-43) it does not excuse for longer than the arm moves.
+    #[test]
+    fn j33_braking_ends_where_the_arm_stands() {
+        let mut stands = braking(State::HoldPos, Tes::Pause);
+        assert!(!stands.brake());
+        assert_eq!(stands.braking_ms, None);
+        let mut moves = braking(State::HoldPos, Tes::Pause);
+        moves.motion.set.velocity[2] = -0.03;
+        assert!(moves.brake());
+        assert_eq!(moves.braking_ms, Some(6));
+        let mut on_the_path = braking(State::Operate, Tes::Execute);
+        assert!(on_the_path.brake(), "path time still runs");
+    }
+
+    #[test]
+    fn j33_braking_ends_with_the_states_that_hold_or_follow() {
+        for (next, goes_on) in [(State::HoldPos, true), (State::Error, false), (State::Init, false)] {
+            let mut controller = braking(State::Operate, Tes::Execute);
+            controller.enter(next);
+            assert_eq!(controller.braking_ms.is_some(), goes_on, "{next:?}");
+        }
+    }
+
+    #[test]
+    fn j34_after_a_stop_the_path_begins_anew() {
+        for (tes, time) in [(Tes::Stop, 0.0), (Tes::Null, 0.0), (Tes::Pause, 250.0), (Tes::Finish, 250.0)] {
+            let mut controller = braking(State::Operate, Tes::Execute);
+            controller.clock.time = 250.0;
+            controller.set_tes(tes);
+            assert_eq!(controller.clock.time, time, "{tes:?}: this is the index that the status shows");
+        }
+    }
+}

@@ -211,3 +211,27 @@ impl Motion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j34_on_the_approach_the_velocity_is_the_derivative_of_the_position() {
+        let (from, to) = ([0.1, -0.2, 0.3, 0.0, 1.0, -1.0], [0.13, -0.2, 0.28, 0.05, 1.0, -0.96]);
+        let at = |ms: f64| {
+            let mut motion = Motion::default();
+            motion.glide(&from, &to, ms / 200.0, 200.0);
+            motion.set
+        };
+        for ms in 1..200 {
+            let (before, now, after) = (at(f64::from(ms - 1)), at(f64::from(ms)), at(f64::from(ms + 1)));
+            for j in 0..JOINTS {
+                let rate = (after.position[j] - before.position[j]) / (2.0 * DT);
+                assert!((now.velocity[j] - rate).abs() < 1e-4, "{ms} ms: {} {rate}", now.velocity[j]);
+            }
+        }
+        assert_eq!((at(0.0).position, at(200.0).velocity), (from, [0.0; JOINTS]));
+        assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+}

@@ -234,6 +234,16 @@ mod tests {
         assert!((joint.used().velocity - 0.1).abs() < 1e-12);
     }
 
+    /// A joint that was thrown is not carried on as fast as it flew.
+    #[test]
+    fn j63_no_more_is_carried_on_than_a_little_over_the_velocity_limit() {
+        for (velocity, carried) in [(1.7, 1.7), (2.5, 1.2 * VELOCITY_MAX), (-2.5, -1.2 * VELOCITY_MAX)] {
+            let mut joint = moving(velocity);
+            joint.step(&tick(None, velocity), &Config::avena());
+            assert!((joint.used().position - carried * DT).abs() < 1e-12, "{:?}", joint.used());
+        }
+    }
+
     #[test]
     fn j35_the_reach_grows_with_the_time_since_the_last_usable_answer() {
         for silent in 0..4 {

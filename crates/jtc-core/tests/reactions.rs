@@ -122,6 +122,22 @@ fn j66_a_command_of_the_host_makes_it_stand_firm_again() {
     assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
 }
 
+/// What braking excuses is for the arm that cannot follow its path, not for one that is pushed away from where the path stands.
+#[test]
+fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_gives_way_while_it_still_brakes() {
+    let mut rig = bench(true);
+    assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
+    // It moves all the time, so braking goes on.
+    rig.nodes[3].report.velocity = 0.5;
+    rig.until(500, |r| r.tes() == Tes::Pause);
+    push(&mut rig, 0.097);
+    rig.run(2);
+    let t = *rig.controller.telemetry();
+    assert_eq!((t.state, t.tes, t.errors), (State::HoldPos, Tes::Pause, 0));
+    assert!((t.joints[3].set_position - rig.nodes[3].report.position).abs() < 0.04, "{:?}", t.joints[3]);
+    assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);
+}
+
 struct Row {
     error: &'static str,
     cause: fn(&mut Rig),

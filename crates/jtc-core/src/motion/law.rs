@@ -66,7 +66,7 @@ impl JointTorque {
 
 impl Motion {
     /// The control law and its limits: torques to command, and joint errors found on the way. `braking`: with all the torque
-    /// there is, so that what this does to torque, position error and acceleration is none (J-33).
+    /// there is, so that what this does to the torque, and on the path to position error and acceleration, is none (J-33).
     pub fn control(
         &mut self,
         law: Law,
@@ -190,7 +190,9 @@ impl Motion {
         parameters: &ControlParameters<'_>,
     ) -> ([f64; JOINTS], [u16; JOINTS]) {
         let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
-        let excused = if braking { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
+        // Only while path time runs: an arm that is pushed away from where the path stands is not to be fought (J-66).
+        let on_path = braking && law == Law::Follow;
+        let excused = if on_path { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         for j in 0..JOINTS {
             let limits = &config.joints[j];
             let computed = self.torque[j].sum();

@@ -319,7 +319,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// The control law; returns the torque to command. Errors of the joints are acted upon, or raised.
-    fn control(&mut self, law: Law) -> [f64; JOINTS] {
+    pub(crate) fn control(&mut self, law: Law) -> [f64; JOINTS] {
         // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
         self.errors.raise_joints(&self.motion.too_fast(&self.nodes, &self.config));
         let (mut torque, mut errors) = self.compute(law);

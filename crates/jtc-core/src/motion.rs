@@ -113,6 +113,12 @@ impl Motion {
         })
     }
 
+    /// As if every joint were enabled and its position latched.
+    #[cfg(test)]
+    pub fn hold_for_test(&mut self) {
+        self.holding = [true; JOINTS];
+    }
+
     /// Every joint is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
         self.coast.iter().all(Option::is_none)

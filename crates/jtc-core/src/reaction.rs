@@ -90,6 +90,24 @@ mod tests {
     }
 
     #[test]
+    fn j66_what_the_law_finds_in_motion_is_what_the_arm_reacts_to() {
+        let found = |velocity: f64, offset: f64| {
+            let mut controller = running();
+            controller.motion.hold_for_test();
+            controller.motion.set.velocity[1] = velocity;
+            controller.motion.set.position[1] = controller.nodes.positions()[1] + offset;
+            controller.control(Law::Follow);
+            (controller.path, controller.tes, controller.errors.word(), controller.errors.joint(1))
+        };
+        let limits = Config::avena().joints[1];
+        let (too_fast, too_far) = (1.01 * limits.velocity_max, 1.01 * limits.position_error_max);
+        let stops = Path::Running { leave: Some(Tes::Pause) };
+        assert_eq!(found(too_fast, 0.0), (stops, Tes::Execute, 0, (0, joint_error::VELOCITY)));
+        let (_, tes, word, joint) = found(0.0, too_far);
+        assert_eq!((tes, word, joint), (Tes::Pause, 0, (0, joint_error::POSITION_ERROR)));
+    }
+
+    #[test]
     fn j66_other_errors_and_other_states_do_not_stop_on_the_path() {
         for bit in [joint_error::TORQUE, joint_error::POSITION_ERROR, joint_error::POSITION] {
             assert!(!running().stops_on_path(Law::Follow, &[0, bit | joint_error::VELOCITY, 0, 0, 0, 0]));

@@ -175,6 +175,11 @@ fn error_and_clear(rig: &mut Rig) {
 fn the_pump_is_switched_off_by_an_error_where_the_setting_says_so() {
     for state in POWERED {
         let mut rig = powered(state);
+        rig.safety_input = false;
+        rig.tick();
+        let off = matches!(rig.sent.last(), Some(Request::Move { pump: false, .. }));
+        assert!(off, "in the tick of the error: {:?}", rig.sent.last());
+        let mut rig = powered(state);
         error_and_clear(&mut rig);
         assert_eq!((rig.nodes[GRIPPER].report.fsm, rig.pump), (fsm::READY, false));
         assert_eq!(rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]), DataStatus::NotAllowed);

@@ -292,13 +292,67 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
             .all(|event| matches!(event.what, Happening::Error { .. } | Happening::State { .. }))
     );
     bus.recover(a);
-    let events = run(&mut bus, 60 * MS);
-    let back =
-        events.iter().find(|event| matches!(event.what, Happening::State { member, .. } if member == a));
-    assert_eq!(back.unwrap().at_ns, 51 * MS + 128 * 11 * 1000);
+    let events = run(&mut bus, 100 * MS);
+    let is_back = |event: &TimedEvent| matches!(event.what, Happening::State { member, .. } if member == a);
+    let back = events.iter().position(is_back).unwrap();
+    // Nobody acknowledges the other one's frame: each try ends with 11 recessive bits.
+    assert_eq!(errors(&events[..back]), [BusError::NotAcknowledged; 128]);
     assert_eq!(received(&events, a), [frame(0x200, &[])]);
     bus.queue(a, frame(0x100, &[1])).unwrap();
-    assert_eq!(received(&run(&mut bus, 70 * MS), b), [frame(0x100, &[1])]);
+    assert_eq!(received(&run(&mut bus, 110 * MS), b), [frame(0x100, &[1])]);
+}
+
+#[test]
+fn recovery_on_an_idle_bus_takes_1408_bit_times() {
+    let mut bus = TimedBus::new(500_000, 7);
+    let (a, _b) = (bus.join(), bus.join());
+    bus.set_disturbance(1.0);
+    bus.queue(a, frame(0x100, &[1])).unwrap();
+    run(&mut bus, 100 * MS);
+    assert_eq!(bus.state(a).errors, ErrorState::BusOff);
+    bus.recover(a);
+    let back = bus.advance_to(200 * MS).unwrap();
+    assert_eq!((back.at_ns, bus.state(a).errors), (100 * MS + 1408 * 2000, ErrorState::Active));
+}
+
+/// ISO 11898-1: on a busy bus 11 recessive bits in a row come once a frame, so 128 frames pass before a controller is back.
+#[test]
+fn recovery_on_a_busy_bus_takes_128_frames() {
+    let mut bus = TimedBus::new(1_000_000, 7);
+    let (a, b, c) = (bus.join(), bus.join(), bus.join());
+    bus.set_recovers_by_itself(true);
+    bus.set_disturbance(1.0);
+    bus.queue(a, frame(0x100, &[1])).unwrap();
+    while bus.state(a).errors != ErrorState::BusOff {
+        bus.advance_to(50 * MS);
+    }
+    bus.set_disturbance(0.0);
+    // Waits for it, and nobody's frame waits meanwhile.
+    bus.queue(a, frame(0x001, &[])).unwrap();
+    for _ in 0..200 {
+        bus.queue(b, frame(0x200, &[0x55; 8])).unwrap();
+    }
+    let events = run(&mut bus, 100 * MS);
+    let heard = received(&events, c);
+    let first = heard.iter().position(|frame| frame.id() == Id::standard(1).unwrap()).unwrap();
+    assert_eq!(first, 128, "frames before the first one of the member that was bus-off");
+    assert_eq!(bus.state(a).errors, ErrorState::Active);
+}
+
+/// A reset brings a member back at once, with all counters at 0.
+#[test]
+fn a_reset_member_is_on_the_bus_again() {
+    let mut bus = TimedBus::new(1_000_000, 7);
+    let (a, b) = (bus.join(), bus.join());
+    bus.set_disturbance(1.0);
+    bus.queue(a, frame(0x100, &[1])).unwrap();
+    run(&mut bus, 50 * MS);
+    assert_eq!(bus.state(a).errors, ErrorState::BusOff);
+    bus.set_disturbance(0.0);
+    bus.clear(a);
+    assert_eq!((bus.state(a).tec, bus.state(a).rec), (Some(0), Some(0)));
+    bus.queue(a, frame(0x100, &[2])).unwrap();
+    assert_eq!(received(&run(&mut bus, 60 * MS), b), [frame(0x100, &[2])]);
 }
 
 #[test]

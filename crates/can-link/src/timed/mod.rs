@@ -15,7 +15,7 @@ use confinement::Counters;
 use contest::{Contest, Starter};
 pub use event::{BusError, BusStats, Happening, MemberId, QueueError, TimedEvent};
 pub use wire::classic_frame_bits;
-use wire::{ERROR_FRAME, INTERMISSION, RECOVERY, TO_ACKNOWLEDGE};
+use wire::{ERROR_FRAME, INTERMISSION, RECESSIVE_RUN, RECOVERIES, TO_ACKNOWLEDGE};
 
 /// Frames of a member that wait at most.
 const QUEUE: usize = 65_536;
@@ -53,6 +53,7 @@ pub struct TimedBus {
     free_from: u64,
     events: VecDeque<Happening>,
     stats: BusStats,
+    recovers_by_itself: bool,
 }
 
 struct Member {
@@ -63,8 +64,8 @@ struct Member {
     counters: Counters,
     /// A passive member lets others go first.
     may_start: u64,
-    /// When it is on the bus again after bus-off.
-    recovers: Option<u64>,
+    /// Its way back from bus-off.
+    recovery: Option<Recovery>,
     one_shot: bool,
     /// What it is sending was forgotten meanwhile: there is no second try.
     last_try: bool,
@@ -75,6 +76,22 @@ struct Member {
 impl Member {
     fn on_bus(&self) -> bool {
         !self.left && !self.counters.bus_off()
+    }
+}
+
+/// What a member that is bus-off still has to see: 11 recessive bits, so often.
+///
+/// They come one after the other on an idle bus, and one at the end of each frame: the delimiter of its acknowledgement or of its
+/// error frame, the end, and the intermission. A busy bus lets nobody back sooner than after 128 frames.
+struct Recovery {
+    left: u32,
+    /// Recessive since then, ns; `None` while a frame is on the wire.
+    recessive_from: Option<u64>,
+}
+
+impl Recovery {
+    fn due(&self, sequence_ns: u64) -> Option<u64> {
+        Some(self.recessive_from? + u64::from(self.left) * sequence_ns)
     }
 }
 
@@ -110,7 +127,14 @@ impl TimedBus {
             free_from: 0,
             events: VecDeque::new(),
             stats: BusStats::default(),
+            recovers_by_itself: false,
         }
+    }
+
+    /// Whether controllers begin their way back as soon as they are bus-off, as `restart-ms` of Linux and the automatic recovery of
+    /// many controllers do. What is queued meanwhile waits. Else [`recover`](Self::recover) begins it.
+    pub fn set_recovers_by_itself(&mut self, recovers: bool) {
+        self.recovers_by_itself = recovers;
     }
 
     /// A new member. It acknowledges, hears what ends from now on, and tries again when sending fails.
@@ -120,7 +144,7 @@ impl TimedBus {
             lines: None,
             counters: Counters::default(),
             may_start: 0,
-            recovers: None,
+            recovery: None,
             one_shot: false,
             last_try: false,
             acknowledges: true,
@@ -134,16 +158,30 @@ impl TimedBus {
         let member = &mut self.members[member.0];
         member.queue.clear();
         member.lines = None;
-        member.recovers = None;
+        member.recovery = None;
         member.left = true;
     }
 
-    /// Forgets what the member has queued, as a reset does. A frame on the wire ends as it would have, but is not tried again.
+    /// Forgets what the member has queued and its error counters, as a reset does: it is on the bus again. A frame on the wire ends
+    /// as it would have, but is not tried again.
     pub fn clear(&mut self, member: MemberId) {
         let sends = self.transfer.as_ref().is_some_and(|transfer| transfer.contest.involves(member));
-        let member = &mut self.members[member.0];
+        let number = member;
+        let member = &mut self.members[number.0];
         member.queue.truncate(usize::from(sends));
         member.last_try = sends;
+        self.restart(number);
+    }
+
+    /// Counters of a member as after power-up.
+    fn restart(&mut self, number: MemberId) {
+        let member = &mut self.members[number.0];
+        member.recovery = None;
+        let before = core::mem::take(&mut member.counters).state().errors;
+        let state = member.counters.state();
+        if state.errors != before {
+            self.events.push_back(Happening::State { member: number, state });
+        }
     }
 
     /// A member that gives up a frame after one failure instead of trying again.
@@ -185,7 +223,7 @@ impl TimedBus {
         if member.left {
             return Err(QueueError::Left);
         }
-        if member.counters.bus_off() {
+        if member.counters.bus_off() && !self.recovers_by_itself {
             return Err(QueueError::BusOff);
         }
         let waiting = member.queue.len() + member.lines.as_ref().map_or(0, |lines| lines.0.len());
@@ -209,12 +247,13 @@ impl TimedBus {
         self.members[member.0].counters.state()
     }
 
-    /// Starts the recovery of a member that is bus-off: it is back after 128 times 11 bit times.
+    /// Starts the recovery of a member that is bus-off: it is back when it has seen 11 recessive bits 128 times (ISO 11898-1), which
+    /// takes 1408 bit times on an idle bus.
     pub fn recover(&mut self, member: MemberId) {
-        let due = self.now + self.bits_ns(RECOVERY);
+        let recessive_from = self.transfer.is_none().then_some(self.now);
         let member = &mut self.members[member.0];
-        if member.counters.bus_off() && member.recovers.is_none() {
-            member.recovers = Some(due);
+        if member.counters.bus_off() && member.recovery.is_none() {
+            member.recovery = Some(Recovery { left: RECOVERIES, recessive_from });
         }
     }
 
@@ -233,10 +272,11 @@ impl TimedBus {
         if !self.events.is_empty() {
             return Some(self.now);
         }
+        let sequence = self.bits_ns(RECESSIVE_RUN);
         let lines = self.members.iter().filter_map(|member| member.lines.as_deref());
         let due =
             lines.flat_map(|(send, receive)| [send.next_due(), receive.next_due()]).flatten().filter_map(ns);
-        let recoveries = self.members.iter().filter_map(|member| member.recovers);
+        let recoveries = self.members.iter().filter_map(|member| member.recovery.as_ref()?.due(sequence));
         let wire = match &self.transfer {
             Some(transfer) => Some(transfer.end),
             None => self.next_start(),
@@ -283,14 +323,13 @@ impl TimedBus {
             && let Some(transfer) = self.transfer.take()
         {
             self.finish(transfer);
+            self.wire_is_recessive();
         }
+        let sequence = self.bits_ns(RECESSIVE_RUN);
         for number in 0..self.members.len() {
-            let member = &mut self.members[number];
-            if member.recovers.is_some_and(|due| due <= self.now) {
-                member.recovers = None;
-                member.counters = Counters::default();
-                let state = member.counters.state();
-                self.events.push_back(Happening::State { member: MemberId(number), state });
+            let recovery = self.members[number].recovery.as_ref();
+            if recovery.and_then(|recovery| recovery.due(sequence)).is_some_and(|due| due <= self.now) {
+                self.restart(MemberId(number));
             }
             let member = &mut self.members[number];
             let off = !member.on_bus();
@@ -308,6 +347,24 @@ impl TimedBus {
         // Events of this moment come first: who reacts to them takes part in the next arbitration.
         if self.events.is_empty() && self.transfer.is_none() {
             self.start();
+        }
+    }
+
+    /// A frame has ended: the first of 11 recessive bits was the delimiter before its end.
+    fn wire_is_recessive(&mut self) {
+        let from = self.free_from.saturating_sub(self.bits_ns(RECESSIVE_RUN));
+        for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
+            recovery.recessive_from.get_or_insert(from);
+        }
+    }
+
+    /// A frame begins: what was not yet 11 recessive bits counts for nothing.
+    fn wire_is_taken(&mut self) {
+        let (now, sequence) = (self.now, self.bits_ns(RECESSIVE_RUN));
+        for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
+            let Some(from) = recovery.recessive_from.take() else { continue };
+            let seen = now.saturating_sub(from) / sequence.max(1);
+            recovery.left = recovery.left.saturating_sub(u32::try_from(seen).unwrap_or(u32::MAX));
         }
     }
 
@@ -334,6 +391,7 @@ impl TimedBus {
         self.free_from = end + self.bits_ns(INTERMISSION);
         self.stats.busy_ns += self.free_from - self.now;
         self.transfer = Some(Transfer { end, contest, error });
+        self.wire_is_taken();
     }
 
     /// Senders do not acknowledge.

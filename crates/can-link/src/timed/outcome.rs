@@ -3,7 +3,7 @@
 use super::confinement::Counters;
 use super::wire::SUSPENDED;
 use super::{BusError, Happening, MemberId, TimedBus, Transfer, time};
-use crate::CanFrame;
+use crate::{CanFrame, ErrorState};
 
 impl TimedBus {
     pub(super) fn finish(&mut self, transfer: Transfer) {
@@ -107,6 +107,9 @@ impl TimedBus {
         let state = member.counters.state();
         if state.errors != before {
             self.events.push_back(Happening::State { member: number, state });
+            if self.recovers_by_itself && state.errors == ErrorState::BusOff {
+                self.recover(number);
+            }
         }
     }
 }

@@ -16,8 +16,9 @@ pub(crate) const INTERMISSION: u32 = 3;
 pub(crate) const ERROR_FRAME: u32 = 6 + 6 + 8;
 /// How long an error passive member waits after the intermission that follows its own frame.
 pub(crate) const SUSPENDED: u32 = 8;
-/// Recessive bits after which a controller may leave bus-off: 128 times 11.
-pub(crate) const RECOVERY: u32 = 128 * 11;
+/// Recessive bits in a row that a controller on its way back from bus-off counts as one, and how many of those it needs.
+pub(crate) const RECESSIVE_RUN: u32 = 11;
+pub(crate) const RECOVERIES: u32 = 128;
 
 /// Most bits from the start of a frame to the end of its CRC, stuffing included (29-bit identifier, 8 bytes: 118 and 29).
 const MOST: usize = 147;

@@ -6,8 +6,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use can_link::{
-    BusError, BusStats, CanFrame, ClientEvent, ClientId, Happening, MemberId, SocketcandGateway, TimedBus,
-    TimedEvent,
+    BusError, BusStats, CanFrame, ClientEvent, ClientId, ErrorState, Happening, MemberId, SocketcandGateway,
+    TimedBus, TimedEvent,
 };
 use cli_kit::{Output, Stop};
 use serde_json::json;
@@ -101,12 +101,17 @@ struct Server<'a> {
     started: Instant,
     start_us: u64,
     words: Receiver<String>,
+    /// The last frame on the wire that clients were given, and when it ended, ns.
+    carried: Option<(u64, CanFrame)>,
+    /// When it was last said that a controller has left the bus, ns.
+    off_said_ns: Option<u64>,
     out: &'a Output,
 }
 
 impl<'a> Server<'a> {
     fn new(gateway: SocketcandGateway, chain: ChainSim, bitrate: u32, seed: u64, out: &'a Output) -> Self {
         let mut bus = TimedBus::new(bitrate, seed);
+        bus.set_recovers_by_itself(true);
         let inside = (0..chain.members()).map(|_| bus.join()).collect();
         Self {
             gateway,
@@ -118,6 +123,8 @@ impl<'a> Server<'a> {
             started: Instant::now(),
             start_us: 0,
             words: words(),
+            carried: None,
+            off_said_ns: None,
             out,
         }
     }
@@ -173,6 +180,7 @@ impl<'a> Server<'a> {
             for member in self.chain.advance(at_us) {
                 self.bus.clear(self.inside[member]);
             }
+            self.bus.set_disturbance(self.chain.disturbance());
             for (i, member) in self.inside.iter().enumerate() {
                 self.bus.set_acknowledges(*member, self.chain.is_powered(i));
                 while let Some(frame) = self.chain.poll(i) {
@@ -210,13 +218,18 @@ impl<'a> Server<'a> {
                     if let Ok(protocol) = plain(frame) {
                         self.chain.sent(i, &protocol);
                     }
-                    for frame in through(&mut self.chain, frame) {
-                        self.gateway.deliver(0, &frame, None);
+                    // Frames of several members that are alike bit for bit are one on the wire (D-07).
+                    if self.carried.replace((event.at_ns, *frame)) != Some((event.at_ns, *frame)) {
+                        for frame in through(&mut self.chain, frame) {
+                            self.gateway.deliver(0, &frame, None);
+                        }
                     }
                 }
                 None => {
                     let client = self.clients.iter().find(|(_, m)| *m == member).map(|(client, _)| *client);
-                    self.gateway.deliver(0, frame, client);
+                    if self.carried.replace((event.at_ns, *frame)) != Some((event.at_ns, *frame)) {
+                        self.gateway.deliver(0, frame, client);
+                    }
                 }
             },
             Happening::Failed { member, frame } => {
@@ -231,8 +244,28 @@ impl<'a> Server<'a> {
                     "{time_s:.3} s: two members send {id} at once with different data; both are destroyed (D-05)"
                 ));
             }
+            Happening::State { member, state } if state.errors == ErrorState::BusOff => {
+                self.is_off(*member, event.at_ns)
+            }
             Happening::Error { .. } | Happening::State { .. } => {}
         }
+    }
+
+    /// A controller has left the bus; it comes back by itself. Said once a second at most: on a bad wire it happens all the time.
+    fn is_off(&mut self, member: MemberId, at_ns: u64) {
+        if self.off_said_ns.is_some_and(|said| at_ns.saturating_sub(said) < 1_000_000_000) {
+            return;
+        }
+        self.off_said_ns = Some(at_ns);
+        let client = self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| client.to_string());
+        let who = match self.inside.iter().position(|m| *m == member) {
+            Some(i) => format!("the board at position {}", i + 1),
+            None => client.unwrap_or_else(|| "a client that has gone".into()),
+        };
+        let time_s = at_ns as f64 * 1e-9;
+        self.out.note(format!(
+            "{time_s:.3} s: {who} is bus-off; its controller is back after 128 times 11 recessive bits"
+        ));
     }
 
     fn heard(&mut self, client: ClientId, event: ClientEvent) {

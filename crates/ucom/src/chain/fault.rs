@@ -36,6 +36,8 @@ pub enum FaultKind {
     Corrupted(f64),
     /// A share of the frames comes twice.
     Doubled(f64),
+    /// A share of the frames is destroyed on the wire; error counters rise, up to bus-off.
+    Disturbed(f64),
 }
 
 /// When a fault begins.
@@ -111,7 +113,7 @@ pub enum FaultError {
     },
 }
 
-const KINDS: [&str; 13] = [
+const KINDS: [&str; 14] = [
     "power-loss",
     "silent",
     "deaf",
@@ -125,6 +127,7 @@ const KINDS: [&str; 13] = [
     "lost",
     "corrupted",
     "doubled",
+    "disturbed",
 ];
 
 #[derive(Deserialize)]
@@ -190,9 +193,13 @@ impl Entry {
             "lost" => FaultKind::Lost(share()?),
             "corrupted" => FaultKind::Corrupted(share()?),
             "doubled" => FaultKind::Doubled(share()?),
+            "disturbed" => FaultKind::Disturbed(share()?),
             _ => return Err(FaultError::Kind { fault, kind: self.kind }),
         };
-        let shared = matches!(kind, FaultKind::Lost(_) | FaultKind::Corrupted(_) | FaultKind::Doubled(_));
+        let shared = matches!(
+            kind,
+            FaultKind::Lost(_) | FaultKind::Corrupted(_) | FaultKind::Doubled(_) | FaultKind::Disturbed(_)
+        );
         if self.share.is_some() && !shared {
             return Err(superfluous("share"));
         }
@@ -251,7 +258,7 @@ mod tests {
         for kind in KINDS {
             assert!(FAULT_HELP.contains(&format!("\n{kind} ")), "{kind} is not in the help");
             let mut text = format!("[[fault]]\nkind = '{kind}'\nat_s = 1.5\n");
-            if matches!(kind, "lost" | "corrupted" | "doubled") {
+            if matches!(kind, "lost" | "corrupted" | "doubled" | "disturbed") {
                 text += "share = 0.5\n";
             } else if !kind.starts_with("foreign") {
                 text += "board = 2\n";

@@ -37,6 +37,7 @@ pub struct ChainSim {
     lost: f64,
     corrupted: f64,
     doubled: f64,
+    disturbed: f64,
     master_at: Option<u64>,
     foreign_at: Option<u64>,
 }
@@ -60,6 +61,7 @@ impl ChainSim {
             lost: 0.0,
             corrupted: 0.0,
             doubled: 0.0,
+            disturbed: 0.0,
             master_at: None,
             foreign_at: None,
         };
@@ -170,6 +172,11 @@ impl ChainSim {
         vec![data; times]
     }
 
+    /// Share of the frames that are destroyed on the wire, 0 to 1: the caller's bus destroys them.
+    pub fn disturbance(&self) -> f64 {
+        self.disturbed
+    }
+
     fn count(&mut self, frame: &Frame) {
         *self.seen.entry(frame.id()).or_default() += 1;
         if self.waiting.iter().any(|fault| matches!(fault.trigger, Trigger::Frame { .. })) {
@@ -251,6 +258,7 @@ impl ChainSim {
             FaultKind::Lost(s) => self.lost = share(s),
             FaultKind::Corrupted(s) => self.corrupted = share(s),
             FaultKind::Doubled(s) => self.doubled = share(s),
+            FaultKind::Disturbed(s) => self.disturbed = share(s),
             FaultKind::ForeignMaster => self.master_at = on.then_some(now),
             FaultKind::ForeignFrames => self.foreign_at = on.then_some(now),
             kind => {

@@ -32,7 +32,13 @@ pub fn image(data: &[u8]) {
 
 /// Recordings in every form; what is read is written in the same form and gives the same.
 pub fn recording(data: &[u8]) {
-    if let Ok(recording) = Recording::read_candump(data) {
+    // Text forms count microseconds, and what is written is whole.
+    let as_written = |recording: &mut Recording| {
+        recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
+        recording.broken_off = None;
+    };
+    if let Ok(mut recording) = Recording::read_candump(data) {
+        as_written(&mut recording);
         let mut out = CandumpWriter::new(Vec::new());
         recording.records.iter().for_each(|r| out.write(r).expect("a vector takes all"));
         let again = Recording::read_candump(&out.into_inner()[..]).expect("our own form");
@@ -42,8 +48,7 @@ pub fn recording(data: &[u8]) {
     stream.push(b'\n');
     stream.extend_from_slice(data);
     if let Ok(mut recording) = Recording::read_fzi(&stream[..]) {
-        // The form counts microseconds.
-        recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
+        as_written(&mut recording);
         let mut out = FziWriter::new(Vec::new()).expect("a vector takes all");
         recording.records.iter().for_each(|r| out.write(r).expect("a frame of this form"));
         assert_eq!(Recording::read_fzi(&out.into_inner()[..]).expect("our own form"), recording);

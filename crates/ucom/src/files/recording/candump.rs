@@ -130,14 +130,10 @@ impl<W: Write> CandumpWriter<W> {
         Ok(())
     }
 
-    /// Adds a line. Microseconds as candump has them; nanoseconds where the record is finer.
+    /// Adds a line. Its time has microseconds: can-utils refuse any other number of decimals.
     pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let (seconds, ns) = (record.time_ns / 1_000_000_000, record.time_ns % 1_000_000_000);
-        if ns % 1000 == 0 {
-            write!(self.out, "({seconds:010}.{:06})", ns / 1000)?;
-        } else {
-            write!(self.out, "({seconds:010}.{ns:09})")?;
-        }
+        write!(self.out, "({seconds:010}.{:06})", ns / 1000)?;
         write!(self.out, " {} {}", record.channel, record.frame)?;
         match record.direction {
             None => writeln!(self.out)?,
@@ -145,6 +141,11 @@ impl<W: Write> CandumpWriter<W> {
             Some(Direction::Sent) => writeln!(self.out, " T")?,
         }
         Ok(())
+    }
+
+    /// Passes on what is buffered.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        Ok(self.out.flush()?)
     }
 
     /// The output.

@@ -66,6 +66,9 @@ pub enum RecordProblem {
     /// Not data.
     #[error("the data are not pairs of hexadecimal digits, or too many")]
     Data,
+    /// The file ends in the middle of it: even what can be read of it may be only its beginning.
+    #[error("the file is broken off here: the line has no end")]
+    BrokenOff,
     /// Wrong number of columns.
     #[error("a line of FZI-CAN is `sec.usec id dlc` and eight bytes")]
     FziColumns,

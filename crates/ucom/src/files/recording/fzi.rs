@@ -84,6 +84,11 @@ impl<W: Write> FziWriter<W> {
         Ok(())
     }
 
+    /// Passes on what is buffered.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        Ok(self.out.flush()?)
+    }
+
     /// The output.
     pub fn into_inner(self) -> W {
         self.out

@@ -9,13 +9,15 @@ use super::{MAX_LINE, Record, RecordProblem, RecordingError};
 pub(super) struct Lines<R> {
     input: R,
     number: usize,
+    /// The last line had no end.
+    endless: bool,
     failed: bool,
 }
 
 impl<R: BufRead> Lines<R> {
     /// From the start of the file.
     pub fn new(input: R) -> Self {
-        Self { input, number: 0, failed: false }
+        Self { input, number: 0, endless: false, failed: false }
     }
 
     /// The next line without blanks around it; `None` at the end of the file. Memory is bounded whatever comes.
@@ -29,6 +31,7 @@ impl<R: BufRead> Lines<R> {
         if line.len() > MAX_LINE {
             return Err(self.error(RecordProblem::TooLong));
         }
+        self.endless = line.last() != Some(&b'\n');
         Ok(Some(String::from_utf8_lossy(&line).trim().to_owned()))
     }
 
@@ -54,6 +57,8 @@ impl<R: BufRead> Lines<R> {
         while let Some(line) = self.line()? {
             if line.starts_with('#') {
                 comment(&line);
+            } else if self.endless && !line.is_empty() {
+                return Err(self.error(RecordProblem::BrokenOff));
             } else if !line.is_empty() {
                 return parse(&line).map(Some).map_err(|problem| self.error(problem));
             }

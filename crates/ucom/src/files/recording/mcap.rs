@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Direction, FrameKind, Record, RecordedFrame, Recording, RecordingError, hex_bytes};
 
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const TOPIC: &str = "/can";
 const METADATA: &str = "ucom";
 /// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
@@ -151,6 +152,11 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(self.out.write_to_known_channel(&header, &json)?)
     }
 
+    /// Ends the chunk under way: what was written so far can be read without the rest.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        Ok(self.out.flush()?)
+    }
+
     /// Writes index and end.
     pub fn finish(mut self) -> Result<W, RecordingError> {
         self.out.finish()?;
@@ -158,11 +164,12 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Reads a whole file.
+/// Reads a whole file, or one whose writer was killed up to its last whole record.
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
     let mut channels = BTreeMap::new();
-    each_record(file, LinearReaderOptions::default(), |record| {
+    let options = LinearReaderOptions::default();
+    let broken_off = each_record(file, options, |record| {
         match record {
             records::Record::Metadata(metadata) if metadata.name == METADATA => {
                 recording.profile = metadata.metadata.get("profile").cloned();
@@ -183,19 +190,21 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
         }
         Ok(())
     })?;
+    recording.broken_off = broken_off;
     Ok(recording)
 }
 
 /// Shows the records of a file that we write, those in chunks too. Attachments and indices are passed over unread: the
-/// library panics at damaged ones.
+/// library panics at damaged ones. What is wrong in a file that its writer did not end is no error: it is returned.
 fn each_record(
     file: &[u8],
     options: LinearReaderOptions,
     mut see: impl FnMut(records::Record) -> Result<(), RecordingError>,
-) -> Result<(), RecordingError> {
+) -> Result<Option<String>, RecordingError> {
     let mut reader = LinearReader::new_with_options(options.with_record_length_limit(MAX_RECORD));
     let mut rest = file;
-    while let Some(event) = reader.next_event() {
+    let mut next = || -> Result<bool, RecordingError> {
+        let Some(event) = reader.next_event() else { return Ok(false) };
         match event? {
             LinearReadEvent::ReadRequest(wanted) => {
                 let (piece, later) = rest.split_at(wanted.min(rest.len()));
@@ -208,6 +217,18 @@ fn each_record(
             }
             LinearReadEvent::Record { .. } => {}
         }
+        Ok(true)
+    };
+    // A chunk whose writer was killed says nothing of its length yet, so its damage need not be at the end.
+    let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
+    loop {
+        match next() {
+            Ok(true) => {}
+            Ok(false) => return Ok(None),
+            Err(e) if file.starts_with(MAGIC) && !ended => {
+                return Ok(Some(format!("the file is broken off after {} bytes ({e})", file.len())));
+            }
+            Err(e) => return Err(e),
+        }
     }
-    Ok(())
 }

@@ -75,6 +75,8 @@ pub struct Recording {
     pub profile: Option<String>,
     /// Frames in the order of the file.
     pub records: Vec<Record>,
+    /// Where and how the file ends in the middle of a record, as after a writer that was killed; `None`: it is whole.
+    pub broken_off: Option<String>,
 }
 
 impl Recording {
@@ -100,15 +102,32 @@ impl Recording {
     /// Reads candump lines.
     pub fn read_candump(input: impl BufRead) -> Result<Self, RecordingError> {
         let mut reader = CandumpReader::new(input);
-        let records = reader.by_ref().collect::<Result<_, _>>()?;
-        Ok(Self { profile: reader.into_profile(), records })
+        let (records, broken_off) = whole(&mut reader)?;
+        Ok(Self { profile: reader.into_profile(), records, broken_off })
     }
 
     /// Reads an FZI-CAN stream.
     pub fn read_fzi(input: impl BufRead) -> Result<Self, RecordingError> {
-        let records = FziReader::new(input)?.collect::<Result<_, _>>()?;
-        Ok(Self { profile: None, records })
+        let (records, broken_off) = whole(&mut FziReader::new(input)?)?;
+        Ok(Self { profile: None, records, broken_off })
     }
+}
+
+/// The records of a text up to its end, and how that looks if it is none.
+fn whole(
+    lines: &mut dyn Iterator<Item = Result<Record, RecordingError>>,
+) -> Result<(Vec<Record>, Option<String>), RecordingError> {
+    let mut records = Vec::new();
+    for record in lines {
+        match record {
+            Ok(record) => records.push(record),
+            Err(e @ RecordingError::Line { problem: RecordProblem::BrokenOff, .. }) => {
+                return Ok((records, Some(e.to_string())));
+            }
+            Err(e) => return Err(e),
+        }
+    }
+    Ok((records, None))
 }
 
 /// Writes a recording of any form to a file.
@@ -144,6 +163,15 @@ impl RecordingWriter {
             Self::Candump(w) => w.write(record),
             Self::FziCan(w) => w.write(record),
             Self::Mcap(w) => w.write(record, name),
+        }
+    }
+
+    /// Lets all that was written reach the file: a writer that is killed later loses only what came since.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        match self {
+            Self::Candump(w) => w.flush(),
+            Self::FziCan(w) => w.flush(),
+            Self::Mcap(w) => w.flush(),
         }
     }
 

@@ -198,6 +198,8 @@ fn traffic(o: &Observation, f: &mut Findings) {
     }
 }
 
+const BYTE_ORDER: &str = "`ucom probe --out FILE`, then `--profile FILE` with every command";
+
 fn chain(o: &Observation, f: &mut Findings) {
     if let Some(init) = &o.init {
         for finding in &init.findings {
@@ -218,6 +220,7 @@ fn chain(o: &Observation, f: &mut Findings) {
                     "were boards swapped? `ucom init --inventory FILE` writes the new order".into()
                 }
                 InitFinding::Refused { error, .. } => error.hint(),
+                InitFinding::ByteOrder { .. } => BYTE_ORDER.into(),
                 _ => "`ucom init` again".into(),
             };
             f.problem(finding.to_string(), "", next);
@@ -230,6 +233,11 @@ fn chain(o: &Observation, f: &mut Findings) {
     for shared in scan.findings.iter().filter_map(ScanFinding::error) {
         let (why, next) = super::error::SHARED_CAUSE;
         f.problem(shared.to_string(), why, next);
+    }
+    if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
+        // What else was read of these boards is read wrong, too.
+        f.problem(order.to_string(), "", BYTE_ORDER);
+        return;
     }
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {

@@ -311,6 +311,14 @@ pub enum Incomplete {
         /// How many.
         strings: u32,
     },
+    /// Counts that are small numbers in the other order of bytes.
+    #[error(
+        "it announces {strings} strings, every count a multiple of 256: the byte order is probably wrong"
+    )]
+    ByteOrder {
+        /// How many.
+        strings: u32,
+    },
     /// Packages of a buffer are missing.
     #[error("{missing} of {of} packages are missing")]
     Packages {
@@ -435,6 +443,9 @@ impl Error {
             Self::NoAnswer { board, .. } => {
                 format!("board {board} talks but does not answer this: `ucom info {board}`, then `ucom doctor`")
             }
+            Self::Incomplete { problem: Incomplete::ByteOrder { .. }, .. } => {
+                "`ucom probe --out FILE` measures the order and writes a profile for --profile".into()
+            }
             Self::Incomplete { problem: Incomplete::TooMany { .. } | Incomplete::Start { .. }, .. } => {
                 "the board may read the protocol otherwise: `ucom probe` measures it".into()
             }
@@ -449,6 +460,10 @@ impl Error {
             Self::Device { code, .. } => code.reaction().into(),
             Self::AckMismatch { .. } | Self::WrongSequence { .. } => {
                 "two boards may share a number, or the board reads the protocol otherwise: `ucom reset`, `ucom probe`"
+                    .into()
+            }
+            Self::WrongBoard { wanted, found, .. } if *wanted == found.swap_bytes() => {
+                "only the bytes are exchanged: is the byte order right (`endian` in the profile)? `ucom probe` measures it"
                     .into()
             }
             Self::WrongBoard { board, .. } => {

@@ -12,9 +12,10 @@ use super::link::Link;
 use super::repair::given_back;
 pub(crate) use super::repair::{repair, repair_procedure};
 use super::request::{Answer, TRIES, ask_info, confirmed, info, set_status};
-use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
+use super::scan::{REPORTS, Reports, ask_reports, collect_reports, exchanged, other_order};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
+use crate::profile::Endian;
 use crate::{FromBoard, Function, Sequence, Status, ToBoard};
 
 /// How to number a chain.
@@ -72,6 +73,12 @@ pub enum InitFinding {
         after: u8,
         /// Low bytes of the flash numbers that reported and were not reached.
         ids: Vec<u8>,
+    },
+    /// The flash numbers fit the reports only with their bytes exchanged (D-10).
+    #[error("{}", other_order(*endian))]
+    ByteOrder {
+        /// The order that the profile has.
+        endian: Endian,
     },
     /// More boards than reports: boards share the low byte of their flash number.
     #[error(
@@ -254,6 +261,11 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
     if reached != report.reports.ids {
         // A report may have been lost.
         ask_reports(link, &mut report.reports).await;
+    }
+    if exchanged(&report.reports, &report.boards) {
+        // Everything else would compare numbers that are read wrong.
+        report.findings.push(InitFinding::ByteOrder { endian: link.profile().endian });
+        return;
     }
     let reports = &report.reports.ids;
     let mut findings = Vec::new();

@@ -7,6 +7,7 @@ use super::holders::one_board_each;
 use super::link::Link;
 use super::request::{Answer, InfoCollector, TRIES, identity, remember};
 use super::{BoardSeen, Error, Outcome};
+use crate::profile::Endian;
 use crate::{BoardInfo, FromBoard, Function, Report, Sequence, Status, ToBoard};
 
 /// Between two requests of a round, µs: the answers of 31 boards do not come as one burst.
@@ -96,6 +97,12 @@ pub enum ScanFinding {
         /// By the data.
         ucom_id: u8,
     },
+    /// The flash numbers fit the reports only with their bytes exchanged (D-10).
+    #[error("{}", other_order(*endian))]
+    ByteOrder {
+        /// The order that the profile has.
+        endian: Endian,
+    },
     /// Answers that contradict each other.
     #[error("the answers of board {board} contradict each other: two boards may have this number")]
     Contradicts {
@@ -126,6 +133,26 @@ pub enum ScanFinding {
         /// Its number.
         board: u8,
     },
+}
+
+/// Words for boards that send the bytes of a word in the other order than the profile has.
+pub(crate) fn other_order(endian: Endian) -> String {
+    let (here, there) = match endian {
+        Endian::Little => ("little", "big"),
+        Endian::Big => ("big", "little"),
+    };
+    format!(
+        "wrong byte order: the flash numbers fit the reports only with their bytes exchanged, so the boards send words as \
+         {there}-endian, and the profile has `endian = \"{here}\"`: `ucom probe --out FILE` measures it and writes a profile"
+    )
+}
+
+/// Whether the boards' flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
+pub(crate) fn exchanged(reports: &Reports, boards: &[BoardSeen]) -> bool {
+    let fits = |byte: u16| reports.ids.contains(&(byte as u8));
+    let only_exchanged = |b: &BoardSeen| !fits(b.info.flash_number) && fits(b.info.flash_number >> 8);
+    let [high, low] = [|b: &BoardSeen| b.info.flash_number >> 8, |b: &BoardSeen| b.info.flash_number & 0xFF];
+    boards.iter().any(only_exchanged) && boards.iter().all(|b| only_exchanged(b) || high(b) == low(b))
 }
 
 fn shared(board: u8, found: [u16; 2]) -> Error {
@@ -310,11 +337,17 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     if missing(&report.boards, &report.reports) || report.reports.ids.is_empty() {
         ask_reports(&link, &mut report.reports).await;
     }
-    judge(&mut report);
+    judge(&mut report, link.profile().endian);
     Ok(Outcome::Scan(report))
 }
 
-fn judge(report: &mut ScanReport) {
+fn judge(report: &mut ScanReport, endian: Endian) {
+    if exchanged(&report.reports, &report.boards) {
+        // What would follow from it is none of the chain's faults.
+        report.findings.retain(|finding| !matches!(finding, ScanFinding::NoDescription { .. }));
+        report.findings.push(ScanFinding::ByteOrder { endian });
+        return;
+    }
     let mut numbered: BTreeSet<u8> = report.boards.iter().map(|b| b.info.flash_number as u8).collect();
     for finding in &report.findings {
         if let ScanFinding::NumberShared { first, second, .. } = finding {

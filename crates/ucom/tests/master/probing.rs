@@ -2,7 +2,7 @@
 
 use ucom::master::doctor::{Controller, Observation, Severity, findings};
 use ucom::master::probe::ProbeOptions;
-use ucom::master::{InitOptions, Outcome, Request};
+use ucom::master::{InitFinding, InitOptions, Outcome, Request, ScanFinding};
 use ucom::profile::{AliveMode, Endian, ReportMode};
 use ucom::{Checksum, Profile};
 
@@ -42,6 +42,41 @@ fn p20_probe_finds_the_profile() {
         assert_eq!(report.profile, profile, "{}", report.table());
         assert_eq!(report.boards, [1, 2, 3]);
     }
+}
+
+/// D-10: with the wrong byte order the order is what is named, and `probe`; not the wire, the load or the flash numbers.
+#[test]
+fn d10_a_wrong_byte_order_is_named() {
+    for (boards, here) in [(Endian::Big, Endian::Little), (Endian::Little, Endian::Big)] {
+        let new = || {
+            let mut bench =
+                Bench::chain_with(&[0x21, 0x42], Profile { endian: boards, ..Profile::default() });
+            bench.master = ucom::master::Master::new(Profile { endian: here, ..Profile::default() });
+            bench
+        };
+        let mut bench = new();
+        let init = Request::Init(InitOptions { expected: vec![(1, 0x21), (2, 0x42)], force: false });
+        let Ok(Outcome::Init(report)) = bench.go(init, 60) else { panic!("no init") };
+        assert_eq!(report.findings, [InitFinding::ByteOrder { endian: here }], "{here:?}");
+        let Ok(Outcome::Scan(scan)) = bench.go(Request::Scan, 60) else { panic!("no scan") };
+        assert_eq!(scan.findings, [ScanFinding::ByteOrder { endian: here }], "{here:?}");
+        let (statistics, boards) = (bench.master.statistics(), bench.master.boards());
+        let (profile, scan) = (bench.master.profile(), Some(scan));
+        let all = findings(&Observation { statistics, boards, profile, scan, ..Default::default() });
+        let problems: Vec<_> = all.iter().filter(|f| f.severity != Severity::Good).collect();
+        assert_eq!(problems.len(), 1, "{problems:?}");
+        assert!(
+            problems[0].what.contains("byte order") && problems[0].next.contains("ucom probe"),
+            "{problems:?}"
+        );
+        // `io`: an application that runs is needed to describe itself.
+        bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
+        let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
+        assert!(error.to_string().contains("byte order") && error.hint().contains("ucom probe"), "{error:?}");
+    }
+    // What only fits by chance is not taken for it.
+    let mut bench = Bench::chain(&[0x2121, 0x42]);
+    assert!(matches!(bench.go(Request::Init(InitOptions::default()), 60), Ok(Outcome::Init(r)) if r.is_ok()));
 }
 
 /// Without `init` only harmless frames leave.

@@ -30,10 +30,10 @@ impl Collector {
             // Strings begin with 2 bytes, their packages have 1 to 8: only at the start are 6 the dimensions.
             let start = Incomplete::Start { len: payload.len(), need };
             let dimensions = Dimensions::parse(payload, profile.endian).ok_or(start)?;
+            self.dimensions = Some(dimensions);
             if dimensions.strings() > MAX_STRINGS {
                 return Err(Incomplete::TooMany { strings: dimensions.strings() });
             }
-            self.dimensions = Some(dimensions);
             return Ok(());
         };
         let string = self.strings.len() as u32;
@@ -63,6 +63,18 @@ impl Collector {
         Incomplete::Silence { complete: self.strings.len() as u32, of }
     }
 
+    /// Why it is no description: perhaps only read in the wrong order of bytes.
+    fn problem(&self, problem: Incomplete) -> Incomplete {
+        let exchanged = |d: &Dimensions| {
+            let all = [d.ci, d.so, d.par];
+            all.iter().all(|n| n & 0xFF == 0) && all.iter().any(|n| *n > 0)
+        };
+        match self.dimensions.filter(exchanged) {
+            Some(d) => Incomplete::ByteOrder { strings: d.strings() },
+            None => problem,
+        }
+    }
+
     fn description(self) -> Option<IoDescription> {
         let d = self.dimensions?;
         let mut strings = self.strings.into_iter();
@@ -84,12 +96,12 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
             if collector.done() {
                 return Ok(collector.description().map(Ok));
             }
-            return Ok(collector.dimensions.map(|_| Err(collector.silence())));
+            return Ok(collector.dimensions.map(|_| Err(collector.problem(collector.silence()))));
         };
         match heard.message {
             FromBoard::IoDescription(payload) => {
                 if let Err(problem) = collector.push(heard.at, &payload, link) {
-                    return Ok(Some(Err(problem)));
+                    return Ok(Some(Err(collector.problem(problem))));
                 }
                 // A surplus frame would come at once.
                 until = link.now() + if collector.done() { times.quiet } else { times.gap };

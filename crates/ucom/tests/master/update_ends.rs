@@ -1,8 +1,8 @@
 //! Updates that do not go to their end: a bus that fails, a cancel, another board in the place of the one that is meant.
 
-use ucom::Frame;
 use ucom::master::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateReport};
 use ucom::master::{Error, Event, Outcome, Request};
+use ucom::{Frame, Status};
 
 use crate::bench::{Bench, From, Member, OLD, Script};
 use crate::chain::initialised;
@@ -303,4 +303,37 @@ fn d08_a_dry_run_looks_for_another_pc() {
     let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
     assert_eq!(update(&mut bench, dry).exit_code(), 0);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
+}
+
+/// A board that has the image already and was left in programming mode, as by a tool that was killed, does not stay in it; a dry
+/// run changes nothing.
+#[test]
+fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
+    let left = || {
+        let mut bench = initialised(&[0x21, 0x42]);
+        update(&mut bench, options(&[1], 128));
+        bench.go(Request::XReset { board: 1, force: false }, 20).unwrap();
+        assert!(bench.board(0).status().has(Status::PROG));
+        bench
+    };
+    for start in [false, true] {
+        let mut bench = left();
+        let from = bench.log.len();
+        let report = update(&mut bench, UpdateOptions { start, ..options(&[1], 128) });
+        let wanted = if start { UpdateOutcome::Running } else { UpdateOutcome::UpToDate };
+        assert_eq!((report.boards[0].outcome, report.exit_code()), (wanted, 0), "{report:?}");
+        assert!(!bench.board(0).status().has(Status::PROG));
+        assert!(bench.log[from..].iter().all(|(.., f)| !f.to_string().starts_with("2C1#")), "not programmed");
+    }
+    let mut bench = left();
+    let report = update(&mut bench, UpdateOptions { dry_run: true, ..options(&[1], 128) });
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::UpToDate, 0));
+    assert!(bench.board(0).status().has(Status::PROG));
+    // It cannot be ended: that is said.
+    let mut bench = left();
+    bench.lose = vec![("< 1C1#", u32::MAX)];
+    let report = update(&mut bench, options(&[1], 128));
+    let code = report.boards[0].failure.as_ref().map(UpdateFailure::code);
+    assert_eq!((code, report.boards[0].outcome), (Some("still-programming"), UpdateOutcome::UpToDate));
+    assert_ne!(report.exit_code(), 0);
 }

@@ -35,14 +35,16 @@ pub(super) struct Campaign {
     pub starting: Option<u8>,
     /// Boards that have the image already and are still to be started.
     pub to_start: Vec<u8>,
+    /// Boards that have the image already and are in programming mode.
+    pub programming: Vec<u8>,
     stages: BTreeMap<u8, Stage>,
 }
 
 impl Campaign {
     pub fn new(options: UpdateOptions) -> Self {
         let results = options.targets.iter().map(|t| UpdateResult::new(t.board)).collect();
-        let (active, to_start, stages) = (Vec::new(), Vec::new(), BTreeMap::new());
-        Self { options, results, active, starting: None, to_start, stages }
+        let (active, to_start, programming) = (Vec::new(), Vec::new(), Vec::new());
+        Self { options, results, active, starting: None, to_start, programming, stages: BTreeMap::new() }
     }
 
     pub fn result(&mut self, board: u8) -> Option<&mut UpdateResult> {

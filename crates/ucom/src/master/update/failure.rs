@@ -78,6 +78,9 @@ pub enum UpdateFailure {
     /// The image is on the board, but the application did not start.
     #[error("the image is on the board, but: {0}")]
     NotRunning(Box<Error>),
+    /// The image was on the board already, but programming mode, in which it was found, could not be ended.
+    #[error("the image is on the board already, but it may still be in programming mode: {0}")]
+    StillProgramming(Box<Error>),
     /// A step after something was erased failed.
     #[error("{0}")]
     After(Box<Error>),
@@ -103,7 +106,7 @@ impl UpdateFailure {
     /// cancelled before anything was erased, 5 failed or cancelled after that.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Refused(e) => match e.exit_code() {
+            Self::Refused(e) | Self::StillProgramming(e) => match e.exit_code() {
                 2 => 2,
                 3 => 3,
                 _ => 4,
@@ -128,6 +131,7 @@ impl UpdateFailure {
         match self {
             Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::After(e) => e.code(),
             Self::MayBeErased(_) => "may-be-erased",
+            Self::StillProgramming(_) => "still-programming",
             Self::NotValid { .. } => "not-valid",
             Self::Device { .. } => "device-error",
             Self::Timeout { .. } => "timeout",
@@ -142,6 +146,7 @@ impl UpdateFailure {
     pub fn hint(&self) -> String {
         match self {
             Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::NotRunning(e) => e.hint(),
+            Self::StillProgramming(e) => format!("{}; `ucom status N --clear PROG` ends it", e.hint()),
             Self::After(e) => format!("{}; then run the update again to get an application back", e.hint()),
             Self::MayBeErased(_) => {
                 "when the board answers again (`ucom repair`, `ucom init`): run the update again".into()

@@ -91,8 +91,29 @@ async fn broken_off(link: &Link, run: &mut Campaign, why: &Error) -> Result<(), 
     Ok(())
 }
 
+/// A board that has the image already may still be in programming mode, as after an update whose tool was killed: it would take
+/// program data that are meant for others.
+async fn end_programming(link: &Link, run: &mut Campaign) -> Result<(), Error> {
+    while let Some(board) = run.programming.pop() {
+        let ended = match link.become_master(run.options.force).await {
+            Ok(()) => set_status(link, board, Status::PROG, Status(0)).await.map(drop),
+            Err(error) => Err(error),
+        };
+        match ended {
+            Ok(()) => link.note(format!("board {board} was in programming mode: ended")),
+            Err(error) => {
+                let failure = UpdateFailure::StillProgramming(Box::new(error));
+                run.end(board, UpdateOutcome::UpToDate, Some(failure));
+                run.to_start.retain(|b| *b != board);
+            }
+        }
+    }
+    Ok(())
+}
+
 async fn all(link: &Link, run: &mut Campaign) -> Result<(), Error> {
     check(link, run).await;
+    end_programming(link, run).await?;
     let failed = run.results.iter().find(|r| r.failure.is_some()).map(|r| r.board);
     if let Some(after) = failed.filter(|_| !run.options.keep_going) {
         skip_open(run, after);
@@ -190,6 +211,9 @@ async fn check(link: &Link, run: &mut Campaign) {
         let there = run.plan(link, Some(board)).is_ok_and(|plan| has(&known, &plan));
         if there && !run.options.force {
             run.end(board, UpdateOutcome::UpToDate, None);
+            if known.status.has(Status::PROG) && !run.options.dry_run {
+                run.programming.push(board);
+            }
             if run.options.start && !run.options.dry_run {
                 run.to_start.push(board);
             }

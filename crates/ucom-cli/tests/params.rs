@@ -30,22 +30,29 @@ fn d11_values_have_the_units_of_the_edge_table() {
     let said = ucom(&["ci", "1", "set_position=-15.5deg"]).ends(0).json();
     assert_eq!(said["set"][0]["value"], json!(-15.5));
     assert!(peer.wait("341#").starts_with("341#0000F2F9"), "-1550");
-    let refused = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
-    assert_eq!(refused["error"]["message"], "board 1: CI `set_position`: 61 is outside -60.00..60.00 deg");
+    let refused = ucom(&["ci", "1", "set_position=61deg"]).ends(4).json();
+    assert_eq!(
+        refused["error"]["message"],
+        "board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg"
+    );
+    // Without the table it would be the word 61, 0.61 degrees.
+    let bare = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
+    let message = bare["error"]["message"].as_str().unwrap();
+    assert!(message.contains("the unit is missing: `61deg`"), "{bare}");
     let io = ucom(&["io", "1"]).ends(0);
     assert!(io.err.contains("has no SO `nobody`"), "{}", io.err);
     let io = io.json();
     assert_eq!(io["boards"][0]["edges"]["ci"][0]["unit"], "deg");
     assert_eq!(io["boards"][0]["edges"]["ci"][1], json!(null));
     assert_eq!(io["boards"][0]["initial_ci"], json!([0.0, 1000, 900]));
-    let so = ucom(&["ci", "1", "set_position=10", "--for", "1"]).ends(0).json();
+    let so = ucom(&["ci", "1", "set_position=10deg", "--for", "1"]).ends(0).json();
     let position = so["so"]["position"].as_f64().unwrap();
     assert!((9.0..11.0).contains(&position), "{position} deg");
     ucom(&["par", "1", "kd=0x0102", "kp=3"]).ends(0);
     assert_eq!(peer.wait("3C1#"), "3C1#01000201");
     let rounded = ucom(&["par", "1", "kd=0.04"]).ends(0);
     assert!(rounded.err.contains("0.04 → 0.0"), "{}", rounded.err);
-    for words in [["par", "1", "kd=2"], ["ci", "1", "set_position=1"]] {
+    for words in [["par", "1", "kd=2"], ["ci", "1", "set_position=1deg"]] {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
     // A number that would wrap is refused as any other value.

@@ -67,6 +67,14 @@ pub enum ValueError {
         /// The edge's unit.
         unit: String,
     },
+    /// A number alone, where it could be the word or a value in the signal's unit.
+    #[error("{given}: the unit is missing: `{given}{unit}`, or the word itself as 0x0000")]
+    NoUnit {
+        /// What was given.
+        given: String,
+        /// The edge's unit.
+        unit: String,
+    },
     /// Between two words.
     #[error("{given}: it is a whole number")]
     Fraction {
@@ -258,6 +266,10 @@ impl Edge {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
+                // Which of the two a bare number means would hang on what table lies in the directory.
+                if unit.is_empty() && !self.unit.is_empty() {
+                    return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
+                }
                 let steps = (value - self.offset) / self.scale;
                 if kind == EdgeType::Bool && steps != 0.0 && steps != 1.0 {
                     return Err(ValueError::Switch { given: text() });
@@ -328,17 +340,21 @@ mod tests {
     #[test]
     fn d11_scale_offset_and_unit() {
         let angle = edge(EdgeType::Int16, 0.01, 0.0, "deg");
-        assert_eq!(word(&angle, "15.5"), Ok(1550));
+        assert_eq!(word(&angle, "15.5deg"), Ok(1550));
         assert_eq!(word(&angle, "-15.504 deg"), Ok(-1550_i16 as u16));
         assert_eq!(angle.text_with_unit(0xFFFF), "-0.01 deg");
         assert_eq!(angle.json(1550), json!(15.5));
+        // It could be the word, or a value in the unit.
+        let said = word(&angle, "15").unwrap_err().to_string();
+        assert_eq!(said, "15: the unit is missing: `15deg`, or the word itself as 0x0000");
+        assert!(word(&angle, "0").is_err());
         // The word itself is never scaled.
         assert_eq!(word(&angle, "0x0010"), Ok(16));
-        let said = word(&angle, "400").unwrap_err().to_string();
-        assert_eq!(said, "400 is outside -327.68..327.67 deg");
+        let said = word(&angle, "400 deg").unwrap_err().to_string();
+        assert_eq!(said, "400 deg is outside -327.68..327.67 deg");
         assert!(word(&angle, "15 rad").unwrap_err().to_string().contains("its unit is deg"));
         let warm = edge(EdgeType::Uint16, 0.1, -40.0, "°C");
-        assert_eq!((warm.text(643), word(&warm, "24.3")), ("24.3".into(), Ok(643)));
+        assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
         let down = edge(EdgeType::Int16, -0.5, 0.0, "");
         assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
     }
@@ -346,20 +362,23 @@ mod tests {
     #[test]
     fn d11_limits_of_the_table_hold_for_every_form() {
         let edge = Edge { min: Some(0.0), max: Some(10.0), ..edge(EdgeType::Int16, 0.01, 0.0, "A") };
-        assert_eq!(word(&edge, "10"), Ok(1000));
-        assert_eq!(word(&edge, "10.01").unwrap_err().to_string(), "10.01 is outside 0.00..10.00 A");
-        assert!(word(&edge, "0x03E9").is_err() && word(&edge, "-0.01").is_err());
+        assert_eq!(word(&edge, "10 A"), Ok(1000));
+        assert_eq!(word(&edge, "10.01 A").unwrap_err().to_string(), "10.01 A is outside 0.00..10.00 A");
+        assert!(word(&edge, "0x03E9").is_err() && word(&edge, "-0.01A").is_err());
     }
 
     /// No value beyond a limit is taken, and no word beyond it is sent, whatever the steps are.
     #[test]
     fn d11_rounding_never_leaves_the_limits() {
         let coarse = Edge { max: Some(150.0), ..edge(EdgeType::Int16, 100.0, 0.0, "mA") };
-        for wrong in ["199.9", "150.1", "0x0002"] {
+        for wrong in ["199.9mA", "150.1mA", "0x0002"] {
             let said = word(&coarse, wrong).unwrap_err().to_string();
             assert_eq!(said, format!("{} is outside -3276800..150 mA", wrong.parse::<Given>().unwrap()));
         }
-        assert_eq!((word(&coarse, "150"), word(&coarse, "149"), word(&coarse, "40")), (Ok(1), Ok(1), Ok(0)));
+        assert_eq!(
+            (word(&coarse, "150mA"), word(&coarse, "149mA"), word(&coarse, "40mA")),
+            (Ok(1), Ok(1), Ok(0))
+        );
         let down = Edge { min: Some(-150.0), ..edge(EdgeType::Int16, -100.0, 0.0, "") };
         assert_eq!((word(&down, "-150"), word(&down, "-151").is_err()), (Ok(1), true));
         // What fractions lose is no violation.
@@ -376,8 +395,8 @@ mod tests {
             let given = text.parse().unwrap();
             tenths.rounded(&given, tenths.word(&given).unwrap())
         };
-        assert_eq!((told("0.04"), told("0.3 A"), told("0x0003")), (Some("0.0 A".into()), None, None));
-        assert_eq!(told("-1234.56"), Some("-1234.6 A".into()));
+        assert_eq!((told("0.04A"), told("0.3 A"), told("0x0003")), (Some("0.0 A".into()), None, None));
+        assert_eq!(told("-1234.56 A"), Some("-1234.6 A".into()));
     }
 
     #[test]

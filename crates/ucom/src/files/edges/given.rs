@@ -13,7 +13,7 @@ const UNIT_MAX: usize = 32;
 pub enum Given {
     /// `0x05DC`: the word itself, whatever the edge's type and scale.
     Raw(u16),
-    /// `15.5` or `15.5 deg`: in the unit of the edge; without a table, the word as a number.
+    /// `15.5 deg`: in the unit of the edge. `15.5`: where the edge has no unit; without a table, the word as a number.
     Number {
         /// The number.
         value: f64,
@@ -32,7 +32,7 @@ pub enum GivenError {
     Hex(String),
     /// Nothing that a value can be.
     #[error(
-        "\"{0}\" is no value; values are numbers (15.5, with their unit if you like), words (0x05DC), on and off"
+        "\"{0}\" is no value; values are numbers (15.5deg; without a unit where there is none), words (0x05DC), on and off"
     )]
     Form(String),
 }

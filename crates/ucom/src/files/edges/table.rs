@@ -268,6 +268,9 @@ impl EdgeTable {
             );
             for (kind, title) in [(Kind::Ci, "ci"), (Kind::So, "so"), (Kind::Par, "par")] {
                 text += &format!("\n[program.{title}]\n");
+                if kind != Kind::So {
+                    text += "# Boards tell no limits: add them, as { …, min = -60, max = 60 }, before anything moves.\n";
+                }
                 let mut used = BTreeSet::new();
                 for (i, name) in description.names(kind).iter().enumerate() {
                     let unique = description.find(0, kind, short(name)) == Ok(i as u16);

@@ -9,7 +9,7 @@ use crate::files::edges::{BoardEdges, Edge, EdgeTable, EdgeType};
 use crate::master::io::{IoDescription, Kind};
 use crate::{BoardInfo, Profile, Status};
 
-const GOOD: &str = "boards:\n  - board: 1\n    flash_number: 0x0021\n    program_id: 0x1234\n    par:\n      kp: 120\n      current_max: 1.5 A\n      \"#2\": 0x0010\n    ci:\n      set_position: -15.5\n  - board: 2\n    name: jaw\n    program_id: any\n";
+const GOOD: &str = "boards:\n  - board: 1\n    flash_number: 0x0021\n    program_id: 0x1234\n    par:\n      kp: 120\n      current_max: 1.5 A\n      \"#2\": 0x0010\n    ci:\n      set_position: -15.5 deg\n  - board: 2\n    name: jaw\n    program_id: any\n";
 
 fn texts(list: &[&str]) -> Vec<String> {
     list.iter().map(|t| (*t).to_owned()).collect()
@@ -82,17 +82,17 @@ fn another_board_or_program_is_a_problem_with_its_line() {
 /// Every mistake is told at once, with line and column.
 #[test]
 fn names_and_ranges_are_checked_with_their_place() {
-    let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 4000\n    kp: 70000\n    current_max: 3\n    mode: on\n  ci:\n    set_position: 61\n";
+    let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 4000\n    kp: 70000\n    current_max: 3 A\n    mode: on\n  ci:\n    set_position: 61 deg\n";
     let file = ParamsFile::parse(text).unwrap();
     let problems = check_board(file.board(1).unwrap(), &description(), &edges()).unwrap_err();
     let said: Vec<String> = problems.iter().map(ToString::to_string).collect();
     assert_eq!(
         said,
         [
-            "line 12, column 19: board 1: CI `set_position`: 61 is outside -60.00..60.00 deg",
+            "line 12, column 19: board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg",
             "line 6, column 9: board 1 has no PAR `kq`; there is `kp [mA/deg]`",
             "line 8, column 9: board 1: PAR `kp` is given twice, first in line 7",
-            "line 9, column 18: board 1: PAR `current_max`: 3 is outside 0.000..2.000 A",
+            "line 9, column 18: board 1: PAR `current_max`: 3 A is outside 0.000..2.000 A",
             "line 10, column 11: board 1: PAR `mode`: on: it is a number",
         ]
     );

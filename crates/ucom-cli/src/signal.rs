@@ -67,6 +67,13 @@ impl Undone {
         })
     }
 
+    /// Something begins that is no request; what it leaves undone, and the next command.
+    pub fn begin_other(&self, what: &str, next: &str) {
+        let mut state = self.lock();
+        state.changed = true;
+        state.now.push(Some((what.into(), next.into())));
+    }
+
     /// A request begins.
     pub fn begin(&self, request: &Request) {
         let left = left_by(request);

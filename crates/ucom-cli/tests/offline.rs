@@ -101,3 +101,37 @@ fn a_result_that_cannot_be_printed_is_an_error() {
         assert_eq!(done.status.code(), Some(0), "{words:?}: {}", String::from_utf8_lossy(&done.stderr));
     }
 }
+
+/// What is there is not written over unasked, and nothing is written when nothing was measured.
+#[test]
+fn files_are_kept_and_nothing_is_made_up() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let kept = ["kept.toml", "kept.dbc", "kept.log", "kept.mcap", "new.log.profile.toml"];
+    kept.iter().for_each(|name| std::fs::write(file(name), "mine").unwrap());
+    let bus = ["--bus", "virtual:empty"];
+    let (toml, dbc, log, mcap, new) =
+        (file("kept.toml"), file("kept.dbc"), file("kept.log"), file("kept.mcap"), file("new.log"));
+    for words in [
+        &["--json", "probe", "--out", &toml][..],
+        &["--json", "dbc", "none", "--out", &dbc],
+        &["--json", "record", &log, "--for", "0.1"],
+        &["--json", "record", &mcap, "--for", "0.1"],
+        // A recording would bring its own profile with it.
+        &["--json", "record", &new, "--for", "0.1"],
+    ] {
+        let said = ucom(&[words, &bus].concat()).ends(4);
+        let error = &said.json()["error"];
+        assert_eq!(error["code"], "exists", "{words:?}: {}", said.out);
+        assert!(error["hint"].as_str().unwrap().contains("--force"), "{words:?}: {}", said.out);
+    }
+    // Nobody is there: also with --force there is nothing to write.
+    for words in [&["--json", "probe", "--out", &toml, "--force"][..], &["--json", "probe"]] {
+        let said = ucom(&[words, &bus].concat()).ends(3);
+        assert_eq!(said.json()["error"]["code"], "no-boards", "{}", said.out);
+    }
+    kept.iter().for_each(|name| assert_eq!(std::fs::read_to_string(file(name)).unwrap(), "mine", "{name}"));
+    ucom(&[&["dbc", "none", "--out", &dbc, "--force"][..], &bus].concat()).ends(0);
+    ucom(&[&["record", &log, "--for", "0.1", "--force"][..], &bus].concat()).ends(0);
+    assert_ne!(std::fs::read_to_string(dbc).unwrap(), "mine");
+}

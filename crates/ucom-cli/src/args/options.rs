@@ -259,6 +259,8 @@ pub struct RecordArgs {
     /// End after so many frames
     #[arg(long, env = "UCOM_COUNT", value_name = "N")]
     pub count: Option<u64>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 /// Options of `ucom replay`.
@@ -349,4 +351,6 @@ pub struct DbcArgs {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }

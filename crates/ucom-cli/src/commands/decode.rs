@@ -3,13 +3,15 @@
 use std::io::BufRead;
 use std::time::Duration;
 
-use cli_kit::{Output, Stop};
+use cli_kit::Output;
 use serde_json::json;
 use ucom::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 
+use super::record::tell_broken_off;
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::failure::Failure;
 use crate::link::{protocol_frame, recorded};
+use crate::signal::Undone;
 use crate::words::Decoder;
 
 /// Decodes to the end, or until Ctrl-C. Exit code 2 when nothing in a file is a frame.
@@ -25,6 +27,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     } else {
         let recording = Recording::read(&args.file)
             .map_err(|e| Failure::usage(e).hint("forms are candump -L, FZI-CAN 1.2 and MCAP"))?;
+        tell_broken_off(&recording, &args.file, out);
         // The recorder's profile is the right one, unless another is asked for.
         if let (None, Some(text)) = (&link.profile, &recording.profile) {
             profile = ucom::Profile::from_toml(text).map_err(Failure::usage)?;
@@ -51,7 +54,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
 }
 
 fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = Stop::listen()?;
+    let stop = Undone::default().listen()?;
     let mut decoder = Decoder::new(link.profile()?);
     let mut bus = link.open()?;
     while left > 0 && !stop.asked() && !Output::gone() {

@@ -10,6 +10,7 @@ use ucom::master::doctor::{Controller, Finding, Observation, Severity, findings}
 use ucom::master::probe::ProbeOptions;
 use ucom::master::{Event, Outcome, Request};
 
+use super::params::not_there;
 use crate::args::{LinkArgs, ProbeArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
@@ -90,6 +91,9 @@ fn line(f: &Finding) -> String {
 
 /// Measures and writes a profile.
 pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    if let Some(file) = &args.out {
+        not_there(file, args.force.force, "another name after --out keeps it")?;
+    }
     let image = match &args.image {
         Some(path) => {
             Some(Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?.bytes().to_vec())
@@ -102,6 +106,17 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         Outcome::Probe(report) => report,
         other => return Err(unexpected(&other)),
     };
+    if report.boards.is_empty() && report.reports == 0 {
+        // Nothing was measured: a profile of defaults would pass for what these boards are.
+        let what = "no board answers: nothing was measured, no profile written";
+        return Err(Failure::new(NO_LINK, "no-boards", what).hint("ucom doctor looks for the reason"));
+    }
+    if report.boards.is_empty() {
+        let n = report.reports;
+        out.note(format!(
+            "{n} boards report and none has a number: only reports were measured; ucom probe --init measures more, or ucom init first"
+        ));
+    }
     let toml = report.profile.to_toml();
     let file = args.out.as_ref().map(|path| path.display().to_string());
     if let Some(path) = &args.out {

@@ -252,6 +252,9 @@ fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output
 
 /// Writes a DBC file with the boards' names.
 pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    if let Some(file) = &args.out {
+        not_there(file, args.force.force, "another name after --out keeps it")?;
+    }
     let (profile, edges) = (link.profile()?, link.edges()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {

@@ -1,19 +1,25 @@
 //! `ucom record` and `ucom replay`: frames of a bus to a file and back.
 
+use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::files::recording::{
-    CandumpWriter, Record, Recording, RecordingError, RecordingFormat, RecordingWriter,
+    CandumpWriter, Record, Recording, RecordingError, RecordingFormat, RecordingWriter, profile_path,
 };
 use ucom::master::Master;
 
+use super::params::not_there;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::driver::shared_numbers;
 use crate::failure::{FAULT, Failure};
 use crate::link::{Link, protocol_frame, recorded, replayed};
+use crate::signal::Undone;
 use crate::words::Decoder;
+
+/// So often what was recorded reaches the file: a recorder that is killed loses no more.
+const FLUSH: Duration = Duration::from_secs(1);
 
 /// Where frames go.
 enum Sink {
@@ -28,15 +34,41 @@ impl Sink {
             Self::Stdout(writer) => writer.write(record),
         }
     }
+
+    fn flush(&mut self) -> Result<(), RecordingError> {
+        match self {
+            Self::File(writer) => writer.flush(),
+            // Line by line by itself.
+            Self::Stdout(_) => Ok(()),
+        }
+    }
+}
+
+fn failed(e: RecordingError) -> Failure {
+    Failure::new(FAULT, "recording", e).hint("is the disk full?")
+}
+
+/// Says that a recording does not end as one does.
+pub fn tell_broken_off(recording: &Recording, file: &Path, out: &Output) {
+    if let Some(why) = &recording.broken_off {
+        let (file, whole) = (file.display(), recording.records.len());
+        out.note(format!("{file}: {why}; the {whole} frames before are whole"));
+    }
 }
 
 /// Records until Ctrl-C, so long, or so many frames.
 pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = Stop::listen()?;
+    let stop = Undone::default().listen()?;
     let profile = link.profile()?;
-    let mut bus = link.open()?;
     let stdout = args.file.as_os_str() == "-";
     let format = RecordingFormat::of_path(&args.file);
+    if !stdout {
+        let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
+        for file in [Some(args.file.clone()), beside].iter().flatten() {
+            not_there(file, args.force.force, "another name keeps it")?;
+        }
+    }
+    let mut bus = link.open()?;
     let mut sink = if stdout {
         Sink::Stdout(CandumpWriter::new(std::io::stdout()))
     } else {
@@ -46,12 +78,16 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let mut decoder = Decoder::new(profile);
     // It only listens: who answers to which number.
     let mut master = Master::new(profile);
-    let start = Instant::now();
+    let (start, mut flushed) = (Instant::now(), Instant::now());
     let (mut frames, mut left_out) = (0_u64, 0_u64);
     while !stop.asked() && frames < args.count.unwrap_or(u64::MAX) {
         let rest = args.duration.map_or(Duration::MAX, |d| d.saturating_sub(start.elapsed()));
         if rest.is_zero() {
             break;
+        }
+        if flushed.elapsed() >= FLUSH {
+            flushed = Instant::now();
+            sink.flush().map_err(failed)?;
         }
         let Some(frame) = bus.receive(rest.min(Duration::from_millis(100)))? else { continue };
         let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -72,7 +108,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
                 Output::lose(&e);
                 break;
             }
-            Err(e) => return Err(Failure::new(FAULT, "recording", e).hint("is the disk full?")),
+            Err(e) => return Err(failed(e)),
         }
     }
     let shared = shared_numbers(&master);
@@ -100,6 +136,7 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         return Err(Failure::usage(format!("--speed {}: it must be above 0", args.speed)));
     }
     let recording = Recording::read(&args.file).map_err(Failure::usage)?;
+    tell_broken_off(&recording, &args.file, out);
     let intrusive = |record: &Record| {
         protocol_frame(&record.frame)
             .ok()
@@ -108,10 +145,14 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     };
     let (guarded, due): (Vec<&Record>, Vec<&Record>) =
         recording.records.iter().partition(|record| !args.intrusive && intrusive(record));
-    let stop = Stop::listen()?;
+    let undone = Undone::default();
+    let stop = undone.listen()?;
     let mut bus = link.open()?;
+    if args.intrusive {
+        undone.begin_other("what the boards took of the recording is not known", "ucom scan");
+    }
     let sent = play(&due, args.speed, &mut bus, &stop, out)?;
-    let value = json!({ "sent": sent, "left_out": guarded.len(), "frames": recording.records.len() });
+    let value = json!({ "sent": sent, "left_out": guarded.len(), "frames": recording.records.len(), "broken_off": recording.broken_off });
     out.result(&value, || {
         let hint = match guarded.len() {
             0 => String::new(),

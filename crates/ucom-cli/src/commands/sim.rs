@@ -17,6 +17,7 @@ use ucom::{Format, Frame, Profile};
 use crate::args::{LinkArgs, SimArgs};
 use crate::failure::Failure;
 use crate::link::to_wire;
+use crate::signal::Undone;
 
 /// The name of the bus.
 const CHANNEL: &str = "can0";
@@ -27,7 +28,7 @@ const CATCH_UP_US: u64 = 200_000;
 
 /// Serves a simulated chain until SIGINT or SIGTERM.
 pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = Stop::listen()?;
+    let stop = Undone::default().listen()?;
     let profile = link.profile()?;
     let config = config(args, &profile)?;
     let faults = match &args.faults {

@@ -89,7 +89,9 @@ pub(super) fn judge(seen: &Seen) -> ProbeReport {
     lengths(&mut rows, seen);
     pins(&mut rows, seen);
     programs(&mut rows, seen);
-    ProbeReport { profile: rows.profile, rows: rows.rows, boards: seen.infos.keys().copied().collect() }
+    let reports = seen.reports.iter().map(|report| report.ucom_id).collect::<BTreeSet<_>>().len();
+    let boards = seen.infos.keys().copied().collect();
+    ProbeReport { profile: rows.profile, rows: rows.rows, boards, reports }
 }
 
 fn reports(rows: &mut Rows, seen: &Seen) {

@@ -54,6 +54,8 @@ pub struct ProbeReport {
     pub rows: Vec<ProbeRow>,
     /// Boards that answered.
     pub boards: Vec<u8>,
+    /// Different UCoM ids in reports: boards with and without a number.
+    pub reports: usize,
 }
 
 impl ProbeReport {

@@ -35,14 +35,27 @@ pub struct Watch {
     pub listen_only: bool,
     /// The boards are to be asked who they are.
     pub ask: bool,
+    /// Rows of boards above the first one that is shown.
+    pub scrolled: usize,
     loaded: Instant,
 }
 
 impl Watch {
-    fn new(url: String, listen_only: bool) -> Self {
+    pub(super) fn new(url: String, listen_only: bool) -> Self {
         let (load, log) = (VecDeque::new(), VecDeque::new());
         let (foreign_master, ask, loaded) = (false, !listen_only, Instant::now());
-        Self { url, load, log, foreign_master, listen_only, ask, loaded }
+        Self { url, load, log, foreign_master, listen_only, ask, scrolled: 0, loaded }
+    }
+
+    /// The row that is shown first, where so many of all have room.
+    pub fn first(&self, room: usize, rows: usize) -> usize {
+        self.scrolled.min(rows.saturating_sub(room))
+    }
+
+    /// Shows boards further down, or up.
+    pub fn scroll(&mut self, by: isize, (room, rows): (usize, usize)) {
+        self.scrolled = self.scrolled.saturating_add_signed(by);
+        self.scrolled = self.first(room, rows);
     }
 
     /// Lets the bus go on for a moment.
@@ -209,6 +222,7 @@ fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64) -> Result<(), Fai
     let mut run = || -> Result<(), Failure> {
         let mut drawn: Option<Instant> = None;
         let mut counted = Instant::now();
+        let mut room = (0, 0);
         while left > 0 && !driver.stop_asked() {
             while event::poll(Duration::ZERO)? {
                 if let Key::Key(key) = event::read()? {
@@ -217,6 +231,17 @@ fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64) -> Result<(), Fai
                     if ctrl_c || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) {
                         return Ok(());
                     }
+                    let page = room.0.max(1) as isize;
+                    let by = match key.code {
+                        KeyCode::Down | KeyCode::Char('j') => 1,
+                        KeyCode::Up | KeyCode::Char('k') => -1,
+                        KeyCode::PageDown | KeyCode::Char(' ') => page,
+                        KeyCode::PageUp => -page,
+                        KeyCode::Home => isize::MIN,
+                        KeyCode::End => isize::MAX,
+                        _ => 0,
+                    };
+                    watch.scroll(by, room);
                     watch.ask |= key.code == KeyCode::Char('r') && !watch.listen_only;
                 }
             }
@@ -227,7 +252,12 @@ fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64) -> Result<(), Fai
             }
             if drawn.is_none_or(|at| at.elapsed() >= Duration::from_millis(100)) {
                 drawn = Some(Instant::now());
-                terminal.draw(|frame| view::draw(frame, driver, watch))?;
+                // Another size of the terminal, or a board that is gone, leaves nothing empty below the last one.
+                watch.scroll(0, room);
+                let (boards, statistics, now) =
+                    (driver.master.boards(), driver.master.statistics(), driver.now_us());
+                let picture = view::Picture { boards: &boards, statistics: &statistics, now, watch };
+                terminal.draw(|frame| room = view::draw(frame, &picture))?;
             }
         }
         Ok(())

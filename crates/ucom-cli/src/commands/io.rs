@@ -9,8 +9,8 @@ use ucom::master::io::{IoDescription, Kind};
 use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel};
 
 use super::followed::Followed;
+use super::outputs::{named, units};
 use super::params::{arrived, become_master, deliver, not_there};
-use super::run::{named, units};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 use crate::cache::{Known, of_several};
 use crate::driver::{Driver, nothing_shared, unexpected};

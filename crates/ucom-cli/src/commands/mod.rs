@@ -9,11 +9,14 @@ mod help;
 mod io;
 mod monitor;
 mod monitor_view;
+mod outputs;
 mod params;
+mod plans;
 mod record;
 mod repair;
 mod run;
 mod sim;
+mod typed;
 mod update;
 mod update_bar;
 mod update_files;
@@ -43,7 +46,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Io(args) => io::io(&args, link, out),
         Command::Ci(args) => io::ci(&args, link, out),
         Command::Par(args) => params::par(&args, link, out),
-        Command::So(args) => run::so(&args, link, out),
+        Command::So(args) => outputs::so(&args, link, out),
         Command::Run(args) => run::run(&args, link, out),
         Command::Monitor(args) => monitor::monitor(&args, link, out),
         Command::Conformance(args) => conformance::conformance(&args, link, out),

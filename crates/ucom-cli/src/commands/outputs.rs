@@ -1,0 +1,164 @@
+//! `ucom so`: what boards send while they run, by name and in units; and its form, which `run` and `ci` share.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use cli_kit::Output;
+use serde_json::{Map, Value, json};
+use ucom::files::Edge;
+use ucom::master::Event;
+use ucom::master::io::{Kind, Snapshot, short};
+
+use crate::args::{LinkArgs, SoArgs};
+use crate::cache::Known;
+use crate::driver::{Driver, nothing_shared};
+use crate::failure::{Failure, NO_LINK};
+use crate::lines::Lines;
+
+/// Keys for so many values: the short names; the whole text where another edge has the same one, with its place where
+/// that does not help either.
+fn keys(names: &[String], count: usize) -> Vec<String> {
+    let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
+    let key = |i: usize| match names.get(i) {
+        None => format!("#{i}"),
+        Some(name) if once(&mut names.iter().map(|n| short(n)), short(name)) => short(name).to_owned(),
+        Some(name) if once(&mut names.iter().map(String::as_str), name) => name.clone(),
+        Some(name) => format!("{name}#{i}"),
+    };
+    (0..count).map(key).collect()
+}
+
+/// Values by the names of their edges, in their units where an edge table knows them (D-11).
+pub fn named(names: &[String], edges: &[Edge], words: &[u16]) -> Value {
+    let value = |i: usize, word: u16| edges.get(i).map_or_else(|| json!(word as i16), |edge| edge.json(word));
+    let values = words.iter().enumerate().map(|(i, word)| value(i, *word));
+    Value::Object(keys(names, words.len()).into_iter().zip(values).collect::<Map<_, _>>())
+}
+
+/// The units of such values, by the same keys, as far as an edge table tells them.
+pub fn units(names: &[String], edges: &[Edge]) -> Value {
+    let pairs = keys(names, names.len()).into_iter().zip(edges);
+    let told = pairs.filter(|(_, edge)| edge.known && !edge.unit.is_empty());
+    Value::Object(told.map(|(key, edge)| (key, json!(edge.unit))).collect::<Map<_, _>>())
+}
+
+/// Waits for the reader of stdout as long as it reads.
+pub fn finish(stdout: &mut Lines, driver: &Driver) {
+    let unseen = stdout.finish();
+    if unseen > 0 && !stdout.gone() {
+        driver.note(format!("{unseen} lines were dropped: nobody read them in time"));
+    }
+}
+
+/// Outputs of boards as they come; only listens once their names are known.
+pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link, out)?;
+    let boards = driver.numbers(&args.boards)?;
+    let edges = link.edges()?;
+    let mut all = BTreeMap::new();
+    for board in boards {
+        let known = args.cache.known(&mut driver, &edges, board)?;
+        driver.master.watch(board, Some(known.names.dimensions().so), true);
+        all.insert(board, known);
+    }
+    let mut stdout = Lines::stdout()?;
+    if args.csv {
+        stdout.push_always(head(&all)?);
+    }
+    let mut left = args.count.unwrap_or(u64::MAX);
+    let (start, mut heard) = (driver.now_us(), Instant::now());
+    let mut patient = true;
+    while left > 0 && !driver.stop_asked() && !stdout.gone() {
+        driver.turn(Duration::from_millis(20))?;
+        while let Some(event) = driver.master.take_event() {
+            match event {
+                // Another PC runs the boards: that is why there is something to see.
+                Event::ForeignMaster { .. } => {}
+                Event::Snapshot { board, snapshot } if left > 0 => {
+                    left -= 1;
+                    heard = Instant::now();
+                    stdout.push(row(args, &all, board, &snapshot, start, out));
+                }
+                other => driver.tell(&other, None),
+            }
+        }
+        nothing_shared(&driver.master)?;
+        if heard.elapsed() > Duration::from_secs(3) && patient {
+            if args.count.is_some() {
+                return Err(Failure::new(
+                    NO_LINK,
+                    "no-outputs",
+                    "no board sends outputs: no control loop runs",
+                )
+                .hint("ucom run, in another terminal"));
+            }
+            driver
+                .note("no board sends outputs: no control loop runs (ucom run, in another terminal)".into());
+            patient = false;
+        }
+    }
+    finish(&mut stdout, &driver);
+    Ok(())
+}
+
+fn head(all: &BTreeMap<u8, Known>) -> Result<String, Failure> {
+    let column = |(name, edge): (&String, &Edge)| match (edge.known, edge.unit.as_str()) {
+        (true, unit) if !unit.is_empty() => quoted(&format!("{} [{unit}]", short(name))),
+        _ => quoted(short(name)),
+    };
+    let columns = |known: &Known| {
+        known.names.so.iter().zip(known.edges.all(Kind::So)).map(column).collect::<Vec<_>>().join(",")
+    };
+    let mut heads = all.values().map(columns);
+    let first = heads.next().unwrap_or_default();
+    if heads.any(|other| other != first) {
+        return Err(Failure::usage("boards with different outputs do not fit into one table")
+            .hint("one board at a time, or --json"));
+    }
+    Ok(format!("time_s,board,{first}"))
+}
+
+/// A field of a CSV table (RFC 4180).
+fn quoted(text: &str) -> String {
+    let plain = !text.contains([',', '"', '\n', '\r']);
+    if plain { text.into() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
+}
+
+/// A snapshot as a line.
+fn row(
+    args: &SoArgs,
+    all: &BTreeMap<u8, Known>,
+    board: u8,
+    snapshot: &Snapshot,
+    start_us: u64,
+    out: &Output,
+) -> String {
+    let time_s = snapshot.time_us.saturating_sub(start_us) as f64 * 1e-6;
+    let Some(known) = all.get(&board) else { return String::new() };
+    let (names, edges) = (&known.names.so, known.edges.all(Kind::So));
+    if args.csv {
+        let list: Vec<String> = snapshot.words.iter().zip(edges).map(|(w, e)| e.text(*w)).collect();
+        return format!("{time_s:.6},{board},{}", list.join(","));
+    }
+    let so = named(names, edges, &snapshot.words);
+    let value = json!({ "time_s": time_s, "board": board, "so": so, "units": units(names, edges) });
+    out.words(&value, || {
+        let pairs = names.iter().zip(edges).zip(&snapshot.words);
+        let pairs: Vec<String> =
+            pairs.map(|((n, e), w)| format!("{} {:>6}", short(n), e.text_with_unit(*w))).collect();
+        format!("{time_s:9.3} s  board {board}  {}", pairs.join("  "))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_equal_names_are_all_there() {
+        let names = ["pos [deg]", "pos [rad]", "x", "x", "current [mA]"].map(String::from);
+        let all = named(&names, &[], &[1, 2, 3, 4, 5, 6]);
+        let keys = json!({ "pos [deg]": 1, "pos [rad]": 2, "x#2": 3, "x#3": 4, "current": 5, "#5": 6 });
+        assert_eq!(all, keys);
+    }
+}

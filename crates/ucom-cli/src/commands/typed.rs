@@ -1,0 +1,120 @@
+//! What is typed while `ucom run` runs: inputs, parameters, outputs on and off.
+
+use std::io::{BufRead, ErrorKind};
+use std::sync::mpsc::{Receiver, channel};
+
+use ucom::master::io::Kind;
+use ucom::master::{AdminChange, Request, Setting};
+
+use crate::args::{Assignment, RunArgs};
+use crate::driver::Driver;
+use crate::failure::Failure;
+use crate::values::{Prepared, only, tell_rounded, words};
+use crate::written::History;
+
+/// Lines on stdin, read beside the bus.
+pub fn typed() -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || each_line(std::io::stdin().lock(), |line| sender.send(line).is_ok()));
+    receiver
+}
+
+/// Hands over every line until the end, or until `take` wants no more. A byte that is no text makes a line that nothing
+/// obeys, and that is said; it does not keep a later `stop` from being read.
+fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        match from.read_until(b'\n', &mut line) {
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Ok(0) | Err(_) => return,
+            Ok(_) => {
+                if !take(String::from_utf8_lossy(&line).into_owned()) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// The assignments of a line: a word without `=` is the unit of the value before it, `current_max=1500 mA`.
+fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignment>, Failure> {
+    let mut values: Vec<String> = Vec::new();
+    for word in words {
+        match values.last_mut() {
+            Some(last) if !word.contains('=') => *last += &format!(" {word}"),
+            _ => values.push(word.to_owned()),
+        }
+    }
+    values.iter().map(|word| word.parse().map_err(Failure::usage)).collect()
+}
+
+/// `ci 1 set_position=1500`, `par 1 kp=80`, `active on`, `active off`.
+pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) -> Result<(), Failure> {
+    let form = || {
+        Failure::usage(format!(
+            "\"{line}\": known are ci N NAME=VALUE, par N NAME=VALUE, active on|off, stop"
+        ))
+    };
+    let mut parts = line.split_whitespace();
+    match parts.next() {
+        None => Ok(()),
+        Some("active") => {
+            let on = match parts.next() {
+                Some("on") => true,
+                Some("off") => false,
+                _ => return Err(form()),
+            };
+            for board in prepared.known.keys() {
+                let change = AdminChange { active: Some(on), ..Default::default() };
+                driver.run(Request::Admin { board: *board, change, force: true })?;
+            }
+            Ok(())
+        }
+        Some(kind @ ("ci" | "par")) => {
+            let board: u8 = parts.next().and_then(|n| n.parse().ok()).ok_or_else(form)?;
+            let not_run = || Failure::usage(format!("board {board} is not among those that run"));
+            let known = prepared.known.get(&board).ok_or_else(not_run)?;
+            let values = assignments(parts)?;
+            only(&[board], &values, "set")?;
+            let kind = if kind == "ci" { Kind::Ci } else { Kind::Par };
+            let words = words(known, kind, &values)?;
+            tell_rounded(driver, board, kind, &words);
+            for word in &words {
+                let (now, Setting { name, value }) = (driver.now_us(), word.setting(known, kind));
+                match kind {
+                    Kind::Ci => driver.master.set_input(now, board, &name, value)?,
+                    _ => driver.master.set_parameter(now, board, &name, value)?,
+                };
+            }
+            if kind == Kind::Par {
+                let words = words.iter().map(|w| (w.index, w.word));
+                History::of(&args.cache, &known.info).wrote(words);
+            }
+            Ok(())
+        }
+        Some(_) => Err(form()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_is_no_text_does_not_end_the_input() {
+        let mut heard = Vec::new();
+        each_line(&b"ci 1 \xFF=3\nstop\nlast"[..], |line| {
+            heard.push(line.trim().to_owned());
+            true
+        });
+        assert_eq!(heard, ["ci 1 \u{FFFD}=3", "stop", "last"]);
+    }
+
+    #[test]
+    fn units_may_stand_apart_from_their_values() {
+        let typed = |line: &str| assignments(line.split_whitespace()).unwrap();
+        assert_eq!(typed("current_max=1500 mA kp=3"), typed("current_max=1500mA kp=3"));
+        assert!(assignments("mA".split_whitespace()).is_err());
+    }
+}

@@ -18,7 +18,6 @@ mod written;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Parser;
 use cli_kit::Output;
 
 use args::Cli;
@@ -27,8 +26,10 @@ use args::Cli;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 fn main() -> ExitCode {
-    // clap itself ends wrong usage with exit code 2.
-    let cli = Cli::parse();
+    let cli: Cli = match cli_kit::usage::parse("ucom", "UCOM_JSON") {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
     let out = Output::new("ucom", cli.json);
     let acts = cli.command.acts();
     match commands::run(cli.command, &cli.link, &out) {

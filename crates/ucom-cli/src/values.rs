@@ -63,7 +63,13 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
         let rounded = edge.rounded(&a.value, word).map(|sent| format!("{} → {sent}", a.value));
         Ok(Word { index, name, word, text: edge.text_with_unit(word), rounded })
     };
-    values.iter().map(word).collect()
+    let all = values.iter().map(word).collect::<Result<Vec<_>, _>>()?;
+    let earlier = |(i, word): &(usize, &Word)| all.iter().take(*i).any(|other| other.index == word.index);
+    if let Some((_, word)) = all.iter().enumerate().find(earlier) {
+        let what = format!("board {}: {} `{}` is given twice", known.board, kind.name(), word.name);
+        return Err(Failure::usage(what).hint("give each name once: nothing was sent"));
+    }
+    Ok(all)
 }
 
 /// Says which values lie between two words and go as the nearer one.

@@ -360,3 +360,46 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
     assert_ne!(said.code, 0);
     assert!(said.out.contains("more boards than reports"), "{}", said.out);
 }
+
+/// Single frames leave as they are; what changes boards only when that is said, and then all or none.
+#[test]
+fn single_frames_can_be_sent() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    let mut peer = sim.peer();
+    let sent = sim.ucom(&["--json", "send", "201#", "12345678#11"]).ends(0).json();
+    assert_eq!(sent["sent"], json!(["201#", "12345678#11"]));
+    peer.wait("201#");
+    peer.wait("12345678#11");
+    peer.all(300);
+    let refused = sim.ucom(&["--json", "send", "201#", "000#"]).ends(4).json();
+    assert_eq!(refused["error"]["code"], "intrusive");
+    assert!(peer.all(100).iter().all(|f| f != "000#" && f != "201#"));
+    sim.ucom(&["send", "000#", "--intrusive"]).ends(0);
+    peer.wait("000#");
+    sim.ucom(&["send", "xyz"]).ends(2);
+}
+
+/// A name that is given twice is a mistake: which of the two is meant nobody can tell.
+#[test]
+fn a_name_given_twice_is_refused() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    sim.ucom(&["start", "1"]).ends(0);
+    let mut peer = sim.peer();
+    for words in [["par", "1", "kp=5", "KP=6"], ["ci", "1", "set_position=5", "0=6"]] {
+        let said = sim.ucom(&words).ends(2);
+        assert!(said.err.contains("is given twice"), "{words:?}: {}", said.err);
+    }
+    assert!(peer.all(100).iter().all(|f| !f.starts_with("3C1#") && !f.starts_with("341#")));
+}
+
+/// Boards without a number give away how they report, and nothing else; that is said.
+#[test]
+fn a_probe_of_boards_without_numbers_says_how_little_it_is() {
+    let sim = Sim::start(&["--boards", "2"]);
+    let file = sim.path("found.toml");
+    let said = sim.ucom(&["probe", "--out", &file]).ends(0);
+    assert!(said.err.contains("only reports were measured") && said.err.contains("--init"), "{}", said.err);
+    assert!(std::fs::metadata(file).is_ok());
+}

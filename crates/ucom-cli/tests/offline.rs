@@ -135,3 +135,35 @@ fn files_are_kept_and_nothing_is_made_up() {
     ucom(&[&["record", &log, "--for", "0.1", "--force"][..], &bus].concat()).ends(0);
     assert_ne!(std::fs::read_to_string(dbc).unwrap(), "mine");
 }
+
+/// Programs that ask for JSON get it for wrong usage, too.
+#[test]
+fn wrong_usage_is_json_where_that_is_asked_for() {
+    for words in [&["--json", "scann"][..], &["ci", "2,3", "x=1", "--json"], &["info", "--json", "99"]] {
+        let error = ucom(words).ends(2).json()["error"].clone();
+        assert_eq!((error["code"].as_str(), error["exit"].as_u64()), (Some("usage"), Some(2)), "{words:?}");
+        assert!(!error["message"].as_str().unwrap().is_empty(), "{words:?}");
+    }
+    let said = ucom(&["ci", "2,3", "x=1"]).ends(2);
+    assert!(said.err.contains("one board at a time"), "{}", said.err);
+    assert!(ucom(&["--json", "--help"]).ends(0).out.contains("Usage"));
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("x.asc");
+    let said = ucom(&["record", file.to_str().unwrap(), "--bus", "virtual:x"]).ends(2);
+    assert!(said.err.contains(".asc") && !file.exists(), "{}", said.err);
+}
+
+/// A recording whose writer was killed: what is whole is told, and that it is not all.
+#[test]
+fn a_recording_that_is_cut_off_is_decoded_up_to_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("cut.log");
+    std::fs::write(&file, "(1.000000) can0 240#\n(2.000000) can0 441#21\n(3.000000) can0 141#2100").unwrap();
+    let said = ucom(&["--json", "decode", file.to_str().unwrap()]).ends(0);
+    assert_eq!(said.out.lines().count(), 2, "{}", said.out);
+    assert!(
+        said.err.contains("line 3") && said.err.contains("the 2 frames before are whole"),
+        "{}",
+        said.err
+    );
+}

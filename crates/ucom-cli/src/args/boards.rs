@@ -49,6 +49,17 @@ impl FromStr for Boards {
     }
 }
 
+/// The number of one board.
+pub fn one_board(text: &str) -> Result<u8, String> {
+    match text.parse() {
+        Ok(number @ 0..=31) => Ok(number),
+        _ if text.parse::<Boards>().is_ok() => {
+            Err("inputs are set on one board at a time; ucom run sets those of several".into())
+        }
+        _ => Err(format!("\"{text}\" is no board: a number 0..31")),
+    }
+}
+
 /// `NAME=VALUE` or `BOARD.NAME=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assignment {

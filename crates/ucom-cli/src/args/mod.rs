@@ -167,7 +167,10 @@ pub enum Command {
     )]
     Run(RunArgs),
     /// Live view of boards, bus load and foreign frames; asks once, then listens
-    #[command(after_help = "Examples:\n  ucom monitor\n  ucom --json monitor --count 5")]
+    #[command(after_help = "Examples:\n  ucom monitor\n  ucom --json monitor --count 5\n\n\
+                            Keys: arrows, PageUp, PageDown, Home and End scroll, r asks the boards again, q ends.\n\
+                            Status bits where room is short, a dot where one is not set: M MSTART, A ASTART, R MCARUN, X EXLRUN,\n\
+                            I INIT, P PROG, o OPINIT, i IPINIT. On wider terminals they are words.")]
     Monitor(MonitorArgs),
     /// Write the frames of the bus to a file: candump log, FZI-CAN or MCAP
     #[command(
@@ -179,6 +182,13 @@ pub enum Command {
     #[command(after_help = "Examples:\n  ucom replay bus.log\n  ucom replay bus.log --intrusive\n\n\
                             Frames that reset, number, program, start or move boards are left out without --intrusive.")]
     Replay(ReplayArgs),
+    /// Send single frames as they are
+    #[command(
+        after_help = "Examples:\n  ucom send 240#                     who is there? (PC_REPORT to all)\n  ucom send 1C1#0202 201# --intrusive\n\n\
+                            In the order given. Frames that reset, number, program, start or move boards are refused (4) without\n\
+                            --intrusive, and then none is sent. What boards answer: ucom decode --live, in another terminal."
+    )]
+    Send(SendArgs),
     /// Frames in words: a file, stdin or the live bus
     #[command(
         after_help = "Examples:\n  ucom decode bus.log\n  echo '141#2100011934126E38' | ucom decode -\n  ucom decode --live"
@@ -244,6 +254,7 @@ impl Command {
             | Self::Repair(_)
             | Self::Run(_)
             | Self::Replay(_)
+            | Self::Send(_)
             | Self::Conformance(_) => true,
             Self::Status(args) => args.set.is_some() || args.clear.is_some() || args.raw.is_some(),
             Self::Update(args) => !args.dry_run,

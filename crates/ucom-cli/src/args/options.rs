@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use clap::builder::FalseyValueParser;
 
-use super::boards::{Assignment, Boards, bits, flash_id, raw_status, seconds};
+use super::boards::{Assignment, Boards, bits, flash_id, one_board, raw_status, seconds};
 use super::{ForceArgs, ValueEnum};
 
 /// Options of `ucom sim`.
@@ -133,7 +133,7 @@ pub struct CacheArgs {
 #[derive(Args, Debug)]
 pub struct CiArgs {
     /// Board number
-    #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
+    #[arg(value_name = "BOARD", value_parser = one_board)]
     pub board: u8,
     /// NAME=VALUE; a name as `ucom io` shows it, in any case, with or without its unit, or an index
     #[arg(value_name = "NAME=VALUE")]
@@ -225,9 +225,12 @@ pub struct RunArgs {
     /// What to do when a board is lost; default: the profile's on_lost
     #[arg(long, env = "UCOM_ON_LOST", value_enum, value_name = "POLICY")]
     pub on_lost: Option<OnLost>,
-    /// Have the boards send their texts
+    /// Have the boards send the texts of their applications
     #[arg(long, env = "UCOM_DEBUG", value_parser = FalseyValueParser::new())]
     pub debug: bool,
+    /// Have the boards send all their texts (global debug)
+    #[arg(long, env = "UCOM_GLOBAL_DEBUG", value_parser = FalseyValueParser::new())]
+    pub global_debug: bool,
     /// End after so many seconds
     #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
@@ -276,6 +279,17 @@ pub struct ReplayArgs {
     pub speed: f64,
     #[command(flatten)]
     pub force: ForceArgs,
+}
+
+/// Options of `ucom send`.
+#[derive(Args, Debug)]
+pub struct SendArgs {
+    /// Frames as candump writes them: ID#DATA, 240#, 1C1#0202, 12345678#11, 123#R
+    #[arg(value_name = "FRAME", required = true)]
+    pub frames: Vec<String>,
+    /// Send frames too that reset, number, program, start or move boards
+    #[arg(long, env = "UCOM_INTRUSIVE", value_parser = FalseyValueParser::new())]
+    pub intrusive: bool,
 }
 
 /// Options of `ucom decode`.

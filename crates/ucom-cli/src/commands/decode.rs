@@ -95,7 +95,8 @@ fn lines(input: impl BufRead) -> impl Iterator<Item = Result<Record, Failure>> {
     })
 }
 
-fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
+/// A line of a log, or a bare frame; `None`: nothing but a comment.
+pub fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
     let bare = !line.starts_with('(');
     // A bare frame has no time and no bus; with both it is a line of a log.
     let full = if bare { format!("(0.0) can0 {line}\n") } else { format!("{line}\n") };

@@ -15,6 +15,7 @@ mod plans;
 mod record;
 mod repair;
 mod run;
+mod send;
 mod sim;
 mod typed;
 mod update;
@@ -55,6 +56,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Dbc(args) => io::dbc(&args, link, out),
         Command::Record(args) => record::record(&args, link, out),
         Command::Replay(args) => record::replay(&args, link, out),
+        Command::Send(args) => send::send(&args, link, out),
         Command::Decode(args) => decode::decode(&args, link, out),
         Command::Help { topic } => help::help(topic, out),
         Command::Completions { shell } => {

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::files::recording::{
-    CandumpWriter, Record, Recording, RecordingError, RecordingFormat, RecordingWriter, profile_path,
+    CandumpWriter, Record, RecordedFrame, Recording, RecordingError, RecordingFormat, RecordingWriter,
+    profile_path,
 };
 use ucom::master::Master;
 
@@ -63,6 +64,15 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let stdout = args.file.as_os_str() == "-";
     let format = RecordingFormat::of_path(&args.file);
     if !stdout {
+        let ending = args.file.extension().map(|e| e.to_string_lossy().into_owned());
+        if let Some(other) =
+            ending.filter(|e| !["log", "candump", "fzi", "fzican", "mcap"].contains(&e.as_str()))
+        {
+            let what = format!("{}: nothing writes .{other} here", args.file.display());
+            return Err(
+                Failure::usage(what).hint("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP")
+            );
+        }
         let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
         for file in [Some(args.file.clone()), beside].iter().flatten() {
             not_there(file, args.force.force, "another name keeps it")?;
@@ -137,12 +147,7 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     let recording = Recording::read(&args.file).map_err(Failure::usage)?;
     tell_broken_off(&recording, &args.file, out);
-    let intrusive = |record: &Record| {
-        protocol_frame(&record.frame)
-            .ok()
-            .and_then(|f| f.address().ok())
-            .is_some_and(|(f, _)| intrusive_function(f))
-    };
+    let intrusive = |record: &Record| is_intrusive(&record.frame);
     let (guarded, due): (Vec<&Record>, Vec<&Record>) =
         recording.records.iter().partition(|record| !args.intrusive && intrusive(record));
     let undone = Undone::default();
@@ -192,6 +197,12 @@ fn play(records: &[&Record], speed: f64, bus: &mut Link, stop: &Stop, out: &Outp
     }
     bar.finish_and_clear();
     Ok(sent)
+}
+
+/// A frame of this protocol that changes boards or keeps them running.
+pub fn is_intrusive(frame: &RecordedFrame) -> bool {
+    let function = protocol_frame(frame).ok().and_then(|f| f.address().ok()).map(|(f, _)| f);
+    function.is_some_and(intrusive_function)
 }
 
 /// What changes boards or keeps them running; questions and frames of boards do not.

@@ -118,8 +118,10 @@ fn start(
 
 /// Texts of the boards, if they are wanted.
 fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), Failure> {
-    for board in boards.iter().filter(|_| args.debug) {
-        let change = AdminChange { debug: Some(true), ..Default::default() };
+    let on = |wanted: bool| wanted.then_some(true);
+    for board in boards.iter().filter(|_| args.debug || args.global_debug) {
+        let change =
+            AdminChange { debug: on(args.debug), global_debug: on(args.global_debug), ..Default::default() };
         driver.run(Request::Admin { board: *board, change, force: true })?;
     }
     Ok(())

@@ -20,9 +20,9 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
         "bytes": report.bytes,
         "images": images.clone().map(|(image, name)| image_value(image, name)).collect::<Vec<_>>(),
         "unverifiable": report.unverifiable.map(|why| json!({ "reason": why.to_string(), "hint": why.hint() })),
-        // The outcome of one board is what scripts ask for most.
+        // The outcome of one board is what scripts ask for most; of several, where it is the same.
         "outcome": match report.boards.as_slice() {
-            [one] => json!(one.outcome.name()),
+            [first, rest @ ..] if rest.iter().all(|b| b.outcome == first.outcome) => json!(first.outcome.name()),
             _ => Value::Null,
         },
         "boards": report.boards.iter().map(|b| result(b, report, profile)).collect::<Vec<_>>(),

@@ -313,3 +313,19 @@ fn refused(code: DataStatus, state: u8) -> &'static str {
 pub(crate) fn accepted(r: &Response) -> bool {
     r.status == FrameStatus::NoError && r.data == DataStatus::NoError
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// J-34: resume right after pause finds Execute until the arm stands.
+    #[test]
+    fn a_resume_too_early_is_told_from_one_without_a_pause() {
+        let early = Error::NotPaused { state: 3, tes: 3 };
+        assert!(early.to_string().contains("still slowing down"), "{early}");
+        assert!(early.hint().contains("resume` again"), "{}", early.hint());
+        let never = Error::NotPaused { state: 2, tes: 4 };
+        assert!(never.to_string().contains("would start a motion"), "{never}");
+        assert_eq!((early.exit_code(), never.exit_code()), (4, 4));
+    }
+}

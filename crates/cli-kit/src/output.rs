@@ -81,7 +81,7 @@ impl Output {
     /// A bar on stderr; invisible where stderr is no terminal.
     pub fn bar(&self, total: u64, what: &str) -> ProgressBar {
         let bar = ProgressBar::with_draw_target(Some(total), target());
-        let style = ProgressStyle::with_template("{msg:12} {bar:40.cyan/dim} {pos:>5}/{len} {elapsed:>5}");
+        let style = ProgressStyle::with_template("{msg:8} {wide_bar:.cyan/dim} {pos:>5}/{len} {elapsed:>5}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─"));
         bar.set_message(what.to_owned());
         bar

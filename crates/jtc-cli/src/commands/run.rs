@@ -264,8 +264,8 @@ fn execute(
     what: &str,
     operator: &mut Operator,
 ) -> Result<Outcome, Error> {
-    let bar = operator.out.bar((trajectory.duration_s() * 1e3) as u64, what);
     operator.motion_begins();
+    let bar = operator.out.bar((trajectory.duration_s() * 1e3) as u64, what);
     let outcome = session.execute().and_then(|()| {
         session.follow(|s| {
             bar.set_position(u64::from(s.point));

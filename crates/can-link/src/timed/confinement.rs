@@ -47,6 +47,22 @@ impl Counters {
     }
 }
 
+/// What a member that is bus-off still has to see: 11 recessive bits, so often.
+///
+/// They come one after the other on an idle bus, and one at the end of each frame: the delimiter of its acknowledgement or of its
+/// error frame, the end, and the intermission. A busy bus lets nobody back sooner than after 128 frames.
+pub(crate) struct Recovery {
+    pub left: u32,
+    /// Recessive since then, ns; `None` while a frame is on the wire.
+    pub recessive_from: Option<u64>,
+}
+
+impl Recovery {
+    pub(crate) fn due(&self, sequence_ns: u64) -> Option<u64> {
+        Some(self.recessive_from? + u64::from(self.left) * sequence_ns)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

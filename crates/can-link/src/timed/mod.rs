@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use crate::faulty::Line;
 use crate::{CanFrame, ControllerState, Counts, Plan};
-use confinement::Counters;
+use confinement::{Counters, Recovery};
 use contest::{Contest, Starter};
 pub use event::{BusError, BusStats, Happening, MemberId, QueueError, TimedEvent};
 pub use wire::classic_frame_bits;
@@ -76,22 +76,6 @@ struct Member {
 impl Member {
     fn on_bus(&self) -> bool {
         !self.left && !self.counters.bus_off()
-    }
-}
-
-/// What a member that is bus-off still has to see: 11 recessive bits, so often.
-///
-/// They come one after the other on an idle bus, and one at the end of each frame: the delimiter of its acknowledgement or of its
-/// error frame, the end, and the intermission. A busy bus lets nobody back sooner than after 128 frames.
-struct Recovery {
-    left: u32,
-    /// Recessive since then, ns; `None` while a frame is on the wire.
-    recessive_from: Option<u64>,
-}
-
-impl Recovery {
-    fn due(&self, sequence_ns: u64) -> Option<u64> {
-        Some(self.recessive_from? + u64::from(self.left) * sequence_ns)
     }
 }
 

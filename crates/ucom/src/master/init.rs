@@ -7,12 +7,13 @@
 use std::collections::BTreeSet;
 use std::prelude::v1::*;
 
+use super::byte_order::{exchanged, other_order};
 use super::holders::one_board_each;
 use super::link::Link;
 use super::repair::given_back;
 pub(crate) use super::repair::{repair, repair_procedure};
 use super::request::{Answer, TRIES, ask_info, confirmed, info, set_status};
-use super::scan::{REPORTS, Reports, ask_reports, collect_reports, exchanged, other_order};
+use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome};
 use crate::profile::Endian;

@@ -34,6 +34,7 @@
 //! sends life signs until [`Master::end_session`]. Scan, information and descriptions change nothing and send none.
 
 mod boards;
+mod byte_order;
 pub mod conformance;
 mod control;
 pub mod doctor;

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::prelude::v1::*;
 
+use super::byte_order::{exchanged, other_order};
 use super::holders::one_board_each;
 use super::link::Link;
 use super::request::{Answer, InfoCollector, TRIES, identity, remember};
@@ -133,26 +134,6 @@ pub enum ScanFinding {
         /// Its number.
         board: u8,
     },
-}
-
-/// Words for boards that send the bytes of a word in the other order than the profile has.
-pub(crate) fn other_order(endian: Endian) -> String {
-    let (here, there) = match endian {
-        Endian::Little => ("little", "big"),
-        Endian::Big => ("big", "little"),
-    };
-    format!(
-        "wrong byte order: the flash numbers fit the reports only with their bytes exchanged, so the boards send words as \
-         {there}-endian, and the profile has `endian = \"{here}\"`: `ucom probe --out FILE` measures it and writes a profile"
-    )
-}
-
-/// Whether the boards' flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
-pub(crate) fn exchanged(reports: &Reports, boards: &[BoardSeen]) -> bool {
-    let fits = |byte: u16| reports.ids.contains(&(byte as u8));
-    let only_exchanged = |b: &BoardSeen| !fits(b.info.flash_number) && fits(b.info.flash_number >> 8);
-    let [high, low] = [|b: &BoardSeen| b.info.flash_number >> 8, |b: &BoardSeen| b.info.flash_number & 0xFF];
-    boards.iter().any(only_exchanged) && boards.iter().all(|b| only_exchanged(b) || high(b) == low(b))
 }
 
 fn shared(board: u8, found: [u16; 2]) -> Error {

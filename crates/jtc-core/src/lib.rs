@@ -34,7 +34,7 @@ pub use config::{Config, ConfigError, Friction, JointConfig, Parameters, PidGain
 pub use controller::Controller;
 pub use interpolation::{SetPoint, interpolate, position_speed};
 pub use io::{BusState, HostEvent, Inputs, Outputs};
-pub use parameters::ParameterBounds;
+pub use parameters::{OutOfBounds, ParameterBounds};
 pub use records::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};
 

@@ -46,6 +46,38 @@ pub struct ParameterBounds {
     pub rest_friction_max: f64,
 }
 
+/// A parameter beyond its bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfBounds {
+    /// What it is, with its unit.
+    pub what: &'static str,
+    /// Velocity that it belongs to, rad/s: friction only.
+    pub velocity: Option<f64>,
+    /// The value.
+    pub value: f64,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+}
+
+impl OutOfBounds {
+    /// Written so that a NaN is refused.
+    fn unless_within(what: &'static str, value: f64, low: f64, high: f64) -> Result<(), Self> {
+        if value >= low && value <= high {
+            Ok(())
+        } else {
+            Err(Self { what, velocity: None, value, low, high })
+        }
+    }
+}
+
+impl From<OutOfBounds> for DataStatus {
+    fn from(_: OutOfBounds) -> Self {
+        Self::IncorrectValue
+    }
+}
+
 impl ParameterBounds {
     /// For the known drives.
     pub const fn known_drives() -> Self {
@@ -64,35 +96,40 @@ impl ParameterBounds {
         }
     }
 
-    /// Gains of a joint with that torque limit (N·m). Written so that a NaN is refused.
-    fn check_gains(&self, gains: &PidGains, torque_max: f64) -> Result<(), DataStatus> {
+    /// Gains of a joint.
+    pub fn check_gains(&self, gains: &PidGains, joint: &JointConfig) -> Result<(), OutOfBounds> {
         let PidGains { kp, ki, kd, int_min, int_max } = *gains;
-        let within = |value: f64, low: f64, high: f64| value >= low && value <= high;
+        let within = OutOfBounds::unless_within;
+        within("Kp (N·m/rad)", kp, 0.0, self.kp_max)?;
+        within("Ki (N·m/(rad·s))", ki, 0.0, self.ki_max)?;
+        within("Kd (N·m·s/rad)", kd, 0.0, self.kd_max)?;
+        within("IntMin (rad·s)", int_min, -self.integral_max, int_max)?;
+        within("IntMax (rad·s)", int_max, int_min, self.integral_max)?;
         // The integral nearest to zero.
         let least = int_min.max(0.0) - int_max.min(0.0);
-        let good = within(kp, 0.0, self.kp_max)
-            && within(ki, 0.0, self.ki_max)
-            && within(kd, 0.0, self.kd_max)
-            && within(int_min, -self.integral_max, int_max)
-            && within(int_max, int_min, self.integral_max)
-            && ki * least <= self.integral_bias_max * torque_max;
-        if good { Ok(()) } else { Err(DataStatus::IncorrectValue) }
+        within(
+            "torque that the bounds of the integral force on a joint at rest (N·m)",
+            ki * least,
+            0.0,
+            self.integral_bias_max * joint.torque_max,
+        )
     }
 
     /// Masses and inertias of a model that is physical.
-    fn check_masses(&self, model: &ArmModel) -> Result<(), DataStatus> {
-        let good = |link: &Link| {
-            link.mass <= self.link_mass_max && link.inertia.iter().all(|i| i.abs() <= self.link_inertia_max)
-        };
-        if model.links.iter().all(good) { Ok(()) } else { Err(DataStatus::IncorrectValue) }
+    pub fn check_masses(&self, model: &ArmModel) -> Result<(), OutOfBounds> {
+        for link in &model.links {
+            OutOfBounds::unless_within("mass of a link (kg)", link.mass, 0.0, self.link_mass_max)?;
+            let most = self.link_inertia_max;
+            for &inertia in &link.inertia {
+                OutOfBounds::unless_within("inertia of a link (kg·m²)", inertia, -most, most)?;
+            }
+        }
+        Ok(())
     }
-}
 
-impl ParameterBounds {
-    /// The torque (N·m) that compensates friction of a joint at a velocity (rad/s). Written so that a NaN is refused.
-    fn check_friction(&self, torque: f64, velocity: f64, joint: &JointConfig) -> Result<(), DataStatus> {
-        let (share, speed) = (torque / joint.torque_max, velocity.abs());
-        let along = if velocity < 0.0 { -share } else { share };
+    /// The torque (N·m) that compensates friction of a joint at a velocity (rad/s).
+    fn check_friction(&self, torque: f64, velocity: f64, joint: &JointConfig) -> Result<(), OutOfBounds> {
+        let speed = velocity.abs();
         let (low, high) = if speed == 0.0 {
             (-self.rest_friction_max, self.rest_friction_max)
         } else if speed <= MEASURED * joint.velocity_max {
@@ -100,11 +137,19 @@ impl ParameterBounds {
         } else {
             (-self.friction_max, self.friction_max)
         };
-        if along >= low && along <= high { Ok(()) } else { Err(DataStatus::IncorrectValue) }
+        // Against the motion is positive for both directions.
+        let along = if velocity < 0.0 { -torque } else { torque };
+        OutOfBounds::unless_within(
+            "friction torque (N·m)",
+            along,
+            low * joint.torque_max,
+            high * joint.torque_max,
+        )
+        .map_err(|e| OutOfBounds { velocity: Some(velocity), ..e })
     }
 
     /// A polynomial at all speeds that the joint may have. Its temperature factor is bounded by itself (J-42).
-    fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), DataStatus> {
+    pub fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), OutOfBounds> {
         let [c0, c1, c2, c3, ..] = *coefficients;
         let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
         (1..=SPEEDS).map(|k| joint.velocity_max * f64::from(k) / f64::from(SPEEDS)).try_for_each(|v| {
@@ -114,7 +159,7 @@ impl ParameterBounds {
     }
 
     /// A table at its own velocities, and at standstill.
-    fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), DataStatus> {
+    pub fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), OutOfBounds> {
         for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
             for &torque in row {
                 // Standstill is checked below, where most tables have no row.
@@ -146,7 +191,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn set_pid(&mut self, gains: [PidGains; JOINTS]) -> Result<(), DataStatus> {
         let bounds = &self.config.parameter_bounds;
         for (gains, joint) in gains.iter().zip(&self.config.joints) {
-            bounds.check_gains(gains, joint.torque_max)?;
+            bounds.check_gains(gains, joint)?;
         }
         self.pid = gains;
         self.given.set(Given::PID);
@@ -222,7 +267,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let j = if let Work::TableCheck(j) = work { j } else { 0 };
                 let table = read_table(floats, j).and_then(|table| {
                     let joint = self.config.joints.get(j).ok_or(DataStatus::IncorrectValue)?;
-                    self.config.parameter_bounds.check_table(&table, joint)
+                    self.config.parameter_bounds.check_table(&table, joint).map_err(DataStatus::from)
                 });
                 match table {
                     Err(status) => Progress::Refused(status),

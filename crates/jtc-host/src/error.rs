@@ -50,6 +50,14 @@ pub enum Error {
         /// Trajectory execution state then.
         tes: u8,
     },
+    /// The controller refused a parameter, and this is beyond the bounds of known controllers.
+    #[error("{request:?}: {}: {beyond}", words::data_status(DataStatus::IncorrectValue))]
+    BeyondBounds {
+        /// The request.
+        request: FrameType,
+        /// Joint, value and bounds.
+        beyond: crate::arm::Beyond,
+    },
     /// The controller refused a segment for good.
     #[error("segment {segment} of {segments}: {}", words::data_status(*code))]
     SegmentRefused {
@@ -197,6 +205,7 @@ impl Error {
         match self {
             Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } | Error::LinkLost { .. } => 3,
             Error::Refused { .. }
+            | Error::BeyondBounds { .. }
             | Error::SegmentRefused { .. }
             | Error::UploadFailed { .. }
             | Error::Device { .. }
@@ -218,6 +227,7 @@ impl Error {
             Error::NoLink { .. } => "no-link",
             Error::NotConfirmed { .. } => "not-confirmed",
             Error::Refused { .. } => "refused",
+            Error::BeyondBounds { .. } => "beyond-bounds",
             Error::SegmentRefused { .. } => "segment-refused",
             Error::UploadFailed { .. } => "upload-failed",
             Error::Device { .. } => "device-error",
@@ -254,6 +264,10 @@ impl Error {
                     .into()
             }
             Error::Refused { code, state, .. } => refused(*code, *state).into(),
+            Error::BeyondBounds { .. } => {
+                "such a number would throw or drop the arm: correct the file (`jtc params show FILE`); what the controller had before \
+                 is unchanged".into()
+            }
             Error::SegmentRefused { code, .. } => refused(*code, 2).into(),
             Error::UploadFailed { .. } => "`jtc doctor` looks at the line; then run it again".into(),
             Error::Device { .. } => "`jtc recover` leads back to HoldPos, `jtc explain CODE` tells about each error".into(),

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use jtc_core::Config;
-use jtc_host::arm::{Arm, FrictionChoice, ParameterFile};
+use jtc_core::{Config, Friction};
+use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
 use jtc_host::port::sim::SimPort;
 use jtc_host::port::{Port, PortError};
 use jtc_host::session::{Flow, Outcome, ParameterSource, RecoverStep, UploadOptions, UploadReport};
@@ -419,4 +419,32 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     assert!(text.contains("joint 5: position error"), "{text}");
     assert!(error.hint().contains("jtc traj resume"));
     assert_eq!(s.fresh_status().unwrap().fsm, 2, "it is held");
+}
+
+/// The controller says "incorrect value" only: joint, value and bounds are found on this side.
+#[test]
+fn j06_a_refused_parameter_is_named() {
+    let mut s = ready(Some(921_600));
+    let good = Arm::avena().parameter_set();
+    let said = |s: &mut Sim, set: &ParameterSet| {
+        let error = s.push(set, |_| ()).expect_err("it is refused");
+        assert_eq!((error.exit_code(), error.code()), (1, "beyond-bounds"), "{error}");
+        error.to_string()
+    };
+    let mut set = ParameterSet { pid: good.pid, ..ParameterSet::default() };
+    set.pid.as_mut().unwrap()[2].kp = 60_000.0;
+    let text = said(&mut s, &set);
+    assert!(text.contains("joint 3: Kp (N·m/rad) 60000 is outside 0..50000"), "{text}");
+    let Some(Friction::Polynomial(mut c)) = good.friction.clone() else { panic!("a polynomial") };
+    c[4][1] *= -1.0;
+    let set = ParameterSet { friction: Some(Friction::Polynomial(c)), ..ParameterSet::default() };
+    let text = said(&mut s, &set);
+    assert!(text.contains("joint 5: friction torque (N·m) at ") && text.contains("is outside"), "{text}");
+    let mut set = ParameterSet { model: good.model, ..ParameterSet::default() };
+    set.model.as_mut().unwrap().links[0].mass = 51.0;
+    let text = said(&mut s, &set);
+    assert!(text.contains("mass of a link (kg) 51 is outside 0..50"), "{text}");
+    // What the arm was given before is still what it uses.
+    assert_eq!(s.fresh_status().unwrap().jtc_init, 0);
+    s.push(&good, |_| ()).unwrap();
 }

@@ -18,7 +18,7 @@ use jtc_dynamics::ArmModel;
 
 pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
-pub use parameters::{ParameterError, ParameterSet};
+pub use parameters::{Beyond, ParameterError, ParameterSet};
 pub use urdf::ArmChoice;
 
 use crate::file::{FileError, Place, read_text};

@@ -1,6 +1,6 @@
 //! What a controller is given, and the checks that come before.
 
-use jtc_core::{Friction, JOINTS, PidGains, TableOf};
+use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 
 /// Parameters to send; `None`: not this one.
@@ -57,6 +57,30 @@ pub enum ParameterError {
     Model(jtc_dynamics::ModelError),
 }
 
+/// A parameter beyond the bounds of a controller (J-06). Joints count from 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beyond {
+    /// Joint from 1; `None`: of the arm model.
+    pub joint: Option<usize>,
+    /// What it is, and within what.
+    pub bounds: OutOfBounds,
+}
+
+impl std::fmt::Display for Beyond {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let OutOfBounds { what, velocity, value, low, high } = self.bounds;
+        if let Some(joint) = self.joint {
+            write!(f, "joint {joint}: ")?;
+        }
+        write!(f, "{what} ")?;
+        if let Some(velocity) = velocity {
+            write!(f, "at {velocity:.3} rad/s ")?;
+        }
+        let short = |v: f64| (v * 1e6).round() / 1e6;
+        write!(f, "{} is outside {}..{}", short(value), short(low), short(high))
+    }
+}
+
 impl ParameterError {
     /// The next command or act that helps.
     pub fn hint(&self) -> String {
@@ -80,7 +104,28 @@ impl ParameterSet {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// All that the controller would refuse with "incorrect value" (J-06), before anything is sent.
+    /// The first parameter beyond what a controller with these settings takes (J-06): for the words after it refused.
+    pub fn beyond(&self, config: &Config) -> Option<Beyond> {
+        let bounds = &config.parameter_bounds;
+        let joints = config.joints.iter().enumerate();
+        let of_joint = |j: usize, checked: Result<(), OutOfBounds>| {
+            checked.err().map(|bounds| Beyond { joint: Some(j + 1), bounds })
+        };
+        let friction = joints.clone().find_map(|(j, joint)| match &self.friction {
+            Some(Friction::Polynomial(c)) => of_joint(j, bounds.check_polynomial(&c[j], joint)),
+            Some(Friction::Table(t)) => of_joint(j, bounds.check_table(&t[j], joint)),
+            None => None,
+        });
+        let gains =
+            || joints.clone().find_map(|(j, joint)| of_joint(j, bounds.check_gains(&self.pid?[j], joint)));
+        let masses = || {
+            let bounds = bounds.check_masses(self.model.as_ref()?).err()?;
+            Some(Beyond { joint: None, bounds })
+        };
+        friction.or_else(gains).or_else(masses)
+    }
+
+    /// All that cannot be sent, and much of what the controller would refuse with "incorrect value" (J-06), before anything is sent.
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {
             Some(Friction::Polynomial(c)) => {

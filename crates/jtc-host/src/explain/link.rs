@@ -69,9 +69,11 @@ pub(super) const PAGES: &[Page] = &[
         6,
         "incorrect-value",
         [
-            "A number that cannot be: NaN, negative mass, bounds exchanged, axis not increasing, unknown command.",
+            "A number that cannot be, or would throw or drop the arm: NaN, negative mass or gain, bounds exchanged, axis not \
+             increasing, unknown command, gains, masses or friction beyond the bounds of these drives, a model whose weight the \
+             torque limits cannot hold; or a trajectory that leaves a limit.",
             "File or program that sends it.",
-            "The push names the number before it sends anything.",
+            "The push names the number, `jtc traj check` the place of a trajectory.",
             "jtc params push FILE",
         ],
     ),

@@ -1,5 +1,8 @@
 //! Friction, gains and arm model to the controller.
 
+use jtc_core::Config;
+use jtc_wire::{DataStatus, FrameType};
+
 use super::{Parameter, Session};
 use crate::arm::ParameterSet;
 use crate::port::Port;
@@ -41,7 +44,7 @@ impl<P: Port> Session<P> {
         for (parameter, frame, times) in frames {
             let start = self.port.now();
             for _ in 0..times {
-                self.command(&frame)?;
+                self.command(&frame).map_err(|e| explained(e, set))?;
             }
             let time_s = (self.port.now() - start).as_secs_f64();
             let pushed = Pushed { parameter, bytes: frame.len(), times, time_s };
@@ -50,4 +53,16 @@ impl<P: Port> Session<P> {
         }
         Ok(all)
     }
+}
+
+/// A refused value by its name, where one of the set is beyond the bounds of the controllers that are known.
+fn explained(error: Error, set: &ParameterSet) -> Error {
+    let Error::Refused { request, code: DataStatus::IncorrectValue, .. } = error else { return error };
+    // Only what this frame carried.
+    let part = match request {
+        FrameType::PidParam => ParameterSet { pid: set.pid, ..ParameterSet::default() },
+        FrameType::ArmModel => ParameterSet { model: set.model, ..ParameterSet::default() },
+        _ => ParameterSet { friction: set.friction.clone(), ..ParameterSet::default() },
+    };
+    part.beyond(&Config::avena()).map_or(error, |beyond| Error::BeyondBounds { request, beyond })
 }

@@ -19,7 +19,7 @@ pub const PATH_STEP_MS: u16 = 10;
 pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let to = from.map(|q| (q + 1.2 * (rng.f64() - 0.5)).clamp(-1.4, 1.4));
-    host::there_and_back(from, &to, 1.0 + 2.0 * rng.f64(), 1, PATH_STEP_MS)
+    host::there_and_back(from, &to, 1.6 + 2.0 * rng.f64(), 1, PATH_STEP_MS)
 }
 
 /// What a soak run saw.

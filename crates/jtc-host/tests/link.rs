@@ -301,7 +301,8 @@ fn j34_resume_only_after_a_pause() {
         let error = s.resume().unwrap_err();
         assert!(matches!(error, Error::NotPaused { tes: t, .. } if t == tes), "{error}");
         assert_eq!((error.exit_code(), written.borrow().len()), (4, 0), "{error}");
-        assert!(!error.hint().contains("traj resume"), "{}", error.hint());
+        // Only a motion that may be slowing down can be resumed by the same command a little later.
+        assert_eq!(error.hint().contains("traj resume"), tes == 3, "{}", error.hint());
     }
     let (mut s, written) =
         scripted::session(jtc_wire::Status { fsm: 2, tes: 2, ..Default::default() }, Duration::MAX);

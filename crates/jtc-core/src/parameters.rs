@@ -152,7 +152,10 @@ impl ParameterBounds {
     pub fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), OutOfBounds> {
         let [c0, c1, c2, c3, ..] = *coefficients;
         let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
-        (1..=SPEEDS).map(|k| joint.velocity_max * f64::from(k) / f64::from(SPEEDS)).try_for_each(|v| {
+        let step = joint.velocity_max / f64::from(SPEEDS);
+        // Arms often move slowly: as many speeds again within the first step.
+        let slow = (1..SPEEDS).map(|k| step * f64::from(k) / f64::from(SPEEDS));
+        slow.chain((1..=SPEEDS).map(|k| step * f64::from(k))).try_for_each(|v| {
             // The sign is smoothed around standstill, where there is no torque.
             self.check_friction(friction::polynomial(&without_temperature, v, 0.0, v), v, joint)
         })

@@ -12,6 +12,9 @@ use crate::config::{Config, JointConfig};
 /// swing.
 const CALM_MS: u16 = 100;
 
+/// Speed below which a swing that grows is noise, rad/s.
+const FAST_SWING: f64 = 0.1;
+
 /// A joint whose load may have to be caught.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Catch {
@@ -21,12 +24,15 @@ pub(crate) struct Catch {
     busy_ms: u16,
     /// How far the set position has sagged, rad: in one direction only.
     sag: f64,
+    /// Highest speed of this half of a swing, with its sign, and of the half before, rad/s.
+    peak: f64,
+    peak_before: f64,
 }
 
 impl Catch {
     /// The joint was just enabled.
     pub fn begin(config: &Config) -> Self {
-        Self { left_ms: config.catch_ms_max, busy_ms: CALM_MS, sag: 0.0 }
+        Self { left_ms: config.catch_ms_max, busy_ms: CALM_MS, ..Self::default() }
     }
 
     /// The joint is not at rest yet.
@@ -34,13 +40,23 @@ impl Catch {
         self.left_ms > 0 && self.busy_ms > 0
     }
 
-    /// One tick, with the measured `speed` (rad/s): whether a load may still be caught.
-    pub fn step(&mut self, speed: f64) -> bool {
+    /// One tick, with the measured velocity (rad/s): whether a load may still be caught. A swing that grows is no load that comes to
+    /// rest but a loop that is unstable, and the catch is over.
+    pub fn step(&mut self, velocity: f64) -> bool {
         if self.left_ms == 0 {
             return false;
         }
         self.left_ms -= 1;
-        self.busy_ms = if speed.abs() > STANDING { CALM_MS } else { self.busy_ms.saturating_sub(1) };
+        let speed = velocity.abs();
+        self.busy_ms = if speed > STANDING { CALM_MS } else { self.busy_ms.saturating_sub(1) };
+        if speed > STANDING && velocity * self.peak < 0.0 {
+            (self.peak_before, self.peak) = (self.peak.abs(), velocity);
+        } else if speed > self.peak.abs() {
+            self.peak = velocity;
+        }
+        if self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING) {
+            *self = Self::default();
+        }
         self.left_ms > 0
     }
 

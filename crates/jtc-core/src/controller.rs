@@ -60,6 +60,8 @@ pub struct Controller<M> {
     pub(crate) tables: [TableOf<f32>; JOINTS],
     pub(crate) friction_is_table: bool,
     pub(crate) teaching: bool,
+    /// Milliseconds for which teaching has waited until the arm is held.
+    teaching_waits_ms: u32,
     pub(crate) pump: bool,
     // The trajectory and its execution.
     pub(crate) store: Store<M>,
@@ -97,6 +99,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             tables: core::array::from_fn(|j| *defaults::friction_table(j)),
             friction_is_table: false,
             teaching: false,
+            teaching_waits_ms: 0,
             pump: false,
             store: Store::new(points),
             check: TrajectoryCheck::new(&config, 1, None),
@@ -251,7 +254,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             State::Error
         } else if !initialised {
             State::Init
-        } else if self.teaching {
+        } else if self.teaching && (self.state == State::Teaching || self.motion.may_be_taught(&self.config))
+        {
+            // Accepted, it waits until every joint is held at rest: what the arm carries is found only then (J-25).
             State::Teaching
         } else if self.tes == Tes::Execute {
             State::Operate
@@ -298,6 +303,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn hold(&mut self) -> [f64; JOINTS] {
+        // It does not wait for ever: nobody expects the arm to go soft then.
+        self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
+        self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         self.motion.latch(&self.nodes, &self.config);
         self.motion.hold(&self.config);
         self.control(Law::Hold)

@@ -133,6 +133,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
             }
             Path::Gliding { from, elapsed_ms, leave } => {
+                if elapsed_ms == 0.0 {
+                    // The arm was held until now, without friction compensation.
+                    self.motion.change_law();
+                }
                 let length = f64::from(self.config.ramp_ms.max(1));
                 let elapsed_ms = elapsed_ms + 1.0;
                 self.motion.glide(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);

@@ -307,6 +307,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// J-34.
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         match (self.tes, command) {
+            // Teaching was accepted, and begins as soon as the arm is held.
+            (_, ExecCommand::Execute) if self.teaching => Err(DataStatus::NotAllowed),
             (Tes::Stop | Tes::Finish, ExecCommand::Execute) => {
                 self.check_friction()?;
                 self.start_path()

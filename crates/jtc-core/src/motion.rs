@@ -126,12 +126,18 @@ impl Motion {
             && !self.catch.iter().any(Catch::busy)
     }
 
+    /// What the arm carries is known, or is none of it: an arm that gives way has more likely a contact against it.
+    pub fn may_be_taught(&self, config: &Config) -> bool {
+        self.all_holding() && (self.yielding || self.payload.is_known(config))
+    }
+
     /// Latches the set position of joints that have just been enabled, and brings those to rest that move; joints that are
     /// not enabled are followed, without torque.
     pub fn latch(&mut self, nodes: &Nodes, config: &Config) {
         let (measured, velocity) = (nodes.positions(), nodes.velocities());
         let enabled = core::array::from_fn(|j| nodes.node(j).enabled());
-        let just_enabled = core::array::from_fn(|j| enabled[j] && !self.holding[j]);
+        let just_enabled: [bool; JOINTS] = core::array::from_fn(|j| enabled[j] && !self.holding[j]);
+        let another = just_enabled.contains(&true);
         for j in 0..JOINTS {
             if !(enabled[j] && self.holding[j]) {
                 self.set.position[j] = measured[j];
@@ -140,6 +146,9 @@ impl Motion {
                 let moves = just_enabled[j] && velocity[j].abs() > STANDING;
                 self.coast[j] =
                     moves.then_some(Coast::falling(measured[j], velocity[j], config, &config.joints[j]));
+            } else if another {
+                // Its load moves when that of another joint does.
+                self.catch[j] = Catch::begin(config);
             }
         }
         self.holding = enabled;
@@ -212,6 +221,10 @@ impl Motion {
     /// Teaching ends: hold where the arm is, and let the integral take over what teaching carried.
     pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         self.hold_measured(nodes, config);
+        for (catch, coast) in self.catch.iter_mut().zip(&self.coast) {
+            // What a hand has led is stopped as a load is.
+            *catch = if coast.is_some() { Catch::begin(config) } else { *catch };
+        }
         for ((pid, gains), torque) in self.pid.iter_mut().zip(gains).zip(&self.torque) {
             pid.take_over(gains, torque.payload);
         }

@@ -9,11 +9,15 @@
 use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
-use crate::config::Config;
+use crate::config::{Config, JointConfig};
 use crate::motion::smooth;
 
 /// Ticks over which the missing torque is averaged: the time constant of a low-pass filter.
 const AVERAGE_MS: f64 = 100.0;
+/// Ticks of calm holding after which the average is trusted: an arm that swings below what counts as standing turns twice.
+const OBSERVED_MS: u16 = 400;
+/// Share of a torque limit below which what is missing is no load worth waiting for: friction of the joint holds it.
+const LITTLE: f64 = 0.1;
 /// Torque of 1 kg at the flange, all joints together (N·m/kg): up to the first nothing is attributed to a mass, from the second
 /// all that fits.
 const LOAD: (f64, f64) = (2.0, 6.0);
@@ -23,8 +27,8 @@ const LOAD: (f64, f64) = (2.0, 6.0);
 pub(crate) struct Payload {
     /// The torque that the model lacks to hold the arm, averaged, N·m.
     missing: [f64; JOINTS],
-    /// The average has begun.
-    observed: bool,
+    /// Ticks that the average is of, at least.
+    observed_ms: u16,
     /// Fitted mass at the flange, kg; negative where the modelled arm is too heavy.
     mass: f64,
     /// What did not fit, N·m, and how long it has been fading.
@@ -35,13 +39,20 @@ pub(crate) struct Payload {
 impl Payload {
     /// The arm is not held: what is missing is to be found anew.
     pub fn forget(&mut self) {
-        self.observed = false;
+        self.observed_ms = 0;
+    }
+
+    /// It has been observed for long enough to tell what the arm carries, or that it is next to nothing.
+    pub fn is_known(&self, config: &Config) -> bool {
+        let little = |(missing, joint): (&f64, &JointConfig)| missing.abs() < LITTLE * joint.torque_max;
+        let nothing = self.observed_ms > 0 && self.missing.iter().zip(&config.joints).all(little);
+        nothing || self.observed_ms >= OBSERVED_MS
     }
 
     /// A tick of HoldPos, which adds `correction` (N·m) to the torque of the model.
     pub fn observe(&mut self, correction: &[f64; JOINTS]) {
-        let weight = if self.observed { 1.0 / AVERAGE_MS } else { 1.0 };
-        self.observed = true;
+        let weight = 1.0 / (f64::from(self.observed_ms) + 1.0).min(AVERAGE_MS);
+        self.observed_ms = self.observed_ms.saturating_add(1);
         for (missing, correction) in self.missing.iter_mut().zip(correction) {
             *missing += weight * (correction - *missing);
         }
@@ -49,7 +60,7 @@ impl Payload {
 
     /// Teaching begins at `q` (rad): fits the mass, by least squares over the joints.
     pub fn fit(&mut self, dynamics: &Dynamics, q: &[f64; JOINTS], config: &Config) {
-        let missing = if self.observed { self.missing } else { [0.0; JOINTS] };
+        let missing = if self.observed_ms > 0 { self.missing } else { [0.0; JOINTS] };
         let unit = dynamics.flange_torque(q);
         let load: f64 = unit.iter().map(|u| u * u).sum();
         let fitted: f64 =

@@ -29,8 +29,7 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     rig.until(600, |r| r.tes() == Tes::Pause);
     rig.run(2);
     rig.send(FrameType::TeachingModeEnable, &[]);
-    rig.run(3);
-    assert_eq!(rig.state(), State::Teaching);
+    rig.until(450, |r| r.state() == State::Teaching);
     rig.follow = false;
     rig.nodes[1].report.velocity = 0.4;
     for ms in 0..2_000 {

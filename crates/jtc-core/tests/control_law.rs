@@ -238,7 +238,7 @@ fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
             rig.defaults();
             rig.run(300);
             rig.ask(FrameType::TeachingModeEnable, &[]);
-            rig.run(150);
+            rig.run(650);
             rig.nodes[1].report.velocity = side * 0.8;
             rig.run(2);
             rig.send(FrameType::TeachingModeDisable, &[]);

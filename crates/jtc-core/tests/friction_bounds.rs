@@ -144,3 +144,44 @@ fn j06_the_bounds_of_friction_are_settings() {
     let mut rig = Rig::holding_with(config);
     assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::IncorrectValue);
 }
+
+/// A cubic between the speeds at which it is looked at: arms often move as slowly as this.
+#[test]
+fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
+    let limits = Config::avena().joints.map(|joint| joint.torque_max);
+    // Shares of the torque limit: 1.7 against the motion, and 0.78 along it, at 0.02 rad/s.
+    for shares in [
+        [1.946984127, -12.050370370, 21.744197531, -10.161740153],
+        [-1.017777778, 12.327407407, -22.332839506, 10.155720165],
+    ] {
+        let mut rig = Rig::holding();
+        let joints: [[f64; 4]; 6] = limits.map(|limit| shares.map(|share| 0.999 * share * limit));
+        assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&joints)), DataStatus::IncorrectValue);
+    }
+}
+
+/// A table may have friction at standstill: it begins with the way to the path, and not in one tick.
+#[test]
+fn j44_the_friction_of_a_table_at_standstill_makes_no_step() {
+    let tables = Config::avena().joints.map(|joint| {
+        let share = (joint.torque_max / 180.0) as f32;
+        table_of(-1.0, |v| share * (9.0 + 40.0 * v))
+    });
+    let mut rig = Rig::holding();
+    assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables)), DataStatus::NoError);
+    rig.run(300);
+    rig.upload(&[RawPoint::default(); 30], 10);
+    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    let correction = |rig: &Rig| rig.controller.telemetry().joints.map(|j| j.torque - j.torque_model);
+    let (mut last, mut most) = (correction(&rig), 0.0_f64);
+    for _ in 0..700 {
+        rig.tick();
+        let now = correction(&rig);
+        for j in 0..6 {
+            assert!((now[j] - last[j]).abs() < 0.5, "joint {}: {} after {} N·m", j + 1, now[j], last[j]);
+        }
+        most = most.max(rig.controller.telemetry().joints[1].torque_friction);
+        last = now;
+    }
+    assert!(most > 8.0, "there was friction: {most} N·m");
+}

@@ -186,7 +186,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
     rig.run(400);
     assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
-    rig.run(200);
+    rig.run(500);
     assert_eq!(rig.state(), State::Teaching);
     // A trajectory out there is another matter.
     rig.ask(FrameType::TeachingModeDisable, &[]);

@@ -499,6 +499,7 @@ fn j25_teaching_is_refused_outside_holdpos() {
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NotAllowed);
     assert_eq!(rig.state(), State::Init);
     let mut rig = Rig::holding();
+    rig.run(100);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(2);
     assert_eq!(rig.state(), State::Teaching);

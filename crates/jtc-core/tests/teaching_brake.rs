@@ -44,9 +44,14 @@ struct Braked {
 }
 
 fn braked(model: &ArmModel, rotor: f64, joint: usize, push: f64) -> Braked {
+    braked_with(model, rotor, rotor, joint, push)
+}
+
+/// The same with a rotor inertia (kg·m²) that the controller is `given`, and the true one.
+fn braked_with(model: &ArmModel, given: f64, rotor: f64, joint: usize, push: f64) -> Braked {
     let mut config = Config::avena();
     for j in &mut config.joints {
-        j.rotor_inertia = rotor;
+        j.rotor_inertia = given;
     }
     let mut arm = Plant::new(model, [LuGre { viscous: 0.3, ..LuGre::NONE }; 6], POSE);
     arm.rotor = [rotor; 6];
@@ -63,7 +68,10 @@ fn braked(model: &ArmModel, rotor: f64, joint: usize, push: f64) -> Braked {
         arm.tick(&mut rig);
     }
     rig.send(FrameType::TeachingModeEnable, &[]);
-    arm.run(&mut rig, 3);
+    while rig.state() != State::Teaching {
+        arm.tick(&mut rig);
+        assert_eq!(rig.errors(), 0);
+    }
     let mut it = Braked { fastest: 0.0, turns: 0 };
     let (mut last, mut change) = (0.0, 0.0);
     for ms in 0..600 {
@@ -99,5 +107,14 @@ fn j25_the_brake_has_its_whole_damping_in_the_joints_of_the_default_arm() {
         assert_eq!(it.turns, 0, "joint {}", joint + 1);
         // 40 N·m·s/rad: 14 N·m less the grease are borne by 0.34 rad/s.
         assert!((it.fastest - 1.34).abs() < 0.05, "joint {}: {} rad/s", joint + 1, it.fastest);
+    }
+}
+
+/// An arm file that gives no rotor inertia has drives with rotors all the same.
+#[test]
+fn j25_the_brake_is_whole_where_no_rotor_inertia_is_given() {
+    for joint in 3..6 {
+        let it = braked_with(&Parameters::avena().model, 0.0, 0.7, joint, 6.0);
+        assert!(it.fastest < 1.25, "joint {}: {} rad/s", joint + 1, it.fastest);
     }
 }

@@ -157,6 +157,6 @@ impl Operator {
     /// Teaching on.
     pub fn teach(&mut self) -> Result<(), OperatorError> {
         self.ask(&host::frame(FrameType::TeachingModeEnable, &[]))?;
-        self.wait("Teaching", 100, |world| world.telemetry().state == State::Teaching)
+        self.wait("Teaching", 600, |world| world.telemetry().state == State::Teaching)
     }
 }

@@ -11,6 +11,11 @@ use crate::{JOINTS, friction, joint_error, limits};
 /// brake above 200 1/s would drive a joint to and fro, and joints that move each other make that less.
 const BRAKE_RATE: f64 = 100.0;
 
+/// Rotor inertia of a drive of which none is given, kg·m²: that of the known drives.
+const UNKNOWN_ROTOR: f64 = 0.7;
+/// Speed above which torque at its limit that drives the joint on catches nothing, rad/s.
+const DRIVEN: f64 = 0.05;
+
 /// Which parts of the control law act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Law {
@@ -143,7 +148,7 @@ impl Motion {
             self.torque[j] = torque;
         }
         self.transfer.blend(before, &mut self.torque, nodes, config);
-        if law == Law::Hold && !self.yielding {
+        if law == Law::Hold && !self.yielding && self.all_holding() {
             self.payload.observe(&self.torque.map(|t| t.correction()));
         } else {
             self.payload.forget();
@@ -164,7 +169,9 @@ impl Motion {
         let mass = parameters.dynamics.mass_matrix(nodes.positions());
         for (j, torque) in self.torque.iter_mut().enumerate() {
             let joint = &config.joints[j];
-            let damping = config.teach_damping.min(BRAKE_RATE * (mass[j][j] + joint.rotor_inertia));
+            // A rotor that nobody gave is there all the same.
+            let rotor = if joint.rotor_inertia > 0.0 { joint.rotor_inertia } else { UNKNOWN_ROTOR };
+            let damping = config.teach_damping.min(BRAKE_RATE * (mass[j][j] + rotor));
             if nodes.node(j).enabled() {
                 torque.brake = within(-damping * excess[j], torque.sum(), joint.torque_max);
             }
@@ -197,8 +204,11 @@ impl Motion {
             let limits = &config.joints[j];
             let computed = self.torque[j].sum();
             let catching = self.catch[j].step(nodes.velocities()[j]) && law == Law::Hold;
+            // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
+            let driven = computed.signum() * nodes.velocities()[j] > DRIVEN;
+            let stopping = (catching || self.coast[j].is_some()) && !driven;
             let (limited, torque_error) =
-                self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || catching);
+                self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || stopping);
             let joint = (self.set.position[j], self.set.velocity[j], self.set.acceleration[j]);
             let set_error = limits::check_set(joint, nodes.positions()[j], limits, law == Law::Follow);
             torque[j] = limited;

@@ -149,7 +149,8 @@ impl Rig {
     pub fn holding_with(config: Config) -> Self {
         let mut rig = Self::new(config);
         rig.defaults();
-        rig.run(200);
+        // Until what the arm carries is known: teaching waits for that.
+        rig.run(700);
         assert_eq!(rig.state(), State::HoldPos, "{:?}", rig.controller.telemetry());
         assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
         rig

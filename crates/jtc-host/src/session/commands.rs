@@ -1,11 +1,16 @@
 //! The simple commands.
 
+use std::time::Duration;
+
 use jtc_wire::{ExecCommand, FrameType, Status, fixed};
 
 use super::{Session, not_allowed};
 use crate::error::accepted;
 use crate::port::Port;
 use crate::{Error, words};
+
+/// Longest that a controller waits with teaching until the arm is held, and a little more.
+const TEACHING: Duration = Duration::from_secs(11);
 
 /// What the controller wants to be given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -58,10 +63,14 @@ impl<P: Port> Session<P> {
         self.command(&fixed::reset_can_devices(nodes))
     }
 
-    /// Teaching on (only in HoldPos) or off.
+    /// Teaching on (only in HoldPos) or off. It begins once the arm is held at rest; this waits for it.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
-        let kind = if on { FrameType::TeachingModeEnable } else { FrameType::TeachingModeDisable };
-        self.command(&fixed::empty(kind))
+        if !on {
+            return self.command(&fixed::empty(FrameType::TeachingModeDisable));
+        }
+        self.command(&fixed::empty(FrameType::TeachingModeEnable))?;
+        let taught = self.wait_for("teaching", TEACHING, |s| s.fsm == 4 || s.fsm == 5);
+        taught.map(drop)
     }
 
     /// Pump on or off.
@@ -133,7 +142,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Waits until the controller is in HoldPos; an error at once when it reports errors.
-    pub fn wait_hold(&mut self, timeout: std::time::Duration) -> Result<Status, Error> {
+    pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| s.fsm == 2 || s.fsm == 5)?;
         if status.fsm == 5 { Err(Error::Device { status: Box::new(status) }) } else { Ok(status) }
     }

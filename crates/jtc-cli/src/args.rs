@@ -189,7 +189,7 @@ impl Command {
         matches!(
             self,
             Command::Demo(_)
-                | Command::Traj(TrajCommand::Run(_))
+                | Command::Traj(TrajCommand::Run(_) | TrajCommand::Replay(_))
                 | Command::Teach(TeachCommand::Record { .. })
         )
     }

@@ -345,3 +345,22 @@ fn the_examples_run_in_the_simulator() {
     // The last status is from up to 40 ms before.
     assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", said.err);
 }
+
+/// What was recorded runs again, and is the same motion.
+#[test]
+fn a_recording_is_looked_at_checked_and_run_again() {
+    let sim = Sim::start(&["--speed", "max"]);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    jtc(&["example", "motion", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
+    let motion = sim.path("motion.csv");
+    for name in ["run.mcap", "run.csv"] {
+        let run = sim.path(name);
+        sim.jtc(&["traj", "run", &motion, "--record", &run]).ends(0);
+        let info = |file: &str| jtc(&["--json", "traj", "info", file]).ends(0).json();
+        let (of_motion, of_run) = (info(&motion), info(&run));
+        assert_eq!((&of_run["form"], &of_run["duration_s"]), (&"recording".into(), &of_motion["duration_s"]));
+        jtc(&["traj", "check", &run]).ends(0);
+        sim.jtc(&["traj", "replay", &run]).ends(0);
+        jtc(&["traj", "replay", &motion, "--port", "/nowhere/tty"]).ends(2);
+    }
+}

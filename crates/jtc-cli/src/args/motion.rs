@@ -44,6 +44,12 @@ pub enum TrajCommand {
                             jtc traj run motion.csv --speed 10 --record run.mcap"
     )]
     Run(RunArgs),
+    /// Run again what a recording is of: its last execution, along the commanded path
+    #[command(
+        after_help = "As `jtc traj run`, which takes recordings too; here any other file is refused.\n\nExamples:\n  \
+                            jtc traj replay run.mcap --approach\n  jtc traj replay run.csv --speed 50 --record again.mcap"
+    )]
+    Replay(RunArgs),
     /// Pause on the path
     #[command(after_help = "Examples:\n  jtc traj pause")]
     Pause(LinkArgs),

@@ -8,7 +8,7 @@ use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, Verdict};
 use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
-use jtc_host::trajectory::{Loaded, Trajectory};
+use jtc_host::trajectory::{Form, Loaded, Trajectory};
 use jtc_host::{Error, Session, plan};
 use serde_json::json;
 
@@ -22,6 +22,15 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
         TrajCommand::Check { file, check: args } => check(file, args, out),
         TrajCommand::Info { file } => info(file, out),
         TrajCommand::Run(args) => run::run(args, out),
+        TrajCommand::Replay(args) => {
+            if Loaded::load(&args.file, None)?.form != Form::Recording {
+                let message = format!("{} is no recording of a run", args.file.display());
+                return Err(
+                    Failure::usage(message).hint(format!("`jtc traj run {}` runs it", typed(&args.file)))
+                );
+            }
+            run::run(args, out)
+        }
         TrajCommand::Pause(link) => {
             send(link, Session::pause, "pause", "pausing on the path", out).map_err(may_be_moving)
         }

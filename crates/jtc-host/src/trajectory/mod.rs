@@ -2,6 +2,7 @@
 
 mod csv;
 pub(crate) mod fit;
+mod replay;
 mod structured;
 #[cfg(test)]
 mod tests;
@@ -47,6 +48,8 @@ pub enum Form {
     Json,
     /// `trajectory_msgs/JointTrajectory` as YAML or JSON.
     JointTrajectory,
+    /// A recording of a run, MCAP or CSV.
+    Recording,
 }
 
 /// A trajectory from a file.
@@ -63,7 +66,13 @@ pub struct Loaded {
 impl Loaded {
     /// From a file of any form; `joint_names` are those of the arm, where they are known.
     pub fn load(path: &Path, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
+        if replay::is_recording(path, None) {
+            return replay::load(path);
+        }
         let text = read_text(path)?;
+        if replay::is_recording(path, Some(&text)) {
+            return replay::load(path);
+        }
         let yaml = path.extension().is_some_and(|e| e == "yaml" || e == "yml");
         let read =
             if yaml { structured::read_yaml(&text, joint_names) } else { Self::parse(&text, joint_names) };

@@ -1,0 +1,131 @@
+//! The trajectory that a recording is of.
+//!
+//! A sample of an execution says at which millisecond of its path the controller was, so the path is found whatever the line
+//! and the host did to the times of the samples, and also where it was paused.
+
+use std::path::Path;
+
+use super::fit::Samples;
+use super::{Form, Loaded};
+use crate::file::{FileError, Place};
+use crate::recording::{Recording, RecordingError};
+use crate::sample::Sample;
+
+/// States of execution, as on the wire.
+const EXECUTE: u8 = jtc_core::Tes::Execute as u8;
+const FINISH: u8 = jtc_core::Tes::Finish as u8;
+
+/// First words of the header of a recording as CSV.
+const CSV_HEADER: &str = "time_s,state,tes,point,";
+
+/// The file is a recording: MCAP by its name, CSV by its header.
+pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
+    let mcap = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+    mcap || text.is_some_and(|text| text.trim_start_matches('\u{feff}').starts_with(CSV_HEADER))
+}
+
+/// Reads a recording and takes its last execution out of it.
+pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
+    let recording = Recording::read(path).map_err(|e| match e {
+        RecordingError::Io { path, source } => FileError::Io { path, source },
+        // Its words begin with the name of the file.
+        other => {
+            let words = other.to_string();
+            let name = path.display().to_string();
+            let problem =
+                words.strip_prefix(&name).map_or(words.as_str(), |w| w.trim_start_matches([':', ',', ' ']));
+            FileError::form(problem.to_owned()).in_file(path)
+        }
+    })?;
+    executed(&recording.samples).map_err(|e| e.in_file(path))
+}
+
+/// The path of the last execution in the samples.
+fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
+    let mut path = Samples::default();
+    let mut last = None;
+    for sample in samples {
+        let place = match (sample.tes, path.position.last()) {
+            (EXECUTE, _) => sample.joints.map(|joint| joint.set_position),
+            // The set values are known on the path only. It ends at rest, nearly where it was a moment before.
+            (FINISH, Some(place)) => *place,
+            _ => continue,
+        };
+        if place.iter().any(|q| !q.is_finite()) || last == Some(sample.point) {
+            continue;
+        }
+        if last.is_some_and(|point| sample.point < point) {
+            // Another execution begins, the one after an approach for example.
+            path = Samples::default();
+        }
+        last = Some(sample.point);
+        path.times.push(f64::from(sample.point) * 1e-3);
+        path.position.push(place);
+    }
+    let count = path.times.len();
+    if count < 2 {
+        let problem = "the recording holds no execution of a trajectory whose commanded positions are known";
+        return Err(FileError::at(Place::default(), problem));
+    }
+    let (from, to) = (path.times[0], path.times[count - 1]);
+    let longest = path.times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+    let fitted = path.fit().map_err(|_| FileError::form("the times of the path do not increase"))?;
+    let mut notes = vec![format!(
+        "the last execution in the recording, {from:.3}..{to:.3} s of its path, known at {count} places at most {:.0} ms apart",
+        1e3 * longest
+    )];
+    notes.extend(fitted.notes);
+    Ok(Loaded { trajectory: fitted.trajectory, form: Form::Recording, notes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::JointSample;
+    use jtc_core::JOINTS;
+
+    /// A sample at `point` with the set positions of a smooth path of 2 s.
+    fn sample(tes: u8, point: u32) -> Sample {
+        let s = f64::from(point) / 2_000.0;
+        let q = 0.3 * s * s * (3.0 - 2.0 * s);
+        let joint = JointSample { set_position: q, position: q + 1e-4, ..JointSample::UNKNOWN };
+        // The host's times are of no use in virtual time.
+        Sample { tes, point, joints: [joint; JOINTS], ..Sample::default() }
+    }
+
+    #[test]
+    fn the_path_is_found_by_the_point_index_over_pauses_and_lost_samples() {
+        let unknown = Sample { joints: [JointSample::UNKNOWN; JOINTS], ..sample(EXECUTE, 500) };
+        let pause = [sample(EXECUTE, 800), sample(2, 800), sample(EXECUTE, 800)];
+        let mut samples = vec![sample(1, 0), sample(EXECUTE, 0), sample(EXECUTE, 0), unknown];
+        samples.extend((0..20).map(|k| sample(EXECUTE, 40 * k)));
+        samples.extend(pause);
+        samples.extend((21..50).filter(|k| k % 7 != 0).map(|k| sample(EXECUTE, 40 * k)));
+        samples.extend([sample(FINISH, 2_000), sample(FINISH, 2_000)]);
+        let loaded = executed(&samples).unwrap();
+        assert_eq!(loaded.form, Form::Recording);
+        assert!((loaded.trajectory.duration_s() - 2.0).abs() < 1e-9);
+        // Its last 40 ms are unknown.
+        for (i, point) in loaded.trajectory.points.iter().enumerate() {
+            let s = i as f64 * f64::from(loaded.trajectory.step_ms) / 2_000.0;
+            let q = 0.3 * s * s * (3.0 - 2.0 * s);
+            assert!((point.position[2] - q).abs() < 2e-3, "{i}: {} {q}", point.position[2]);
+        }
+    }
+
+    #[test]
+    fn of_several_executions_the_last_one_counts() {
+        let approach = (0..10).map(|k| sample(EXECUTE, 100 * k));
+        let motion = (0..4).map(|k| sample(EXECUTE, 50 * k));
+        let loaded =
+            executed(&approach.chain([sample(FINISH, 1_000)]).chain(motion).collect::<Vec<_>>()).unwrap();
+        assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_recording_without_an_execution_is_refused() {
+        let held: Vec<Sample> = (0..9).map(|_| sample(1, 0)).collect();
+        assert!(executed(&held).unwrap_err().to_string().contains("no execution"));
+        assert!(executed(&[sample(EXECUTE, 0), sample(FINISH, 0)]).is_err());
+    }
+}

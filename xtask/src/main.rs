@@ -6,10 +6,10 @@ mod dependencies;
 mod docs;
 mod emulate;
 mod firmware;
-mod fuzz;
 mod links;
 // For the checks of the board's program.
 mod panics;
+mod prove;
 mod python;
 mod rules;
 mod shell;
@@ -30,8 +30,14 @@ Usage: cargo xtask COMMAND
   bench [--json FILE] [--quick]
                                performance and tracking figures beside their anchors, all measured in this run
   soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)
-  fuzz [TARGET] [--runs N] [--keep]
-                               run one fuzz target, or each of them (default: 20000000 executions each)
+  prove mutants [--package NAME] [--survivors] [--resume] [--report]
+                               mutation testing of the crates that run on a board (hours); fails when a survivor has no
+                               sentence in docs/evidence.md or more than 3 % of a crate survive
+                               --survivors: only those of the last run; --resume: go on with the crate that was
+                               interrupted; --report: judge the results that are there
+  prove fuzz [TARGET] [--runs N] [--keep]
+                               run one fuzz target, or each of them, up to 20000000 executions each, counted by commit
+                               in docs/evidence.md
                                --keep: afterwards add to fuzz/corpus what reaches code that no kept input does
   firmware [BOARD...]          build the boards' programs; sizes, and that the tick cannot panic
   emulate [--update]           boot those programs in an emulator of the chip: tests, and figures that must be those of
@@ -62,7 +68,7 @@ fn dispatch(arguments: &[String]) -> anyhow::Result<ExitCode> {
         "test" => test::main(rest),
         "bench" => bench::main(rest),
         "soak" => soak::main(rest),
-        "fuzz" => fuzz::main(rest),
+        "prove" => prove::main(rest),
         "firmware" => firmware::main(rest),
         "emulate" => emulate::main(rest),
         "docs" => docs::main(rest),

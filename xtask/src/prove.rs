@@ -1,0 +1,18 @@
+//! `cargo xtask prove`: what takes hours and therefore is no part of `cargo xtask test`. What was found stands in
+//! docs/evidence.md.
+mod evidence;
+mod fuzz;
+mod mutants;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+/// `arguments`: `mutants` or `fuzz`, then its own.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    match arguments.split_first() {
+        Some((what, rest)) if what == "mutants" => mutants::main(rest),
+        Some((what, rest)) if what == "fuzz" => fuzz::main(rest),
+        _ => bail!("prove needs `mutants` or `fuzz`; see `cargo xtask help`"),
+    }
+}

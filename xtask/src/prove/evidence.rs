@@ -1,0 +1,94 @@
+//! docs/evidence.md: generated tables between marks, and sentences that people write about mutants that no test
+//! can see.
+use std::collections::BTreeSet;
+use std::fs::{read_to_string, write};
+
+use anyhow::{Context, Result};
+
+use crate::shell::root;
+
+const PAGE: &str = "docs/evidence.md";
+
+/// The page.
+pub fn read() -> Result<String> {
+    read_to_string(root().join(PAGE)).with_context(|| format!("cannot read {PAGE}"))
+}
+
+/// Replace what stands between the marks `<!-- name -->` and `<!-- end of name -->`.
+pub fn replace(name: &str, table: &str) -> Result<()> {
+    let page = read()?;
+    let (before, rest) = parts(&page, name)?;
+    let (_, after) = rest;
+    let page = format!("{before}\n{}\n{after}", table.trim_end());
+    write(root().join(PAGE), page).with_context(|| format!("cannot write {PAGE}"))
+}
+
+/// What stands between the marks of `name`.
+pub fn table(page: &str, name: &str) -> Result<String> {
+    Ok(parts(page, name)?.1.0.trim().to_owned())
+}
+
+/// Up to the end of the first mark, between the marks, from the last mark on.
+fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))> {
+    let (open, close) = (format!("<!-- {name} -->"), format!("<!-- end of {name} -->"));
+    let missing = || format!("{PAGE} lacks `{open}` … `{close}`");
+    let start = page.find(&open).with_context(missing)? + open.len();
+    let end = start + page[start..].find(&close).with_context(missing)?;
+    Ok((&page[..start], (&page[start..end], &page[end..])))
+}
+
+/// A mutant by what it is, not where: file, its line of source without indentation, what is changed.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Named {
+    /// From the root of the workspace.
+    pub file: String,
+    /// The line in which it begins.
+    pub line: String,
+    /// As cargo-gamma describes it.
+    pub change: String,
+}
+
+/// Mutants that the page shows to be equivalent: below a heading `### FILE` the items
+/// ``- `LINE` → `CHANGE`: sentence``.
+pub fn explained(page: &str) -> BTreeSet<Named> {
+    let mut file = "";
+    let mut explained = BTreeSet::new();
+    for text in page.lines() {
+        if let Some(heading) = text.strip_prefix("### ") {
+            file = heading.trim();
+        }
+        let item = text.strip_prefix("- `").and_then(|rest| rest.split_once("` → `"));
+        let Some((line, rest)) = item else { continue };
+        // A mutant without a sentence is not explained.
+        let Some((change, sentence)) = rest.split_once("`: ") else { continue };
+        if !sentence.trim().is_empty() {
+            explained.insert(Named { file: file.into(), line: line.into(), change: change.into() });
+        }
+    }
+    explained
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_has_its_tables_and_names_files_that_are_there() {
+        let page = read().unwrap();
+        for name in ["mutants", "fuzz"] {
+            assert!(table(&page, name).unwrap().starts_with('|'), "{name}");
+        }
+        for named in explained(&page) {
+            let source = read_to_string(root().join(&named.file)).unwrap_or_default();
+            assert!(source.lines().any(|line| line.trim() == named.line), "{PAGE}: {named:?} is no more");
+        }
+    }
+
+    #[test]
+    fn only_items_with_a_sentence_explain() {
+        let page = "### a.rs\n- `x < y` → `replace x < y with x <= y`: equal ones are sorted before.\n- `z` → `gone`: \n";
+        let named =
+            Named { file: "a.rs".into(), line: "x < y".into(), change: "replace x < y with x <= y".into() };
+        assert_eq!(explained(page), BTreeSet::from([named]));
+    }
+}

@@ -1,0 +1,187 @@
+//! `cargo xtask prove fuzz`: runs the fuzz targets with cargo-fuzz on the nightly toolchain, both installed when missing.
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::create_dir_all;
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result, ensure};
+
+use super::evidence;
+use super::mutants::commit;
+use crate::shell::{self, command, root, run, works};
+
+const RUNS: &str = "20000000";
+const PORTION: u64 = 500_000;
+/// Name of the table in docs/evidence.md.
+const TABLE: &str = "fuzz";
+
+/// Kept inputs are short, so that a person can read them and git need not carry them.
+const KEPT_LENGTH: &str = "-max_len=4096";
+
+/// A command of the nightly toolchain; the pinned toolchain's variables are taken away.
+fn nightly(arguments: &[&str]) -> Command {
+    let mut rustup = command("rustup");
+    rustup.args(["run", "nightly"]).args(arguments).env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
+    rustup
+}
+
+/// `arguments`: a target, `--runs N`, `--keep`.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    let mut arguments = arguments.to_vec();
+    let wanted = shell::option(&mut arguments, "--runs")?;
+    let wanted: u64 = wanted.as_deref().unwrap_or(RUNS).parse().context("--runs needs a number")?;
+    let keep = shell::flag(&mut arguments, "--keep");
+    let only = if arguments.is_empty() { None } else { Some(arguments.remove(0)) };
+    shell::nothing_left(&arguments)?;
+
+    let mut targets = targets();
+    if let Some(only) = only {
+        ensure!(targets.contains(&only), "no fuzz target `{only}`; there are: {}", targets.join(", "));
+        targets = vec![only];
+    }
+    ensure!(!targets.is_empty(), "there is no fuzz target in fuzz/fuzz_targets");
+    install()?;
+    for target in targets {
+        let done = executions(&evidence::table(&evidence::read()?, TABLE)?, &target);
+        println!("\n== {target}: {done} of {wanted} executions done");
+        let directories = directories(&target)?;
+        let directories: Vec<&str> = directories.iter().map(String::as_str).collect();
+        let mut left = wanted.saturating_sub(done);
+        while left > 0 {
+            // In portions, so that what was done counts when the run is interrupted.
+            let portion = left.min(PORTION);
+            run(&mut fuzz(&target, &directories, &[&format!("-runs={portion}"), "-max_len=16384"]))?;
+            count(&target, portion)?;
+            left -= portion;
+        }
+        if keep {
+            // What code is reached, not how often, and by few inputs.
+            let merge = ["-set_cover_merge=1", "-use_counters=0", KEPT_LENGTH];
+            run(&mut fuzz(&target, &[directories[1], directories[0]], &merge))?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The nightly toolchain and cargo-fuzz, when missing.
+fn install() -> Result<()> {
+    if !works(&mut nightly(&["rustc", "--version"])) {
+        run(command("rustup").args(["toolchain", "install", "nightly", "--profile", "minimal"]))?;
+    }
+    if !works(&mut nightly(&["cargo", "fuzz", "--version"])) {
+        run(&mut nightly(&["cargo", "install", "cargo-fuzz", "--locked"]))?;
+    }
+    Ok(())
+}
+
+/// Where inputs are: what is found, what is kept, regressions when there are any.
+fn directories(target: &str) -> Result<Vec<String>> {
+    // What is found grows from run to run beside the build, outside git; git has the kept inputs.
+    let mut directories = vec![format!("fuzz/target/corpus/{target}"), format!("fuzz/corpus/{target}")];
+    for directory in &directories {
+        let path = root().join(directory);
+        create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;
+    }
+    let regressions = format!("fuzz/regressions/{target}");
+    if root().join(&regressions).is_dir() {
+        directories.push(regressions);
+    }
+    Ok(directories)
+}
+
+/// Add `portion` executions of the commit that is checked out to the page, unless what runs is in no commit.
+fn count(target: &str, portion: u64) -> Result<()> {
+    let changed =
+        shell::read(command("git").args(["status", "--porcelain", "--", "crates", "fuzz/fuzz_targets"]))?;
+    if !changed.trim().is_empty() {
+        println!("crates/ has changes that are in no commit: these executions are not counted");
+        return Ok(());
+    }
+    let table = evidence::table(&evidence::read()?, TABLE)?;
+    evidence::replace(TABLE, &with(&table, target, &commit()?, portion))
+}
+
+/// Rows of the table: target, commit, executions.
+fn rows(table: &str) -> BTreeMap<(String, String), u64> {
+    let row = |line: &str| {
+        let mut cells = line.split('|').map(|cell| cell.trim().trim_matches('`').to_owned()).skip(1);
+        let key = (cells.next()?, cells.next()?);
+        Some((key, cells.next()?.replace(',', "").parse().ok()?))
+    };
+    table.lines().filter_map(row).collect()
+}
+
+/// Executions of `target` on all commits.
+fn executions(table: &str, target: &str) -> u64 {
+    rows(table).iter().filter(|((name, _), _)| name == target).map(|(_, executions)| executions).sum()
+}
+
+/// The table with `portion` more executions of `target` on `commit`.
+fn with(table: &str, target: &str, commit: &str, portion: u64) -> String {
+    let mut rows = rows(table);
+    *rows.entry((target.into(), commit.into())).or_default() += portion;
+    let mut table = String::from("| target | commit | executions |\n|---|---|---|\n");
+    for ((target, commit), executions) in rows {
+        let _ = writeln!(table, "| `{target}` | {commit} | {executions} |");
+    }
+    table
+}
+
+/// The fuzzer on `directories`; new inputs go into the first. Without address sanitizer: there is no unsafe code, and it
+/// is several times as fast.
+fn fuzz(target: &str, directories: &[&str], options: &[&str]) -> Command {
+    let mut fuzz = nightly(&["cargo", "fuzz", "run", "-s", "none", target]);
+    fuzz.args(directories).arg("--").args(options);
+    fuzz
+}
+
+/// Names of the fuzz targets.
+fn targets() -> Vec<String> {
+    shell::files(&root().join("fuzz/fuzz_targets"), &["rs"])
+        .iter()
+        .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::{read_dir, read_to_string};
+
+    use super::*;
+
+    #[test]
+    fn executions_of_all_commits_are_added() {
+        let table = with("", "stream_parser", "aaa", 500);
+        let table = with(&with(&table, "stream_parser", "bbb", 20), "stream_parser", "aaa", 1);
+        assert_eq!(
+            table.lines().skip(2).collect::<Vec<_>>(),
+            ["| `stream_parser` | aaa | 501 |", "| `stream_parser` | bbb | 20 |"]
+        );
+        assert_eq!((executions(&table, "stream_parser"), executions(&table, "bus_frame")), (521, 0));
+    }
+
+    /// A target runs over its kept inputs in every test run, too, and what is kept belongs to a target.
+    #[test]
+    fn every_target_is_built_and_tested() {
+        let manifest = read_to_string(root().join("fuzz/Cargo.toml")).unwrap();
+        let tests: String = shell::files(&root().join("crates"), &["rs"])
+            .iter()
+            .filter(|path| path.ends_with("tests/fuzz_regressions.rs"))
+            .map(|path| read_to_string(path).unwrap())
+            .collect();
+        let targets = targets();
+        for target in &targets {
+            assert!(manifest.contains(&format!("name = \"{target}\"\n")), "{target} is no [[bin]] of fuzz/");
+            assert!(
+                tests.contains(&format!("(\"{target}\", ")),
+                "{target} is in no tests/fuzz_regressions.rs"
+            );
+        }
+        for kind in ["fuzz/corpus", "fuzz/regressions"] {
+            for directory in read_dir(root().join(kind)).into_iter().flatten() {
+                let name = directory.unwrap().file_name().into_string().unwrap();
+                assert!(targets.contains(&name), "{kind}/{name} belongs to no target");
+            }
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! `cargo xtask prove mutants`: mutation testing of the crates that run on a board with cargo-gamma, which builds
+//! all mutants into one set of test programs. What to change is in gamma.toml.
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::{create_dir_all, read_to_string, write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
+
+use super::evidence::{self, Named};
+use crate::shell::{self, cargo, command, run, target, works};
+
+/// Reports of another version may differ.
+const VERSION: &str = "0.4.0";
+const REPORT: &str = "gamma-report.json";
+/// The commit of which the report is.
+const COMMIT: &str = "commit";
+/// Crates that run on a board, those with the quickest tests first.
+const PACKAGES: [&str; 5] = ["jtc-bus", "jtc-dynamics", "jtc-wire", "ucom", "jtc-core"];
+/// At most this share of a crate's mutants may be left alive, with a sentence or without.
+const SURVIVING_MAX: f64 = 0.03;
+
+/// What became of the mutants of a crate.
+#[derive(Default)]
+struct Tally {
+    killed: usize,
+    /// A test that never ends is a failing test.
+    endless: usize,
+    equivalent: usize,
+    unexplained: Vec<String>,
+}
+
+impl Tally {
+    fn count(&self) -> usize {
+        self.killed + self.endless + self.survived()
+    }
+
+    fn survived(&self) -> usize {
+        self.equivalent + self.unexplained.len()
+    }
+
+    fn share(&self) -> f64 {
+        self.survived() as f64 / self.count().max(1) as f64
+    }
+}
+
+/// `arguments`: `--package NAME`, `--survivors`, `--resume`, `--report`.
+pub fn main(arguments: &[String]) -> Result<ExitCode> {
+    let mut arguments = arguments.to_vec();
+    let package = shell::option(&mut arguments, "--package")?;
+    let survivors = shell::flag(&mut arguments, "--survivors");
+    let resume = shell::flag(&mut arguments, "--resume");
+    let report_only = shell::flag(&mut arguments, "--report");
+    shell::nothing_left(&arguments)?;
+    let chosen: Vec<&str> =
+        PACKAGES.into_iter().filter(|name| package.as_deref().is_none_or(|wanted| wanted == *name)).collect();
+    ensure!(!chosen.is_empty(), "--package needs one of {}", PACKAGES.join(", "));
+    ensure!(!resume || chosen.len() == 1, "--resume needs --package: the one that was interrupted");
+
+    if !report_only {
+        install()?;
+        for package in chosen {
+            campaign(package, survivors, resume)?;
+        }
+    }
+    let page = evidence::read()?;
+    let mut tallies = BTreeMap::new();
+    for package in PACKAGES {
+        let path = results(package).join(REPORT);
+        if path.is_file() {
+            let commit = read_to_string(results(package).join(COMMIT)).unwrap_or_default();
+            tallies.insert(package, (tally(&read_report(&path)?, &page)?, commit));
+        }
+    }
+    for mutant in tallies.values().flat_map(|(tally, _)| &tally.unexplained) {
+        println!("survived: {mutant}");
+    }
+    let missing: Vec<&str> = PACKAGES.into_iter().filter(|name| !tallies.contains_key(name)).collect();
+    if !missing.is_empty() {
+        println!(
+            "no results yet of {}: cargo xtask prove mutants --package {}",
+            missing.join(", "),
+            missing[0]
+        );
+        return Ok(ExitCode::FAILURE);
+    }
+    evidence::replace("mutants", &table(&tallies))?;
+    println!("wrote the table of mutants of docs/evidence.md");
+    let met =
+        tallies.values().all(|(tally, _)| tally.unexplained.is_empty() && tally.share() <= SURVIVING_MAX);
+    Ok(if met { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// cargo-gamma, when missing.
+fn install() -> Result<()> {
+    if !works(command(program()).args(["gamma", "--version"])) {
+        let mut install = cargo(&["install", "cargo-gamma", "--locked", "--version", VERSION, "--root"]);
+        run(install.arg(target().join("tools")))?;
+    }
+    // It asks cargo offline for the dependencies of every platform.
+    run(&mut cargo(&["fetch", "--locked"]))
+}
+
+fn program() -> PathBuf {
+    target().join("tools/bin/cargo-gamma")
+}
+
+/// Where the results of a crate are kept.
+fn results(package: &str) -> PathBuf {
+    target().join("mutants").join(package)
+}
+
+/// Run cargo-gamma for one crate; what it ends with depends on the mutants and is judged from its report.
+fn campaign(package: &str, survivors: bool, resume: bool) -> Result<()> {
+    let results = results(package);
+    create_dir_all(&results).with_context(|| format!("cannot create {}", results.display()))?;
+    // Its report is of the mutants that were run only: the whole report is kept, and brought up to date.
+    let whole = results.join(REPORT);
+    let before = if survivors { Some(read_report(&whole)?) } else { None };
+    let commit = commit()?;
+    let mut gamma: Command = command(program());
+    gamma.args(["gamma", "run", "--color", "never", "--progress", "never"]);
+    gamma.arg("--artifact-dir").arg(&results);
+    if resume {
+        gamma.arg("--resume-testing");
+    } else {
+        gamma.args(["--package", package]);
+    }
+    if survivors {
+        gamma.arg("--only-survivors");
+    }
+    println!("== {package}");
+    let status = gamma.status().context("cannot start cargo-gamma")?;
+    // 2: too many survived.
+    ensure!(
+        matches!(status.code(), Some(0 | 2)),
+        "cargo-gamma ended with {status}; go on with `cargo xtask prove mutants --package {package} --resume`"
+    );
+    if let Some(mut before) = before {
+        update(&mut before, &read_report(&whole)?);
+        write(&whole, before.to_string()).with_context(|| format!("cannot write {}", whole.display()))?;
+    }
+    let path = results.join(COMMIT);
+    write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Take over what became of the mutants that were run again.
+fn update(whole: &mut Value, part: &Value) {
+    let mut statuses = BTreeMap::new();
+    for mutant in part["files"].as_object().into_iter().flatten().flat_map(|(_, file)| mutants(file)) {
+        if let (Some(id), Some(status)) = (mutant["id"].as_str(), mutant["status"].as_str()) {
+            statuses.insert(id, status);
+        }
+    }
+    for file in whole["files"].as_object_mut().into_iter().flat_map(|files| files.values_mut()) {
+        for mutant in file["mutants"].as_array_mut().into_iter().flatten() {
+            let status = mutant["id"].as_str().and_then(|id| statuses.get(id));
+            if let Some(&status) = status.filter(|status| ["Killed", "Timeout"].contains(*status)) {
+                mutant["status"] = status.into();
+            }
+        }
+    }
+}
+
+fn mutants(file: &Value) -> impl Iterator<Item = &Value> {
+    file["mutants"].as_array().into_iter().flatten()
+}
+
+fn read_report(path: &Path) -> Result<Value> {
+    let text = read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(serde_json::from_str(&text)?)
+}
+
+/// What became of the mutants of a report.
+fn tally(report: &Value, page: &str) -> Result<Tally> {
+    let explained = evidence::explained(page);
+    let mut tally = Tally::default();
+    for (file, content) in report["files"].as_object().context("the report has no files")? {
+        let lines: Vec<&str> = content["source"].as_str().unwrap_or_default().lines().collect();
+        for mutant in mutants(content) {
+            match mutant["status"].as_str().unwrap_or_default() {
+                "Killed" => tally.killed += 1,
+                "Timeout" => tally.endless += 1,
+                "Survived" | "NoCoverage" => {
+                    let at = mutant["location"]["start"]["line"].as_u64().unwrap_or(1) as usize;
+                    let named = Named {
+                        file: file.clone(),
+                        line: lines.get(at.wrapping_sub(1)).map_or("", |line| line.trim()).into(),
+                        change: mutant["description"].as_str().unwrap_or_default().into(),
+                    };
+                    if explained.contains(&named) {
+                        tally.equivalent += 1;
+                    } else {
+                        let Named { line, change, .. } = named;
+                        tally.unexplained.push(format!("{file}:{at}\n- `{line}` → `{change}`:"));
+                    }
+                }
+                // Does not compile, or was not in this run.
+                _ => {}
+            }
+        }
+    }
+    Ok(tally)
+}
+
+fn table(tallies: &BTreeMap<&str, (Tally, String)>) -> String {
+    let mut table = String::from(
+        "| crate | mutants | killed | never ended | equivalent | unexplained | alive | commit |\n\
+         |---|---|---|---|---|---|---|---|\n",
+    );
+    for (name, (tally, commit)) in tallies {
+        let _ = writeln!(
+            table,
+            "| `{name}` | {} | {} | {} | {} | {} | {:.1} % | {commit} |",
+            tally.count(),
+            tally.killed,
+            tally.endless,
+            tally.equivalent,
+            tally.unexplained.len(),
+            100.0 * tally.share()
+        );
+    }
+    table
+}
+
+/// The commit that is tested.
+pub(super) fn commit() -> Result<String> {
+    Ok(shell::read(command("git").args(["rev-parse", "--short=9", "HEAD"]))?.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn survivors_are_told_unless_the_page_explains_them() {
+        let mutant = |status: &str, line: u64| json!({"status": status, "description": "replace < with <=", "location": {"start": {"line": line}}});
+        let report = json!({"files": {"crates/jtc-bus/src/a.rs": {
+            "source": "fn f() {\n    a < b\n    c < d\n}\n",
+            "mutants": [mutant("Killed", 2), mutant("Survived", 2), mutant("NoCoverage", 3), mutant("Timeout", 3), mutant("CompileError", 3)],
+        }}});
+        let page = "### crates/jtc-bus/src/a.rs\n- `a < b` → `replace < with <=`: they are never equal.\n";
+        let bus = tally(&report, page).unwrap();
+        assert_eq!((bus.count(), bus.killed, bus.endless, bus.equivalent), (4, 1, 1, 1));
+        assert_eq!(bus.unexplained, ["crates/jtc-bus/src/a.rs:3\n- `c < d` → `replace < with <=`:"]);
+        let tallies = BTreeMap::from([("jtc-bus", (bus, "abc".to_owned()))]);
+        assert!(table(&tallies).ends_with("| `jtc-bus` | 4 | 1 | 1 | 1 | 1 | 50.0 % | abc |\n"));
+    }
+
+    #[test]
+    fn a_survivor_that_a_new_test_kills_is_killed_in_the_whole_report() {
+        let report = |statuses: &[(&str, &str)]| {
+            let mutants: Vec<Value> =
+                statuses.iter().map(|(id, status)| json!({"id": id, "status": status})).collect();
+            json!({"files": {"a.rs": {"source": "", "mutants": mutants}}})
+        };
+        let mut whole = report(&[("a", "Killed"), ("b", "Survived"), ("c", "Survived")]);
+        update(&mut whole, &report(&[("a", "Pending"), ("b", "Killed"), ("c", "Survived")]));
+        assert_eq!(whole, report(&[("a", "Killed"), ("b", "Killed"), ("c", "Survived")]));
+    }
+}

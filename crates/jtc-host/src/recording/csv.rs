@@ -27,6 +27,10 @@ const COLUMNS: [Column; 12] = [
 
 const SAMPLE_COLUMNS: [&str; 6] = ["time_s", "state", "tes", "point", "errors", "can_current"];
 
+/// State and execution state of an arm that moves along a trajectory, as on the wire.
+const OPERATE: u8 = 3;
+const EXECUTE: u8 = 3;
+
 /// How the comments at the end begin.
 const OUTCOME: &str = "# outcome: ";
 const REASON: &str = "# reason: ";
@@ -67,6 +71,14 @@ impl<W: Write> CsvWriter<W> {
         Ok(())
     }
 
+    pub(super) fn flush(&mut self) -> Result<(), RecordingError> {
+        Ok(self.out.flush()?)
+    }
+
+    pub(super) fn end(&mut self, ending: &Ending) {
+        self.ending = ending.clone();
+    }
+
     pub(super) fn finish(mut self) -> Result<(), RecordingError> {
         let Ending { outcome, reason } = &self.ending;
         if !matches!(outcome.as_str(), "" | "finished") {
@@ -91,7 +103,10 @@ fn number(row: &mut String, value: f64) {
 /// Reads rows back; columns may stand in any order, unknown ones are passed over, missing ones leave values unknown.
 pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     let text = String::from_utf8_lossy(bytes);
-    let mut lines = text.lines().enumerate();
+    // Every line that was written whole has its end.
+    let whole = text.rfind('\n').map_or(0, |end| end + 1);
+    let (rows, rest) = if whole == 0 { (&*text, "") } else { text.split_at(whole) };
+    let mut lines = rows.lines().enumerate();
     let fail = |line, column: Option<&str>, problem| RecordingError::Line {
         path: PathBuf::new(),
         line,
@@ -125,7 +140,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
         }
         samples.push(sample);
     }
-    Ok(Recording { info: None, samples, ending })
+    let in_motion = samples.last().is_some_and(|s| s.state == OPERATE && s.tes == EXECUTE);
+    let cut = if !rest.trim().is_empty() {
+        Some("the file breaks off within a line")
+    } else if in_motion && ending.outcome.is_empty() {
+        Some("the file breaks off while the arm moves")
+    } else {
+        None
+    };
+    Ok(Recording::new(None, ending, samples, cut.map(str::to_owned)))
 }
 
 fn put(sample: &mut Sample, name: &str, field: &str) -> Option<()> {

@@ -11,6 +11,11 @@ pub enum RecordingError {
         /// The file.
         path: PathBuf,
     },
+    /// Nothing is in the file.
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
     /// The operating system refused.
     Io {
         /// The file.
@@ -55,6 +60,7 @@ impl RecordingError {
     /// The same error with the file it is about.
     pub(super) fn at(mut self, file: &Path) -> Self {
         let (RecordingError::UnknownFormat { path }
+        | RecordingError::Empty { path }
         | RecordingError::Io { path, .. }
         | RecordingError::Line { path, .. }
         | RecordingError::Mcap { path, .. }
@@ -73,6 +79,9 @@ impl fmt::Display for RecordingError {
                     "{}: recordings are .mcap or .csv files; choose one of these endings",
                     path.display()
                 )
+            }
+            RecordingError::Empty { path } => {
+                write!(f, "{}: an empty file: the program ended before anything was recorded", path.display())
             }
             RecordingError::Io { path, source } => write!(f, "{}: {source}", path.display()),
             RecordingError::Line { path, line, column, problem } => {

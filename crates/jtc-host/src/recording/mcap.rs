@@ -1,6 +1,6 @@
 //! MCAP files with ROS 2 schemas, in CDR.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Seek, Write};
 use std::path::PathBuf;
 
@@ -9,11 +9,13 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
-use super::{Recording, RecordingError, RecordingInfo, schema};
+use super::{Ending, Recording, RecordingError, RecordingInfo, schema};
 use crate::sample::Sample;
 
 /// Name of the metadata record with the [`RecordingInfo`].
 const METADATA: &str = "openjtc";
+/// Name of the metadata record with the [`Ending`], behind all messages.
+const END: &str = "openjtc_end";
 /// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
 const MAX_RECORD: usize = 1 << 26;
 const STATES_TOPIC: &str = "/joint_states";
@@ -126,6 +128,17 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(())
     }
 
+    pub(super) fn flush(&mut self) -> Result<(), RecordingError> {
+        Ok(self.out.flush()?)
+    }
+
+    pub(super) fn end(&mut self, ending: &Ending) -> Result<(), RecordingError> {
+        let pairs = [("outcome", &ending.outcome), ("reason", &ending.reason)];
+        let metadata = pairs.into_iter().filter(|(_, value)| !value.is_empty());
+        let metadata = metadata.map(|(key, value)| (key.to_owned(), value.clone())).collect();
+        Ok(self.out.write_metadata(&Metadata { name: END.into(), metadata })?)
+    }
+
     pub(super) fn finish(mut self) -> Result<(), RecordingError> {
         self.out.finish()?;
         self.out.into_inner().flush()?;
@@ -133,19 +146,26 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Reads what [`McapWriter`] wrote; messages of other topics are passed over.
+/// A sample in the making, and which of its messages have come.
+type Gathered = (Sample, BTreeSet<u16>);
+
+/// Reads what [`McapWriter`] wrote, as far as the file is whole; messages of other topics are passed over.
 pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     let mut info: Option<RecordingInfo> = None;
+    let mut ending: Option<Ending> = None;
     let mut topics = BTreeMap::new();
-    let mut samples: BTreeMap<u64, Sample> = BTreeMap::new();
+    let mut samples: BTreeMap<u64, Gathered> = BTreeMap::new();
     let seconds = |info: &Option<RecordingInfo>, time_ns: u64| {
         time_ns.saturating_sub(info.as_ref().map_or(0, |i| i.start_unix_ns)) as f64 * 1e-9
     };
     // A file that was cut off has no end.
-    each_record(bytes, LinearReaderOptions::default().with_skip_end_magic(true), |record| {
+    let read = each_record(bytes, LinearReaderOptions::default().with_skip_end_magic(true), |record| {
         match record {
             records::Record::Metadata(metadata) if metadata.name == METADATA => {
                 info = Some(RecordingInfo::from_map(&metadata.metadata));
+            }
+            records::Record::Metadata(metadata) if metadata.name == END => {
+                ending = Some(RecordingInfo::from_map(&metadata.metadata).ending);
             }
             records::Record::Channel(channel) => {
                 topics.insert(channel.id, channel.topic);
@@ -153,34 +173,59 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
             records::Record::Message { header, data } => {
                 let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
                 let topic = topics.get(&header.channel_id).ok_or(unknown)?;
-                let sample = samples.entry(header.log_time).or_default();
+                let (sample, came) = samples.entry(header.log_time).or_default();
                 decode(topic, &data, sample).ok_or_else(|| RecordingError::Message {
                     path: PathBuf::new(),
                     topic: topic.clone(),
                     time_s: seconds(&info, header.log_time),
                 })?;
+                came.insert(header.channel_id);
             }
             _ => {}
         }
         Ok(())
-    })?;
-    let samples =
-        samples.into_iter().map(|(time_ns, sample)| Sample { time_s: seconds(&info, time_ns), ..sample });
-    let ending = info.as_ref().map_or_else(Default::default, |i| i.ending.clone());
-    Ok(Recording { samples: samples.collect(), info, ending })
+    });
+    let cut = match read {
+        Ok(true) => None,
+        Ok(false) => Some("the file was not completed".to_owned()),
+        Err(e) if samples.is_empty() => return Err(e),
+        Err(RecordingError::Mcap { problem, .. }) => Some(format!("the file breaks off: {problem}")),
+        Err(e) => return Err(e),
+    };
+    if cut.is_some() {
+        // Its last sample may be without some of its messages.
+        let most = samples.values().map(|(_, came)| came.len()).max().unwrap_or(0);
+        if samples.last_key_value().is_some_and(|(_, (_, came))| came.len() < most) {
+            samples.pop_last();
+        }
+    }
+    let samples = samples
+        .into_iter()
+        .map(|(time_ns, (sample, _))| Sample { time_s: seconds(&info, time_ns), ..sample })
+        .collect();
+    if let (Some(info), Some(ending)) = (&mut info, &ending) {
+        info.ending = ending.clone();
+    }
+    let ending = ending.or_else(|| info.as_ref().map(|i| i.ending.clone())).unwrap_or_default();
+    Ok(Recording::new(info, ending, samples, cut))
 }
 
-/// Shows the records of a file that we write, those in chunks too. Attachments and indices are passed over unread: the
-/// library panics at damaged ones.
+/// Shows the records of a file that we write, those in chunks too, and returns whether the file was completed. Attachments and
+/// indices are passed over unread: the library panics at damaged ones.
 fn each_record(
     file: &[u8],
     options: LinearReaderOptions,
     mut see: impl FnMut(records::Record) -> Result<(), RecordingError>,
-) -> Result<(), RecordingError> {
+) -> Result<bool, RecordingError> {
     let mut reader = LinearReader::new_with_options(options.with_record_length_limit(MAX_RECORD));
-    let mut rest = file;
+    let (mut rest, mut whole) = (file, false);
     while let Some(event) = reader.next_event() {
-        match event? {
+        let event = match event {
+            // What stands behind the data is an index.
+            Err(_) if whole => break,
+            other => other?,
+        };
+        match event {
             LinearReadEvent::ReadRequest(wanted) => {
                 let (piece, later) = rest.split_at(wanted.min(rest.len()));
                 reader.insert(piece.len()).copy_from_slice(piece);
@@ -190,10 +235,11 @@ fn each_record(
             LinearReadEvent::Record { opcode: opcode @ (op::CHANNEL | op::MESSAGE | op::METADATA), data } => {
                 see(mcap::parse_record(opcode, data)?)?;
             }
+            LinearReadEvent::Record { opcode: op::DATA_END, .. } => whole = true,
             LinearReadEvent::Record { .. } => {}
         }
     }
-    Ok(())
+    Ok(whole)
 }
 
 fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {

@@ -4,11 +4,15 @@
 //! Foxglove, PlotJuggler and Rerun plot it at once, the torque split on `/jtc/control` and states on `/jtc/state`. A CSV file
 //! has one row a sample and a header that names the units; lines that begin with `#` at its end say how a run ended that was not
 //! finished.
+//!
+//! A file that breaks off (a program that was killed, a full disk) is read as far as it is whole, and [`Recording::cut`] says what
+//! is missing.
 
 mod cdr;
 mod csv;
 mod error;
 mod info;
+mod live;
 mod mcap;
 mod schema;
 #[cfg(test)]
@@ -20,6 +24,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::RecordingError;
 pub use info::{Ending, JointInfo, RecordingInfo};
+pub use live::{FLUSH, LiveRecorder, SampleSink};
 
 use crate::sample::Sample;
 
@@ -93,6 +98,28 @@ impl Recorder {
         self.finish()
     }
 
+    /// Hands all samples so far to the operating system: they are in the file whatever becomes of this program.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        let done = match &mut self.writer {
+            Writer::Mcap(w) => w.flush(),
+            Writer::Csv(w) => w.flush(),
+        };
+        done.map_err(|e| e.at(&self.path))
+    }
+
+    /// Completes the file as [`Self::finish`], with how the run ended, which nobody knew when it was begun.
+    pub fn finish_as(mut self, ending: &Ending) -> Result<u64, RecordingError> {
+        let done = match &mut self.writer {
+            Writer::Mcap(w) => w.end(ending),
+            Writer::Csv(w) => {
+                w.end(ending);
+                Ok(())
+            }
+        };
+        done.map_err(|e| e.at(&self.path))?;
+        self.finish()
+    }
+
     /// Completes the file (index and summary of an MCAP file) and says how many samples it holds.
     pub fn finish(self) -> Result<u64, RecordingError> {
         let done = match self.writer {
@@ -127,6 +154,8 @@ pub struct Recording {
     pub ending: Ending,
     /// Oldest first.
     pub samples: Vec<Sample>,
+    /// What is missing of a file that breaks off, in words; none where it was completed.
+    pub cut: Option<String>,
 }
 
 impl Recording {
@@ -134,10 +163,24 @@ impl Recording {
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let format = Format::of(path)?;
         let bytes = std::fs::read(path).map_err(|e| RecordingError::io(path, e))?;
+        if bytes.is_empty() {
+            return Err(RecordingError::Empty { path: path.to_owned() });
+        }
         match format {
             Format::Mcap => mcap::read(&bytes),
             Format::Csv => csv::read(&bytes),
         }
         .map_err(|e| e.at(path))
+    }
+
+    /// The samples of a file, and where it is not whole why.
+    fn new(info: Option<RecordingInfo>, ending: Ending, samples: Vec<Sample>, why: Option<String>) -> Self {
+        let cut = why.map(|why| {
+            let upto = samples.last().map_or("it holds no sample".to_owned(), |last| {
+                format!("{} samples up to {:.3} s are whole", samples.len(), last.time_s)
+            });
+            format!("{why}; {upto}")
+        });
+        Self { info, ending, samples, cut }
     }
 }

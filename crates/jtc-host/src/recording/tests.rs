@@ -90,19 +90,53 @@ fn what_is_no_recording_is_refused_by_name() {
     assert!(mcap::read(b"not an mcap file").is_err());
 }
 
+/// Cut at any byte, a file gives all samples of the blocks that are whole, in the order in which they were written, and says that it
+/// breaks off.
 #[test]
-fn a_cut_off_mcap_file_still_gives_its_whole_chunks_or_an_error() {
-    let mut bytes = Vec::new();
-    let mut writer =
-        mcap::McapWriter::new(std::io::Cursor::new(&mut bytes), &RecordingInfo::default()).unwrap();
-    for s in samples(3000) {
-        writer.write(&s).unwrap();
-    }
-    writer.finish().unwrap();
-    for cut in [0, 1, 8, 40, 400, bytes.len() / 2, bytes.len() - 20] {
-        if let Ok(recording) = mcap::read(&bytes[..cut]) {
-            assert!(recording.samples.len() <= 3000);
+fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["run.mcap", "run.csv"] {
+        let path = dir.path().join(name);
+        let mut recorder = Recorder::create(&path, &RecordingInfo::default()).unwrap();
+        let mut sizes = Vec::new();
+        for (i, sample) in samples(1000).iter().enumerate() {
+            recorder.write(sample).unwrap();
+            if i % 100 == 99 {
+                recorder.flush().unwrap();
+                sizes.push(std::fs::metadata(&path).unwrap().len() as usize);
+            }
         }
+        recorder.finish_as(&Ending { outcome: "finished".into(), ..Ending::default() }).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let read = Recording::read(&path).unwrap();
+        assert_eq!((read.samples.len(), read.ending.outcome.is_empty()), (1000, name == "run.csv"));
+        if name == "run.mcap" {
+            assert_eq!(read.cut, None);
+        }
+        let cut = dir.path().join(format!("cut-{name}"));
+        for (k, size) in sizes.iter().enumerate() {
+            for more in [0, 1, 9, 700, 5000] {
+                let length = size + more;
+                if sizes.get(k + 1).is_some_and(|next| length >= *next) || length >= bytes.len() {
+                    continue;
+                }
+                std::fs::write(&cut, &bytes[..length]).unwrap();
+                let read = Recording::read(&cut).unwrap_or_else(|e| panic!("{length} bytes: {e}"));
+                assert!(read.samples.len() >= 100 * (k + 1), "{name}: {} of {length}", read.samples.len());
+                for (i, sample) in read.samples.iter().enumerate() {
+                    assert_eq!(sample.point, i as u32);
+                    assert!(sample.joints.iter().all(|j| j.temperature == 31.0 && j.position.is_finite()));
+                }
+                // Behind the last block stands the end of an MCAP file.
+                if k + 1 == sizes.len() && more > 0 {
+                    continue;
+                }
+                let missing = read.cut.unwrap_or_default();
+                assert!(missing.contains("breaks off") || missing.contains("not completed"), "{missing:?}");
+            }
+        }
+        std::fs::write(&cut, "").unwrap();
+        assert!(matches!(Recording::read(&cut), Err(RecordingError::Empty { .. })));
     }
 }
 

@@ -1,0 +1,167 @@
+//! A recording that is written while it is made, so that a program that is killed loses no more than its last moments.
+//!
+//! A thread of its own writes: a disk that is slow or full never holds up whoever follows an arm.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::{Ending, Recorder, RecordingError, RecordingInfo};
+use crate::sample::Sample;
+
+/// What was recorded is handed to the operating system after this time at the latest.
+pub const FLUSH: Duration = Duration::from_millis(200);
+/// Samples that wait for a disk that does not take them: 16 s of a simulator, many minutes of a serial line.
+const WAITING_MAX: usize = 1 << 14;
+
+enum Message {
+    Sample(Box<Sample>),
+    End(Ending),
+    Abandon,
+}
+
+/// Takes samples while they are made.
+#[derive(Clone)]
+pub struct SampleSink(SyncSender<Message>);
+
+impl SampleSink {
+    /// Hands a sample over. What follows an error is dropped: the error was reported when it happened.
+    pub fn write(&self, sample: &Sample) {
+        let _ = self.0.send(Message::Sample(Box::new(*sample)));
+    }
+}
+
+/// A recording in the making.
+pub struct LiveRecorder {
+    sink: SampleSink,
+    thread: JoinHandle<Result<u64, RecordingError>>,
+}
+
+impl LiveRecorder {
+    /// Writes what precedes all samples, so that a disk that takes nothing is an error here; the ending of `path` chooses the format.
+    /// `on_error` is called once, by the thread that writes, as soon as writing fails.
+    pub fn begin(
+        file: File,
+        path: &Path,
+        info: &RecordingInfo,
+        on_error: impl FnOnce(&RecordingError) + Send + 'static,
+    ) -> Result<Self, RecordingError> {
+        let mut recorder = Recorder::on(file, path, info)?;
+        recorder.flush()?;
+        let (send, messages) = sync_channel(WAITING_MAX);
+        let thread = std::thread::Builder::new().name("recording".into()).spawn(move || {
+            let done = write(recorder, &messages);
+            done.inspect_err(on_error)
+        });
+        let thread = thread.map_err(|e| RecordingError::io(path, e))?;
+        Ok(Self { sink: SampleSink(send), thread })
+    }
+
+    /// Where samples go; the recording ends with [`Self::finish`], however many of these there are.
+    pub fn sink(&self) -> SampleSink {
+        self.sink.clone()
+    }
+
+    /// Completes the file, with how the run ended, and returns how many samples it holds; or why it is not whole.
+    pub fn finish(self, ending: &Ending) -> Result<u64, RecordingError> {
+        self.end(Message::End(ending.clone()))
+    }
+
+    /// Ends without completing the file, which is about to be begun again.
+    pub fn abandon(self) {
+        let _ = self.end(Message::Abandon);
+    }
+
+    fn end(self, message: Message) -> Result<u64, RecordingError> {
+        let _ = self.sink.0.send(message);
+        self.thread.join().unwrap_or_else(|_| Err(std::io::Error::other("the writer ended").into()))
+    }
+}
+
+/// Writes until the end is announced.
+fn write(mut recorder: Recorder, messages: &Receiver<Message>) -> Result<u64, RecordingError> {
+    let (mut due, mut fresh) = (Instant::now() + FLUSH, false);
+    loop {
+        match messages.recv_timeout(due.saturating_duration_since(Instant::now())) {
+            Ok(Message::Sample(sample)) => {
+                recorder.write(&sample)?;
+                fresh = true;
+            }
+            Ok(Message::End(ending)) => return recorder.finish_as(&ending),
+            Ok(Message::Abandon) | Err(RecvTimeoutError::Disconnected) => return Ok(recorder.samples()),
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        let now = Instant::now();
+        if now >= due {
+            if fresh {
+                recorder.flush()?;
+            }
+            (due, fresh) = (now + FLUSH, false);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Recording;
+    use super::*;
+
+    fn sample(i: u32) -> Sample {
+        Sample { time_s: f64::from(i) * 1e-3, state: 3, tes: 3, point: i, ..Sample::default() }
+    }
+
+    /// Nobody ends the recording: as after `kill -9`, what the operating system has is all there is.
+    #[test]
+    fn what_was_recorded_is_readable_while_it_goes_on() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["run.mcap", "run.csv"] {
+            let path = dir.path().join(name);
+            let info = RecordingInfo::default();
+            let live = LiveRecorder::begin(File::create(&path).unwrap(), &path, &info, |_| ()).unwrap();
+            let sink = live.sink();
+            (0..150).for_each(|i| sink.write(&sample(i)));
+            let whole = (0..200).any(|_| {
+                std::thread::sleep(Duration::from_millis(20));
+                Recording::read(&path).is_ok_and(|r| r.samples.len() == 150)
+            });
+            assert!(whole, "{name}: {:?}", Recording::read(&path).map(|r| r.samples.len()));
+            let read = Recording::read(&path).unwrap();
+            assert!(read.cut.unwrap().contains("0.149 s"), "{name}");
+            // An observer that still holds a sink does not keep the recording open.
+            let ending = Ending { outcome: "stopped".into(), reason: "by hand".into() };
+            assert_eq!(live.finish(&ending).unwrap(), 150);
+            let read = Recording::read(&path).unwrap();
+            assert_eq!((read.samples.len(), read.ending, read.cut), (150, ending, None), "{name}");
+            sink.write(&sample(150));
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_disk_that_takes_nothing_is_known_before_the_first_sample() {
+        for name in ["run.csv", "run.mcap"] {
+            let full = File::options().write(true).open("/dev/full").unwrap();
+            let begun = LiveRecorder::begin(full, Path::new(name), &RecordingInfo::default(), |_| ());
+            let error = begun.err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(error.contains("No space left"), "{error}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_error_on_the_way_is_reported_at_once_and_again_at_the_end() {
+        let (read, write) = std::io::pipe().unwrap();
+        let file = File::from(std::os::fd::OwnedFd::from(write));
+        let (send, errors) = std::sync::mpsc::channel();
+        let on_error = move |e: &RecordingError| send.send(e.to_string()).unwrap();
+        let live =
+            LiveRecorder::begin(file, Path::new("run.csv"), &RecordingInfo::default(), on_error).unwrap();
+        drop(read);
+        live.sink().write(&sample(0));
+        let said = errors.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert!(said.starts_with("run.csv: ") && said.contains("pipe"), "{said}");
+        assert!(live.finish(&Ending::default()).is_err());
+    }
+}

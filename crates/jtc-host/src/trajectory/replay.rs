@@ -5,8 +5,10 @@
 
 use std::path::Path;
 
+use jtc_core::JOINTS;
+
 use super::fit::Samples;
-use super::{Form, Loaded};
+use super::{Form, Loaded, Point};
 use crate::file::{FileError, Place};
 use crate::recording::{Recording, RecordingError};
 use crate::sample::Sample;
@@ -14,6 +16,9 @@ use crate::sample::Sample;
 /// States of execution, as on the wire.
 const EXECUTE: u8 = jtc_core::Tes::Execute as u8;
 const FINISH: u8 = jtc_core::Tes::Finish as u8;
+
+/// Points further apart than this are left as they are, ms.
+const GRID_MS: u32 = 10;
 
 /// First words of the header of a recording as CSV.
 const CSV_HEADER: &str = "time_s,state,tes,point,";
@@ -37,42 +42,93 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
             FileError::form(problem.to_owned()).in_file(path)
         }
     })?;
-    executed(&recording.samples).map_err(|e| e.in_file(path))
+    let mut loaded = executed(&recording.samples).map_err(|e| match (e, &recording.cut) {
+        (FileError::At { path, place, problem }, Some(cut)) => {
+            FileError::At { path, place, problem: format!("{problem}; {cut}") }
+        }
+        (e, _) => e,
+    });
+    if let (Ok(loaded), Some(cut)) = (&mut loaded, recording.cut) {
+        loaded.notes.insert(0, format!("{}: {cut}", path.display()));
+    }
+    loaded.map_err(|e| e.in_file(path))
+}
+
+/// Places of a path that were seen, at the controller's milliseconds.
+#[derive(Default)]
+struct Seen {
+    ms: Vec<u32>,
+    points: Vec<Point>,
+}
+
+impl Seen {
+    /// Every tenth millisecond, and both ends: a path that is known at each millisecond has more points than the controller holds.
+    fn thinned(self) -> Self {
+        let last = self.ms.len().saturating_sub(1);
+        if self.ms.iter().zip(self.ms.iter().skip(1)).any(|(a, b)| b - a >= GRID_MS) {
+            return self;
+        }
+        let kept = |(i, ms): &(usize, u32)| ms % GRID_MS == 0 || *i == 0 || *i == last;
+        let kept: Vec<usize> = self.ms.iter().copied().enumerate().filter(kept).map(|(i, _)| i).collect();
+        Self {
+            ms: kept.iter().map(|i| self.ms[*i]).collect(),
+            points: kept.iter().map(|i| self.points[*i]).collect(),
+        }
+    }
+
+    fn into_samples(self) -> Samples {
+        let known = |part: fn(&Point) -> [f64; JOINTS]| {
+            let values: Vec<_> = self.points.iter().map(part).collect();
+            values.iter().flatten().all(|v| v.is_finite()).then_some(values)
+        };
+        let velocity = known(|p| p.velocity);
+        Samples {
+            times: self.ms.iter().map(|ms| f64::from(*ms) * 1e-3).collect(),
+            position: self.points.iter().map(|p| p.position).collect(),
+            acceleration: velocity.as_ref().and_then(|_| known(|p| p.acceleration)),
+            velocity,
+        }
+    }
 }
 
 /// The path of the last execution in the samples.
 fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
-    let mut path = Samples::default();
-    let mut last = None;
+    let mut path = Seen::default();
     for sample in samples {
-        let place = match (sample.tes, path.position.last()) {
-            (EXECUTE, _) => sample.joints.map(|joint| joint.set_position),
+        let place = match (sample.tes, path.points.last()) {
+            (EXECUTE, _) => Point {
+                position: sample.joints.map(|joint| joint.set_position),
+                velocity: sample.joints.map(|joint| joint.set_velocity),
+                acceleration: sample.joints.map(|joint| joint.set_acceleration),
+            },
             // The set values are known on the path only. It ends at rest, nearly where it was a moment before.
-            (FINISH, Some(place)) => *place,
+            (FINISH, Some(place)) => Point { position: place.position, ..Point::default() },
             _ => continue,
         };
-        if place.iter().any(|q| !q.is_finite()) || last == Some(sample.point) {
+        if place.position.iter().any(|q| !q.is_finite()) || path.ms.last() == Some(&sample.point) {
             continue;
         }
-        if last.is_some_and(|point| sample.point < point) {
+        if path.ms.last().is_some_and(|point| sample.point < *point) {
             // Another execution begins, the one after an approach for example.
-            path = Samples::default();
+            path = Seen::default();
         }
-        last = Some(sample.point);
-        path.times.push(f64::from(sample.point) * 1e-3);
-        path.position.push(place);
+        path.ms.push(sample.point);
+        path.points.push(place);
     }
-    let count = path.times.len();
+    let count = path.ms.len();
     if count < 2 {
         let problem = "the recording holds no execution of a trajectory whose commanded positions are known";
         return Err(FileError::at(Place::default(), problem));
     }
-    let (from, to) = (path.times[0], path.times[count - 1]);
-    let longest = path.times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-    let fitted = path.fit().map_err(|_| FileError::form("the times of the path do not increase"))?;
+    let (from, to) = (f64::from(path.ms[0]) * 1e-3, f64::from(path.ms[count - 1]) * 1e-3);
+    let longest = path.ms.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(0);
+    let fitted = path
+        .thinned()
+        .into_samples()
+        .fit()
+        .map_err(|_| FileError::form("the times of the path do not increase"))?;
     let mut notes = vec![format!(
-        "the last execution in the recording, {from:.3}..{to:.3} s of its path, known at {count} places at most {:.0} ms apart",
-        1e3 * longest
+        "the last execution in the recording, {from:.3}..{to:.3} s of its path, known at {count} places at most {longest} ms apart"
     )];
     notes.extend(fitted.notes);
     Ok(Loaded { trajectory: fitted.trajectory, form: Form::Recording, notes })
@@ -82,7 +138,6 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
 mod tests {
     use super::*;
     use crate::sample::JointSample;
-    use jtc_core::JOINTS;
 
     /// A sample at `point` with the set positions of a smooth path of 2 s.
     fn sample(tes: u8, point: u32) -> Sample {
@@ -120,6 +175,31 @@ mod tests {
         let loaded =
             executed(&approach.chain([sample(FINISH, 1_000)]).chain(motion).collect::<Vec<_>>()).unwrap();
         assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
+    }
+
+    /// `jtc sim` records each millisecond: a minute of that is more points than the controller holds. What was commanded comes back,
+    /// velocities and accelerations too.
+    #[test]
+    fn a_long_path_known_at_each_millisecond_can_be_run_again() {
+        let at = |ms: u32| {
+            let x = std::f64::consts::TAU * f64::from(ms) / 60_000.0;
+            let w = std::f64::consts::TAU / 60.0;
+            let joint = JointSample {
+                set_position: 1.0 - x.cos(),
+                set_velocity: w * x.sin(),
+                set_acceleration: w * w * x.cos(),
+                ..JointSample::UNKNOWN
+            };
+            Sample { tes: EXECUTE, point: ms, joints: [joint; JOINTS], ..Sample::default() }
+        };
+        let loaded = executed(&(0..=60_000).map(at).collect::<Vec<_>>()).unwrap();
+        assert!(loaded.trajectory.points.len() <= jtc_core::POINTS_MAX);
+        assert_eq!(loaded.trajectory.duration_s(), 60.0);
+        for (i, point) in loaded.trajectory.points.iter().enumerate() {
+            let joint = at(i as u32 * u32::from(loaded.trajectory.step_ms)).joints[0];
+            let seen = (point.position[5], point.velocity[5], point.acceleration[5]);
+            assert_eq!(seen, (joint.set_position, joint.set_velocity, joint.set_acceleration), "{i}");
+        }
     }
 
     #[test]

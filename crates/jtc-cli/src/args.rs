@@ -84,7 +84,11 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  jtc sim --serial /tmp/jtc\n  jtc sim --serial /tmp/jtc --arm my-arm.toml --seed 7\n  \
                             jtc sim --serial /tmp/jtc --speed max --no-throttle\n  \
-                            jtc sim --serial /tmp/jtc --faults faults.toml\n\nLines on the standard input are \
+                            jtc sim --serial /tmp/jtc --faults faults.toml\n  \
+                            jtc sim --serial /tmp/jtc --record sim.mcap\n\n\
+                            --record takes up to 40 MB a minute as .mcap, 50 MB as .csv, and is opened before anything runs. The file can be\n\
+                            read while it grows, and after a killed simulator up to its last 0.2 s. If the disk is full, that is said at\n\
+                            once, the simulation goes on, and ends with exit code 5.\n\nLines on the standard input are \
                             events:\n  push 3 12 0.5    joint 3 (counted from 1) is pushed by 12 N·m for 0.5 s\n  \
                             hand lead.csv    a hand leads the arm along the positions of a trajectory file while it is taught"
     )]

@@ -57,6 +57,13 @@ impl Failure {
             .hint("make room or name another place, and run again")
     }
 
+    /// Of a recording that broke off: what was written before is in it.
+    pub fn recording_broken_off(self) -> Self {
+        let message = format!("{}; the recording ends where that happened", self.message);
+        Self { exit: FAULT, code: "output-lost".into(), message, ..self }
+            .hint("make room or name another place, and run again")
+    }
+
     /// A verdict that was printed as the command's result.
     pub fn printed(exit: u8) -> Self {
         Self { exit, code: String::new(), message: String::new(), hint: String::new(), printed: true }

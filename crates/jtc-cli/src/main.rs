@@ -38,6 +38,8 @@ fn main() -> ExitCode {
         Err(failure) => {
             if !failure.printed {
                 out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
+            } else if let Some(why) = Output::lost() {
+                out.note(format_args!("jtc: the result could not be printed: {why}"));
             }
             ExitCode::from(failure.exit)
         }

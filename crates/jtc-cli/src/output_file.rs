@@ -1,12 +1,12 @@
 //! Files that a command writes: opened before anything is sent or moved, never written over unless that was asked for.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use jtc_host::Sample;
-use jtc_host::recording::{RecordingInfo, write_into};
+use cli_kit::Output;
+use jtc_host::recording::{Ending, LiveRecorder, RecordingInfo, SampleSink};
 
 use crate::failure::{Failure, REFUSED};
 
@@ -78,22 +78,41 @@ impl OutputFile {
         done.map_err(|e| self.failure(&e))
     }
 
-    /// Writes a recording, in the form that the ending of the name says.
-    pub fn record(mut self, info: &RecordingInfo, samples: &[Sample]) -> Result<(), Failure> {
+    /// Begins a recording, in the form that the ending of the name says; what it began before is gone. Writing that fails later is said
+    /// at once, and `goes_on` what happens then.
+    pub fn record(
+        &mut self,
+        info: &RecordingInfo,
+        goes_on: &'static str,
+        out: &Output,
+    ) -> Result<Tape, Failure> {
         let file = self.begin().map_err(|e| self.failure(&e))?;
-        let settled = file.try_clone().map_err(|e| self.failure(&e))?;
-        write_into(file, &self.path, info, samples)?;
-        settle(&settled).map_err(|e| self.failure(&e))
+        let on_disk = file.try_clone().map_err(|e| self.failure(&e))?;
+        let out = *out;
+        let live = LiveRecorder::begin(file, &self.path, info, move |e| {
+            out.note(format!("jtc: {e}; nothing more is recorded, {goes_on}"));
+        });
+        // Without its beginning the file is as good as none.
+        self.written = live.is_ok();
+        let live = live?;
+        Ok(Tape { name: self.name(), live, on_disk })
+    }
+
+    /// The open file, for a command that writes it piece by piece.
+    pub fn pieces(mut self) -> Result<File, Failure> {
+        self.begin().map_err(|e| self.failure(&e))
     }
 
     /// What was in the file goes only now.
     fn begin(&mut self) -> std::io::Result<File> {
         self.written = true;
         settled(&self.path);
-        if self.file.metadata()?.is_file() {
-            self.file.set_len(0)?;
+        let mut file = self.file.try_clone()?;
+        if file.metadata()?.is_file() {
+            file.set_len(0)?;
+            file.rewind()?;
         }
-        self.file.try_clone()
+        Ok(file)
     }
 
     fn failure(&self, e: &std::io::Error) -> Failure {
@@ -107,6 +126,37 @@ impl Drop for OutputFile {
             settled(&self.path);
             let _ = std::fs::remove_file(&self.path);
         }
+    }
+}
+
+/// A recording in the making.
+pub struct Tape {
+    name: String,
+    live: LiveRecorder,
+    on_disk: File,
+}
+
+impl Tape {
+    /// As people name it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where samples go.
+    pub fn sink(&self) -> SampleSink {
+        self.live.sink()
+    }
+
+    /// Completes it with how the run ended.
+    pub fn finish(self, ending: &Ending) -> Result<(), Failure> {
+        let Self { name, live, on_disk } = self;
+        live.finish(ending).map_err(|e| Failure::from(e).recording_broken_off())?;
+        settle(&on_disk).map_err(|e| Failure::usage(format!("{name}: {e}")).recording_broken_off())
+    }
+
+    /// Ends it without completing the file, which is about to be begun again.
+    pub fn abandon(self) {
+        self.live.abandon();
     }
 }
 

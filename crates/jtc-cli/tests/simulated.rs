@@ -141,26 +141,6 @@ fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
     assert!(said.err.contains("given before"), "{}", said.err);
 }
 
-/// The motion is made, and the recording is lost: an error that says so.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_recording_on_a_full_disk_is_an_error_although_the_run_was_good() {
-    let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
-    let (file, full, page) = (sim.path("motion.csv"), sim.path("full.mcap"), sim.path("page.html"));
-    std::fs::write(&file, motion(0.2)).unwrap();
-    std::os::unix::fs::symlink("/dev/full", &full).unwrap();
-    let said = sim.jtc(&["--json", "traj", "run", &file, "--record", &full, "--report", &page]).ends(5);
-    let value = said.json();
-    assert_eq!(
-        (value["outcome"].as_str(), value["error"]["code"].as_str()),
-        (Some("finished"), Some("output-lost"))
-    );
-    assert!(value["error"]["message"].as_str().unwrap().contains("No space left"), "{value}");
-    // The other output is not lost with it.
-    assert_eq!(value["files"], serde_json::json!([page]));
-}
-
 #[test]
 fn a_start_elsewhere_is_refused_until_it_is_approached() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);

@@ -40,7 +40,10 @@ pub enum TrajCommand {
     /// Check, upload, execute, follow, report
     #[command(
         after_help = "On a terminal space pauses and resumes, s stops. Ctrl-C stops on the path, then ends; a second one ends at once.\n\
-                            Output files are opened before anything moves.\n\nExamples:\n  jtc traj run motion.csv --approach\n  \
+                            Output files are opened before anything moves. A recording is written while the arm moves, and after a killed\n\
+                            program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\
+                            moves; if that happens on the way (full disk), it is said at once, the motion goes on as it was checked, and\n\
+                            the command ends with exit code 5.\n\nExamples:\n  jtc traj run motion.csv --approach\n  \
                             jtc traj run motion.csv --speed 10 --record run.mcap"
     )]
     Run(RunArgs),
@@ -99,7 +102,9 @@ pub enum TeachCommand {
     Off(LinkArgs),
     /// Record a motion by hand as a trajectory file, until Ctrl-C
     #[command(
-        after_help = "Examples:\n  jtc teach record motion.csv\n  jtc teach record motion.csv --duration 20"
+        after_help = "The file is written while the arm is led: a killed program leaves what was led up to then. If it cannot be\n\
+                            written to (full disk), the recording ends at once and the arm is held, with exit code 5.\n\n\
+                            Examples:\n  jtc teach record motion.csv\n  jtc teach record motion.csv --duration 20"
     )]
     Record {
         /// Trajectory file to write, CSV

@@ -57,4 +57,9 @@ pub struct SimArgs {
     /// Put the joint bus on a CAN URL too, as multicast:239.74.163.2:43113
     #[arg(long, env = "JTC_BUS", value_name = "URL")]
     pub bus: Option<String>,
+    /// Record every millisecond from power-up on, .mcap or .csv: commanded and measured positions, velocities, torques, states
+    #[arg(long, env = "JTC_SIM_RECORD", value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }

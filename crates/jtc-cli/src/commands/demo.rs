@@ -8,7 +8,7 @@ use cli_kit::Output;
 use jtc_host::arm::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::SimPort;
-use jtc_host::recording::RecordingInfo;
+use jtc_host::recording::{Ending, RecordingInfo, SampleSink};
 use jtc_host::report::{self, Facts, ReportInput, Summary};
 use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadOptions, UploadReport};
 use jtc_host::trajectory::{Point, Trajectory};
@@ -19,7 +19,7 @@ use serde_json::json;
 use super::run_report;
 use crate::args::{DemoArgs, SimSpeed};
 use crate::failure::{FAULT, Failure};
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, Tape};
 
 /// Seed of the demo: anyone's demo gives the same figures.
 const SEED: u64 = 1;
@@ -47,9 +47,15 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::usage(format!("{}: {e}", args.out.display())))?;
     let file = |name: &str| args.out.join(name);
     let open = |name: &str| OutputFile::open(&file(name), args.force.force, &[]);
-    let (page, mcap, csv, picture) = (open(NAMES[0])?, open(NAMES[1])?, open(NAMES[2])?, open(NAMES[3])?);
+    let (page, mut mcap, mut csv, picture) =
+        (open(NAMES[0])?, open(NAMES[1])?, open(NAMES[2])?, open(NAMES[3])?);
     let begin = Instant::now();
-    let run = execute(args.speed, out)?;
+    let info = run_report::info(&Arm::avena(), "simulator", "Six joints, ten seconds", 0);
+    let mut tapes = Vec::new();
+    for file in [&mut mcap, &mut csv] {
+        tapes.push(file.record(&info, "the demo goes on", out)?);
+    }
+    let run = execute(args.speed, info, tapes.iter().map(Tape::sink).collect(), out)?;
     let facts = [
         run_report::link_facts(&run.upload, &run.link, run.baud),
         Facts {
@@ -62,8 +68,8 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
         },
     ];
     let summary = Summary::of(&run.info, &run.samples);
-    mcap.record(&run.info, &run.samples).map_err(Failure::output_lost)?;
-    csv.record(&run.info, &run.samples).map_err(Failure::output_lost)?;
+    let ending = Ending { outcome: "finished".into(), ..Ending::default() };
+    tapes.into_iter().try_for_each(|tape| tape.finish(&ending))?;
     let input = ReportInput { info: &run.info, samples: &run.samples, facts: &facts, failure: None };
     page.write(&report::html(&input)).map_err(Failure::output_lost)?;
     picture.write(&report::picture_svg(&input)).map_err(Failure::output_lost)?;
@@ -96,7 +102,12 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
+fn execute(
+    speed: SimSpeed,
+    info: RecordingInfo,
+    sinks: Vec<SampleSink>,
+    out: &Output,
+) -> Result<Run, Failure> {
     let arm = Arm::avena();
     let trajectory = trajectory();
     let points = trajectory.raw().map_err(|e| Failure::usage(e.to_string()))?;
@@ -112,10 +123,16 @@ fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
     let samples: Rc<RefCell<Vec<Sample>>> = Rc::default();
     let recording = Rc::new(Cell::new(false));
     let mut port = SimPort::new(world);
+    let mut zero = None;
     let (taken, on, start) = (Rc::clone(&samples), Rc::clone(&recording), Instant::now());
     port.observe(move |world| {
         if on.get() && world.ticked() {
-            taken.borrow_mut().push(Sample::from(world.telemetry()));
+            let mut taken = taken.borrow_mut();
+            let now = Sample::from(world.telemetry());
+            let zero = *zero.get_or_insert(now.time_s);
+            let sample = Sample { time_s: now.time_s - zero, ..now };
+            sinks.iter().for_each(|sink| sink.write(&sample));
+            taken.push(sample);
         }
         if speed == SimSpeed::Realtime {
             std::thread::sleep(Duration::from_micros(world.now_us()).saturating_sub(start.elapsed()));
@@ -166,12 +183,9 @@ fn execute(speed: SimSpeed, out: &Output) -> Result<Run, Failure> {
 
     let (link, baud) = (session.statistics(), session.port().baud());
     drop(session);
-    let mut samples = samples.take();
-    let zero = samples.first().map_or(0.0, |s| s.time_s);
-    samples.iter_mut().for_each(|s| s.time_s -= zero);
     Ok(Run {
-        info: run_report::info(&arm, "simulator", "Six joints, ten seconds", 0),
-        samples,
+        info,
+        samples: samples.take(),
         upload,
         link,
         baud,

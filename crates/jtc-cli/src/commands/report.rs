@@ -23,6 +23,9 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let page_file = OutputFile::open(&page, force, &inputs)?;
     let picture_file = OutputFile::open(&picture, force, &[&inputs[..], &[page.as_path()]].concat())?;
     let recording = Recording::read(&args.file)?;
+    if let Some(cut) = &recording.cut {
+        out.note(format!("note: {}: {cut}", args.file.display()));
+    }
     let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     let info = match (arm, recording.info) {
@@ -41,6 +44,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
         "recorded_s": summary.recorded_s,
         "executed_s": summary.executed_s,
         "samples": recording.samples.len(),
+        "cut": recording.cut,
         "joints": summary.joints,
         "failure": failure,
         "files": [page.display().to_string(), picture.display().to_string()],

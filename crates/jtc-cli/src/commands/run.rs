@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use cli_kit::Output;
 use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
-use jtc_host::recording::{Ending, Format};
+use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
 use jtc_host::report::{self, ReportInput, RunFailure, Summary};
 use jtc_host::session::{Flow, Outcome, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
@@ -22,7 +22,7 @@ use crate::args::RunArgs;
 use crate::failure::{FAULT, Failure, REFUSED};
 use crate::limits;
 use crate::operator::Operator;
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, Tape};
 
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(15);
@@ -53,34 +53,45 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
         out.note(format!("warning: {warning}"));
     }
 
-    let outputs = Outputs::open(args)?;
+    let mut outputs = Outputs::open(args)?;
     let mut operator = Operator::listen(out)?;
     let mut session = args.link.session()?;
     let status = ready(&mut session, &operator)?;
     let here = status.joints.map(|j| f64::from(j.position));
     let verdict = job.verdict(&job.trajectory, Some(here), options);
+    let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let source = session.port().name();
+    let mut record = |phase: &str, start_unix_ns| {
+        let name = if phase == APPROACH { format!("{name}, {APPROACH}") } else { name.clone() };
+        let info = run_report::info(&job.arm, &source, &name, start_unix_ns);
+        let tape = outputs.begin(&info, out)?;
+        Ok((info, tape))
+    };
     let mut broken_off = None;
     if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose) {
         if !args.approach {
             return Err(job.refuse(&verdict, out));
         }
         let path = approach(job, here, args, out)?;
-        let leg = Leg::run(&mut session, &path, "approach", &UploadOptions::default(), &mut operator)?;
-        if !matches!(leg.outcome, Ok(Outcome::Finished(_))) {
+        let leg =
+            Leg::run(&mut session, &path, APPROACH, &UploadOptions::default(), &mut operator, &mut record)?;
+        if matches!(leg.outcome, Ok(Outcome::Finished(_))) {
+            // The recording is that of the motion.
+            if let Some(tape) = leg.tape {
+                tape.abandon();
+            }
+        } else {
             broken_off = Some(leg);
         }
     }
     let leg = match broken_off {
         Some(leg) => leg,
-        None => Leg::run(&mut session, &job.trajectory, "motion", &options, &mut operator)?,
+        None => Leg::run(&mut session, &job.trajectory, "motion", &options, &mut operator, &mut record)?,
     };
     drop(operator);
-    let Leg { phase, upload, start_unix_ns, samples, outcome } = leg;
+    let Leg { phase, upload, mut info, tape, samples, outcome } = leg;
 
     let link = session.statistics();
-    let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let name = if phase == APPROACH { format!("{name}, approach") } else { name };
-    let mut info = run_report::info(&job.arm, &session.port().name(), &name, start_unix_ns);
     // A run that ended in a fault is what one wants to look at most: it is recorded and reported as well.
     let facts = [run_report::link_facts(&upload, &link, session.port().baud())];
     let broken = match &outcome {
@@ -104,7 +115,7 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
     };
     info.ending = Ending { outcome: word.into(), reason };
     let input = ReportInput { info: &info, samples: &samples, facts: &facts, failure: broken.as_ref() };
-    let (files, lost) = outputs.write(&input);
+    let (files, lost) = outputs.write(tape, &input);
     let summary = Summary::of(&info, &samples);
     // A file that is lost is said even when the run failed, but the run comes first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
@@ -156,7 +167,8 @@ const APPROACH: &str = "approach";
 struct Leg {
     phase: &'static str,
     upload: UploadReport,
-    start_unix_ns: u64,
+    info: RecordingInfo,
+    tape: Option<Tape>,
     samples: Vec<Sample>,
     outcome: Result<Outcome, Error>,
 }
@@ -169,6 +181,7 @@ impl Leg {
         phase: &'static str,
         options: &UploadOptions,
         operator: &mut Operator,
+        record: &mut impl FnMut(&str, u64) -> Result<(RecordingInfo, Option<Tape>), Failure>,
     ) -> Result<Self, Failure> {
         let what = if phase == APPROACH { APPROACH } else { "upload" };
         let upload = upload(session, trajectory, options, what, operator)?;
@@ -176,10 +189,11 @@ impl Leg {
             return Err(cancelled("upload"));
         }
         let start_unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
-        let samples = observe(session, trajectory);
+        let (info, tape) = record(phase, start_unix_ns).map_err(not_started)?;
+        let samples = observe(session, trajectory, tape.as_ref().map(Tape::sink));
         let outcome = execute(session, trajectory, phase, operator);
         session.stop_observing();
-        Ok(Self { phase, upload, start_unix_ns, samples: samples.take(), outcome })
+        Ok(Self { phase, upload, info, tape, samples: samples.take(), outcome })
     }
 }
 
@@ -187,6 +201,12 @@ impl Leg {
 fn cancelled(during: &str) -> Failure {
     let message = format!("cancelled during the {during}; the motion was not started");
     Failure { message, ..Failure::of(&Error::Cancelled) }
+}
+
+/// An output cannot be written, and nothing moved yet.
+fn not_started(failure: Failure) -> Failure {
+    Failure { message: format!("{}; the motion was not started", failure.message), ..failure }
+        .hint("make room or name another place, and run again")
 }
 
 /// Waits until the controller holds the arm with all drives enabled.
@@ -278,21 +298,16 @@ fn execute(
     outcome
 }
 
-/// Collects what each status carries; the commanded values come from the trajectory at the status' point index.
-fn observe(session: &mut Session<SerialPort>, trajectory: &Trajectory) -> Samples {
+/// Collects what each status carries, and records it as it comes; the commanded values come from the trajectory at the status'
+/// point index.
+fn observe(session: &mut Session<SerialPort>, trajectory: &Trajectory, sink: Option<SampleSink>) -> Samples {
     let samples = Samples::default();
     let (taken, trajectory) = (Rc::clone(&samples), trajectory.clone());
     let mut clock = Clock { arrived: session.now(), point: 0, time_s: 0.0 };
     session.observe(move |now, status| {
-        let mut sample = Sample::from_status(clock.at(now, status), status);
-        if status.fsm == 3
-            && let Some(set) = trajectory.at_ms(status.point)
-        {
-            for (j, joint) in sample.joints.iter_mut().enumerate() {
-                joint.set_position = set.position[j];
-                joint.set_velocity = set.velocity[j];
-                joint.set_acceleration = set.acceleration[j];
-            }
+        let sample = Sample::following(clock.at(now, status), status, &trajectory);
+        if let Some(sink) = &sink {
+            sink.write(&sample);
         }
         taken.borrow_mut().push(sample);
     });
@@ -334,15 +349,22 @@ impl Outputs {
         Ok(Self { record, report })
     }
 
-    /// Writes all of them; one that is lost does not cost the other. Returns the names of those that were written.
-    fn write(self, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
-        let record = self.record.map(|file| (file.name(), file.record(input.info, input.samples)));
-        let report = self.report.map(|file| (file.name(), file.write(&report::html(input))));
+    /// Begins the recording, from its start where it was begun before.
+    fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
+        self.record.as_mut().map(|file| file.record(info, "the motion goes on", out)).transpose()
+    }
+
+    /// Completes all of them; one that is lost does not cost the other. Returns the names of those that are whole.
+    fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
+        let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
+        let report = self
+            .report
+            .map(|file| (file.name(), file.write(&report::html(input)).map_err(Failure::output_lost)));
         let (mut files, mut lost) = (Vec::new(), Vec::new());
         for (name, done) in record.into_iter().chain(report) {
             match done {
                 Ok(()) => files.push(name),
-                Err(e) => lost.push(e.output_lost()),
+                Err(e) => lost.push(e),
             }
         }
         (files, lost)

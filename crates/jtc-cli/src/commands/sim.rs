@@ -16,13 +16,21 @@ const NO_BRAKES: &str =
 /// Serves a simulated controller until SIGINT or SIGTERM.
 #[cfg(unix)]
 pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
+    use std::path::Path;
+
     use jtc_host::arm::Arm;
+    use jtc_host::recording::{Ending, Format};
     use jtc_sim::{SimConfig, Support, World};
     use serde_json::json;
 
+    use super::run_report;
+    use crate::output_file::{OutputFile, Tape};
     use crate::serve::{Pty, Server, Typed};
     use cli_kit::Stop;
 
+    if let Some(path) = &args.record {
+        Format::of(path)?; // a wrong ending is said before anything runs
+    }
     let stop = Stop::listen()?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
     for warning in &arm.warnings {
@@ -35,6 +43,9 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
         out.note("note: the arm file does not give every rotor inertia: 0 is simulated for those that it leaves out");
     }
     let faults = args.faults.as_deref().map(faults).transpose()?.unwrap_or_default();
+    let inputs: Vec<&Path> = [&args.arm, &args.faults].into_iter().filter_map(|p| p.as_deref()).collect();
+    let file =
+        args.record.as_deref().map(|path| OutputFile::open(path, args.force.force, &inputs)).transpose()?;
     let config = SimConfig {
         baud: (!args.no_throttle).then_some(args.baud),
         seed: args.seed,
@@ -55,10 +66,18 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
         out.result(&value, || format!("ready: {name}"))
     };
     let tap = args.bus.as_deref().map(bus).transpose()?;
+    let info = run_report::info(&arm, "simulator", "", 0);
+    let begin = |mut file: OutputFile| file.record(&info, "the simulation goes on", out);
+    let tape = file.map(begin).transpose()?;
     let time_s = Server::new(world, pty, tap, Typed::listen())
+        .recorded(tape.as_ref().map(Tape::sink))
         .run(args.speed, &stop, ready)
         .map_err(Failure::usage)?;
     out.note(format!("ended after {time_s:.1} s of virtual time"));
+    let Some(tape) = tape else { return Ok(()) };
+    let name = tape.name().to_owned();
+    tape.finish(&Ending { outcome: "ended".into(), reason: "the simulator was ended".into() })?;
+    out.note(format!("{name}: {time_s:.1} s, each millisecond of it"));
     Ok(())
 }
 

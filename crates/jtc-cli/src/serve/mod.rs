@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 
 use can_link::CanBus;
 use cli_kit::Stop;
+use jtc_host::Sample;
+use jtc_host::recording::SampleSink;
 use jtc_sim::{BusTap, World};
 
 use crate::args::SimSpeed;
@@ -46,6 +48,8 @@ pub struct Server {
     stood: Duration,
     /// A status has left the controller.
     answers: bool,
+    /// Takes every tick.
+    sink: Option<SampleSink>,
 }
 
 impl Server {
@@ -63,7 +67,13 @@ impl Server {
             stalled: false,
             stood: Duration::ZERO,
             answers: false,
+            sink: None,
         }
+    }
+
+    /// Hands what each tick of the controller computed to `sink`.
+    pub fn recorded(self, sink: Option<SampleSink>) -> Self {
+        Self { sink, ..self }
     }
 
     /// Runs until `stop`; calls `ready` when the first status has left the controller. Returns the virtual time, s.
@@ -94,6 +104,11 @@ impl Server {
             }
             self.typed.act(&mut self.world);
             self.world.step();
+            if let Some(sink) = &self.sink
+                && self.world.ticked()
+            {
+                sink.write(&Sample::from(self.world.telemetry()));
+            }
             if let Some(tap) = &mut self.tap
                 && let Err(e) = tap.exchange(&mut self.world)
             {

@@ -1,0 +1,196 @@
+//! A motion by hand as a trajectory file that is written while the arm is led: what was led is in it whatever ends the program.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write;
+
+use crate::failure::Failure;
+use crate::output_file::OutputFile;
+
+/// Movement below this is standing still, rad.
+const STILL: f64 = 0.002;
+/// The controller's own grid, s: the host's clock only says which status was lost.
+const GRID_S: f64 = 0.04;
+/// Fewer rows are no motion.
+const LEAST: usize = 3;
+const HEADER: &str = "t,q1,q2,q3,q4,q5,q6\n";
+
+/// One pose in the file.
+struct Row {
+    position: [f64; 6],
+    /// Bytes of the file up to its end.
+    end: usize,
+}
+
+/// Rows of the motion: without the standing still before and after it, but with the last resting pose of each.
+pub struct TaughtFile {
+    name: String,
+    output: Option<OutputFile>,
+    file: Option<File>,
+    text: String,
+    rows: Vec<Row>,
+    /// Where the arm rested at first, and the last slot in which it did.
+    rest: Option<([f64; 6], i64)>,
+    start_slot: i64,
+    last_slot: i64,
+}
+
+impl TaughtFile {
+    /// An output that stays as it is until the arm moves.
+    pub fn new(output: OutputFile) -> Self {
+        Self {
+            name: output.name(),
+            output: Some(output),
+            file: None,
+            text: HEADER.to_owned(),
+            rows: Vec::new(),
+            rest: None,
+            start_slot: 0,
+            last_slot: -1,
+        }
+    }
+
+    /// As people name it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// A motion is in the file.
+    pub fn is_begun(&self) -> bool {
+        self.file.is_some()
+    }
+
+    /// The pose at a time (s); in the file when this returns, if the arm has moved.
+    pub fn take(&mut self, time_s: f64, position: [f64; 6]) -> Result<(), Failure> {
+        let slot = (time_s / GRID_S).round() as i64;
+        if slot <= self.last_slot {
+            return Ok(());
+        }
+        self.last_slot = slot;
+        let (rest, rested) = *self.rest.get_or_insert((position, slot));
+        if self.rows.is_empty() {
+            if !moved(&position, &rest) {
+                self.rest = Some((rest, slot));
+                return Ok(());
+            }
+            self.start_slot = rested;
+            self.row(rested, rest);
+        }
+        let before = self.text.len();
+        self.row(slot, position);
+        let fresh = match &self.file {
+            Some(_) => before,
+            None if self.in_motion() >= LEAST => {
+                self.file = self.output.take().map(OutputFile::pieces).transpose()?;
+                0
+            }
+            None => return Ok(()),
+        };
+        let Some(file) = &mut self.file else { return Ok(()) };
+        let done = file.write_all(&self.text.as_bytes()[fresh..]);
+        done.map_err(|e| Failure::usage(format!("{}: {e}", self.name)).recording_broken_off())
+    }
+
+    fn row(&mut self, slot: i64, position: [f64; 6]) {
+        let _ = write!(self.text, "{:.3}", (slot - self.start_slot) as f64 * GRID_S);
+        for v in position {
+            let _ = write!(self.text, ",{v:.6}");
+        }
+        self.text.push('\n');
+        self.rows.push(Row { position, end: self.text.len() });
+    }
+
+    /// Rows up to the first one of the rest at the end.
+    fn in_motion(&self) -> usize {
+        let Some(last) = self.rows.last() else { return 0 };
+        let moving = self.rows.iter().rposition(|row| moved(&row.position, &last.position));
+        moving.map_or(0, |i| i + 2).min(self.rows.len())
+    }
+
+    /// Takes the rest at the end off, and returns what the file holds; none when the arm was not moved and nothing was written.
+    pub fn finish(self) -> Result<Option<String>, Failure> {
+        let kept = self.in_motion();
+        let Self { name, file, mut text, rows, .. } = self;
+        let Some(file) = file else { return Ok(None) };
+        if kept >= LEAST {
+            text.truncate(rows[kept - 1].end);
+        }
+        let settle = || {
+            if file.metadata()?.is_file() {
+                file.set_len(text.len() as u64)?;
+                file.sync_all()?;
+            }
+            Ok(())
+        };
+        settle()
+            .map_err(|e: std::io::Error| Failure::usage(format!("{name}: {e}")).recording_broken_off())?;
+        Ok(Some(text))
+    }
+}
+
+fn moved(a: &[f64; 6], b: &[f64; 6]) -> bool {
+    a.iter().zip(b).any(|(x, y)| (x - y).abs() > STILL)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jtc_host::trajectory::Loaded;
+
+    /// Rest for 0.4 s, to 0.5 rad in 1 s, rest for 0.4 s.
+    fn pose(k: u32) -> [f64; 6] {
+        let u = ((f64::from(k) - 10.0) / 25.0).clamp(0.0, 1.0);
+        [0.0, 0.5 * u * u * (3.0 - 2.0 * u), 0.0, 0.0, 0.0, 0.0]
+    }
+
+    #[test]
+    fn what_was_led_is_in_the_file_before_anybody_ends_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("taught.csv");
+        std::fs::write(&path, "precious").unwrap();
+        let mut taught = TaughtFile::new(OutputFile::open(&path, true, &[]).unwrap());
+        for k in 0..8 {
+            taught.take(f64::from(k) * GRID_S, pose(k)).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious", "the arm stands still");
+        for k in 8..45 {
+            taught.take(f64::from(k) * GRID_S, pose(k)).unwrap();
+            if k >= 14 {
+                let led = Loaded::load(&path, None).unwrap();
+                let last = led.trajectory.points.last().unwrap().position[1];
+                assert!((last - pose(k)[1]).abs() < 1e-6, "{k}: {last}");
+            }
+        }
+        let text = taught.finish().unwrap().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        let led = Loaded::load(&path, None).unwrap().trajectory;
+        assert!((0.9..=1.16).contains(&led.duration_s()), "{} s", led.duration_s());
+        assert!(
+            led.points[0].position[1].abs() < 1e-9
+                && (led.points.last().unwrap().position[1] - 0.5).abs() < 0.002
+        );
+    }
+
+    #[test]
+    fn an_arm_that_was_not_moved_leaves_no_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("taught.csv");
+        let mut taught = TaughtFile::new(OutputFile::open(&path, false, &[]).unwrap());
+        for k in 0..50 {
+            taught.take(f64::from(k) * GRID_S, [0.001 * f64::from(k % 2); 6]).unwrap();
+        }
+        assert!(!taught.is_begun() && taught.finish().unwrap().is_none());
+        assert!(!path.exists());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_known_at_once() {
+        let output = OutputFile::open(std::path::Path::new("/dev/full"), false, &[]).unwrap();
+        let mut taught = TaughtFile::new(output);
+        let failure = (0..45).find_map(|k| taught.take(f64::from(k) * GRID_S, pose(k)).err()).unwrap();
+        assert!(failure.exit == FAULT && failure.message.contains("No space left"), "{}", failure.message);
+    }
+
+    use crate::failure::FAULT;
+}

@@ -1,0 +1,170 @@
+//! Recordings of a run, of the simulator and of the demo: what a killed program, a full disk and a second run leave of them.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Sim, command, jtc, motion};
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
+fn ready(options: &[&str]) -> Sim {
+    let sim = Sim::start(options);
+    sim.jtc(&["params", "use-defaults"]).ends(0);
+    sim
+}
+
+fn json(words: &[&str]) -> serde_json::Value {
+    let mut all = vec!["--json"];
+    all.extend(words);
+    jtc(&all).ends(0).json()
+}
+
+/// Each millisecond of a motion that ran over the serial port, readable while the simulator runs, after `kill -9`, and run again.
+#[test]
+fn the_simulator_records_each_millisecond() {
+    for name in ["sim.mcap", "sim.csv"] {
+        let dir = tempfile::tempdir().unwrap();
+        let record = dir.path().join(name).to_str().unwrap().to_owned();
+        let sim = ready(&["--speed", "max", "--no-throttle", "--record", &record]);
+        let file = sim.path("motion.csv");
+        std::fs::write(&file, motion(0.2)).unwrap();
+        sim.jtc(&["traj", "run", &file]).ends(0);
+        // It was ready before, so the file is there, and not written over.
+        let said = jtc(&["sim", "--record", &record]).ends(4);
+        assert!(said.err.contains("is there already"), "{}", said.err);
+        // What is younger than 0.2 s may be missing.
+        assert!((0..400).any(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+            recorded_ms(&record) == 1_200
+        }));
+        assert_eq!(sim.end("-KILL").0, -1);
+        let info = json(&["traj", "info", &record]);
+        assert_eq!((&info["form"], &info["duration_s"]), (&"recording".into(), &1.2.into()), "{info}");
+        let notes = info["notes"].to_string();
+        assert!(notes.contains("at 1201 places at most 1 ms apart"), "{notes}");
+        assert!(
+            name == "sim.csv" || notes.contains("not completed") || notes.contains("breaks off"),
+            "{notes}"
+        );
+        jtc(&["traj", "check", &record]).ends(0);
+        let report = json(&["report", &record]);
+        assert!(report["samples"].as_u64().unwrap() > 5_000, "{report}");
+        for joint in report["joints"].as_array().unwrap() {
+            assert!(joint["rms_error_mrad"].as_f64().is_some_and(|e| e < 2.0), "{joint}");
+        }
+        let other = ready(&["--speed", "max", "--no-throttle"]);
+        other.jtc(&["traj", "replay", &record]).ends(0);
+    }
+}
+
+#[test]
+fn a_simulator_that_is_ended_completes_its_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    let record = dir.path().join("sim.mcap").to_str().unwrap().to_owned();
+    let sim = ready(&["--speed", "max", "--no-throttle", "--record", &record]);
+    let file = sim.path("motion.csv");
+    std::fs::write(&file, motion(0.2)).unwrap();
+    sim.jtc(&["traj", "run", &file]).ends(0);
+    assert_eq!(sim.end("-TERM").0, 0);
+    let info = json(&["traj", "info", &record]);
+    assert!(!info["notes"].to_string().contains("completed"), "{info}");
+}
+
+/// A recorder that is killed in the middle of a motion leaves all but the last moments of it.
+#[test]
+fn a_run_that_is_killed_leaves_its_recording() {
+    for name in ["run.mcap", "run.csv"] {
+        let sim = ready(&["--no-throttle"]);
+        let (file, record) = (sim.path("motion.csv"), sim.path(name));
+        jtc(&["example", "motion", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
+        let mut run = command()
+            .args([
+                "traj",
+                "run",
+                &file,
+                "--speed",
+                "20",
+                "--record",
+                &record,
+                "--port",
+                sim.port.to_str().unwrap(),
+            ])
+            .stdin(Stdio::null())
+            .stderr(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let moving = (0..400).any(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+            recorded_ms(&record) > 1_000
+        });
+        run.kill().unwrap();
+        run.wait().unwrap();
+        assert!(moving, "nothing of the motion is in {name}");
+        let info = json(&["traj", "info", &record]);
+        let seen = info["duration_s"].as_f64().unwrap();
+        assert!((1.0..30.0).contains(&seen), "{info}");
+        let notes = info["notes"].to_string();
+        assert!(notes.contains("breaks off") || notes.contains("not completed"), "{notes}");
+        let said = jtc(&["report", &record]).ends(0);
+        assert!(said.err.contains("breaks off") || said.err.contains("not completed"), "{}", said.err);
+        assert!(said.out.starts_with("FAILED "), "{}", said.out);
+    }
+}
+
+/// Milliseconds of the path in a recording that somebody is writing.
+fn recorded_ms(record: &str) -> u64 {
+    let said = jtc(&["--json", "traj", "info", record]);
+    let value: serde_json::Value = serde_json::from_str(said.out.trim()).unwrap_or_default();
+    (value["duration_s"].as_f64().unwrap_or(0.0) * 1e3) as u64
+}
+
+/// A disk that takes nothing is known before the arm moves.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_found_before_anything_moves() {
+    let sim = ready(&["--speed", "max", "--no-throttle"]);
+    let (file, full, page) = (sim.path("motion.csv"), sim.path("full.mcap"), sim.path("page.html"));
+    std::fs::write(&file, motion(0.2)).unwrap();
+    std::os::unix::fs::symlink("/dev/full", &full).unwrap();
+    let said = sim.jtc(&["traj", "run", &file, "--record", &full, "--report", &page]).ends(2);
+    assert!(
+        said.err.contains("No space left") && said.err.contains("the motion was not started"),
+        "{}",
+        said.err
+    );
+    assert!(!std::path::Path::new(&page).exists());
+    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    assert_eq!((status["state"].as_str(), status["point"].as_u64()), (Some("HoldPos"), Some(0)), "{status}");
+    let said = jtc(&["sim", "--record", &full]).ends(2);
+    assert!(said.err.contains("No space left") && said.out.is_empty(), "{}", said.err);
+}
+
+/// The disk is full on the way: said at once, the motion goes on to its end, and the exit code says that something is lost.
+#[test]
+fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good() {
+    let sim = ready(&["--speed", "max", "--no-throttle"]);
+    let (file, pipe, page) = (sim.path("motion.csv"), sim.path("pipe.csv"), sim.path("page.html"));
+    std::fs::write(&file, motion(0.2)).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    // A reader that takes the header and no more.
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || {
+            let mut line = String::new();
+            BufReader::new(std::fs::File::open(pipe).unwrap()).read_line(&mut line).unwrap();
+            line
+        }
+    });
+    let said = sim.jtc(&["--json", "traj", "run", &file, "--record", &pipe, "--report", &page]).ends(5);
+    assert!(reader.join().unwrap().starts_with("time_s,"));
+    let value = said.json();
+    assert_eq!(
+        (value["outcome"].as_str(), value["error"]["code"].as_str()),
+        (Some("finished"), Some("output-lost"))
+    );
+    assert!(said.err.contains("nothing more is recorded, the motion goes on"), "{}", said.err);
+    // The other output is not lost with it.
+    assert_eq!(value["files"], serde_json::json!([page]));
+}

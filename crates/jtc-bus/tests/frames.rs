@@ -1,8 +1,8 @@
 //! The frames on the wire, byte by byte and as properties.
 
 use jtc_bus::{
-    Answer, Frame, FrameError, GRIPPER, GripperReport, JOINTS, JointReport, NODES, POSITION_FULL_SCALE,
-    Request, Scale, TORQUE_FULL_SCALE, Target, config, fsm, warning,
+    Answer, Bits, Frame, FrameError, GRIPPER, GripperReport, JOINTS, JointReport, NODES, POSITION_FULL_SCALE,
+    Request, Scale, TORQUE_FULL_SCALE, Target, config, error, fsm, warning,
 };
 use proptest::num::f64::ANY;
 use proptest::prelude::*;
@@ -219,6 +219,31 @@ fn frames_read_as_words() {
     assert_eq!(frame(0x3FF, &[1, 0xAB]).to_string(), "3FF no frame of the joint bus has id 0x3FF: 01 AB");
     let short = frame(0x000, &[]);
     assert_eq!(short.to_string(), "000 frame 0x000 has 0 bytes and needs 16: no bytes");
+    let short = frame(0x203, &[1, 2]);
+    assert_eq!(short.to_string(), "203 frame 0x203 has 2 bytes and needs 16: 01 02");
+}
+
+#[test]
+fn configurations_read_as_words() {
+    let request =
+        Request::ChangeMode { mode: [0, 1, 2, 3, 1, 1], config: [0, 0x17, 0x17, 1, 0x17, 0x17], gripper: 0 };
+    assert_eq!(
+        request.emit().to_string(),
+        "0F0 ChangeMode none/00 torque/17 speed/17 mode-3/01 torque/17 torque/17, gripper 00 (-)"
+    );
+}
+
+#[test]
+fn what_a_gripper_says_reads_as_words() {
+    assert_eq!(Request::Reset(6).emit().to_string(), "1A6 Reset gripper");
+    let report =
+        GripperReport { pump: true, pressure1: true, fsm: fsm::FAULT, errors: 0x06, ..Default::default() };
+    assert_eq!(
+        Answer::Gripper(report).emit(SCALE).to_string(),
+        "206 gripper pump on, level 1 reached, level 2 not reached, fault, \
+         errors: motor-control fault, over-speed"
+    );
+    assert_eq!(Bits(0, &error::NAMES).to_string(), "-");
 }
 
 /// Torque numbers as a drive reads them.

@@ -131,7 +131,7 @@ fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileE
             let problem = format!("{} s does not lie after {} s of the line before", times[i], times[i - 1]);
             Err(FileError::at(Place::line(lines[i]).named("time"), problem))
         }
-        Err(FitError::Duration(d)) => Err(FileError::form(format!("{d} s are longer than a day"))),
+        Err(other) => Err(FileError::form(other.to_string())),
     }
 }
 

@@ -1,8 +1,46 @@
-//! Makes points at a fixed step from samples at any times, with velocities and accelerations where the file has none.
+//! Fits a trajectory, points at a fixed step, to samples at any times, with velocities and accelerations where there are none.
 //!
-//! Missing velocities and accelerations are those of a cubic spline that starts and ends at rest; missing accelerations alone
-//! those of a spline through the velocities, which the rounding of positions does not disturb. Between samples a quintic is
-//! followed, so that resampled points agree with the samples in position, velocity and acceleration.
+//! Units are those of a trajectory: s, rad, rad/s, rad/s², joints from base to wrist.
+//!
+//! # What is derived
+//!
+//! - **Positions only**: a cubic spline through the positions (continuous position, velocity and acceleration) gives velocities and
+//!   accelerations. Its end conditions are rest: the velocity at the first and at the last sample is 0. The acceleration there is
+//!   not, so the motion begins and ends with a step in acceleration.
+//! - **Positions and velocities**: a cubic spline through the velocities, of each joint alone, gives the accelerations; the rounding
+//!   of positions does not disturb it. Its end conditions are those of a natural spline: the jerk is 0 at the ends. The
+//!   velocities are taken as they are, at the ends too.
+//! - **All three channels**: nothing is derived.
+//!
+//! # Time
+//!
+//! Samples whose times lie on a grid of whole milliseconds (to 50 µs, steps of 1..1000 ms) become the points as they are. All others
+//! are resampled to 10 ms, or to a longer step where 10 ms would make more points than the controller holds. Between samples a
+//! quintic is followed that has position, velocity and acceleration of both its ends. When the whole takes no whole number of steps,
+//! the last step is longer than its share: the last point is the last sample.
+//!
+//! # Overshoot
+//!
+//! A spline passes through every sample, and between samples it may leave the interval of its two neighbours: after a step it swings
+//! over, by some 10 % of the step where the samples are equally far apart. Nothing is limited here. What the fit made of the samples,
+//! between the points too, is what [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) looks at. Samples closer to each
+//! other where the direction changes keep it small.
+//!
+//! # Example
+//!
+//! ```
+//! use jtc_host::trajectory::fit::Samples;
+//!
+//! // Joint 1 goes to 0.5 rad in two seconds, over a place where it is after 0.8 s.
+//! let position = [0.0, 0.2, 0.5].map(|q| [q, 0.0, 0.0, 0.0, 0.0, 0.0]).to_vec();
+//! let fitted = Samples { times: vec![0.0, 0.8, 2.0], position, ..Samples::default() }.fit()?;
+//! assert_eq!((fitted.trajectory.step_ms, fitted.trajectory.points.len()), (10, 201));
+//! assert!(fitted.trajectory.points[200].velocity[0].abs() < 1e-9);
+//! for note in &fitted.notes {
+//!     println!("{note}"); // what was derived and resampled, in words
+//! }
+//! # Ok::<(), jtc_host::trajectory::fit::FitError>(())
+//! ```
 
 use std::cmp::Ordering;
 
@@ -10,18 +48,25 @@ use jtc_core::{JOINTS, POINTS_MAX};
 
 use super::{Point, Trajectory};
 
-/// Samples as a file has them; times in s, strictly increasing.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Samples {
+/// Samples of a motion, as files have them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// s, strictly increasing; the first one need not be 0.
     pub times: Vec<f64>,
+    /// rad, one for each time.
     pub position: Vec<[f64; JOINTS]>,
+    /// rad/s, one for each time; `None`: derived.
     pub velocity: Option<Vec<[f64; JOINTS]>>,
+    /// rad/s², one for each time; `None`: derived. Accelerations without velocities are not used.
     pub acceleration: Option<Vec<[f64; JOINTS]>>,
 }
 
-/// A sampled trajectory, and what was done to get there.
-pub(crate) struct Fitted {
+/// A trajectory that was fitted to samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fitted {
+    /// Points at a fixed step.
     pub trajectory: Trajectory,
+    /// What was derived and resampled, in words.
     pub notes: Vec<String>,
 }
 
@@ -33,16 +78,38 @@ const REGULAR: f64 = 50e-6;
 const DURATION_MAX: f64 = 86_400.0;
 
 /// Why samples make no trajectory.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum FitError {
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// A channel has another number of samples than there are times.
+    #[error("{samples} samples of the {channel} for {times} times")]
+    Count {
+        /// "position", "velocity" or "acceleration".
+        channel: &'static str,
+        /// Its samples.
+        samples: usize,
+        /// How many there must be.
+        times: usize,
+    },
+    /// A number that is none, at this sample (from 0).
+    #[error("sample {0}: a number is not finite")]
+    NotFinite(usize),
     /// Time does not increase at this sample (from 0).
+    #[error("sample {0}: its time does not lie after that of the sample before")]
     Time(usize),
-    /// Longer than a day.
+    /// Longer than a day, s.
+    #[error("{0} s are longer than a day")]
     Duration(f64),
 }
 
 impl Samples {
+    /// The trajectory through the samples; no sample makes an empty one, which no check passes.
+    ///
+    /// # Errors
+    ///
+    /// [`FitError`]: channels of different length, a number that is not finite, times that do not increase, or more than a day.
     pub fn fit(self) -> Result<Fitted, FitError> {
+        self.whole()?;
         let mut notes = Vec::new();
         if let Some(i) =
             self.times.windows(2).position(|w| w[1].partial_cmp(&w[0]) != Some(Ordering::Greater))
@@ -69,6 +136,25 @@ impl Samples {
         Ok(Fitted { trajectory: Trajectory { step_ms, points: self.resample(&points, step_ms) }, notes })
     }
 
+    /// As many samples in each channel as there are times, all of them numbers.
+    fn whole(&self) -> Result<(), FitError> {
+        let times = self.times.len();
+        let channels = [
+            ("position", Some(&self.position)),
+            ("velocity", self.velocity.as_ref()),
+            ("acceleration", self.acceleration.as_ref()),
+        ];
+        for (channel, rows) in channels.into_iter().filter_map(|(name, rows)| Some((name, rows?))) {
+            if rows.len() != times {
+                return Err(FitError::Count { channel, samples: rows.len(), times });
+            }
+            if let Some(i) = rows.iter().position(|row| row.iter().any(|v| !v.is_finite())) {
+                return Err(FitError::NotFinite(i));
+            }
+        }
+        self.times.iter().position(|t| !t.is_finite()).map_or(Ok(()), |i| Err(FitError::NotFinite(i)))
+    }
+
     /// The step when all times lie on a grid of whole milliseconds.
     fn regular_step(&self) -> Option<u16> {
         let [first, second, ..] = self.times[..] else { return Some(STEP_MS) };
@@ -91,9 +177,9 @@ impl Samples {
                 None => spline_slopes(&self.times, &position, true),
             };
             let bends = match (&self.acceleration, &self.velocity) {
-                (Some(a), _) => column(a, j),
+                (Some(a), Some(_)) => column(a, j),
                 (None, Some(_)) => spline_slopes(&self.times, &slopes, false),
-                (None, None) => spline_bends(&self.times, &position, &slopes),
+                (_, None) => spline_bends(&self.times, &position, &slopes),
             };
             for (i, point) in points.iter_mut().enumerate() {
                 point.velocity[j] = slopes[i];
@@ -258,6 +344,48 @@ mod tests {
     fn long_irregular_files_get_a_longer_step() {
         assert_eq!(resampled_step(10.0), 10);
         assert_eq!(resampled_step(1200.0), 101);
+    }
+
+    /// The documented overshoot: joint 1 steps by 1 rad between two of ten equally far samples.
+    #[test]
+    fn a_spline_swings_over_after_a_step() {
+        let position: Vec<_> = (0..10).map(|i| [f64::from(u8::from(i >= 5)); 6]).collect();
+        let times = (0..10).map(|i| f64::from(i) * 0.1).collect();
+        let fitted = Samples { times, position, ..Samples::default() }.fit().unwrap();
+        let points = &fitted.trajectory.points;
+        let between = |w: &[Point]| {
+            (0..=20).map(|k| quintic(&w[0], &w[1], 0.1, f64::from(k) / 20.0).position[0]).fold(0.0, f64::max)
+        };
+        let over = points.windows(2).map(between).fold(0.0, f64::max) - 1.0;
+        assert!((0.08..0.12).contains(&over), "{over}");
+        // End conditions: at rest, but not free of acceleration where the path begins to bend at once.
+        assert_eq!((points[0].velocity, points[9].velocity), ([0.0; 6], [0.0; 6]));
+        let bent = Samples {
+            times: vec![0.0, 0.5, 1.0],
+            position: vec![[0.0; 6], [0.2; 6], [0.5; 6]],
+            ..Samples::default()
+        };
+        assert!(bent.fit().unwrap().trajectory.points[0].acceleration[0].abs() > 1.0);
+    }
+
+    #[test]
+    fn channels_that_do_not_belong_together_are_refused() {
+        let good = samples(vec![0.0, 0.01, 0.02], true);
+        let mut short = good.clone();
+        short.position.pop();
+        assert_eq!(short.fit(), Err(FitError::Count { channel: "position", samples: 2, times: 3 }));
+        let mut long = good.clone();
+        long.velocity.as_mut().unwrap().push([0.0; 6]);
+        assert_eq!(long.fit(), Err(FitError::Count { channel: "velocity", samples: 4, times: 3 }));
+        let mut none = good.clone();
+        none.acceleration = Some(vec![[0.0; 6], [f64::INFINITY; 6], [0.0; 6]]);
+        assert_eq!(none.fit(), Err(FitError::NotFinite(1)));
+        let never = Samples { times: vec![f64::NAN], position: vec![[0.0; 6]], ..Samples::default() };
+        assert_eq!(never.fit(), Err(FitError::NotFinite(0)));
+        assert_eq!(Samples::default().fit().unwrap().trajectory.points.len(), 0);
+        // Accelerations alone are not used: they would contradict the derived velocities.
+        let alone = Samples { velocity: None, acceleration: Some(vec![[9.0; 6]; 3]), ..good };
+        assert!(alone.fit().unwrap().trajectory.points.iter().all(|p| p.acceleration[0] != 9.0));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Trajectories: points at a fixed step, from the files that people have.
 
 mod csv;
-pub(crate) mod fit;
+pub mod fit;
 mod replay;
 mod structured;
 #[cfg(test)]
@@ -65,6 +65,10 @@ pub struct Loaded {
 
 impl Loaded {
     /// From a file of any form; `joint_names` are those of the arm, where they are known.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read or is no trajectory of a known form, with line and column.
     pub fn load(path: &Path, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         if replay::is_recording(path, None) {
             return replay::load(path);
@@ -80,6 +84,10 @@ impl Loaded {
     }
 
     /// From a text, told by its content.
+    ///
+    /// # Errors
+    ///
+    /// A text that is no trajectory of a known form, with line and column.
     pub fn parse(text: &str, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let keyed = || start.lines().any(|l| l.trim_start_matches([' ', '-']).starts_with("joint_names:"));
@@ -124,6 +132,10 @@ impl From<&RawPoint> for Point {
 
 impl Point {
     /// As the wire carries it; `index` is for the error.
+    ///
+    /// # Errors
+    ///
+    /// The first number that a trajectory frame cannot carry.
     pub fn raw(&self, index: usize) -> Result<RawPoint, ScaleError> {
         let channel = |values: &[f64; JOINTS], scale: f64, channel, unit| {
             let mut out = [0i16; JOINTS];
@@ -154,6 +166,10 @@ impl Point {
 
 impl Trajectory {
     /// All points as the wire carries them.
+    ///
+    /// # Errors
+    ///
+    /// The first number that a trajectory frame cannot carry.
     pub fn raw(&self) -> Result<Vec<RawPoint>, ScaleError> {
         self.points.iter().enumerate().map(|(i, p)| p.raw(i)).collect()
     }

@@ -204,7 +204,7 @@ fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
                 format!("time {} s does not lie after {} s of the point before", times[i], times[i - 1]);
             Err(FileError::at(Place::name(format!("point {i}")), problem))
         }
-        Err(FitError::Duration(d)) => Err(FileError::form(format!("{d} s are longer than a day"))),
+        Err(other) => Err(FileError::form(other.to_string())),
     }
 }
 

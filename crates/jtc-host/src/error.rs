@@ -2,6 +2,7 @@
 
 use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status};
 
+use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::port::PortError;
 use crate::words;
@@ -105,6 +106,20 @@ pub enum Error {
     /// The check found problems; nothing was sent.
     #[error("{0}")]
     Check(Box<Verdict>),
+    /// The arm has values that no frame carries and that the controller uses otherwise (J-55); nothing was sent.
+    #[error("{arm}: {} values of this arm cannot be given to the controller, which uses its own; nothing was sent ({})", differences.len(), listed(differences))]
+    DeviceLimits {
+        /// Name of the arm.
+        arm: String,
+        /// What differs.
+        differences: Vec<Difference>,
+    },
+    /// Execution was asked for of a trajectory that this session did not upload, or that the controller lost since; nothing was
+    /// sent.
+    #[error(
+        "the controller does not hold this trajectory: it was not uploaded, another one was since, or an error made the controller forget it; nothing was sent"
+    )]
+    NotUploaded,
     /// The motion did not end as asked for.
     #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::errors_line(status))]
     RunFault {
@@ -191,6 +206,10 @@ fn not_paused(tes: u8) -> &'static str {
     }
 }
 
+fn listed(differences: &[Difference]) -> String {
+    differences.iter().map(Difference::to_string).collect::<Vec<_>>().join("; ")
+}
+
 fn heard(bytes: u64) -> String {
     match bytes {
         0 => "no byte came".into(),
@@ -212,6 +231,8 @@ impl Error {
             | Error::StateTimeout { .. } => 1,
             Error::File(_) | Error::Parameter(_) | Error::Frame(_) => 2,
             Error::Check(_)
+            | Error::DeviceLimits { .. }
+            | Error::NotUploaded
             | Error::NotPaused { .. }
             | Error::NoParameters { .. }
             | Error::IncompleteArm { .. } => 4,
@@ -235,6 +256,8 @@ impl Error {
             Error::File(_) => "file",
             Error::Parameter(_) => "parameter",
             Error::Check(_) => "check",
+            Error::DeviceLimits { .. } => "device-limits",
+            Error::NotUploaded => "not-uploaded",
             Error::RunFault { .. } => "run-fault",
             Error::PausedByController { .. } => "paused-by-controller",
             Error::NotPaused { .. } => "not-paused",
@@ -275,6 +298,11 @@ impl Error {
             Error::File(e) => e.hint(),
             Error::Parameter(e) => e.hint(),
             Error::Check(v) => v.hint(),
+            Error::DeviceLimits { .. } => format!(
+                "no frame carries {NOT_CARRIED}. Build the firmware for this arm, or, where the controller's values are safe for it, \
+                 accept them (`--accept-device-limits`)"
+            ),
+            Error::NotUploaded => "check it again from the pose of the arm, upload it, then execute it (`jtc traj run FILE`)".into(),
             Error::RunFault { .. } => "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos".into(),
             Error::PausedByController { .. } => {
                 "look what keeps the arm from its path: it is held where it gave way, with little torque. `jtc traj resume` goes on \

@@ -7,7 +7,7 @@ use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
 use jtc_host::port::sim::SimPort;
 use jtc_host::port::{Port, PortError};
 use jtc_host::session::{Flow, Outcome, ParameterSource, RecoverStep, UploadOptions, UploadReport};
-use jtc_host::{Error, Session, Trajectory, plan};
+use jtc_host::{CheckOptions, CheckedTrajectory, Error, Session, Trajectory, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
@@ -36,8 +36,16 @@ fn trajectory(points: usize) -> Trajectory {
     Trajectory { step_ms: there.step_ms, points: all }
 }
 
-fn upload(s: &mut Sim, t: &Trajectory) -> Result<UploadReport, Error> {
-    s.upload(&t.raw().unwrap(), t.step_ms, &UploadOptions::default(), |_| Flow::Continue)
+/// Checked for the default arm, which stands at the first point.
+fn checked(t: &Trajectory, upload: UploadOptions) -> CheckedTrajectory {
+    let options = CheckOptions { upload, ..CheckOptions::default() };
+    CheckedTrajectory::check(t, &Arm::avena(), &t.points[0].position, &options).unwrap()
+}
+
+fn upload(s: &mut Sim, t: &Trajectory) -> Result<(CheckedTrajectory, UploadReport), Error> {
+    let checked = checked(t, UploadOptions::default());
+    let report = s.upload(&checked, |_| Flow::Continue)?;
+    Ok((checked, report))
 }
 
 #[test]
@@ -62,7 +70,7 @@ fn parameters_go_over_and_the_controller_becomes_ready() {
 fn uploads_fill_the_line() {
     for (baud, points) in [(115_200, 2_000), (921_600, 12_000), (3_000_000, 12_000)] {
         let mut s = ready(Some(baud));
-        let report = upload(&mut s, &trajectory(points)).unwrap();
+        let (_, report) = upload(&mut s, &trajectory(points)).unwrap();
         let share = report.line_share.unwrap();
         println!("{baud} Bd: {points} points in {:.3} s, {:.2} % of the line", report.time_s, share * 100.0);
         assert!(share >= 0.98, "{baud} Bd: {share}");
@@ -107,17 +115,15 @@ fn j04_lost_confirmations_are_survived() {
         // Every tenth status arrives damaged.
         let mut s =
             Session::new(Noisy { port: ready(Some(921_600)).into_port(), random: seed, every: 1_700 });
-        let t = trajectory(3_000);
         let options = UploadOptions { points_per_segment: Some(60), ..UploadOptions::default() };
-        let report = s
-            .upload(&t.raw().unwrap(), t.step_ms, &options, |_| Flow::Continue)
-            .unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+        let t = checked(&trajectory(3_000), options);
+        let report = s.upload(&t, |_| Flow::Continue).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         println!(
             "seed {seed}: {:.2} s, {} retries, {} restarts",
             report.time_s, report.retries, report.restarts
         );
         assert!(s.statistics().bad_bytes > 0);
-        s.execute().unwrap();
+        s.execute(&t).unwrap();
         s.stop().unwrap();
     }
 }
@@ -132,7 +138,7 @@ fn uploads_survive_a_bad_line() {
     ] {
         let mut s = ready(Some(921_600));
         s.port_mut().world_mut().inject(Fault { kind, trigger: Trigger::At(0), duration_ms: None });
-        let report =
+        let (_, report) =
             upload(&mut s, &trajectory(3_000)).unwrap_or_else(|e| panic!("seed {seed}, {kind:?}: {e}"));
         println!(
             "{kind:?}: {:.2} s, {} retries, {} restarts",
@@ -147,8 +153,8 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
     let mut s = ready(Some(921_600));
     let config = Config::avena();
     let t = plan::joint_move(&[0.0; 6], &[0.4, -0.3, 0.2, 0.1, 0.2, -0.5], &config, 100.0).unwrap();
-    upload(&mut s, &t).unwrap();
-    s.execute().unwrap();
+    let (t, _) = upload(&mut s, &t).unwrap();
+    s.execute(&t).unwrap();
     let mut seen = 0;
     let outcome = s
         .follow(|_| {
@@ -157,10 +163,10 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
         })
         .unwrap();
     let Outcome::Finished(status) = outcome else { panic!("{outcome:?}") };
-    assert_eq!(status.point, (t.duration_s() * 1e3).round() as u32);
+    assert_eq!(status.point, (t.trajectory().duration_s() * 1e3).round() as u32);
     assert!(seen > 10 && (f64::from(status.joints[0].position) - 0.4).abs() < 0.01);
     // Again from Finish: refused, the arm is at the end (J-34).
-    let error = s.execute().unwrap_err();
+    let error = s.execute(&t).unwrap_err();
     assert_eq!(error.exit_code(), 1);
     assert!(error.hint().contains("--approach"), "{error}");
 }
@@ -169,8 +175,8 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
 fn pause_resume_and_stop() {
     let mut s = ready(Some(921_600));
     let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
-    upload(&mut s, &t).unwrap();
-    s.execute().unwrap();
+    let (t, _) = upload(&mut s, &t).unwrap();
+    s.execute(&t).unwrap();
     let (mut paused, mut resumed, mut stopped) = (false, false, false);
     let outcome = s
         .follow(|status| match (status.tes, status.point) {
@@ -196,13 +202,13 @@ fn pause_resume_and_stop() {
 fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     let mut s = ready(Some(921_600));
     let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
-    upload(&mut s, &t).unwrap();
+    let (t, _) = upload(&mut s, &t).unwrap();
     s.port_mut().world_mut().inject(Fault {
         kind: FaultKind::MotorFault { joint: 2, bits: 2 },
         trigger: Trigger::AtPoint(500),
         duration_ms: Some(300),
     });
-    s.execute().unwrap();
+    s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     let Error::RunFault { point, .. } = &error else { panic!("{error}") };
     // That of the last status on the path: up to 40 ms before the fault.
@@ -407,13 +413,13 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     (gains.kp, gains.ki, gains.kd) = (150.0, 0.0, 15.0);
     s.push(&arm.parameter_set(), |_| {}).unwrap();
     s.wait_hold(Duration::from_secs(15)).unwrap();
-    upload(&mut s, &trajectory(2_000)).unwrap();
+    let (t, _) = upload(&mut s, &trajectory(2_000)).unwrap();
     s.port_mut().world_mut().inject(Fault {
         kind: FaultKind::Push { joint: 4, torque: 38.0 },
         trigger: Trigger::AtPoint(500),
         duration_ms: Some(400),
     });
-    s.execute().unwrap();
+    s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     assert_eq!((error.code(), error.exit_code()), ("paused-by-controller", 5));
     let text = error.to_string();

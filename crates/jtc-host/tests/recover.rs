@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
-use jtc_host::session::{Flow, ParameterSource, UploadOptions};
-use jtc_host::{Error, Session, plan};
+use jtc_host::session::{Flow, ParameterSource};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, Session, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
@@ -17,8 +17,9 @@ fn session() -> Sim {
 /// On a path of some seconds, from HoldPos.
 fn move_arm(s: &mut Sim) {
     let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
-    s.upload(&t.raw().unwrap(), t.step_ms, &UploadOptions::default(), |_| Flow::Continue).unwrap();
-    s.execute().unwrap();
+    let t = CheckedTrajectory::check(&t, &Arm::avena(), &[0.0; 6], &CheckOptions::default()).unwrap();
+    s.upload(&t, |_| Flow::Continue).unwrap();
+    s.execute(&t).unwrap();
     s.wait_for("motion", Duration::from_secs(10), |s| s.fsm == 3 && s.point > 100).unwrap();
 }
 

@@ -10,9 +10,9 @@ use jtc_host::port::Port;
 use jtc_host::port::sim::SimPort;
 use jtc_host::recording::{Ending, RecordingInfo, SampleSink};
 use jtc_host::report::{self, Facts, ReportInput, Summary};
-use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadOptions, UploadReport};
+use jtc_host::session::{Flow, LinkStatistics, Outcome, UploadReport};
 use jtc_host::trajectory::{Point, Trajectory};
-use jtc_host::{Sample, Session};
+use jtc_host::{CheckOptions, CheckedTrajectory, Sample, Session};
 use jtc_sim::{SimConfig, World};
 use serde_json::json;
 
@@ -110,7 +110,6 @@ fn execute(
 ) -> Result<Run, Failure> {
     let arm = Arm::avena();
     let trajectory = trajectory();
-    let points = trajectory.raw().map_err(|e| Failure::usage(e.to_string()))?;
     let world = World::new(SimConfig { seed: SEED, ..SimConfig::new(arm.config(), &arm.parameters()) });
     let percent = |true_value: f64, believed: f64| {
         let off = if believed > 0.0 { ((true_value / believed - 1.0) * 100.0).round() + 0.0 } else { 0.0 };
@@ -145,12 +144,12 @@ fn execute(
         out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes))
     })?;
     out.note("drives: waiting until all six hold the arm");
-    session.wait_hold(BRING_UP)?;
-    session.wait_for("all drives enabled", BRING_UP, |s| s.joints.iter().all(|j| j.fsm == 3))?;
+    let here = session.wait_ready(BRING_UP)?.joints.map(|j| f64::from(j.position));
     out.note(format!("  HoldPos, drives enabled after {:.1} s", session.now().as_secs_f64()));
 
+    let checked = CheckedTrajectory::check(&trajectory, &arm, &here, &CheckOptions::default())?;
     let bar = out.bar(1, "upload");
-    let upload = session.upload(&points, trajectory.step_ms, &UploadOptions::default(), |p| {
+    let upload = session.upload(&checked, |p| {
         bar.set_length(p.segments as u64);
         bar.set_position(p.segments_done as u64);
         Flow::Continue
@@ -164,7 +163,7 @@ fn execute(
     recording.set(true);
     wait(&mut session, MARGIN)?;
     let bar = out.bar((trajectory.duration_s() * 1e3) as u64, "motion");
-    session.execute()?;
+    session.execute(&checked)?;
     let outcome = session.follow(|s| {
         bar.set_position(u64::from(s.point));
         Flow::Continue

@@ -1,8 +1,6 @@
 //! `jtc traj run`: check, upload, execute, follow, report.
 
-use std::cell::RefCell;
 use std::path::Path;
-use std::rc::Rc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use cli_kit::Output;
@@ -10,9 +8,9 @@ use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
 use jtc_host::report::{self, ReportInput, RunFailure, Summary};
-use jtc_host::session::{Flow, Outcome, UploadOptions, UploadReport};
+use jtc_host::session::{Flow, Outcome, Run, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
-use jtc_host::{Error, Sample, Session, plan, words};
+use jtc_host::{CheckOptions, CheckedTrajectory, Error, Sample, Session, plan, words};
 use jtc_wire::Status;
 use serde_json::json;
 
@@ -26,9 +24,6 @@ use crate::output_file::{OutputFile, Tape};
 
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(15);
-
-/// Samples that an observer collects while the session goes on.
-type Samples = Rc<RefCell<Vec<Sample>>>;
 
 /// Runs a trajectory from a file.
 pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
@@ -57,8 +52,6 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
     let mut operator = Operator::listen(out)?;
     let mut session = args.link.session()?;
     let status = ready(&mut session, &operator)?;
-    let here = status.joints.map(|j| f64::from(j.position));
-    let verdict = job.verdict(&job.trajectory, Some(here), options);
     let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let source = session.port().name();
     let mut record = |phase: &str, start_unix_ns| {
@@ -67,26 +60,31 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
         let tape = outputs.begin(&info, out)?;
         Ok((info, tape))
     };
+    let mut motion = job.checked(&job.trajectory, &status, args, options);
     let mut broken_off = None;
-    if verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose) {
-        if !args.approach {
-            return Err(job.refuse(&verdict, out));
-        }
-        let path = approach(job, here, args, out)?;
-        let leg =
-            Leg::run(&mut session, &path, APPROACH, &UploadOptions::default(), &mut operator, &mut record)?;
+    if let Err(Error::Check(verdict)) = &motion
+        && args.approach
+        && verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose)
+    {
+        let path = approach(job, &status, args, out)?;
+        let leg = Leg::run(&mut session, &path, APPROACH, &mut operator, &mut record)?;
         if matches!(leg.outcome, Ok(Outcome::Finished(_))) {
             // The recording is that of the motion.
             if let Some(tape) = leg.tape {
                 tape.abandon();
             }
+            // From where the approach ended, not from where it should have.
+            motion = job.checked(&job.trajectory, &session.fresh_status()?, args, options);
         } else {
-            broken_off = Some(leg);
+            broken_off = Some((leg, path));
         }
     }
-    let leg = match broken_off {
-        Some(leg) => leg,
-        None => Leg::run(&mut session, &job.trajectory, "motion", &options, &mut operator, &mut record)?,
+    let (leg, checked) = match broken_off {
+        Some(ended) => ended,
+        None => {
+            let motion = motion.map_err(|e| job.not_checked(e, out))?;
+            (Leg::run(&mut session, &motion, "motion", &mut operator, &mut record)?, motion)
+        }
     };
     drop(operator);
     let Leg { phase, upload, mut info, tape, samples, outcome } = leg;
@@ -134,7 +132,7 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
         "samples": summary.samples,
         "joints": summary.joints,
         "failure": broken,
-        "verdict": verdict,
+        "verdict": checked.verdict(),
         "upload": upload,
         "link": link,
         "files": files,
@@ -177,23 +175,21 @@ impl Leg {
     /// Uploads and executes. An error before the motion begins is the command's own; one in motion is the outcome.
     fn run(
         session: &mut Session<SerialPort>,
-        trajectory: &Trajectory,
+        checked: &CheckedTrajectory,
         phase: &'static str,
-        options: &UploadOptions,
         operator: &mut Operator,
         record: &mut impl FnMut(&str, u64) -> Result<(RecordingInfo, Option<Tape>), Failure>,
     ) -> Result<Self, Failure> {
         let what = if phase == APPROACH { APPROACH } else { "upload" };
-        let upload = upload(session, trajectory, options, what, operator)?;
+        let upload = upload(session, checked, what, operator)?;
         if operator.wants_the_end() {
             return Err(cancelled("upload"));
         }
         let start_unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
         let (info, tape) = record(phase, start_unix_ns).map_err(not_started)?;
-        let samples = observe(session, trajectory, tape.as_ref().map(Tape::sink));
-        let outcome = execute(session, trajectory, phase, operator);
-        session.stop_observing();
-        Ok(Self { phase, upload, info, tape, samples: samples.take(), outcome })
+        let Run { outcome, samples } =
+            execute(session, checked, phase, tape.as_ref().map(Tape::sink), operator);
+        Ok(Self { phase, upload, info, tape, samples, outcome })
     }
 }
 
@@ -241,32 +237,56 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
 }
 
 /// A motion to the first point, checked.
-fn approach(job: &Job, here: [f64; 6], args: &RunArgs, out: &Output) -> Result<Trajectory, Failure> {
+fn approach(job: &Job, status: &Status, args: &RunArgs, out: &Output) -> Result<CheckedTrajectory, Failure> {
+    let here = pose(status);
     let refused =
         |e: plan::PlanError| Failure { exit: REFUSED, code: "approach".into(), ..Failure::usage(e) };
     let first = job.trajectory.points.first().map_or(here, |p| p.position);
     // Half of the limits: nobody has looked at this path for obstacles.
     let speed = args.check.speed.min(50.0);
     let path = plan::approach(&here, &first, &job.config, Some(&job.arm.model), speed).map_err(refused)?;
-    let verdict = job.verdict(&path, Some(here), UploadOptions::default());
-    if !verdict.is_ok() {
-        return Err(job.refuse(&verdict, out));
-    }
+    let checked = job.checked(&path, status, args, UploadOptions::default());
+    let checked = checked.map_err(|e| job.not_checked(e, out))?;
     out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
-    Ok(path)
+    Ok(checked)
+}
+
+/// Where the arm is, rad.
+fn pose(status: &Status) -> [f64; 6] {
+    status.joints.map(|j| f64::from(j.position))
+}
+
+impl Job {
+    /// A trajectory of this job, checked for a run from where the arm is.
+    fn checked(
+        &self,
+        trajectory: &Trajectory,
+        status: &Status,
+        args: &RunArgs,
+        upload: UploadOptions,
+    ) -> Result<CheckedTrajectory, Error> {
+        let options = CheckOptions { upload, accept_device_limits: args.accept.accept_device_limits };
+        CheckedTrajectory::check(trajectory, &self.arm, &pose(status), &options)
+    }
+
+    /// Prints what forbids to run it.
+    fn not_checked(&self, error: Error, out: &Output) -> Failure {
+        match error {
+            Error::Check(verdict) => self.refuse(&verdict, out),
+            other => other.into(),
+        }
+    }
 }
 
 fn upload(
     session: &mut Session<SerialPort>,
-    trajectory: &Trajectory,
-    options: &UploadOptions,
+    checked: &CheckedTrajectory,
     what: &str,
     operator: &Operator,
 ) -> Result<UploadReport, Failure> {
-    let points = trajectory.raw().map_err(Failure::usage)?;
-    operator.out.note(format!("uploading {} points", points.len()));
+    operator.out.note(format!("uploading {} points", checked.trajectory().points.len()));
     let bar = operator.out.bar(1, what);
-    let report = session.upload(&points, trajectory.step_ms, options, |p| {
+    let report = session.upload(checked, |p| {
         bar.set_length(p.segments as u64);
         bar.set_position(p.segments_done as u64);
         if operator.wants_the_end() { Flow::Cancel } else { Flow::Continue }
@@ -280,56 +300,26 @@ fn upload(
 
 fn execute(
     session: &mut Session<SerialPort>,
-    trajectory: &Trajectory,
+    checked: &CheckedTrajectory,
     what: &str,
+    sink: Option<SampleSink>,
     operator: &mut Operator,
-) -> Result<Outcome, Error> {
+) -> Run {
     operator.motion_begins();
-    let bar = operator.out.bar((trajectory.duration_s() * 1e3) as u64, what);
-    let outcome = session.execute().and_then(|()| {
-        session.follow(|s| {
-            bar.set_position(u64::from(s.point));
-            bar.set_message(if s.tes == 2 { "paused" } else { what }.to_owned());
-            operator.wish(s)
-        })
+    let bar = operator.out.bar((checked.trajectory().duration_s() * 1e3) as u64, what);
+    let record = move |sample: &Sample| {
+        if let Some(sink) = &sink {
+            sink.write(sample);
+        }
+    };
+    let run = session.run_observed(checked, record, |s| {
+        bar.set_position(u64::from(s.point));
+        bar.set_message(if s.tes == 2 { "paused" } else { what }.to_owned());
+        operator.wish(s)
     });
     operator.motion_ended();
     bar.finish_and_clear();
-    outcome
-}
-
-/// Collects what each status carries, and records it as it comes; the commanded values come from the trajectory at the status'
-/// point index.
-fn observe(session: &mut Session<SerialPort>, trajectory: &Trajectory, sink: Option<SampleSink>) -> Samples {
-    let samples = Samples::default();
-    let (taken, trajectory) = (Rc::clone(&samples), trajectory.clone());
-    let mut clock = Clock { arrived: session.now(), point: 0, time_s: 0.0 };
-    session.observe(move |now, status| {
-        let sample = Sample::following(clock.at(now, status), status, &trajectory);
-        if let Some(sink) = &sink {
-            sink.write(&sample);
-        }
-        taken.borrow_mut().push(sample);
-    });
-    samples
-}
-
-/// Time of statuses: the controller's own milliseconds while it follows the path, which no delay on the way to us can blur; the time of
-/// arrival otherwise.
-struct Clock {
-    arrived: Duration,
-    point: u32,
-    time_s: f64,
-}
-
-impl Clock {
-    fn at(&mut self, now: Duration, status: &Status) -> f64 {
-        let moved = f64::from(status.point.saturating_sub(self.point)) * 1e-3;
-        let waited = now.saturating_sub(self.arrived).as_secs_f64();
-        self.time_s += if moved > 0.0 { moved } else { waited };
-        (self.arrived, self.point) = (now, status.point);
-        self.time_s
-    }
+    run
 }
 
 /// Files of a run, open since before it.

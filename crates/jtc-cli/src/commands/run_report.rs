@@ -2,32 +2,17 @@
 
 use cli_kit::table;
 use jtc_host::arm::Arm;
-use jtc_host::recording::{Ending, JointInfo, RecordingInfo};
+use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Facts, RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 
 /// What a recording of this arm says about itself.
 pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
-    let origin = |i: usize| {
-        let o = &arm.model.joints[i];
-        [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]]
-    };
     RecordingInfo {
-        arm: arm.name.clone(),
         source: source.to_owned(),
         trajectory: trajectory.to_owned(),
         start_unix_ns,
-        joints: std::array::from_fn(|j| JointInfo {
-            name: arm.joint_names[j].clone(),
-            position_min_rad: arm.joints[j].position_min,
-            position_max_rad: arm.joints[j].position_max,
-            velocity_max_rad_s: arm.joints[j].velocity_max,
-            torque_max_nm: arm.joints[j].torque_max,
-            position_error_max_rad: arm.joints[j].position_error_max,
-            origin: origin(j),
-        }),
-        flange: origin(6),
-        ending: Ending::default(),
+        ..RecordingInfo::of(arm)
     }
 }
 

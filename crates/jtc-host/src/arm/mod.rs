@@ -73,18 +73,30 @@ impl Arm {
     }
 
     /// From a TOML or URDF file, told apart by their content.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, is of no known form, or whose numbers are no arm of these drives, with the place.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| e.in_file(path))
     }
 
     /// From the text of a TOML or URDF file.
+    ///
+    /// # Errors
+    ///
+    /// A text of no known form, or whose numbers are no arm of these drives, with the place.
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let arm = if is_xml(text) { Self::from_urdf(text)? } else { Self::from_toml(text)? };
         arm.checked()
     }
 
     /// From a URDF file, of which `choice` says what is the arm.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, is no URDF, leaves open which six joints are the arm, or is no arm of these drives.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let arm = if is_xml(&text) {
@@ -97,14 +109,22 @@ impl Arm {
 
     /// The arm, unless its numbers are no arm of these drives.
     fn checked(self) -> Result<Self, FileError> {
-        let arm = self;
-        arm.model.check().map_err(|e| FileError::at(Place::name("arm model"), e.to_string()))?;
+        self.is_physical()?;
+        Ok(self)
+    }
+
+    /// Whether the numbers are those of an arm that these drives can move.
+    ///
+    /// # Errors
+    ///
+    /// The first number of the model or of the limits that is none.
+    pub fn is_physical(&self) -> Result<(), FileError> {
+        self.model.check().map_err(|e| FileError::at(Place::name("arm model"), e.to_string()))?;
         // J-35, J-43: limits that the drives cannot keep, or would stop at by themselves.
-        arm.config().check().map_err(|e| {
-            let name = arm.joint_names.get(e.joint() - 1).map_or("", String::as_str);
+        self.config().check().map_err(|e| {
+            let name = self.joint_names.get(e.joint() - 1).map_or("", String::as_str);
             FileError::at(Place::name(format!("joint {name}")), e.to_string())
-        })?;
-        Ok(arm)
+        })
     }
 
     /// Settings of a controller for this arm; what the file does not say is as for the default arm, but a rotor inertia that is

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::Arm;
+
 /// One joint's name and limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointInfo {
@@ -71,6 +73,28 @@ pub struct RecordingInfo {
 }
 
 impl RecordingInfo {
+    /// Names, limits and frames of an arm; source, trajectory, start time and ending are left empty.
+    pub fn of(arm: &Arm) -> Self {
+        let origin = |i: usize| {
+            let o = &arm.model.joints[i];
+            [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]]
+        };
+        Self {
+            arm: arm.name.clone(),
+            joints: std::array::from_fn(|j| JointInfo {
+                name: arm.joint_names[j].clone(),
+                position_min_rad: arm.joints[j].position_min,
+                position_max_rad: arm.joints[j].position_max,
+                velocity_max_rad_s: arm.joints[j].velocity_max,
+                torque_max_nm: arm.joints[j].torque_max,
+                position_error_max_rad: arm.joints[j].position_error_max,
+                origin: origin(j),
+            }),
+            flange: origin(6),
+            ..Self::default()
+        }
+    }
+
     /// The name of joint `j`, `joint_1` and so on when it has none.
     pub fn joint_name(&self, j: usize) -> String {
         match self.joints.get(j) {

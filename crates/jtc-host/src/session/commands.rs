@@ -5,12 +5,16 @@ use std::time::Duration;
 use jtc_wire::{ExecCommand, FrameType, Status, fixed};
 
 use super::{Session, not_allowed};
+use crate::check::CheckedTrajectory;
 use crate::error::accepted;
 use crate::port::Port;
 use crate::{Error, words};
 
 /// Longest that a controller waits with teaching until the arm is held, and a little more.
 const TEACHING: Duration = Duration::from_secs(11);
+
+/// Node state byte of an enabled drive.
+const ENABLED: u8 = 3;
 
 /// What the controller wants to be given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -49,21 +53,41 @@ impl Parameter {
 
 impl<P: Port> Session<P> {
     /// Clears current errors: the controller's own, and those of the nodes in `nodes` (bits 0..6).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
+    /// [`Error::Port`] of the line.
     pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), Error> {
         self.command(&fixed::clear_current_errors(jtc, nodes))
     }
 
     /// Clears current and occurred errors.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
+    /// [`Error::Port`] of the line.
     pub fn clear_occurred(&mut self) -> Result<(), Error> {
         self.command(&fixed::CLEAR_OCCURRED_ERRORS)
     }
 
     /// Resets the nodes in `nodes` (bits 0..6).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
+    /// [`Error::Port`] of the line.
     pub fn reset(&mut self, nodes: u8) -> Result<(), Error> {
         self.command(&fixed::reset_can_devices(nodes))
     }
 
     /// Teaching on (only in HoldPos) or off. It begins once the arm is held at rest; this waits for it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
+    /// [`Error::Port`] of the line. [`Error::StateTimeout`] when teaching does not begin, because the arm does not come to rest.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
         if !on {
             return self.command(&fixed::empty(FrameType::TeachingModeDisable));
@@ -74,42 +98,84 @@ impl<P: Port> Session<P> {
     }
 
     /// Pump on or off.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
+    /// [`Error::Port`] of the line.
     pub fn gripper(&mut self, pump: bool) -> Result<(), Error> {
         self.command(&fixed::gripper_control(pump))
     }
 
     /// Tells the controller to use its default of one parameter.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
+    /// [`Error::Port`] of the line.
     pub fn use_default(&mut self, parameter: Parameter) -> Result<(), Error> {
         self.command(&fixed::empty(parameter.use_default()))
     }
 
     /// Tells the controller to use its defaults: friction polynomial, gains and arm model.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::use_default`], of the first that is not accepted.
     pub fn use_defaults(&mut self) -> Result<(), Error> {
         [Parameter::FrictionPolynomial, Parameter::Pid, Parameter::ArmModel]
             .into_iter()
             .try_for_each(|p| self.use_default(p))
     }
 
-    /// Starts the trajectory from its first point; after a pause it goes on from there.
-    pub fn execute(&mut self) -> Result<(), Error> {
+    /// Starts the trajectory that was just uploaded, from its first point; after a pause it goes on from there. **The arm moves.**
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotUploaded`], and nothing is sent, unless this session uploaded exactly this trajectory and the controller still
+    /// holds it. [`Error::Refused`] when the controller does not start it: the arm is not at the first point (J-34), or is not held.
+    /// [`Error::LinkLost`] when no confirmation came: the arm may be moving.
+    pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
+        self.catch_up()?;
+        if self.uploaded != Some(checked.number()) {
+            return Err(Error::NotUploaded);
+        }
+        self.go()
+    }
+
+    /// Execute, whatever the controller holds.
+    pub(super) fn go(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Execute, |s| s.tes == 3)
     }
 
-    /// Goes on after a pause; an error, and nothing sent, when nothing is paused.
+    /// Goes on after a pause.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotPaused`], and nothing is sent, when nothing is paused; [`Error::Refused`] when the arm was moved since;
+    /// [`Error::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
         let status = self.fresh_status()?;
         match status.tes {
-            2 => self.execute(),
+            2 => self.go(),
             tes => Err(Error::NotPaused { state: status.fsm, tes }),
         }
     }
 
     /// Pauses on the path.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when nothing moves; [`Error::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn pause(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Pause, |s| s.tes == 2)
     }
 
     /// Ends the trajectory; the next execution begins at its start.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Refused`] when there is nothing to stop; [`Error::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn stop(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Stop, |s| s.tes == 1)
     }
@@ -142,12 +208,34 @@ impl<P: Port> Session<P> {
     }
 
     /// Waits until the controller is in HoldPos; an error at once when it reports errors.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Device`] when the controller reports errors, [`Error::StateTimeout`] when it is not in HoldPos in this time,
+    /// [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| s.fsm == 2 || s.fsm == 5)?;
         if status.fsm == 5 { Err(Error::Device { status: Box::new(status) }) } else { Ok(status) }
     }
 
+    /// Waits until the controller holds the arm in HoldPos with every drive enabled; an error at once when it reports errors. The
+    /// positions of the status are then measured ones, the pose that a run starts from.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Device`] when the controller reports errors, [`Error::StateTimeout`] when it does not hold the arm in this time (it
+    /// may still lack parameters), [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
+    pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
+        let ready = |s: &Status| s.fsm == 2 && s.joints.iter().all(|j| j.fsm == ENABLED);
+        let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| s.fsm == 5 || ready(s))?;
+        if status.fsm == 5 { Err(Error::Device { status: Box::new(status) }) } else { Ok(status) }
+    }
+
     /// One line about where the controller is.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::next_status`].
     pub fn where_now(&mut self) -> Result<String, Error> {
         Ok(words::waiting_for(&self.fresh_status()?))
     }

@@ -40,6 +40,12 @@ impl<P: Port> Session<P> {
     /// Follows the execution that was just started. `each` sees every status.
     ///
     /// When the link is lost on the way, a stop is sent that may still arrive, and the error says that the arm may be moving.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::RunFault`] when the controller ended the motion with an error, [`Error::PausedByController`] when it paused it
+    /// because of one, [`Error::Cancelled`] when `each` left it, [`Error::LinkLost`] when nothing is received any more: the arm
+    /// may be moving.
     pub fn follow(&mut self, mut each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         let start = self.port.now();
         let (mut begun, mut stopping) = (false, false);
@@ -75,7 +81,7 @@ impl<P: Port> Session<P> {
             match flow {
                 Flow::Continue => {}
                 Flow::Pause if status.tes == 3 => unless_ended(self.pause())?,
-                Flow::Resume if status.tes == 2 => self.execute()?,
+                Flow::Resume if status.tes == 2 => self.go()?,
                 // Once accepted it needs no repetition: the controller slows down to standstill by itself.
                 Flow::Stop if !stopping => {
                     unless_ended(self.stop())?;

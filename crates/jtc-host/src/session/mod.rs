@@ -7,6 +7,7 @@ mod commands;
 mod follow;
 mod params;
 mod recover;
+mod run;
 mod statistics;
 mod upload;
 
@@ -19,12 +20,16 @@ pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
 pub use params::Pushed;
 pub use recover::{ParameterSource, RecoverStep};
+pub use run::Run;
 pub use statistics::LinkStatistics;
 pub use upload::{Progress, UploadOptions, UploadReport};
 
 use crate::Error;
 use crate::error::accepted;
 use crate::port::{Port, line_time};
+
+/// Trajectory execution state of a controller that holds no complete trajectory.
+const NO_TRAJECTORY: u8 = 0;
 
 /// Called with each status and the port's time.
 type Observer = Box<dyn FnMut(Duration, &Status)>;
@@ -57,6 +62,8 @@ pub struct Session<P> {
     start: Duration,
     last_heard: Duration,
     observer: Option<Observer>,
+    /// The check of the trajectory that the controller holds from this session.
+    uploaded: Option<u64>,
     /// How patient the session is.
     pub patience: Patience,
 }
@@ -75,6 +82,7 @@ impl<P: Port> Session<P> {
             start,
             last_heard: start,
             observer: None,
+            uploaded: None,
             patience: Patience::default(),
         }
     }
@@ -124,6 +132,10 @@ impl<P: Port> Session<P> {
     }
 
     /// The next status; `None` when none comes in this time.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Port`] when the port is gone.
     pub fn poll(&mut self, timeout: Duration) -> Result<Option<Status>, Error> {
         let end = self.port.now() + timeout;
         loop {
@@ -138,6 +150,10 @@ impl<P: Port> Session<P> {
     }
 
     /// The next status; an error when the controller is silent.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NoLink`] when none comes within [`Patience::status`], [`Error::Port`] when the port is gone.
     pub fn next_status(&mut self) -> Result<Status, Error> {
         let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
         match self.poll(self.patience.status)? {
@@ -152,6 +168,10 @@ impl<P: Port> Session<P> {
     }
 
     /// A status that was made after this call: what had arrived before is passed over.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::next_status`].
     pub fn fresh_status(&mut self) -> Result<Status, Error> {
         self.catch_up()?;
         self.next_status()
@@ -188,6 +208,9 @@ impl<P: Port> Session<P> {
             if let Some(observer) = &mut self.observer {
                 observer(now, status);
             }
+            if status.tes == NO_TRAJECTORY {
+                self.uploaded = None;
+            }
             self.last = Some(*status);
             self.last_heard = now;
         }
@@ -211,8 +234,8 @@ impl<P: Port> Session<P> {
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.patience.confirmation
     }
 
-    /// Sends a frame and waits for its record; frames that arrive damaged are sent again.
-    pub fn request(&mut self, frame: &[u8]) -> Result<Response, Error> {
+    /// Sends a frame and waits for its record; frames that arrive damaged are sent again. Not public: a frame can start a motion.
+    fn request(&mut self, frame: &[u8]) -> Result<Response, Error> {
         let kind = frame.get(1).copied().unwrap_or(0);
         let mut bad = None;
         self.catch_up()?;
@@ -267,6 +290,11 @@ impl<P: Port> Session<P> {
     }
 
     /// Waits until `reached` says yes; `what` names it in the error.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::StateTimeout`] with the last status, [`Error::NoLink`] when the controller falls silent, [`Error::Port`] when the
+    /// port is gone.
     pub fn wait_for(
         &mut self,
         what: &'static str,

@@ -23,6 +23,12 @@ pub struct Pushed {
 
 impl<P: Port> Session<P> {
     /// Sends what `set` has, after all of it was checked; `done` is called after each.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] before anything is sent, for numbers that no frame carries or that are not physical;
+    /// [`Error::BeyondBounds`] or [`Error::Refused`] when the controller refuses one, which keeps what it had;
+    /// [`Error::NotConfirmed`], [`Error::NoLink`] and [`Error::Port`] of the line.
     pub fn push(&mut self, set: &ParameterSet, mut done: impl FnMut(&Pushed)) -> Result<Vec<Pushed>, Error> {
         set.check()?;
         let mut frames = Vec::new();

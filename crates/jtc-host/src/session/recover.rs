@@ -101,6 +101,11 @@ const PERSON_TIME: Duration = Duration::from_secs(60);
 impl<P: Port> Session<P> {
     /// Leads the controller to HoldPos without errors. Where it misses friction, gains or arm model, `parameters` says whose it is
     /// given; no source, or one that lacks a part, is an error before anything is sent. No trajectory is resumed.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NoParameters`] and [`Error::IncompleteArm`], before anything is sent, when there is nothing to give the
+    /// controller; [`Error::Device`] and [`Error::StateTimeout`] when an error does not go away; those of the line.
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,
@@ -111,6 +116,10 @@ impl<P: Port> Session<P> {
 
     /// The same, until `ended` says that a person wants it to end: nothing more is sent then and the error is
     /// [`Error::Cancelled`], but a motion is stopped and followed to its standstill first.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::recover`], and [`Error::Cancelled`] once `ended` says so.
     pub fn recover_until(
         &mut self,
         parameters: ParameterSource<'_>,
@@ -242,6 +251,10 @@ impl<P: Port> Session<P> {
 
 impl ParameterSource<'_> {
     /// An arm must be whole: friction, gains and arm model.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] or [`Error::IncompleteArm`] for a set that cannot be given whole.
     pub fn check(&self) -> Result<(), Error> {
         match self {
             ParameterSource::Arm { name, set } if !set.missing().is_empty() => {

@@ -10,6 +10,7 @@ use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 use jtc_wire::{DataStatus, EncodeError, FrameStatus, RawPoint, Response, STATUS_LEN};
 
 use super::{Flow, Session};
+use crate::check::CheckedTrajectory;
 use crate::error::accepted;
 use crate::port::{Port, line_time};
 use crate::{Error, frame};
@@ -193,9 +194,31 @@ impl Upload {
 }
 
 impl<P: Port> Session<P> {
-    /// Uploads points that are `step_ms` apart; done when the controller says that the trajectory is complete (TES Stop).
+    /// Uploads a trajectory that passed the check; done when the controller says that it is complete (TES Stop). Nothing moves.
     /// `progress` is called after each confirmed segment and may end it with [`Flow::Cancel`].
+    ///
+    /// What the controller held before is lost with the first segment.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::SegmentRefused`] when the controller refuses a segment, for example because it does not hold the arm or because its
+    /// own check (J-36) found a problem; [`Error::UploadFailed`] when the line lost too much to complete it; [`Error::Cancelled`]
+    /// when `progress` ended it; [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone. The controller then
+    /// holds no complete trajectory, and nothing can be executed.
     pub fn upload(
+        &mut self,
+        checked: &CheckedTrajectory,
+        progress: impl FnMut(&Progress) -> Flow,
+    ) -> Result<UploadReport, Error> {
+        self.uploaded = None;
+        let step_ms = checked.trajectory().step_ms;
+        let report = self.send(checked.raw(), step_ms, checked.upload_options(), progress)?;
+        self.uploaded = Some(checked.number());
+        Ok(report)
+    }
+
+    /// Sends points that are `step_ms` apart.
+    fn send(
         &mut self,
         points: &[RawPoint],
         step_ms: u16,

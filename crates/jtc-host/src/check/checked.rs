@@ -1,0 +1,154 @@
+//! A trajectory that passed the check, the only kind that a session uploads and executes.
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use jtc_core::JOINTS;
+use jtc_wire::RawPoint;
+
+use super::{Checker, Verdict};
+use crate::Error;
+use crate::arm::Arm;
+use crate::session::UploadOptions;
+use crate::trajectory::Trajectory;
+
+/// Counts the checks that were passed, so that two trajectories are never taken for one another.
+static PASSED: AtomicU64 = AtomicU64::new(1);
+
+/// How a trajectory is checked for a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CheckOptions {
+    /// Segments that it will be sent in; their number is part of the check.
+    pub upload: UploadOptions,
+    /// The values of the arm file that no frame carries (limits, gravity, rotor inertia) may differ from those that are built into
+    /// the controller, and those of the controller are safe for this arm. Without it such an arm is refused (J-55).
+    pub accept_device_limits: bool,
+}
+
+/// A trajectory that may be run: it passed the check against an arm, from the pose in which the arm stood.
+///
+/// [`Session::upload`](crate::Session::upload) and [`Session::execute`](crate::Session::execute) take nothing else, and
+/// [`CheckedTrajectory::check`] is the only way to make one, so a program that runs an unchecked trajectory does not compile:
+///
+/// ```compile_fail,E0308
+/// fn run<P: jtc_host::Port>(session: &mut jtc_host::Session<P>, trajectory: &jtc_host::Trajectory) {
+///     session.upload(trajectory, |_| jtc_host::session::Flow::Continue);
+/// }
+/// ```
+///
+/// Nor can one be put together from its parts, or be changed after the check:
+///
+/// ```compile_fail,E0616
+/// fn faster(checked: &mut jtc_host::CheckedTrajectory) {
+///     checked.trajectory.step_ms = 1;
+/// }
+/// ```
+///
+/// # Start pose
+///
+/// The check compares the first point with the pose that it is given: no joint may be further from it than the start tolerance,
+/// 0.02 rad (J-34). Give it the pose that was measured just before, from the status that
+/// [`Session::wait_ready`](crate::Session::wait_ready) returns. An arm that stands elsewhere is moved to the first point by a
+/// trajectory of its own, which [`plan::approach`](crate::plan::approach) makes and which is checked in the same way; after it the
+/// motion is checked from the pose that the approach ended in.
+///
+/// The controller compares once more at the moment of execution. An arm that was moved after the check does not move by it:
+/// execution is refused with data status 8.
+#[derive(Clone)]
+pub struct CheckedTrajectory {
+    trajectory: Arc<Trajectory>,
+    raw: Arc<[RawPoint]>,
+    options: UploadOptions,
+    verdict: Verdict,
+    number: u64,
+}
+
+impl fmt::Debug for CheckedTrajectory {
+    /// Without its points, which are up to 12 000.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Verdict { points, step_ms, duration_s, .. } = self.verdict;
+        write!(
+            f,
+            "CheckedTrajectory {{ number: {}, points: {points}, step_ms: {step_ms}, duration_s: {duration_s} }}",
+            self.number
+        )
+    }
+}
+
+impl CheckedTrajectory {
+    /// Checks `trajectory` for a run by `arm` from the measured pose `start` (rad, base to wrist).
+    ///
+    /// The limits are the tighter ones of the arm and of the controller ([`Arm::config_on_device`]); the torques are those of the
+    /// arm model with the arm's friction, gravity and rotor inertia as the controller computes with them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::DeviceLimits`] when the arm has values that the controller uses otherwise, unless the options accept them.
+    /// [`Error::Check`] with the verdict when anything forbids to run it: a limit exceeded at or between points, a jump, not at rest
+    /// at its ends, too much torque, no room to stop, too many points or segments, or the arm not at the first point. An arm whose
+    /// numbers are not physical is [`Error::File`]. Nothing is sent in either case.
+    pub fn check(
+        trajectory: &Trajectory,
+        arm: &Arm,
+        start: &[f64; JOINTS],
+        options: &CheckOptions,
+    ) -> Result<Self, Error> {
+        // The fields of an arm are public: numbers that make the dynamics senseless would pass for any torque.
+        arm.is_physical()?;
+        let differences = arm.device_differences();
+        if !differences.is_empty() && !options.accept_device_limits {
+            return Err(Error::DeviceLimits { arm: arm.name.clone(), differences });
+        }
+        let (config, friction) = (arm.config_on_device(), arm.friction());
+        let checker = Checker {
+            model: Some(&arm.model),
+            friction: friction.as_ref(),
+            start: Some(*start),
+            upload: options.upload,
+            ..Checker::new(&config)
+        };
+        let verdict = checker.check(trajectory);
+        match trajectory.raw() {
+            Ok(raw) if verdict.is_ok() => Ok(Self {
+                trajectory: Arc::new(trajectory.clone()),
+                raw: raw.into(),
+                options: options.upload,
+                verdict,
+                number: PASSED.fetch_add(1, Ordering::Relaxed),
+            }),
+            // A number that no frame carries is among the problems of the verdict.
+            _ => Err(Error::Check(Box::new(verdict))),
+        }
+    }
+
+    /// What was checked.
+    pub fn trajectory(&self) -> &Trajectory {
+        &self.trajectory
+    }
+
+    /// What the check found: figures of each joint, and warnings that do not forbid the run.
+    pub fn verdict(&self) -> &Verdict {
+        &self.verdict
+    }
+
+    /// The segments that it will be sent in.
+    pub fn upload_options(&self) -> &UploadOptions {
+        &self.options
+    }
+
+    /// As the wire carries it.
+    pub(crate) fn raw(&self) -> &[RawPoint] {
+        &self.raw
+    }
+
+    /// The trajectory, to be kept by an observer.
+    pub(crate) fn shared(&self) -> Arc<Trajectory> {
+        Arc::clone(&self.trajectory)
+    }
+
+    /// Tells this check from all others of the program.
+    pub(crate) fn number(&self) -> u64 {
+        self.number
+    }
+}

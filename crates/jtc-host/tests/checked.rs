@@ -1,0 +1,149 @@
+//! Only what passed the check runs, and only what was uploaded.
+
+use std::time::Duration;
+
+use jtc_core::Config;
+use jtc_host::port::sim::SimPort;
+use jtc_host::session::{Flow, Outcome};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, Session, Trajectory, plan};
+use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
+
+type Sim = Session<SimPort>;
+
+/// In HoldPos at the zero pose, with the default parameters.
+fn ready() -> Sim {
+    let world = World::new(SimConfig { baud: None, ..SimConfig::default() });
+    let mut session = Session::new(SimPort::new(world));
+    session.push(&Arm::avena().parameter_set(), |_| {}).unwrap();
+    let status = session.wait_ready(Duration::from_secs(15)).unwrap();
+    assert!(status.joints.iter().all(|j| j.fsm == 3), "every drive is enabled");
+    session
+}
+
+fn motion(to: f64) -> Trajectory {
+    let target = [to, 0.0, 0.0, 0.0, 0.0, 0.0];
+    plan::joint_move(&[0.0; 6], &target, &Config::avena(), 60.0).unwrap()
+}
+
+fn check(trajectory: &Trajectory) -> Result<CheckedTrajectory, Error> {
+    CheckedTrajectory::check(trajectory, &Arm::avena(), &[0.0; 6], &CheckOptions::default())
+}
+
+#[test]
+fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
+    let mut fast = motion(0.5);
+    fast.step_ms = 2;
+    let error = check(&fast).unwrap_err();
+    assert!(matches!(&error, Error::Check(verdict) if !verdict.is_ok()), "{error}");
+    assert_eq!((error.code(), error.exit_code()), ("check", 4));
+    // A number that no frame carries.
+    let mut wild = motion(0.5);
+    wild.points[3].velocity[2] = f64::NAN;
+    assert!(matches!(check(&wild), Err(Error::Check(_))));
+    // More torque than there is, by the arm model.
+    let mut arm = Arm::avena();
+    arm.joints[1].torque_max = 1.0;
+    let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
+    let error = CheckedTrajectory::check(&motion(0.5), &arm, &[0.0; 6], &options).unwrap_err();
+    assert!(error.to_string().contains("joint 2: torque over its limit"), "{error}");
+}
+
+/// J-34: the first point is within 0.02 rad of where the arm stands.
+#[test]
+fn j34_an_arm_that_stands_elsewhere_is_refused_by_the_check() {
+    let at = |q: f64| {
+        let start = [0.0, q, 0.0, 0.0, 0.0, 0.0];
+        CheckedTrajectory::check(&motion(0.5), &Arm::avena(), &start, &CheckOptions::default())
+    };
+    assert!(at(0.019).is_ok());
+    let error = at(0.021).unwrap_err().to_string();
+    assert!(error.contains("joint 2: +0.0210 rad away from the first point"), "{error}");
+}
+
+/// J-55: limits that the controller does not have are not taken silently, and the tighter ones count.
+#[test]
+fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
+    let mut arm = Arm::avena();
+    let device = arm.joints[0].acceleration_max;
+    arm.joints[0].acceleration_max = 2.0 * device;
+    let check = |arm: &Arm, trajectory: &Trajectory, accept_device_limits| {
+        let options = CheckOptions { accept_device_limits, ..CheckOptions::default() };
+        CheckedTrajectory::check(trajectory, arm, &[0.0; 6], &options)
+    };
+    let error = check(&arm, &motion(0.5), false).unwrap_err();
+    assert_eq!((error.code(), error.exit_code()), ("device-limits", 4));
+    assert!(error.to_string().contains("joint 1, acceleration_max_rad_s2: "), "{error}");
+    assert!(check(&arm, &motion(0.5), true).is_ok());
+    // The gravity that the controller computes with, whatever the file says: an arm without weight would pass.
+    let weightless = Arm { gravity: Some([0.0; 3]), ..Arm::avena() };
+    let mut weak = weightless.clone();
+    weak.joints[1].torque_max = 60.0;
+    let bend = plan::joint_move(&[0.0; 6], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], &weak.config(), 20.0).unwrap();
+    assert!(check(&weightless, &bend, true).is_ok());
+    let error = check(&weak, &bend, true).unwrap_err().to_string();
+    assert!(error.contains("joint 2: torque over its limit"), "{error}");
+    // A limit of the arm's own, where it is tighter.
+    arm.joints[0].velocity_max = 0.1;
+    let error = check(&arm, &motion(0.5), true).unwrap_err().to_string();
+    assert!(error.contains("joint 1: velocity over its limit") && error.contains("(limit 0.1)"), "{error}");
+}
+
+#[test]
+fn an_arm_that_is_none_checks_nothing() {
+    let mut arm = Arm::avena();
+    arm.model.links[3].mass = f64::NAN;
+    let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
+    let error = CheckedTrajectory::check(&motion(0.5), &arm, &[0.0; 6], &options).unwrap_err();
+    assert!(matches!(error, Error::File(_)), "{error}");
+}
+
+/// Execution is asked for of what is in the controller, and of nothing else.
+#[test]
+fn only_what_was_uploaded_is_executed() {
+    let mut s = ready();
+    let (first, second) = (check(&motion(0.5)).unwrap(), check(&motion(0.5)).unwrap());
+    let refused = |s: &mut Sim, t: &CheckedTrajectory| {
+        let sent = s.statistics().frames_sent;
+        let error = s.execute(t).unwrap_err();
+        assert!(matches!(error, Error::NotUploaded), "{error}");
+        assert_eq!((s.statistics().frames_sent, error.exit_code()), (sent, 4), "nothing is sent");
+    };
+    refused(&mut s, &first);
+    s.upload(&first, |_| Flow::Continue).unwrap();
+    // The same points, and yet another check: it may have been against another arm.
+    refused(&mut s, &second);
+    s.upload(&second, |_| Flow::Continue).unwrap();
+    refused(&mut s, &first);
+    // An upload that was broken off leaves nothing to execute.
+    assert!(matches!(s.upload(&first, |_| Flow::Cancel), Err(Error::Cancelled)));
+    refused(&mut s, &first);
+    refused(&mut s, &second);
+    // Nor does an error, which makes the controller forget what it held.
+    s.upload(&first, |_| Flow::Continue).unwrap();
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::SafetyInput,
+        trigger: Trigger::At(0),
+        duration_ms: Some(200),
+    });
+    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    refused(&mut s, &first);
+}
+
+#[test]
+fn a_run_has_an_outcome_and_its_figures() {
+    let mut s = ready();
+    let checked = check(&motion(0.5)).unwrap();
+    s.upload(&checked, |_| Flow::Continue).unwrap();
+    let run = s.run(&checked, |_| Flow::Continue);
+    let Ok(Outcome::Finished(status)) = &run.outcome else { panic!("{:?}", run.outcome) };
+    assert!((f64::from(status.joints[0].position) - 0.5).abs() < 0.01);
+    let summary = run.summary(&Arm::avena());
+    let moved = summary.joints[0].peak_velocity_rad_s.unwrap();
+    assert!((0.2..1.5).contains(&moved), "{moved} rad/s");
+    let error = summary.joints[0].max_error_mrad.unwrap();
+    assert!(error > 0.0 && error < 20.0, "{error} mrad");
+    assert_eq!(summary.joints[0].torque_limit_nm, Some(Arm::avena().joints[0].torque_max));
+    // A second run from the end of the first: the controller refuses it (J-34), and the run says so.
+    let run = s.run(&checked, |_| Flow::Continue);
+    assert!(matches!(run.outcome, Err(Error::Refused { .. })), "{:?}", run.outcome);
+}

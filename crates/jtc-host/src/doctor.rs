@@ -75,6 +75,10 @@ fn finding(severity: Severity, what: impl Into<String>, why: &str, next: &str) -
 
 impl<P: Port> Session<P> {
     /// Listens for `time`; silence is an observation, no error.
+    ///
+    /// # Errors
+    ///
+    /// The port is gone. That nothing is received is an observation, no error.
     pub fn examine(&mut self, time: Duration) -> Result<Observation, Error> {
         let (start, before) = (self.now(), self.statistics());
         let end = start + time;

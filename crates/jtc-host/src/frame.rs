@@ -16,6 +16,10 @@ fn written(
 }
 
 /// One segment of a trajectory.
+///
+/// # Errors
+///
+/// A count or a number that the frame does not carry.
 pub fn segment(
     trajectory: u16,
     segment: u16,
@@ -30,12 +34,20 @@ pub fn segment(
 }
 
 /// Gains of all joints.
+///
+/// # Errors
+///
+/// A gain that is no finite 32-bit float.
 pub fn pid(gains: &[PidGains; JOINTS]) -> Result<Vec<u8>, EncodeError> {
     let gains = gains.map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max]);
     written(FRAME_MAX, |out| jtc_wire::pid_param(out, &gains))
 }
 
 /// Kinematics and masses.
+///
+/// # Errors
+///
+/// A number that is no finite 32-bit float.
 pub fn arm_model(model: &ArmModel) -> Result<Vec<u8>, EncodeError> {
     let origin = |o: &Origin| [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]];
     let joints = model.joints.map(|j| origin(&j));
@@ -50,6 +62,10 @@ pub fn arm_model(model: &ArmModel) -> Result<Vec<u8>, EncodeError> {
 }
 
 /// Friction compensation: the polynomial (six coefficients) or the tables.
+///
+/// # Errors
+///
+/// A number that is no finite 32-bit float.
 pub fn friction(friction: &Friction) -> Result<Vec<u8>, EncodeError> {
     written(FRAME_MAX, |out| match friction {
         Friction::Polynomial(coefficients) => jtc_wire::friction_polynomial(out, coefficients),

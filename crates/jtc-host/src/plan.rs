@@ -60,6 +60,11 @@ pub enum PlanError {
 
 /// A straight move in joint space from rest to rest, as a quintic in time: as fast as `speed_pct` of 90 % of the speed and
 /// acceleration limits allow.
+///
+/// # Errors
+///
+/// [`PlanError::Speed`] outside 1..200 %; [`PlanError::Start`] and [`PlanError::Target`] for a pose that is none or is outside the
+/// limits.
 pub fn joint_move(
     from: &[f64; JOINTS],
     to: &[f64; JOINTS],
@@ -111,6 +116,10 @@ fn quintic(from: &[f64; JOINTS], to: &[f64; JOINTS], seconds: f64) -> Trajectory
 }
 
 /// A move from where the arm is to the first point of a trajectory, slowed down until the arm model says that the torque suffices.
+///
+/// # Errors
+///
+/// Those of [`joint_move`], and [`PlanError::Torque`] when the move needs too much torque however slow it is.
 pub fn approach(
     from: &[f64; JOINTS],
     to: &[f64; JOINTS],
@@ -138,6 +147,10 @@ pub fn approach(
 }
 
 /// The same path at `speed_pct` of its speed.
+///
+/// # Errors
+///
+/// [`PlanError::Speed`] outside 1..200 %, [`PlanError::TooLong`] when the slower one does not fit into the controller.
 pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, PlanError> {
     if !(1.0..=200.0).contains(&speed_pct) {
         return Err(PlanError::Speed(speed_pct));

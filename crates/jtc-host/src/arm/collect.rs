@@ -40,6 +40,10 @@ pub struct ParameterFile {
 
 impl ParameterFile {
     /// Reads an arm file (TOML, URDF), one of the CSV forms, or all of a directory.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, or holds no parameters in a known form, with the place.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         Self::load_all(std::slice::from_ref(&path.to_owned()))
     }
@@ -47,6 +51,11 @@ impl ParameterFile {
     /// Reads files and directories together, later ones over earlier ones. Tables of single joints count only when all six of a
     /// kind are named or lie in a directory that is named: no joint is given another one's numbers, and no file is read that was
     /// not meant.
+    ///
+    /// # Errors
+    ///
+    /// The first file that cannot be read or understood, tables of some joints only, or numbers
+    /// that cannot be sent ([`ParameterSet::check`]).
     pub fn load_all(paths: &[PathBuf]) -> Result<Self, FileError> {
         let mut all = Self::default();
         let mut joints = JointTables::default();

@@ -126,6 +126,10 @@ impl ParameterSet {
     }
 
     /// All that cannot be sent, and much of what the controller would refuse with "incorrect value" (J-06), before anything is sent.
+    ///
+    /// # Errors
+    ///
+    /// The first number that no frame carries, that contradicts another, or that is not physical.
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {
             Some(Friction::Polynomial(c)) => {

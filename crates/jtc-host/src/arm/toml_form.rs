@@ -77,6 +77,10 @@ struct TableForm {
 
 impl Arm {
     /// From the TOML form; numbers that the controller would refuse are an error.
+    ///
+    /// # Errors
+    ///
+    /// The first key or number that is missing, unknown or of the wrong form, with its line.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let wrong = |e: toml::de::Error| {
             let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());

@@ -29,11 +29,19 @@ struct Chain<'a> {
 
 impl Arm {
     /// From the text of a URDF file in which nothing but the arm moves.
+    ///
+    /// # Errors
+    ///
+    /// A text that is no URDF, or does not have exactly one chain of six revolute joints.
     pub fn from_urdf(text: &str) -> Result<Self, FileError> {
         Self::from_urdf_with(text, &ArmChoice::default())
     }
 
     /// From the text of a URDF file, of which `choice` says what is the arm.
+    ///
+    /// # Errors
+    ///
+    /// A text that is no URDF, or in which `choice` does not name six revolute joints in a row.
     pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         let depth = depth(text);
         if depth > DEPTH_MAX {

@@ -88,6 +88,10 @@ pub struct Captured {
 }
 
 /// Reads a capture back. Lines that are none are an error with their number.
+///
+/// # Errors
+///
+/// The input cannot be read, or a line of it is no captured bytes.
 pub fn read_capture(input: impl BufRead) -> io::Result<Vec<Captured>> {
     let mut all = Vec::new();
     for (i, line) in input.lines().enumerate() {

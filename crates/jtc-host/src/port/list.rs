@@ -46,6 +46,10 @@ impl PortInfo {
 }
 
 /// All ports, by name; each is opened for a moment to see whether it can be used.
+///
+/// # Errors
+///
+/// The operating system does not list its ports.
 pub fn list() -> Result<Vec<PortInfo>, PortError> {
     let found = serialport::available_ports().map_err(|e| PortError::io("list of ports", e.into()))?;
     let mut ports: Vec<PortInfo> = found
@@ -61,6 +65,10 @@ pub fn list() -> Result<Vec<PortInfo>, PortError> {
 }
 
 /// The name of the only port that can be used.
+///
+/// # Errors
+///
+/// None, or more than one, with their names.
 pub fn only_one() -> Result<String, PortError> {
     let ports = list()?;
     let mut usable: Vec<String> = ports.iter().filter(|p| p.usable()).map(|p| p.path.clone()).collect();

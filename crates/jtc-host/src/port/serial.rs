@@ -27,6 +27,10 @@ pub struct SerialPort {
 
 impl SerialPort {
     /// Opens `path` at `baud`.
+    ///
+    /// # Errors
+    ///
+    /// The port is not there, is used by another program, may not be opened by this user, or does not take the rate.
     pub fn open(path: &str, baud: u32) -> Result<Self, PortError> {
         // The builder says "not found" in several words; ask the file system first.
         if cfg!(unix) && !std::path::Path::new(path).exists() {

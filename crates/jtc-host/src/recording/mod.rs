@@ -39,6 +39,10 @@ pub enum Format {
 
 impl Format {
     /// By the ending of the file name: `.mcap` or `.csv`.
+    ///
+    /// # Errors
+    ///
+    /// Another ending.
     pub fn of(path: &Path) -> Result<Self, RecordingError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("mcap") => Ok(Format::Mcap),
@@ -62,12 +66,20 @@ pub struct Recorder {
 
 impl Recorder {
     /// Makes (or replaces) the file; its ending chooses the format.
+    ///
+    /// # Errors
+    ///
+    /// Another ending, or a file that cannot be made.
     pub fn create(path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
         Format::of(path)?;
         Self::on(File::create(path).map_err(|e| RecordingError::io(path, e))?, path, info)
     }
 
     /// Writes into a file that is open already; the ending of `path` chooses the format.
+    ///
+    /// # Errors
+    ///
+    /// Another ending, or a file that cannot be written.
     pub fn on(file: File, path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
         let format = Format::of(path)?;
         let file = BufWriter::with_capacity(1 << 16, file);
@@ -79,6 +91,10 @@ impl Recorder {
     }
 
     /// Appends one sample.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be written, on a full disk for example.
     pub fn write(&mut self, sample: &Sample) -> Result<(), RecordingError> {
         let done = match &mut self.writer {
             Writer::Mcap(w) => w.write(sample),
@@ -121,6 +137,10 @@ impl Recorder {
     }
 
     /// Completes the file (index and summary of an MCAP file) and says how many samples it holds.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be written, on a full disk for example.
     pub fn finish(self) -> Result<u64, RecordingError> {
         let done = match self.writer {
             Writer::Mcap(w) => w.finish(),
@@ -131,11 +151,19 @@ impl Recorder {
 }
 
 /// Writes a whole recording at once.
+///
+/// # Errors
+///
+/// Another ending, or a file that cannot be made or written.
 pub fn write_all(path: &Path, info: &RecordingInfo, samples: &[Sample]) -> Result<u64, RecordingError> {
     Recorder::create(path, info)?.finish_with(samples)
 }
 
 /// Writes a whole recording at once into a file that is open already; the ending of `path` chooses the format.
+///
+/// # Errors
+///
+/// Another ending, or a file that cannot be written.
 pub fn write_into(
     file: File,
     path: &Path,
@@ -160,6 +188,10 @@ pub struct Recording {
 
 impl Recording {
     /// Reads a file that [`Recorder`] wrote.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, or is no recording of ours.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let format = Format::of(path)?;
         let bytes = std::fs::read(path).map_err(|e| RecordingError::io(path, e))?;

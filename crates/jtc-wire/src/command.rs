@@ -130,12 +130,10 @@ impl<'a> Command<'a> {
     pub fn parse(frame: FrameRef<'a>) -> Result<Self, DataStatus> {
         let body = frame.body();
         let byte = |i: usize| body.get(i).copied().ok_or(DataStatus::IncorrectValue);
-        let floats = |counts: &[usize]| {
-            if body.len().is_multiple_of(4) && counts.contains(&(body.len() / 4)) {
-                Ok(Floats(body))
-            } else {
-                Err(DataStatus::IncorrectValue)
-            }
+        let floats = || {
+            let counts = frame.frame_type.float_counts();
+            let fits = counts.iter().any(|count| 4 * count == body.len());
+            fits.then_some(Floats(body)).ok_or(DataStatus::IncorrectValue)
         };
         Ok(match frame.frame_type {
             FrameType::ClearCurrentErrors if body.is_empty() => {
@@ -150,11 +148,11 @@ impl<'a> Command<'a> {
             FrameType::Trajectory => {
                 Self::Trajectory(Segment::parse(body).ok_or(DataStatus::IncorrectValue)?)
             }
-            FrameType::FrictionTable => Self::FrictionTable(floats(&[2640])?),
+            FrameType::FrictionTable => Self::FrictionTable(floats()?),
             FrameType::FrictionTableUseDefault => Self::FrictionTableUseDefault,
-            FrameType::PidParam => Self::PidParam(floats(&[30])?),
+            FrameType::PidParam => Self::PidParam(floats()?),
             FrameType::PidParamUseDefault => Self::PidParamUseDefault,
-            FrameType::ArmModel => Self::ArmModel(floats(&[133])?),
+            FrameType::ArmModel => Self::ArmModel(floats()?),
             FrameType::ArmModelUseDefault => Self::ArmModelUseDefault,
             FrameType::TrajSetExecStatus => Self::TrajSetExecStatus(
                 ExecCommand::from_byte(byte(field::EXEC)?).ok_or(DataStatus::IncorrectValue)?,
@@ -162,7 +160,7 @@ impl<'a> Command<'a> {
             FrameType::TeachingModeEnable => Self::TeachingModeEnable,
             FrameType::TeachingModeDisable => Self::TeachingModeDisable,
             FrameType::FrictionPolynomial if body.is_empty() => Self::FrictionPolynomialUseDefault,
-            FrameType::FrictionPolynomial => Self::FrictionPolynomial(floats(&[24, 36])?),
+            FrameType::FrictionPolynomial => Self::FrictionPolynomial(floats()?),
             FrameType::FrictionPolynomialUseDefault => Self::FrictionPolynomialUseDefault,
             FrameType::ResetCanDevices => {
                 Self::ResetCanDevices { nodes: byte(field::RESET_NODES)? & ALL_NODES }

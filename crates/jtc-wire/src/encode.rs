@@ -93,7 +93,7 @@ impl RawPoint {
                 }
                 let exact = value * RAW_FULL_SCALE / limit;
                 // The cast cuts off towards zero: with the half it rounds to the nearest.
-                *to = (exact + if exact < 0.0 { -0.5 } else { 0.5 }) as i16;
+                *to = (exact + 0.5f64.copysign(exact)) as i16;
             }
             Ok(raw)
         };
@@ -254,11 +254,13 @@ pub fn floats(
         let to = out.get_mut(at..at + 4).ok_or(EncodeError::BufferTooShort { needed: at + 4 + 2, given })?;
         to.copy_from_slice(&single.to_be_bytes());
     }
-    let n = 4 * count + 6;
-    if count == 0 || !frame_type.can_have(n) || frame_type == FrameType::Trajectory {
-        return Err(EncodeError::WrongCount { frame_type, count });
-    }
-    frame(out, frame_type, n, |_| Ok(()))
+    check_count(frame_type, count)?;
+    frame(out, frame_type, 4 * count + 6, |_| Ok(()))
+}
+
+fn check_count(frame_type: FrameType, count: usize) -> Result<(), EncodeError> {
+    let fits = frame_type.float_counts().contains(&count);
+    fits.then_some(()).ok_or(EncodeError::WrongCount { frame_type, count })
 }
 
 /// A PidParam frame: per joint Kp, Ki, Kd, IntMin, IntMax (the last two in rad·s).
@@ -308,11 +310,8 @@ pub fn friction_table(out: &mut [u8], tables: &[FrictionTable<'_>; JOINTS]) -> R
 }
 
 fn raw_floats(out: &mut [u8], frame_type: FrameType, floats: Floats<'_>) -> Result<usize, EncodeError> {
-    let n = floats.as_bytes().len() + 6;
-    if floats.is_empty() || !frame_type.can_have(n) {
-        return Err(EncodeError::WrongCount { frame_type, count: floats.len() });
-    }
-    frame(out, frame_type, n, |body| {
+    check_count(frame_type, floats.len())?;
+    frame(out, frame_type, 4 * floats.len() + 6, |body| {
         body.copy_from_slice(floats.as_bytes());
         Ok(())
     })

@@ -152,6 +152,17 @@ impl FrameType {
         }
     }
 
+    /// How many floats a body of this type may be made of; none where it is no list of floats.
+    pub(crate) const fn float_counts(self) -> &'static [usize] {
+        match self {
+            FrameType::FrictionTable => &[2640],
+            FrameType::PidParam => &[30],
+            FrameType::ArmModel => &[133],
+            FrameType::FrictionPolynomial => &[24, 36],
+            _ => &[],
+        }
+    }
+
     /// Sent by the host (all but JtcStatus).
     pub const fn from_host(self) -> bool {
         !matches!(self, FrameType::JtcStatus)

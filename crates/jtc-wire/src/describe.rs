@@ -3,7 +3,7 @@ use core::fmt::{Display, Formatter, Result};
 
 use crate::command::{Command, ExecCommand, Floats};
 use crate::encode::FloatName;
-use crate::frame::{FRAME_MIN, FrameRef, FrameType, HEADER, field};
+use crate::frame::{FrameRef, FrameType, HEADER, field};
 use crate::segment::Segment;
 use crate::status::Status;
 use crate::words::{self, Bits};
@@ -40,7 +40,7 @@ fn wrong(bytes: &[u8], f: &mut Formatter<'_>) -> Result {
         return write!(f, "frame of unknown type {kind:02X}, {} bytes", bytes.len());
     };
     let n = usize::from(u16::from_be_bytes([high, low]));
-    if n < FRAME_MIN || !kind.can_have(n) {
+    if !kind.can_have(n) {
         return write!(f, "{kind} with a length field of {n}, which it cannot have; {} bytes", bytes.len());
     }
     let (covered, crc) = bytes.split_at(bytes.len() - field::CRC_LEN.min(rest.len()));
@@ -282,10 +282,7 @@ impl<'a> Iterator for Pieces<'a> {
 
 /// The good frame at the front of `bytes`.
 fn frame_at(bytes: &[u8]) -> Option<FrameRef<'_>> {
-    let &[header, _, high, low] = bytes.first_chunk()?;
+    let &[_, _, high, low] = bytes.first_chunk()?;
     let n = usize::from(u16::from_be_bytes([high, low]));
-    if header != HEADER {
-        return None;
-    }
     FrameRef::new_checked(bytes.get(..n)?)
 }

@@ -144,7 +144,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         } else {
             now_us.saturating_sub(self.last_us) >= self.gap_us
         };
-        if gap && !self.mark_gap() {
+        if gap && !self.gaps.mark(self.end) {
             self.refused = true;
             self.gap_before_refused = true;
             return 0;
@@ -170,7 +170,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.gap_us {
             // A full list of gaps ends in one at the last byte or is shortened below.
-            self.mark_gap();
+            self.gaps.mark(self.end);
         }
         self.busy = false;
         let mut budget = BUDGET;
@@ -183,10 +183,10 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
             if self.start == self.end {
                 return false;
             }
-            if budget < CANDIDATE {
+            let Some(left) = budget.checked_sub(CANDIDATE) else {
                 self.busy = true;
                 return false;
-            }
+            };
             match self.look() {
                 Sight::Wait => return false,
                 Sight::Frame(kind, n) => {
@@ -198,9 +198,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
                         self.in_run = true;
                         self.event = Some(Found::Run(sort, response, self.base + self.start as u64));
                     }
-                    budget -= CANDIDATE;
-                    let passed = self.pass_over(budget);
-                    budget -= passed;
+                    budget = left - self.pass_over(left);
                 }
             }
         }
@@ -318,18 +316,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         passed
     }
 
-    /// Remembers a gap after the last held byte; false when there is no place for it.
-    fn mark_gap(&mut self) -> bool {
-        if self.start == self.end && self.event.is_none() {
-            self.in_run = false;
-            return true;
-        }
-        self.gaps.mark(self.end)
-    }
-
     /// CRC register before byte `at` of the buffer.
     fn register(&self, at: usize) -> u16 {
-        self.registers.at(at, self.end, self.buffer.as_ref())
+        self.registers.at(at, self.buffer.as_ref())
     }
 
     /// Moves the held bytes to the front of the buffer.
@@ -337,7 +326,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         if self.start == 0 {
             return;
         }
-        self.registers.shift(self.start, self.end, self.buffer.as_ref());
+        self.registers.shift(self.start, self.buffer.as_ref());
         self.gaps.shift(self.start);
         self.base += self.start as u64;
         self.buffer.as_mut().copy_within(self.start..self.end, 0);
@@ -366,9 +355,10 @@ impl Gaps {
         self.count = self.count.saturating_sub(1);
     }
 
+    /// Remembers a gap before the byte at `place`, which is not before the others; false when there is no room for it.
     fn mark(&mut self, place: usize) -> bool {
         let place = place as u16;
-        if self.count > 0 && self.places[self.count - 1] == place {
+        if self.places[..self.count].last() == Some(&place) {
             return true;
         }
         let Some(free) = self.places.get_mut(self.count) else { return false };

@@ -37,10 +37,8 @@ impl Registers {
         }
     }
 
-    pub fn at(&self, at: usize, end: usize, buffer: &[u8]) -> u16 {
-        if at == end {
-            self.last
-        } else if at < self.phase {
+    pub fn at(&self, at: usize, buffer: &[u8]) -> u16 {
+        if at < self.phase {
             crc16_update(self.base, &buffer[..at])
         } else {
             let slot = (at - self.phase) / GRID;
@@ -49,8 +47,8 @@ impl Registers {
     }
 
     /// The bytes before `by` go.
-    pub fn shift(&mut self, by: usize, end: usize, buffer: &[u8]) {
-        self.base = self.at(by, end, buffer);
+    pub fn shift(&mut self, by: usize, buffer: &[u8]) {
+        self.base = self.at(by, buffer);
         if by >= self.phase {
             let gone = (by - self.phase) / GRID + 1;
             self.kept.copy_within(gone.min(self.count)..self.count, 0);
@@ -58,5 +56,45 @@ impl Registers {
             self.phase += gone * GRID;
         }
         self.phase -= by;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crc16;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    /// Bytes in pieces, and now and then some gone from the front.
+    fn steps() -> impl Strategy<Value = Vec<(Vec<u8>, Option<prop::sample::Index>)>> {
+        let piece = prop::collection::vec(any::<u8>(), 0..200);
+        prop::collection::vec((piece, any::<Option<prop::sample::Index>>()), 1..12)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
+
+        /// At every place the register of the whole stream, and from fewer than `GRID` bytes: those before are overwritten.
+        #[test]
+        fn any_register_from_a_few_bytes(steps in steps()) {
+            let (mut registers, mut gone, mut held) = (Registers::new(), Vec::new(), Vec::new());
+            for (bytes, shift) in steps {
+                registers.absorb(held.len(), &bytes);
+                held.extend(bytes);
+                if let Some(by) = shift {
+                    let by = by.index(held.len() + 1);
+                    registers.shift(by, &held);
+                    gone.extend(held.drain(..by));
+                }
+                prop_assert!((1..=GRID).contains(&registers.phase));
+                for at in 0..=held.len() {
+                    let mut buffer = held.clone();
+                    buffer[..(at + 1).saturating_sub(GRID)].fill(0xA5);
+                    let whole = [&gone[..], &held[..at]].concat();
+                    prop_assert_eq!(registers.at(at, &buffer), crc16(&whole), "at {} of {}", at, held.len());
+                }
+            }
+        }
     }
 }

@@ -155,6 +155,21 @@ mod tests {
     }
 
     #[test]
+    fn more_than_all_is_all() {
+        let mut batch = Box::new(EventBatch::new());
+        for done in 0..4 {
+            for position in 0..3 {
+                assert!(batch.push(&ReceivedEvent { line: 0, position, event: frame(&fixed::STOP) }));
+                assert!(!batch.is_empty());
+            }
+            batch.done(done);
+            assert_eq!(batch.is_empty(), done == 3);
+            batch.done(4);
+            assert!(batch.is_empty() && batch.get(0).is_none());
+        }
+    }
+
+    #[test]
     fn j07_a_full_batch_takes_nothing_more() {
         let mut batch = Box::new(EventBatch::new());
         let stop = ReceivedEvent { line: 0, position: 0, event: frame(&fixed::STOP) };

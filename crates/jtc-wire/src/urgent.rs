@@ -227,6 +227,26 @@ mod tests {
         }
     }
 
+    /// A call without bytes is no byte: the gap is counted from the last one received (J-03).
+    #[test]
+    fn j05_an_empty_scan_does_not_join_across_a_gap() {
+        let mut watch = UrgentWatch::<2>::new(6000);
+        watch.scan(0, 100_000, &fixed::STOP[..3]);
+        watch.scan(0, 103_000, &[]);
+        watch.scan(0, 106_000, &fixed::STOP[3..]);
+        assert_eq!(commands(&mut watch), [[], []]);
+    }
+
+    #[test]
+    fn j04_none_of_a_command_is_not_the_last_one() {
+        let mut commands = UrgentCommands::NONE;
+        assert!(commands.is_empty());
+        commands.add(Pause, 2);
+        commands.add(Stop, 1);
+        commands.add(Pause, 0);
+        assert!(commands.iter().eq([(Pause, 2), (Stop, 1)]) && !commands.is_empty());
+    }
+
     #[test]
     fn j04_the_last_of_several_commands_acts_last() {
         let mut watch = UrgentWatch::<2>::new(6000);

@@ -55,6 +55,7 @@ impl Line {
                 None => {}
             }
             self.receiver.release();
+            assert!(all.len() <= 2 * FRAME_MAX, "more events than bytes");
         }
         all
     }

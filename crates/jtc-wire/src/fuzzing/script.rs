@@ -156,6 +156,7 @@ impl Driver {
         };
         let position = self.receiver.event_position().expect("an event is there");
         self.found.push((position, event));
+        assert!(self.found.len() <= self.bytes, "more events than bytes");
         self.receiver.release();
         self.held = self.hold;
     }

@@ -48,11 +48,16 @@ impl Catch {
         }
         self.left_ms -= 1;
         let speed = velocity.abs();
-        self.busy_ms = if speed > STANDING { CALM_MS } else { self.busy_ms.saturating_sub(1) };
-        if speed > STANDING && velocity * self.peak < 0.0 {
-            (self.peak_before, self.peak) = (self.peak.abs(), velocity);
-        } else if speed > self.peak.abs() {
-            self.peak = velocity;
+        if speed > STANDING {
+            self.busy_ms = CALM_MS;
+            if velocity * self.peak < 0.0 {
+                (self.peak_before, self.peak) = (self.peak.abs(), velocity);
+            } else if speed > self.peak.abs() {
+                self.peak = velocity;
+            }
+        } else {
+            // Noise around standstill is no half of a swing: the fall that follows it has not grown out of it.
+            self.busy_ms = self.busy_ms.saturating_sub(1);
         }
         if self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING) {
             *self = Self::default();
@@ -134,5 +139,48 @@ mod tests {
             }
             assert_eq!(catch.busy(), k < 150 || (200..300).contains(&k), "{k}");
         }
+    }
+
+    /// Whether the catch goes on after velocities (rad/s) of one tick each.
+    fn goes_on(velocities: &[f64]) -> bool {
+        let mut catch = begun();
+        velocities.iter().all(|&velocity| catch.step(velocity))
+    }
+
+    #[test]
+    fn j43_a_swing_that_grows_from_half_to_half_is_no_load_that_comes_to_rest() {
+        assert!(goes_on(&[0.1, 0.2, 0.1, -0.15, -0.18, -0.05, 0.15, 0.1, -0.14]), "it fades");
+        assert!(goes_on(&[0.2, -0.2, 0.2]), "it does not grow");
+        assert!(!goes_on(&[0.2, -0.15, 0.16]) && !goes_on(&[-0.2, 0.15, 0.21]));
+        assert!(goes_on(&[0.03, -0.05, 0.1]), "too slow to tell");
+        assert!(!goes_on(&[0.03, -0.05, 0.101]));
+    }
+
+    /// A load that begins to fall after noise of the other sign has to be caught like any other.
+    #[test]
+    fn j43_noise_around_standstill_is_no_half_of_a_swing() {
+        for noise in [0.001, 0.01, STANDING] {
+            assert!(goes_on(&[noise, -0.15]) && goes_on(&[-noise, 0.15]), "{noise} before a fall");
+            assert!(goes_on(&[0.2, -noise, 0.15, -noise, 0.19]), "{noise} within a half");
+        }
+    }
+
+    #[test]
+    fn j34_a_joint_that_keeps_moving_is_not_busy_for_longer_than_a_catch_takes() {
+        let mut catch = begun();
+        for ms in 1..=1_000 {
+            catch.step(0.5);
+            assert_eq!(catch.busy(), ms < 1_000, "{ms}");
+        }
+        let mut stands = begun();
+        (0..100).for_each(|_| assert!(stands.step(STANDING)));
+        assert!(!stands.busy(), "what counts as standing is calm");
+    }
+
+    #[test]
+    fn j43_the_set_position_may_sag_by_the_whole_position_error() {
+        let (mut catch, most) = (begun(), limits().position_error_max);
+        assert_eq!(catch.sag(most * KP, KP, 1.0, &limits()), -most);
+        assert!(catch.step(0.0));
     }
 }

@@ -54,3 +54,98 @@ impl Coast {
         (position, self.velocity * (1.0 - smooth(u)), u >= 1.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// Wide enough for every way in here.
+    fn limits() -> JointConfig {
+        JointConfig { position_min: -9.0, position_max: 9.0, ..Config::avena().joints[0] }
+    }
+
+    /// Positions and velocities until the joint rests.
+    fn ways(mut coast: Coast, limits: &JointConfig) -> Vec<(f64, f64)> {
+        let mut ways = Vec::new();
+        for _ in 0..5_000 {
+            let (position, velocity, rests) = coast.step(limits);
+            ways.push((position, velocity));
+            if rests {
+                return ways;
+            }
+        }
+        panic!("it never rests");
+    }
+
+    #[test]
+    fn j16_j25_a_joint_comes_to_rest_from_what_was_measured_and_its_velocity_is_the_slope() {
+        let config = Config::avena();
+        for velocity in [-1.4, -0.3, 0.05, 1.0] {
+            let (led, falling) = (
+                Coast::led(0.7, velocity, &config, &limits()),
+                Coast::falling(0.7, velocity, &config, &limits()),
+            );
+            for way in [ways(led, &limits()), ways(falling, &limits())] {
+                assert_eq!(way[0], (0.7, velocity), "no step of the error at the beginning");
+                assert_eq!(way[way.len() - 1].1, 0.0);
+                for pair in way.windows(2) {
+                    let [(p, v), (q, w)] = [pair[0], pair[1]];
+                    assert!(((q - p) / DT - 0.5 * (v + w)).abs() < 1e-4, "{pair:?}");
+                    assert!(w.abs() <= v.abs() && w * velocity >= 0.0, "it only gets slower: {pair:?}");
+                }
+            }
+            assert_eq!(ways(led, &limits()).len(), usize::from(config.ramp_ms) + 1, "{velocity}");
+        }
+    }
+
+    #[test]
+    fn j16_a_falling_joint_is_slowed_down_no_faster_than_its_torque_allows_and_no_slower() {
+        let config = Config::avena();
+        let decelerations = |velocity: f64| {
+            let way = ways(Coast::falling(0.0, velocity, &config, &limits()), &limits());
+            way.windows(2).map(|pair| (pair[0].1 - pair[1].1).abs() / DT).fold(0.0, f64::max)
+        };
+        for velocity in [-1.4, -0.5, 0.45, 1.5] {
+            let most = decelerations(velocity);
+            assert!((0.99 * CATCH_DECELERATION..1.001 * CATCH_DECELERATION).contains(&most), "{most}");
+        }
+        // A slow one takes the time of the ramp.
+        assert_eq!(
+            ways(Coast::falling(0.0, 0.1, &config, &limits()), &limits()).len(),
+            usize::from(config.ramp_ms) + 1
+        );
+    }
+
+    #[test]
+    fn j43_coming_to_rest_keeps_the_velocity_limit_and_the_position_limits() {
+        let (config, limits) = (Config::avena(), Config::avena().joints[0]);
+        for velocity in [-7.0, 7.0] {
+            let way = ways(Coast::led(0.0, velocity, &config, &limits), &limits);
+            assert_eq!(way[0].1, limits.velocity_max.copysign(velocity));
+            for (end, outside) in [(limits.position_min, -0.1), (limits.position_max, 0.1)] {
+                let inside = ways(Coast::led(end - 0.1 * outside, velocity, &config, &limits), &limits);
+                let inward = velocity * outside < 0.0;
+                assert!(inside.iter().all(|(q, _)| (limits.position_min..=limits.position_max).contains(q)));
+                // An arm that is found outside is not driven further out.
+                let found = end + outside;
+                let beyond = ways(Coast::led(found, velocity, &config, &limits), &limits);
+                let last = beyond[beyond.len() - 1].0;
+                assert!(if inward { (last - end).abs() < (found - end).abs() } else { last == found });
+            }
+        }
+    }
+
+    #[test]
+    fn j43_a_load_that_is_caught_moves_the_whole_way() {
+        let config = Config::avena();
+        let plain = Coast::led(0.4, 0.3, &config, &limits());
+        let mut moved = plain;
+        moved.shift(-0.02);
+        for ((p, v), (q, w)) in ways(plain, &limits()).into_iter().zip(ways(moved, &limits())) {
+            assert!((q - (p - 0.02)).abs() < 1e-12 && v == w);
+        }
+    }
+}

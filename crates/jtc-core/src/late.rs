@@ -61,4 +61,15 @@ mod tests {
         assert_eq!(until_too_many(1_500, 10), Some(1_500));
         assert_eq!(until_too_many(1_500, u16::MAX), Some(1_500));
     }
+
+    #[test]
+    fn j12_ten_late_ticks_in_exactly_a_second_are_borne() {
+        // From the first to the ninth 16 ms; the last of these many and the tenth 2 ms apart.
+        for (between, too_many) in [(981, true), (982, false)] {
+            let mut late = LateTicks::default();
+            assert!(!(0..9).any(|_| late.count(1)));
+            assert!(!(0..between).any(|_| late.count(0)));
+            assert_eq!(late.count(1), too_many, "{} ms", 18 + between);
+        }
+    }
 }

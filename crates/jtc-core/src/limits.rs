@@ -167,4 +167,13 @@ mod tests {
             }
         }
     }
+
+    /// What the check of J-36 has passed, and rounding has moved by as much as it may, is no error in motion.
+    #[test]
+    fn j36_j43_what_rounding_may_add_is_no_error() {
+        let l = limits();
+        for (position, sign) in [(l.position_min - ROUNDING, -1.0), (l.position_max + ROUNDING, 1.0)] {
+            assert_eq!(check_set((position, sign * (l.velocity_max + ROUNDING), 0.0), position, &l, true), 0);
+        }
+    }
 }

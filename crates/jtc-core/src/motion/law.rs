@@ -227,3 +227,40 @@ fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
     let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j40_j41_j42_the_torque_is_the_sum_of_its_parts() {
+        let torque = JointTorque {
+            model: 128.0,
+            pid: PidTorque { p: 1.0, i: 2.0, d: 4.0 },
+            friction: 8.0,
+            payload: 16.0,
+            brake: 32.0,
+            blend: 64.0,
+        };
+        assert_eq!((torque.correction(), torque.sum()), (127.0, 255.0));
+    }
+
+    /// As much as is wanted, or else as much as the limit leaves; never against what is wanted.
+    #[test]
+    fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
+        for (wanted, torque, taken) in [
+            (15.0, 80.0, 15.0),
+            (50.0, 80.0, 20.0),
+            (-250.0, 80.0, -180.0),
+            (50.0, -80.0, 50.0),
+            (250.0, -80.0, 180.0),
+            (-50.0, -80.0, -20.0),
+            (50.0, 120.0, 0.0),
+            (-50.0, 120.0, -50.0),
+            (-50.0, -120.0, 0.0),
+            (300.0, -120.0, 220.0),
+        ] {
+            assert_eq!(within(wanted, torque, 100.0), taken, "{wanted} to {torque} N·m");
+        }
+    }
+}

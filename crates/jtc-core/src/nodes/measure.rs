@@ -198,6 +198,8 @@ impl Measurement {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
 
     const VELOCITY_MAX: f64 = 1.5;
@@ -303,5 +305,27 @@ mod tests {
             joint.step(&Tick { answer, ..tick(None, 0.0) }, &Config::avena());
         }
         assert!((joint.speed() - 0.3).abs() < 1e-9);
+    }
+
+    /// The double pole's own decay, whatever the ticks are and wherever it is.
+    #[test]
+    fn j63_an_offset_fades_like_a_critically_damped_filter() {
+        let config = Config::avena();
+        let pole = FADING / f64::from(config.blend_ms);
+        for (left, slope) in [(0.01, 0.0), (0.0, 1e-3), (-0.01, 2e-4), (-1e-3, (1.0 + pole) * 1e-3)] {
+            for ms in [1u32, 2, 5] {
+                let mut fading = Fading { left, slope };
+                fading.step(ms, &config);
+                let (t, both) = (f64::from(ms), slope + pole * left);
+                let decay = (-pole * t).exp();
+                let exact = ((left + both * t) * decay, (slope - pole * both * t) * decay);
+                assert!((fading.left - exact.0).abs() < 1e-4 * 0.01, "{ms} ms: {fading:?} {exact:?}");
+                assert!((fading.slope - exact.1).abs() < 1e-4 * 1e-3, "{ms} ms: {fading:?} {exact:?}");
+            }
+        }
+        // However little is left: none of it is dropped at once.
+        let mut little = Fading { left: 1e-6, slope: 0.0 };
+        little.step(1, &config);
+        assert!(little.left > 0.9e-6, "{little:?}");
     }
 }

@@ -49,6 +49,29 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
     (position, velocity, speed)
 }
 
+/// What is left to the limits of joint 0 around two points, whatever signs their velocities and accelerations have: by how much the
+/// hull of the positions keeps inside (rad, below and above), that of the velocities with the bump of the way that they leave
+/// unexplained less one step (rad/s), and the acceleration of `b` (rad/s²).
+fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
+    let (limit, h) = (&config.joints[0], f64::from(step_ms) / 1000.0);
+    let [a, b] = [a, b].map(|point| {
+        let at = SetPoint::from(point);
+        (at.position[0], at.velocity[0], at.acceleration[0])
+    });
+    let around = [a, b].map(|(_, v, a)| 2.0 / 5.0 * v.abs() * h + a.abs() * h * h / 20.0);
+    let fastest = [a, b].map(|(_, v, a)| v.abs() + a.abs() * h / 3.0);
+    let explained = h * (a.1 + b.1) / 2.0 + h * h * (a.2 - b.2) / 12.0;
+    // 30·u²·(1 − u)² in the middle.
+    let bump = 30.0 / 16.0 * ((b.0 - a.0 - explained).abs() - POSITION_STEP).max(0.0) / h;
+    let (around, fastest) = (around[0].max(around[1]), fastest[0].max(fastest[1]));
+    [
+        a.0.min(b.0) - around - limit.position_min,
+        limit.position_max - a.0.max(b.0) - around,
+        limit.velocity_max - fastest - bump,
+        limit.acceleration_max - b.2.abs(),
+    ]
+}
+
 /// Pairs of points that come near the limits, at steps from 1 ms to a second.
 fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
     let step = prop::sample::select(&[1u16, 2, 5, 10, 20, 50, 100, 250, 1000][..]);
@@ -99,6 +122,25 @@ proptest! {
         let passed = check.screen.passes(&Steps::from(&a), &Steps::from(&b));
         // The screen looks at the point before as well, the judge only at what follows it.
         prop_assert!(!passed || check.judge(&b).is_ok(), "{:?}", check.judge(&b));
+    }
+
+    /// What keeps its whole hull within the limits passes without being judged, and nothing else does: of the cases half have their
+    /// hull within a step of a position limit.
+    #[test]
+    fn j36_the_screen_passes_what_has_its_hull_within_the_limits((step, a, b) in pair(), side in 0..4u8) {
+        let (config, mut a, mut b) = (config(), a, b);
+        let [low, high, ..] = room(&config, step, &a, &b);
+        let shift = [0.0, 0.0, -low, high][usize::from(side)] / POSITION_STEP;
+        for point in [&mut a, &mut b] {
+            point.position[0] += shift.round() as i16;
+        }
+        let passed = TrajectoryCheck::new(&config, step, None).screen.passes(&Steps::from(&a), &Steps::from(&b));
+        let room = room(&config, step, &a, &b);
+        // A tenth of a step is left to the judge.
+        let tenth = 0.11 * POSITION_STEP;
+        let left = [tenth, tenth, tenth / (f64::from(step) / 1000.0) + 1e-5, 1e-4];
+        prop_assert!(!passed || room.iter().all(|&r| r >= -1e-6), "{room:?} passed");
+        prop_assert!(passed || room.iter().zip(left).any(|(&r, left)| r <= left), "{room:?} did not pass");
     }
 
     /// Rounding to the steps of the wire refuses no path that keeps to the velocity limit before it.
@@ -175,11 +217,51 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     assert_eq!(refused, Err((2, 3, Quantity::FrictionVelocity, high)));
     // Loaded without a table: the same when it is asked later.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
-    for v in [0.0, -0.4, low - 0.001, 0.0] {
+    for v in [0.0, -0.4, low - 0.001, low - 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
     }
     let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
+}
+
+/// Between its points a path is faster than at them when it accelerates: then the hull of the velocities counts.
+#[test]
+fn j36_a_table_that_is_loaded_later_has_to_hold_what_lies_between_the_points() {
+    let crate::Friction::Table(tables) = crate::Parameters::avena_friction_table() else {
+        panic!("no table")
+    };
+    let (low, high) = friction::velocities(&tables[3]);
+    // A third of what the acceleration does within the step is added to the velocity.
+    for (step, a) in [(100, 0.6), (300, 0.2)] {
+        for (v, a) in [(high - 0.01, a), (high - 0.01, -a), (low + 0.01, -a), (low + 0.01, a)] {
+            let later = |a: f64| {
+                let mut check = TrajectoryCheck::new(&config(), step, None);
+                for p in [point(3, 0.0, 0.0, 0.0), point(3, 0.0, v, a)] {
+                    // Whether such a motion keeps its other limits does not matter here.
+                    let _ = check.take(&p);
+                }
+                inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.limit))
+            };
+            assert_eq!(later(a), Err((1, if v > 0.0 { high } else { low })), "{step} ms");
+            assert_eq!(later(0.4 * a), Ok(()), "{step} ms");
+        }
+    }
+}
+
+#[test]
+fn j36_the_first_step_beyond_the_velocity_limit_is_refused_at_every_step_time() {
+    for step in [1, 2, 5, 20, 100] {
+        let at = |raw: f64| {
+            let v = raw * VELOCITY_STEP;
+            between(&config(), step, &point(1, 0.0, v, 0.0), &point(1, v * f64::from(step) / 1000.0, v, 0.0))
+        };
+        let last = (1.5 / VELOCITY_STEP).floor();
+        assert_eq!((at(last), at(-last)), (Ok(()), Ok(())), "{step} ms");
+        for sign in [1.0, -1.0] {
+            let quantity = at(sign * (last + 1.0)).map_err(|v| v.quantity);
+            assert_eq!(quantity, Err(Quantity::Velocity), "{step} ms");
+        }
+    }
 }
 
 #[test]

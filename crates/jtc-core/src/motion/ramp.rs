@@ -59,3 +59,66 @@ fn within(offset: f64, factor: f64, limit: f64) -> Bounds {
 fn narrow(bounds: &mut Bounds, to: Bounds) {
     *bounds = (bounds.0.max(to.0), bounds.1.min(to.1));
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Parameters;
+
+    /// Joints that stand, that move as slowly as counts as standing, and that move.
+    fn velocities() -> impl Strategy<Value = [f64; JOINTS]> {
+        prop::array::uniform6(prop_oneof![Just(0.0), Just(STANDING), Just(-STANDING), -1.5..1.5f64])
+    }
+
+    fn inside(s: f64, (low, high): Bounds) -> bool {
+        low <= s && s <= high
+    }
+
+    proptest! {
+        /// Within its bounds a slope keeps the limits of acceleration and torque, outside it does not. What a joint that stands
+        /// has too much of is no reason not to let path time run on as it does.
+        #[test]
+        fn j33_the_bounds_of_a_slope_are_where_the_arm_reaches_its_limits(
+            velocity in velocities(),
+            acceleration in prop::array::uniform6(-13.0..13.0f64),
+            share in prop::array::uniform6(prop_oneof![4 => -0.9..0.9f64, 1 => -1.2..1.2f64]),
+            (rate, slope) in (0.0..1.0f64, -8.0..8.0f64),
+            slopes in prop::collection::vec(-40.0..40.0f64, 20),
+        ) {
+            let config = Config::avena();
+            let (nodes, dynamics) = (Nodes::new(&config), Dynamics::new(&Parameters::avena().model, config.gravity));
+            let mut motion = Motion::default();
+            motion.begin_ramp(&nodes, &config, &dynamics);
+            for j in 0..JOINTS {
+                motion.torque[j].model = share[j] * config.joints[j].torque_max;
+            }
+            let at = SetPoint { position: [0.0; JOINTS], velocity, acceleration };
+            let SlopeBounds { easy, full } = motion.slope_bounds(&at, rate, slope, &config);
+
+            // What the arm needs for one more of slope.
+            let zero = [0.0; JOINTS];
+            let (moved, held) = (dynamics.inverse(&zero, &zero, &velocity), dynamics.inverse(&zero, &zero, &zero));
+            let push = |j: usize| moved[j] - held[j] + config.joints[j].rotor_inertia * velocity[j];
+            let acceleration_fits = |j: usize, s: f64| {
+                let used = acceleration[j] * rate * rate + velocity[j] * s;
+                velocity[j] == 0.0 || used.abs() <= RAMP_ACCELERATION * config.joints[j].acceleration_max
+            };
+            let torque_fits = |j: usize, s: f64, most: f64| {
+                let limit = config.joints[j].torque_max;
+                push(j).abs() < 1e-8 || (share[j] * limit + push(j) * (s - slope)).abs() <= most * limit
+            };
+            let near = |s: f64, (low, high): Bounds| (s - low).abs() < 1e-6 || (s - high).abs() < 1e-6;
+            for s in slopes.into_iter().chain([0.0]) {
+                let fits = (0..JOINTS).all(|j| acceleration_fits(j, s) && torque_fits(j, s, RAMP_TORQUE));
+                prop_assert!(near(s, easy) || inside(s, easy) == fits, "{s} in {easy:?}: {fits}");
+                let moving = (0..JOINTS).filter(|&j| velocity[j].abs() > STANDING).all(|j| torque_fits(j, s, 1.0));
+                let all = (0..JOINTS).all(|j| torque_fits(j, s, 1.0));
+                prop_assert!(near(s, full) || moving || !inside(s, full), "{s} in {full:?}");
+                prop_assert!(near(s, full) || !all || inside(s, full), "{s} outside {full:?}");
+                prop_assert!(near(s, full) || s != 0.0 || !moving || inside(s, full), "{s} outside {full:?}");
+            }
+        }
+    }
+}

@@ -143,4 +143,28 @@ mod tests {
             prop_assert_eq!(at(0.0), 0.0);
         }
     }
+
+    #[test]
+    fn j42_a_byte_of_temperature_is_below_zero_from_200_on() {
+        assert_eq!([0, 1, 25, 199].map(celsius), [0.0, 1.0, 25.0, 199.0]);
+        assert_eq!([200, 246, 255].map(celsius), [-56.0, -10.0, -1.0]);
+    }
+
+    /// What rounding may add on the way between two points does not lead out of the table, and no more does not either.
+    #[test]
+    fn j36_j42_what_rounding_adds_to_a_velocity_has_the_torque_at_the_end() {
+        let t = sample();
+        for (end, outward) in [(-1.0, -1.0), (1.375, 1.0)] {
+            for added in [0.5 * ROUNDING, ROUNDING] {
+                assert_eq!(table(&t, end + outward * added, 30.0), table(&t, end, 30.0));
+            }
+            assert_eq!(table(&t, end + outward * 2.0 * ROUNDING, 30.0), None);
+        }
+    }
+
+    #[test]
+    fn j42_the_temperature_factor_reaches_from_a_fifth_to_twice() {
+        let at = |factor: f64| polynomial(&[2.0, 0.0, 0.0, 0.0, 1.0, 20.0], 0.5, 19.0 + factor, 0.02);
+        assert_eq!([0.1, 0.2, 1.0, 1.5, 2.0, 2.1].map(at), [0.4, 0.4, 2.0, 3.0, 4.0, 4.0]);
+    }
 }

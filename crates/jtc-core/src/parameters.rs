@@ -333,3 +333,6 @@ fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataSta
     }
     Ok(table)
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,7 +10,7 @@
 //! * **Inertia.** What of a link is symmetric about its joint axis (its mass, the first and second moment along the
 //!   axis) moves in the same way whether it turns with the link or not, so it is carried by the link before. Going from the wrist to the base, every link keeps seven numbers and no mass at all.
 
-use crate::model::{ArmModel, JOINTS, symmetric};
+use crate::model::{ArmModel, JOINTS, Link, symmetric};
 use crate::rotation::{Mat3, about_x, about_z, apply, congruent, from_rpy, product, unit};
 use crate::trig::angle;
 
@@ -122,8 +122,7 @@ impl Chain {
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
             // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α).
-            let (cos_a, sin_a) =
-                if c[0][2] == 0.0 && c[1][2] == 0.0 { (1.0, 0.0) } else { unit(-c[1][2], c[0][2]) };
+            let (cos_a, sin_a) = unit(-c[1][2], c[0][2]);
             let back = about_z(-sin_a, cos_a);
             let rest = product(&back, c);
             let (cos, sin) = unit(rest[2][2], -rest[1][2]);
@@ -143,23 +142,22 @@ impl Chain {
             shifts[k - 1] = z + shifts[k] * twists[k].cos;
             twists[k].p = [x, y - shifts[k] * twists[k].sin];
         }
-        let bodies = regroup(model, &twists, &turns, &shifts);
+        let bodies = regroup(&model.links, &twists, &turns, &shifts);
         let flange = regroup(&flange_mass(model), &twists, &turns, &shifts).map(|b| [b.hx, b.hy]);
         Self { twists, bodies, lift, placements, flange }
     }
 }
 
-/// The arm without its links, but with 1 kg at the flange.
-fn flange_mass(model: &ArmModel) -> ArmModel {
-    let mut arm = ArmModel { joints: model.joints, ..ArmModel::default() };
-    let (last, flange) = (&mut arm.links[JOINTS], &model.joints[JOINTS]);
-    (last.mass, last.origin.xyz) = (1.0, flange.xyz);
-    arm
+/// Links without mass, but with 1 kg at the flange.
+fn flange_mass(model: &ArmModel) -> [Link; 7] {
+    let mut links = [Link::default(); 7];
+    (links[JOINTS].mass, links[JOINTS].origin.xyz) = (1.0, model.joints[JOINTS].xyz);
+    links
 }
 
 /// Inertia of the links in our frames, with the part symmetric about each joint axis handed inwards.
 fn regroup(
-    model: &ArmModel,
+    links: &[Link; 7],
     twists: &[Twist; JOINTS],
     turns: &[(f64, f64); JOINTS],
     shifts: &[f64; JOINTS],
@@ -168,7 +166,7 @@ fn regroup(
     let mut bodies = [none.split().0; JOINTS];
     let mut handed = none;
     for k in (0..JOINTS).rev() {
-        let link = &model.links[k + 1];
+        let link = &links[k + 1];
         let about_com = Inertia { mass: link.mass, h: [0.0; 3], j: symmetric(&link.inertia) };
         let (s, c) = turns[k];
         let in_link = about_com.placed(&from_rpy(&link.origin.rpy), &link.origin.xyz);

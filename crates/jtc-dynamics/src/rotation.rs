@@ -84,8 +84,51 @@ fn eliminate(a: f64, b: f64, ab: f64, ac: f64, bc: f64) -> (f64, f64, f64, f64, 
     }
     let half = 0.5 * (b - a);
     let root = sqrt(half * half + ab * ab);
-    let t = if half < 0.0 { -ab / (root - half) } else { ab / (root + half) };
+    // The smaller of the two rotations that do it.
+    let t = ab / (half + root.copysign(half));
     let c = 1.0 / sqrt(1.0 + t * t);
     let s = t * c;
     (a - t * ab, b + t * ab, 0.0, c * ac - s * bc, s * ac + c * bc)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn without_a_direction_a_unit_vector_points_along_x() {
+        for x in [0.0, -0.0, f64::INFINITY, f64::NAN] {
+            assert_eq!(unit(x, 0.0 * x), (1.0, 0.0));
+            assert_eq!(unit(0.0 * x, x), (1.0, 0.0));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
+
+        #[test]
+        fn a_unit_vector_keeps_the_direction_whatever_the_length(angle in -3.2..3.2f64, exponent in -300..300i32) {
+            let length = 10f64.powi(exponent);
+            let (x, y) = unit(length * angle.cos(), length * angle.sin());
+            prop_assert!((x - angle.cos()).abs() < 4e-16 && (y - angle.sin()).abs() < 4e-16, "{x} {y}");
+        }
+
+        /// What any turn leaves as it is: also of moments that are equal, zero or negative, in any unit.
+        #[test]
+        fn principal_moments_are_those_before_a_turn(
+            moments in prop::array::uniform3(prop_oneof![Just(0.0), Just(1.0), Just(-1.0), -2.0..2.0f64, -1e-9..1e-9f64]),
+            rpy in prop::array::uniform3(prop_oneof![Just(0.0), Just(1e-9), Just(-1e-5), -3.2..3.2f64]),
+            exponent in -120..120i32,
+        ) {
+            let unit = 10f64.powi(exponent);
+            let [a, b, c] = moments.map(|moment| moment * unit);
+            let turned = congruent(&from_rpy(&rpy), &[[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]);
+            let mut expected = [a, b, c];
+            expected.sort_by(f64::total_cmp);
+            for (got, wanted) in principal_moments(&turned).iter().zip(expected) {
+                prop_assert!((got - wanted).abs() <= 4e-15 * unit, "{got} {wanted}");
+            }
+        }
+    }
 }

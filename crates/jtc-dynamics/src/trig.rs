@@ -78,10 +78,8 @@ pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
         0.0
     } else if -cos >= sin.abs() {
         if sin < 0.0 { -PI } else { PI }
-    } else if sin < 0.0 {
-        -FRAC_PI_2
     } else {
-        FRAC_PI_2
+        FRAC_PI_2.copysign(sin)
     };
     // Each step takes the error e (at first below π/4) to e − sin e.
     for _ in 0..6 {
@@ -89,4 +87,46 @@ pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
         angle += sin * c - cos * s;
     }
     angle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::{FRAC_PI_2, PI};
+    use proptest::prelude::*;
+
+    #[test]
+    fn square_roots_of_what_has_none_are_zero() {
+        for x in [0.0, -0.0, -1.0, f64::NEG_INFINITY, f64::NAN, f64::MIN_POSITIVE / 2.0] {
+            assert_eq!(sqrt(x), 0.0, "{x}");
+        }
+    }
+
+    #[test]
+    fn the_smallest_normal_number_has_a_square_root() {
+        assert_eq!(sqrt(f64::MIN_POSITIVE), 2f64.powi(-511));
+    }
+
+    #[test]
+    fn angles_along_the_axes_are_exact() {
+        assert_eq!(angle(0.0, 1.0), 0.0);
+        assert_eq!(angle(1.0, 0.0), FRAC_PI_2);
+        assert_eq!(angle(-1.0, 0.0), -FRAC_PI_2);
+        assert_eq!(angle(0.0, -1.0), PI, "not -π, which is no angle of the range");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
+
+        #[test]
+        fn square_roots_are_those_of_the_processor(x in prop::num::f64::POSITIVE) {
+            prop_assert!((sqrt(x) - x.sqrt()).abs() <= f64::EPSILON * x.sqrt(), "{x}: {}", sqrt(x));
+        }
+
+        #[test]
+        fn an_angle_is_that_of_its_sine_and_cosine(wanted in -PI..PI) {
+            let got = angle(wanted.sin(), wanted.cos());
+            prop_assert!((got - wanted).abs() <= f64::EPSILON * PI, "{wanted}: {got}");
+        }
+    }
 }

@@ -123,6 +123,73 @@ fn j06_angles_without_a_meaning_are_refused() {
     assert_eq!(error.to_string(), "joint 2: origin pitch is 10000000 rad, limit 1000000 rad; degrees?");
 }
 
+/// The largest angle is told, and is allowed itself.
+#[test]
+fn j06_an_angle_at_the_limit_is_accepted() {
+    let mut model = arms::avena();
+    model.links[3].origin.rpy[2] = -1e9;
+    let Err(ModelError::AngleTooLarge { index: 3, field: Field::LinkRpy(2), value, limit }) = model.check()
+    else {
+        panic!("accepted")
+    };
+    assert_eq!(value, -1e9);
+    for angle in [limit, -limit] {
+        model.links[3].origin.rpy[2] = angle;
+        assert_eq!(model.check(), Ok(()));
+    }
+}
+
+/// A body at the limit stays one when its numbers are rounded to f32, as the frame carries them; a hundred times as far off
+/// it is none. That does not depend on how heavy it is.
+#[test]
+fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
+    let off = f64::from(f32::EPSILON);
+    for unit in [1e-6, 1e-3, 1.0, 1e3] {
+        // A rod: one moment slightly below zero; a plate: one slightly above the sum of the others.
+        for (shape, defect) in [([0.0, 1.0, 1.0], [-1.0, 0.0, 0.0]), ([1.0, 1.0, 2.0], [0.0, 0.0, 1.0])] {
+            let check = |off: f64| {
+                let [a, b, c]: [f64; 3] = core::array::from_fn(|i| unit * (shape[i] + off * defect[i]));
+                let mut model = arms::avena();
+                model.links[2].inertia = [a, 0.0, 0.0, b, 0.0, c];
+                model.check()
+            };
+            assert_eq!(check(off), Ok(()), "{shape:?} in units of {unit}");
+            assert!(check(100.0 * off).is_err(), "{shape:?} in units of {unit}");
+        }
+    }
+}
+
+#[test]
+fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
+    let says = |error: ModelError, text: &str| assert_eq!(error.to_string(), text);
+    let fields = [
+        (Field::JointXyz(0), "joint 2: origin x"),
+        (Field::JointRpy(2), "joint 2: origin yaw"),
+        (Field::LinkXyz(1), "link 2: centre of mass y"),
+        (Field::LinkRpy(0), "link 2: inertia frame roll"),
+        (Field::Inertia(4), "link 2: iyz"),
+        (Field::Mass, "link 2: mass"),
+    ];
+    for (field, place) in fields {
+        let error = ModelError::NotFinite { index: 2, field, value: f64::INFINITY };
+        says(error, &format!("{place} is inf, not a finite number"));
+        let error = ModelError::AngleTooLarge { index: 2, field, value: 90.0, limit: 7.0 };
+        says(error, &format!("{place} is 90 rad, limit 7 rad; degrees?"));
+    }
+    says(ModelError::MassNegative { link: 4, mass: -2.5 }, "link 4: mass is -2.5 kg, must not be negative");
+    says(ModelError::MassZero { link: 4 }, "link 4: mass is 0, only links 0 and 6 may be without");
+    says(
+        ModelError::InertiaNegative { link: 4, moment: -1.5 },
+        "link 4: smallest principal moment of inertia is -1.5 kg m2, must not be negative; sign of the products of \
+         inertia?",
+    );
+    says(
+        ModelError::InertiaTriangle { link: 4, moment: 3.0, limit: 2.5 },
+        "link 4: largest principal moment of inertia is 3 kg m2, more than the sum of the others, 2.5 kg m2; wrong \
+         unit or order of ixx ixy ixz iyy iyz izz?",
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 

@@ -51,6 +51,13 @@ proptest! {
 }
 
 #[test]
+fn j40_the_largest_argument_still_has_a_sine() {
+    for x in [SIN_COS_MAX, -SIN_COS_MAX] {
+        assert!(error(x) <= BOUND + 0.5 * f64::EPSILON * SIN_COS_MAX, "{x}: {:e}", error(x));
+    }
+}
+
+#[test]
 fn j40_exact_where_it_can_be() {
     assert_eq!(sin_cos(0.0), (0.0, 1.0));
     for x in [1e-9, -1e-12, 1e-300, f64::MIN_POSITIVE] {

@@ -6,7 +6,7 @@ use jtc_core::{Friction, JOINTS, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 
 use super::csv::{self, Table};
-use super::{Arm, ParameterSet, Warning};
+use super::{Arm, ParameterSet, Warning, is_xml};
 use crate::file::{FileError, read_text};
 
 /// Which friction compensation to take where a file has both.
@@ -207,8 +207,7 @@ impl ParameterFile {
 
 /// TOML or XML, not a table of numbers.
 fn is_arm(text: &str) -> bool {
-    let start = text.trim_start_matches('\u{feff}').trim_start();
-    start.starts_with('<') || start.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
+    is_xml(text) || text.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
 /// Tables of single joints, until all six of a kind are there.

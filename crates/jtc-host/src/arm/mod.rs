@@ -156,6 +156,7 @@ impl Arm {
     }
 }
 
+/// The text is XML, as a robot description is; a byte order mark may stand before it.
 fn is_xml(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
 }

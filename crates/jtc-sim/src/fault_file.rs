@@ -46,10 +46,17 @@ const STATES: [(&str, State); 6] = [
     ("error", State::Error),
 ];
 
+/// What every format says of itself.
+#[derive(Deserialize)]
+struct Head {
+    format: Option<f64>,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    format: Option<f64>,
+    #[serde(rename = "format")]
+    _format: Option<f64>,
     #[serde(default)]
     fault: Vec<Entry>,
 }
@@ -94,10 +101,13 @@ impl FaultPlan {
         text: &str,
         mut load: impl FnMut(&str) -> Result<HandPath, String>,
     ) -> Result<Self, FaultFileError> {
-        let file: File = toml::from_str(text).map_err(|e| FaultFileError::Syntax(e.to_string()))?;
-        if file.format != Some(FORMAT) {
-            return Err(FaultFileError::Format { found: file.format });
+        let syntax = |e: toml::de::Error| FaultFileError::Syntax(e.to_string());
+        // Before anything else: another format may well have other keys.
+        let Head { format } = toml::from_str(text).map_err(syntax)?;
+        if format != Some(FORMAT) {
+            return Err(FaultFileError::Format { found: format });
         }
+        let file: File = toml::from_str(text).map_err(syntax)?;
         let mut plan = Self::default();
         for (number, entry) in (1..).zip(file.fault) {
             let fault = Reader { number, entry, hands: &mut plan.hands, load: &mut load }.read()?;

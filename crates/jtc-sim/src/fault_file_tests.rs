@@ -85,6 +85,10 @@ fn files_that_counted_from_0_are_refused_with_what_to_change() {
     }
     let message = FaultPlan::from_toml(&format!("format = 1\n{old}")).unwrap_err().to_string();
     assert!(message.contains("format = 1 is none"), "{message}");
+    // Whatever keys it has.
+    let later = "format = 3\nepoch = \"noon\"\n[[fault]]\nkind = \"push\"\nlimb = 1";
+    let message = FaultPlan::from_toml(later).unwrap_err().to_string();
+    assert!(message.contains("format = 3 is none"), "{message}");
     for (node, instead) in [("2", "write joint = 3"), ("6", "write gripper = true")] {
         let text = format!("format = 2\n[[fault]]\nkind = \"node-silent\"\nnode = {node}\nat_s = 1");
         let message = FaultPlan::from_toml(&text).unwrap_err().to_string();

@@ -50,6 +50,11 @@ impl Failure {
         Self { hint: hint.to_string(), ..self }
     }
 
+    /// Of a command that has a port: it was not used.
+    pub fn nothing_sent(self) -> Self {
+        Self { message: format!("{}; nothing was sent", self.message), ..self }
+    }
+
     /// What was measured cannot be written, after it was measured: what the command was run for is lost.
     pub fn output_lost(self) -> Self {
         let message = format!("{}; what was recorded is lost", self.message);

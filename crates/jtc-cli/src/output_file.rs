@@ -36,17 +36,14 @@ pub struct OutputFile {
 
 impl OutputFile {
     /// Opens `path` for writing. A file that is there is refused without `force`, and one of `others` (what the command reads, and
-    /// its other outputs) always.
+    /// its other outputs) always. A command that has a port says that [nothing was sent](Failure::nothing_sent).
     pub fn open(path: &Path, force: bool, others: &[&Path]) -> Result<Self, Failure> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             let message =
                 format!("{} is {}, which this command uses itself", path.display(), other.display());
             return Err(refused("same-file", message).hint("name another file; --force does not cover this"));
         }
-        let io = |e| Failure {
-            code: "io".into(),
-            ..Failure::usage(format!("{}: {e}; nothing was sent", path.display()))
-        };
+        let io = |e| Failure { code: "io".into(), ..Failure::usage(format!("{}: {e}", path.display())) };
         match OpenOptions::new().write(true).create_new(true).open(path) {
             Ok(file) => {
                 UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
@@ -57,7 +54,7 @@ impl OutputFile {
         }
         // A pipe or a device holds nothing that could be lost.
         if !force && path.is_file() {
-            let message = format!("{} is there already; nothing was sent", path.display());
+            let message = format!("{} is there already", path.display());
             return Err(refused("exists", message).hint("name another file; --force writes over it"));
         }
         let file = OpenOptions::new().write(true).open(path).map_err(io)?;
@@ -198,6 +195,10 @@ mod tests {
         let (old, new, input) = (dir.path().join("old"), dir.path().join("new"), dir.path().join("input"));
         std::fs::write(&old, "precious").unwrap();
         std::fs::write(&input, "read").unwrap();
+        // Commands without a port send nothing whatever happens.
+        let there = OutputFile::open(&old, false, &[]).err().unwrap();
+        assert!(there.message.ends_with("is there already"), "{}", there.message);
+        assert!(there.nothing_sent().message.ends_with("is there already; nothing was sent"));
         let code = |result: Result<OutputFile, Failure>| result.err().map(|f| (f.exit, f.code));
         assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists".into())));
         assert_eq!(code(OutputFile::open(&input, true, &[&input])), Some((4, "same-file".into())));

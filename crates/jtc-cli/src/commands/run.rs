@@ -1,5 +1,7 @@
 //! `jtc traj run`: check, upload, execute, follow, report.
 
+mod approach;
+
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -10,14 +12,14 @@ use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
 use jtc_host::report::{self, ReportInput, RunFailure, Summary};
 use jtc_host::session::{Flow, Outcome, Run, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
-use jtc_host::{CheckOptions, CheckedTrajectory, Error, Sample, Session, plan, words};
+use jtc_host::{CheckOptions, CheckedTrajectory, Error, Sample, Session, words};
 use jtc_wire::Status;
 use serde_json::json;
 
 use super::run_report;
 use super::traj::Job;
 use crate::args::RunArgs;
-use crate::failure::{FAULT, Failure, REFUSED};
+use crate::failure::{FAULT, Failure};
 use crate::limits;
 use crate::operator::Operator;
 use crate::output_file::{OutputFile, Tape};
@@ -48,7 +50,7 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
         out.note(format!("warning: {warning}"));
     }
 
-    let mut outputs = Outputs::open(args)?;
+    let mut outputs = Outputs::open(args).map_err(Failure::nothing_sent)?;
     let mut operator = Operator::listen(out)?;
     let mut session = args.link.session()?;
     let status = ready(&mut session, &operator)?;
@@ -66,7 +68,7 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
         && args.approach
         && verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose)
     {
-        let path = approach(job, &status, args, out)?;
+        let path = approach::approach(job, &status, args, out)?;
         let leg = Leg::run(&mut session, &path, APPROACH, &mut operator, &mut record)?;
         if matches!(leg.outcome, Ok(Outcome::Finished(_))) {
             // The recording is that of the motion.
@@ -105,7 +107,8 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
         Ok(Outcome::Stopped(_)) => "stopped",
         Err(_) => "fault",
     };
-    let where_ = if phase == APPROACH { " on the approach to the first point" } else { "" };
+    let where_ =
+        if phase == APPROACH { format!(" on the {APPROACH} to the first point") } else { String::new() };
     let reason = match &outcome {
         Ok(_) => where_.trim_start().to_owned(),
         Err(e) if where_.is_empty() => e.to_string(),
@@ -234,21 +237,6 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
         }
     }
     Ok(status)
-}
-
-/// A motion to the first point, checked.
-fn approach(job: &Job, status: &Status, args: &RunArgs, out: &Output) -> Result<CheckedTrajectory, Failure> {
-    let here = pose(status);
-    let refused =
-        |e: plan::PlanError| Failure { exit: REFUSED, code: "approach".into(), ..Failure::usage(e) };
-    let first = job.trajectory.points.first().map_or(here, |p| p.position);
-    // Half of the limits: nobody has looked at this path for obstacles.
-    let speed = args.check.speed.min(50.0);
-    let path = plan::approach(&here, &first, &job.config, Some(&job.arm.model), speed).map_err(refused)?;
-    let checked = job.checked(&path, status, args, UploadOptions::default());
-    let checked = checked.map_err(|e| job.not_checked(e, out))?;
-    out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
-    Ok(checked)
 }
 
 /// Where the arm is, rad.

@@ -24,9 +24,12 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TeachCommand::On(link) => switch(link, true, out),
         TeachCommand::Off(link) => switch(link, false, out),
-        TeachCommand::Record { file, force, link, duration } => {
-            record(OutputFile::open(file, force.force, &[])?, link, *duration, out)
-        }
+        TeachCommand::Record { file, force, link, duration } => record(
+            OutputFile::open(file, force.force, &[]).map_err(Failure::nothing_sent)?,
+            link,
+            *duration,
+            out,
+        ),
     }
 }
 

@@ -1,0 +1,74 @@
+//! The way from where the arm stands to the first point of a trajectory.
+
+use std::path::Path;
+
+use cli_kit::Output;
+use jtc_host::check::CheckedTrajectory;
+use jtc_host::session::UploadOptions;
+use jtc_host::{Error, plan};
+use jtc_wire::Status;
+use serde_json::json;
+
+use super::super::traj::{Job, typed};
+use super::{APPROACH, pose};
+use crate::args::RunArgs;
+use crate::failure::{Failure, REFUSED};
+
+/// A motion to the first point, checked.
+pub fn approach(
+    job: &Job,
+    status: &Status,
+    args: &RunArgs,
+    out: &Output,
+) -> Result<CheckedTrajectory, Failure> {
+    let here = pose(status);
+    let first = job.trajectory.points.first().map_or(here, |p| p.position);
+    // Half of the limits: nobody has looked at this path for obstacles.
+    let speed = args.check.speed.min(50.0);
+    let path = plan::approach(&here, &first, &job.config, Some(&job.arm.model), speed)
+        .map_err(|e| refused(&e.to_string(), &args.file))?;
+    let checked = job.checked(&path, status, args, UploadOptions::default()).map_err(|e| {
+        let Error::Check(verdict) = e else { return e.into() };
+        let failure = refused(&verdict.to_string(), &args.file);
+        if !out.is_json() {
+            return failure;
+        }
+        let Failure { exit, code, message, hint, .. } = failure;
+        let error = json!({ "code": code, "message": message, "hint": hint, "exit": exit });
+        let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
+        out.result(&value, String::new);
+        out.note(format!("jtc: {message}\n     {hint}"));
+        Failure::printed(exit)
+    })?;
+    out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
+    Ok(checked)
+}
+
+/// The way to the first point cannot be gone; the trajectory itself is sound.
+fn refused(why: &str, file: &Path) -> Failure {
+    let file = typed(file);
+    let message =
+        format!("the straight way from where the arm stands to the first point of {file} is refused: {why}");
+    let hint = format!(
+        "nothing moved, and {file} itself passed: bring the arm nearer to its first point (`jtc traj info {file}` shows it), by hand \
+         with `jtc teach on` and `jtc teach off`, or with a trajectory of your own around what is in the way"
+    );
+    Failure { exit: REFUSED, code: APPROACH.into(), ..Failure::usage(message) }.hint(hint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The file that was typed passed its check: what is refused is the way to it.
+    #[test]
+    fn a_refused_approach_does_not_send_people_to_correct_their_file() {
+        let failure = refused("joint 2: no stop in time", Path::new("my motion.csv"));
+        assert_eq!((failure.exit, failure.code.as_str()), (4, "approach"));
+        assert!(failure.message.contains("first point of 'my motion.csv' is refused: joint 2"));
+        assert!(
+            failure.hint.contains("jtc traj info 'my motion.csv'") && failure.hint.contains("jtc teach on")
+        );
+        assert!(!failure.hint.contains("FILE") && !failure.hint.contains("traj check"), "{}", failure.hint);
+    }
+}

@@ -36,7 +36,7 @@ fn the_simulator_records_each_millisecond() {
         // What is younger than 0.2 s may be missing.
         assert!((0..400).any(|_| {
             std::thread::sleep(std::time::Duration::from_millis(50));
-            recorded_ms(&record) == 1_200
+            jtc(&["traj", "info", &record]).err.contains("at 1201 places")
         }));
         assert_eq!(sim.end("-KILL").0, -1);
         let info = json(&["traj", "info", &record]);

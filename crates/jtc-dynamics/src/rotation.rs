@@ -58,11 +58,11 @@ pub(crate) fn unit(x: f64, y: f64) -> (f64, f64) {
     (x / length, y / length)
 }
 
-/// Eigenvalues of a symmetric matrix in rising order, by Jacobi's rotations (8 sweeps: far past convergence).
+/// Eigenvalues of a symmetric matrix of finite numbers in rising order, by Jacobi's rotations (8 sweeps: far past convergence).
 pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
     let [[mut xx, mut xy, mut xz], [_, mut yy, mut yz], [_, _, mut zz]] = *m;
     let scale = [xx, xy, xz, yy, yz, zz].iter().fold(0.0f64, |a, v| a.max(v.abs()));
-    if scale == 0.0 || !scale.is_finite() {
+    if scale == 0.0 {
         return [0.0; 3];
     }
     for v in [&mut xx, &mut xy, &mut xz, &mut yy, &mut yz, &mut zz] {
@@ -101,6 +101,14 @@ mod tests {
         for x in [0.0, -0.0, f64::INFINITY, f64::NAN] {
             assert_eq!(unit(x, 0.0 * x), (1.0, 0.0));
             assert_eq!(unit(0.0 * x, x), (1.0, 0.0));
+        }
+    }
+
+    #[test]
+    fn j06_a_ball_and_a_point_have_three_equal_moments() {
+        for moment in [0.0, 1.0, -2.0] {
+            let ball = [[moment, 0.0, 0.0], [0.0, moment, 0.0], [0.0, 0.0, moment]];
+            assert_eq!(principal_moments(&ball), [moment; 3]);
         }
     }
 

@@ -79,11 +79,12 @@ pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
 
 /// One rotation in the plane of `a` and `b` that makes their product `ab` vanish; `ac` and `bc` turn with it.
 fn eliminate(a: f64, b: f64, ab: f64, ac: f64, bc: f64) -> (f64, f64, f64, f64, f64) {
-    if ab.abs() < 1.0e-100 {
-        return (a, b, 0.0, ac, bc);
-    }
     let half = 0.5 * (b - a);
     let root = sqrt(half * half + ab * ab);
+    if root == 0.0 {
+        // Round, up to what a square root can see: any turn would do.
+        return (a, b, 0.0, ac, bc);
+    }
     // The smaller of the two rotations that do it.
     let t = ab / (half + root.copysign(half));
     let c = 1.0 / sqrt(1.0 + t * t);

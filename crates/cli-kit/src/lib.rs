@@ -1,14 +1,24 @@
-//! What the commands `jtc` and `ucom` share: how they speak, make their pages, hear Ctrl-C, and are tried by tests.
+//! What the commands `jtc` and `ucom` share: how they print, draw live views, read keys, make their pages, receive Ctrl-C, and are
+//! tried by tests.
 #![forbid(unsafe_code)]
 
+mod bar;
 pub mod exit;
+mod keys;
+mod lines;
 mod output;
 pub mod pages;
+mod screen;
 mod signal;
 #[cfg(feature = "trial")]
 pub mod trial;
 pub mod usage;
+pub mod view;
 
+pub use bar::{Stderr, draws_bars};
 pub use indicatif::ProgressBar;
+pub use keys::{Key, Keys};
+pub use lines::{Lines, stdout_is_stuck};
 pub use output::{Output, figure, table};
+pub use screen::{Screen, restore_terminal};
 pub use signal::Stop;

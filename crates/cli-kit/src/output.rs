@@ -1,19 +1,35 @@
 //! Where words go: results to stdout as text or JSON, progress and logs to stderr.
+//!
+//! A command that streams prints events while it works, one JSON object a line with the key `event`, and its result as the last of
+//! them, `report`. A reader that does not read holds no command: events wait in a queue and are dropped where too many do.
 
 use std::io::{IsTerminal, Write};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::ProgressBar;
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
+
+use crate::bar::{self, suspended};
+use crate::lines::Lines;
 
 /// Why the first result that was lost could not be printed. A command goes on without its output; its exit code says so in the end.
 static LOST: OnceLock<String> = OnceLock::new();
 /// A write to stdout has failed, for whatever reason.
 static GONE: AtomicBool = AtomicBool::new(false);
 
-/// How a command speaks.
+/// Events of this process that wait for their reader; none where it streams nothing.
+static STREAM: OnceLock<Mutex<Stream>> = OnceLock::new();
+
+/// The lines of a stream, and when it began.
+struct Stream {
+    lines: Lines,
+    began: Instant,
+}
+
+/// How a command prints.
 #[derive(Clone, Copy, Debug)]
 pub struct Output {
     program: &'static str,
@@ -31,6 +47,35 @@ impl Output {
         self.json
     }
 
+    /// From now on events are printed as they happen, and the result as the last one, where JSON was asked for.
+    pub fn stream(&self) -> std::io::Result<()> {
+        if self.json && STREAM.get().is_none() {
+            let _ = STREAM.set(Mutex::new(Stream { lines: Lines::stdout()?, began: Instant::now() }));
+        }
+        Ok(())
+    }
+
+    /// Something that happens, with the seconds since the stream began; nothing where no stream was begun.
+    pub fn event(&self, name: &str, value: Value) {
+        let Some(stream) = STREAM.get() else { return };
+        let stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
+        let time_s = (stream.began.elapsed().as_secs_f64() * 1e3).round() / 1e3;
+        let mut event = json!({ "event": name, "time_s": time_s });
+        if let (Some(event), Value::Object(value)) = (event.as_object_mut(), value) {
+            event.extend(value);
+        }
+        stream.lines.push(event.to_string());
+    }
+
+    /// Prints what still waits of a stream, as long as it is read. Events that nobody will see are a lost result.
+    pub fn finish() {
+        let Some(stream) = STREAM.get() else { return };
+        let unseen = stream.lock().unwrap_or_else(PoisonError::into_inner).lines.finish();
+        if unseen > 0 {
+            let _ = LOST.set(format!("{unseen} lines were not read"));
+        }
+    }
+
     /// A result as it is printed: `value` as one line of JSON, or the text.
     pub fn words(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> String {
         if self.json {
@@ -43,16 +88,34 @@ impl Output {
 
     /// Prints a result: `value` as one line of JSON, or the text.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
+        if STREAM.get().is_some() {
+            let value = serde_json::to_value(value)
+                .unwrap_or_else(|e| json!({ "error": { "message": e.to_string() } }));
+            Self::last("report", value);
+            return;
+        }
         let line = self.words(value, text);
         Self::bytes(format!("{}\n", line.trim_end()).as_bytes());
     }
 
+    /// The last line of a stream: a result, or why there is none.
+    fn last(name: &str, value: Value) {
+        let Some(stream) = STREAM.get() else { return };
+        let mut event = json!({ "event": name });
+        if let (Some(event), Value::Object(value)) = (event.as_object_mut(), value) {
+            event.extend(value);
+        }
+        stream.lock().unwrap_or_else(PoisonError::into_inner).lines.push_always(event.to_string());
+    }
+
     /// Prints a result that is a file of its own, as it is.
     pub fn bytes(bytes: &[u8]) {
-        let mut stdout = std::io::stdout().lock();
-        if let Err(e) = stdout.write_all(bytes).and_then(|()| stdout.flush()) {
-            Self::lose(&e);
-        }
+        suspended(|| {
+            let mut stdout = std::io::stdout().lock();
+            if let Err(e) = stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+                Self::lose(&e);
+            }
+        });
     }
 
     /// Remembers why something that was meant for stdout was lost. A reader that has gone (`… | head`) has seen what it wanted: that is no loss.
@@ -75,43 +138,72 @@ impl Output {
 
     /// One line of a log. A terminal that has gone is no reason to leave a machine alone: what cannot be printed is dropped.
     pub fn note(&self, text: impl std::fmt::Display) {
-        let _ = writeln!(std::io::stderr().lock(), "{text}");
+        let text = within(&text.to_string(), bar::stderr_width());
+        suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
 
     /// A bar on stderr; invisible where stderr is no terminal.
     pub fn bar(&self, total: u64, what: &str) -> ProgressBar {
-        let bar = ProgressBar::with_draw_target(Some(total), target());
-        let style = ProgressStyle::with_template("{msg:8} {wide_bar:.cyan/dim} {pos:>5}/{len} {elapsed:>5}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─"));
-        bar.set_message(what.to_owned());
-        bar
+        bar::of_steps(total, what)
     }
 
-    /// A bar of bytes on stderr, with the words of its owner behind it.
+    /// A bar of bytes on stderr, with the words of its owner below it.
     pub fn bytes_bar(&self, total: u64, what: &str) -> ProgressBar {
-        let bar = ProgressBar::with_draw_target(Some(total), target());
-        let style =
-            ProgressStyle::with_template("{prefix:9} {bar:32.cyan/dim} {bytes:>9} of {total_bytes}  {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─"));
-        bar.set_prefix(what.to_owned());
-        bar
+        bar::of_bytes(total, what)
+    }
+
+    /// A bar of a motion of so many milliseconds on stderr, with the words of its owner below it, and the keys below them.
+    pub fn motion_bar(&self, total_ms: u64, what: &str, keys: &str) -> ProgressBar {
+        bar::of_motion(total_ms, what, keys)
     }
 
     /// Prints why a command failed: the exit code, a short name for programs, what happened, what to do next.
     pub fn failure(&self, exit: u8, code: &str, message: &str, hint: &str) {
         if self.json {
             let error = json!({ "code": code, "message": message, "hint": hint, "exit": exit });
-            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error }));
+            if STREAM.get().is_some() {
+                Self::last("error", json!({ "error": error }));
+            } else {
+                let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error }));
+            }
         }
-        self.note(format_args!("{}: {message}", self.program));
+        self.warn(message, hint);
+    }
+
+    /// What is wrong and what to do next, as it is said at the end of a command; on a terminal broken between words.
+    pub fn warn(&self, message: &str, hint: &str) {
+        let width = bar::stderr_width();
+        self.note(hanging(&format!("{}: ", self.program), message, width));
         if !hint.is_empty() {
-            self.note(format_args!("{:1$}  {hint}", "", self.program.len()));
+            self.note(hanging(&" ".repeat(self.program.len() + 2), hint, width));
         }
     }
 }
 
-fn target() -> ProgressDrawTarget {
-    if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
+/// Text whose long lines are broken between words; rows of tables stay as they are.
+fn within(text: &str, width: Option<u16>) -> String {
+    let Some(width) = width.filter(|width| *width >= 16) else { return text.to_owned() };
+    let lines = text.lines().map(|line| {
+        let words = line.trim_start();
+        let head = &line[..line.len() - words.len()];
+        let fits = line.chars().count() <= usize::from(width);
+        if fits || words.contains("  ") || head.len() + 16 > usize::from(width) {
+            line.to_owned()
+        } else {
+            hanging(head, words, Some(width + 1))
+        }
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Text behind a head, its further lines below its first one; as it is where the width is not known.
+fn hanging(head: &str, text: &str, width: Option<u16>) -> String {
+    let Some(room) = width.and_then(|w| w.checked_sub(head.len() as u16 + 1)).filter(|room| *room >= 16)
+    else {
+        return format!("{head}{text}");
+    };
+    let lines = text.lines().flat_map(|line| crate::view::wrapped(line, room)).collect::<Vec<_>>();
+    format!("{head}{}", lines.join(&format!("\n{:1$}", "", head.len())))
 }
 
 /// A number with so many decimals; one that rounds to zero has no sign.
@@ -123,8 +215,42 @@ pub fn figure(value: f64, digits: usize) -> String {
     }
 }
 
-/// Rows as a text table; words to the left, columns whose head begins with `>` (figures) to the right.
+/// Columns of the terminal on stdout; none where it is no terminal.
+fn stdout_width() -> Option<u16> {
+    std::io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten().map(|size| size.0)
+}
+
+/// Rows as a text table; words to the left, columns whose head begins with `>` (figures) to the right. On a terminal that is too
+/// narrow for all columns the rest of them come below, with the first column again.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    table_within(head, rows, stdout_width())
+}
+
+fn table_within(head: &[&str], rows: &[Vec<String>], width: Option<u16>) -> String {
+    let text = whole_table(head, rows);
+    let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+    let Some(width) = width.filter(|width| usize::from(*width) < widest) else { return text };
+    // As many columns as fit beside the first one; at least one, however narrow it is.
+    for count in (2..head.len()).rev() {
+        let rest: Vec<usize> = (count..head.len()).collect();
+        let pick = |columns: &[usize]| {
+            let head: Vec<&str> = columns.iter().map(|c| head[*c]).collect();
+            let cell = |row: &Vec<String>, c: &usize| row.get(*c).cloned().unwrap_or_default();
+            let rows: Vec<Vec<String>> =
+                rows.iter().map(|row| columns.iter().map(|c| cell(row, c)).collect()).collect();
+            (head, rows)
+        };
+        let (first_head, first_rows) = pick(&(0..count).collect::<Vec<_>>());
+        let first = whole_table(&first_head, &first_rows);
+        if count == 2 || first.lines().all(|line| line.chars().count() <= usize::from(width)) {
+            let (rest_head, rest_rows) = pick(&[vec![0], rest].concat());
+            return format!("{first}\n{}", table_within(&rest_head, &rest_rows, Some(width)));
+        }
+    }
+    text
+}
+
+fn whole_table(head: &[&str], rows: &[Vec<String>]) -> String {
     let right: Vec<bool> = head.iter().map(|h| h.starts_with('>')).collect();
     let head: Vec<&str> = head.iter().map(|h| h.trim_start_matches('>')).collect();
     let width = |i: usize| {
@@ -153,6 +279,33 @@ pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn notes_are_broken_between_words_and_rows_of_tables_are_not() {
+        assert_eq!(within("  one two three four five", Some(20)), "  one two three four\n  five");
+        assert_eq!(within("one   two   three   four", Some(20)), "one   two   three   four");
+        assert_eq!(within("one two three four five", None), "one two three four five");
+    }
+
+    /// On a narrow terminal no column is cut.
+    #[test]
+    fn columns_without_room_come_below() {
+        let rows = [vec!["joint 1".into(), "0.201".into(), "0.773".into(), "12".into()]];
+        let head = ["", ">RMS", ">max", ">share %"];
+        assert_eq!(table_within(&head, &rows, None).lines().count(), 2);
+        let narrow =
+            "            RMS     max\njoint 1   0.201   0.773\n\n          share %\njoint 1        12\n";
+        assert_eq!(table_within(&head, &rows, Some(24)), narrow);
+    }
+
+    #[test]
+    fn what_is_wrong_is_broken_between_words_below_its_head() {
+        assert_eq!(
+            hanging("jtc: ", "joint 3 does not answer", Some(22)),
+            "jtc: joint 3 does not\n     answer"
+        );
+        assert_eq!(hanging("jtc: ", "joint 3 does not answer", None), "jtc: joint 3 does not answer");
+    }
 
     #[test]
     fn a_figure_that_rounds_to_zero_has_no_sign() {

@@ -44,7 +44,7 @@ impl Stop {
     }
 
     /// From now on the first SIGINT, SIGTERM or SIGHUP sets the flag. The second one ends the process, whatever the rest of it does,
-    /// with the exit code that `last_words` returns; it runs in a thread of its own and may print.
+    /// with the exit code that `last_words` returns and the terminal as it was; it runs in a thread of its own and may print.
     ///
     /// Signals that follow each other within 0.1 s are one: a terminal and a wrapper may both send theirs.
     pub fn listen_with(last_words: impl Fn() -> u8 + Send + 'static) -> std::io::Result<Self> {
@@ -59,6 +59,7 @@ impl Stop {
                 std::thread::sleep(LOOK);
                 if came.swap(false, Ordering::Relaxed) {
                     if flag.swap(true, Ordering::Relaxed) {
+                        crate::restore_terminal();
                         std::process::exit(last_words().into());
                     }
                     std::thread::sleep(ONE_PRESS);

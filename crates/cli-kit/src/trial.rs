@@ -1,9 +1,19 @@
-//! For tests: runs a command as a user does.
+//! For tests: runs a command as a user does, also at a terminal.
+
+#[cfg(unix)]
+mod screen;
+#[cfg(unix)]
+mod terminal;
 
 use std::io::Write;
 use std::process::{Child, Command, Stdio};
 
 use serde_json::Value;
+
+#[cfg(unix)]
+pub use screen::Picture;
+#[cfg(unix)]
+pub use terminal::Terminal;
 
 /// What a command said and how it ended.
 pub struct Said {
@@ -16,10 +26,16 @@ pub struct Said {
 }
 
 impl Said {
-    /// Its stdout as one JSON object; panics if it is none.
+    /// Its result: the last line of its stdout as one JSON object; panics if it is none.
     pub fn json(&self) -> Value {
         let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
-        serde_json::from_str(self.out.trim()).unwrap_or_else(error)
+        serde_json::from_str(self.out.trim().lines().last().unwrap_or_default()).unwrap_or_else(error)
+    }
+
+    /// The lines of its stdout as JSON objects; panics if one is none.
+    pub fn events(&self) -> Vec<Value> {
+        let parse = |line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line:?}"));
+        self.out.lines().map(parse).collect()
     }
 
     /// The same, once it ended with this code; panics if it ended with another.

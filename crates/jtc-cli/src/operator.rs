@@ -4,12 +4,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use cli_kit::{Output, Stop};
+use cli_kit::view::LEAST;
+use cli_kit::{Keys, Output, Stop, draws_bars};
 use jtc_host::session::Flow;
 use jtc_wire::Status;
 
 use crate::failure::{FAULT, Failure};
-use crate::keys::{HELP, Key, Keys, Terminal};
+use crate::keys::{HELP, NO_SPEED, Wish, wish};
 use crate::output_file;
 
 /// Trajectory execution states, as on the wire.
@@ -25,6 +26,7 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
     let (done, said) = mpsc::channel();
     std::thread::spawn(move || {
         out.failure(FAULT, "ended-at-once", message, hint);
+        Output::finish();
         let _ = done.send(());
     });
     let _ = said.recv_timeout(LAST_WORDS);
@@ -36,7 +38,6 @@ pub struct Operator<'a> {
     /// Where words go.
     pub out: &'a Output,
     stop: Stop,
-    terminal: Terminal,
     /// Only while the arm moves: otherwise the terminal is as it was.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
@@ -49,10 +50,9 @@ impl<'a> Operator<'a> {
     /// From now on the first SIGINT, SIGTERM or SIGHUP is a wish to end; the second one ends the process at once, with the terminal
     /// as it was and words about the arm.
     pub fn listen(out: &'a Output) -> Result<Self, Failure> {
-        let (terminal, moving) = (Terminal::default(), Arc::new(AtomicBool::new(false)));
-        let (its_terminal, its_moving, its_out) = (terminal.clone(), Arc::clone(&moving), *out);
+        let moving = Arc::new(AtomicBool::new(false));
+        let (its_moving, its_out) = (Arc::clone(&moving), *out);
         let stop = Stop::listen_with(move || {
-            its_terminal.restore();
             let (message, hint) = if its_moving.load(Ordering::Relaxed) {
                 (
                     "ended at once: THE ARM MAY BE MOVING",
@@ -63,7 +63,7 @@ impl<'a> Operator<'a> {
             };
             ended_at_once(its_out, message, hint)
         })?;
-        Ok(Self { out, stop, terminal, keys: None, moving, stopping: false, said: 0 })
+        Ok(Self { out, stop, keys: None, moving, stopping: false, said: 0 })
     }
 
     /// The command shall end.
@@ -75,10 +75,24 @@ impl<'a> Operator<'a> {
     pub fn motion_begins(&mut self) {
         self.moving.store(true, Ordering::Relaxed);
         self.said = 0;
-        self.keys = Keys::listen(&self.terminal);
-        if self.keys.is_some() {
-            self.out.note(HELP);
+        self.keys = Keys::listen();
+        if self.keys.is_none() {
+            return;
         }
+        match draws_bars() {
+            // They stand below the bar.
+            Ok(()) if !self.out.is_json() => {}
+            Err(Some((columns, rows))) => self.out.note(format_args!(
+                "{HELP}: the progress bar needs {} columns and {} rows, the terminal has {columns} and {rows}",
+                LEAST.0, LEAST.1
+            )),
+            _ => self.out.note(HELP),
+        }
+    }
+
+    /// The keys as they stand below a bar; empty where none count.
+    pub fn keys(&self) -> &'static str {
+        if self.keys.is_some() { HELP } else { "" }
     }
 
     /// From now on they do not.
@@ -93,16 +107,20 @@ impl<'a> Operator<'a> {
             self.said = status.tes;
             self.out.note(if status.tes == PAUSE { "paused; space goes on" } else { "moving" });
         }
-        let key = self.keys.as_mut().and_then(Keys::pressed);
-        if self.stop.asked() || key == Some(Key::Stop) {
+        let wish = self.keys.as_mut().and_then(wish);
+        if self.stop.asked() || wish == Some(Wish::Stop) {
             if !std::mem::replace(&mut self.stopping, true) {
                 self.out.note("stopping on the path");
             }
             return Flow::Stop;
         }
-        match (key, status.tes) {
-            (Some(Key::PauseOrResume), EXECUTE) => Flow::Pause,
-            (Some(Key::PauseOrResume), PAUSE) => Flow::Resume,
+        match (wish, status.tes) {
+            (Some(Wish::PauseOrResume), EXECUTE) => Flow::Pause,
+            (Some(Wish::PauseOrResume), PAUSE) => Flow::Resume,
+            (Some(Wish::Speed), _) => {
+                self.out.note(NO_SPEED.replace('`', ""));
+                Flow::Continue
+            }
             _ => Flow::Continue,
         }
     }

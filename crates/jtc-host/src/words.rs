@@ -98,22 +98,51 @@ pub fn missing_nodes(node_init: u8) -> Vec<String> {
     (0..7).filter(|n| node_init >> n & 1 == 1).map(node).collect()
 }
 
-/// All current errors of a status in one line, nodes that do not answer first: most of the rest follows from it.
-pub fn errors_line(s: &Status) -> String {
+/// All current errors of a status, the most particular ones first: nodes that do not answer, the safety input, what each joint and
+/// the gripper report. The controller's other error bits follow from these.
+pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
-    all.extend(errors(s.errors).into_iter().map(String::from));
+    all.extend(errors(s.errors & SAFETY_INPUT).into_iter().map(String::from));
     for (j, joint) in s.joints.iter().enumerate() {
         let words = joint_errors(joint.internal)
             .into_iter()
             .chain(node_errors(joint.errors))
             .chain(motor_faults(joint.mc_current))
-            .chain((joint.warnings & 8 != 0).then_some("safety line active"))
+            .chain((joint.warnings & SAFETY_LINE != 0 && is_ready(s, j)).then_some("safety line active"))
             .chain((joint.fsm >= 254).then(|| node_state(joint.fsm)));
         all.extend(words.map(|w| format!("joint {}: {w}", j + 1)));
     }
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
+    all.extend(errors(s.errors & !SAFETY_INPUT).into_iter().map(String::from));
+    all
+}
+
+/// Bit of the controller's errors that has no other cause than itself.
+const SAFETY_INPUT: u16 = 1;
+
+/// Bit of a node's warnings that is an error: the drive holds its torque off.
+const SAFETY_LINE: u8 = 8;
+
+/// Before it is configured a drive sets the bit, too, which says nothing then.
+fn is_ready(s: &Status, j: usize) -> bool {
+    s.node_init >> j & 1 == 0
+}
+
+/// What nodes warn of and is no error.
+pub fn warnings(s: &Status) -> Vec<String> {
+    let joints = s.joints.iter().map(|joint| joint.warnings).chain(s.gripper.map(|g| g.warnings)).enumerate();
+    let words = joints.flat_map(|(n, byte)| {
+        let own = if n < s.joints.len() { byte & !SAFETY_LINE } else { byte };
+        node_warnings(own).into_iter().map(move |word| format!("{}: {word}", node(n)))
+    });
+    words.collect()
+}
+
+/// All current errors of a status in one line.
+pub fn errors_line(s: &Status) -> String {
+    let all = causes(s);
     if all.is_empty() {
         format!("no error bit is set (state {}, trajectory {})", state(s.fsm), tes(s.tes))
     } else {
@@ -161,5 +190,30 @@ pub fn next_step(s: &Status) -> &'static str {
         "`jtc traj stop` ends the motion"
     } else {
         "`jtc status`"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What broke stands before what follows from it, and a drive that is not configured yet has no safety line to be active.
+    #[test]
+    fn the_most_particular_cause_stands_first() {
+        let mut s = Status { fsm: 5, errors: 0x89, can_current: 1 << 10, ..Status::default() };
+        s.joints[3].mc_current = 0x40;
+        s.joints[4].warnings = 8;
+        let first = [
+            "joint 3 does not answer",
+            "emergency input",
+            "joint 4: over-current",
+            "joint 5: safety line active",
+        ];
+        assert_eq!(causes(&s)[..4], first);
+        assert_eq!(causes(&s)[4..], ["external error", "external joints error"]);
+        s.node_init = 1 << 4;
+        assert!(
+            !causes(&s).concat().contains("safety line") && !warnings(&s).concat().contains("safety line")
+        );
     }
 }

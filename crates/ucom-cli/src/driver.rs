@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
-use cli_kit::{Output, Stop};
+use cli_kit::{Lines, Output, Stop};
 use serde_json::{Value, json};
 use ucom::Profile;
 use ucom::master::{
@@ -13,7 +13,6 @@ use ucom::master::{
 use crate::args::{Boards, LinkArgs};
 use crate::commands::conformance::told;
 use crate::failure::{FAULT, Failure, NO_LINK};
-use crate::lines::Lines;
 use crate::link::Link;
 use crate::pump::{LOOK, Pump};
 use crate::signal::Undone;

@@ -6,7 +6,6 @@ mod cache;
 mod commands;
 mod driver;
 mod failure;
-mod lines;
 mod link;
 mod pump;
 mod shape;
@@ -45,7 +44,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             if !failure.printed {
                 // Nobody reads what stands in stdout already.
-                let out = if lines::stdout_is_stuck() { Output::new("ucom", false) } else { out };
+                let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 let exit = failure.exit;
                 signal::say_at_most(PATIENCE, move || {
                     out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);

@@ -1,12 +1,11 @@
 //! `jtc monitor`: the controller live. A full view on a terminal, one line a status elsewhere.
 
+mod joints;
 mod view;
 
-use std::io::IsTerminal;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use cli_kit::{Output, Stop, figure};
-use crossterm::event::{self, Event, KeyCode, KeyModifiers};
+use cli_kit::{Key, Output, Screen, Stop, figure};
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::sample::is_measured;
 use jtc_host::{Session, words};
@@ -16,15 +15,28 @@ use crate::args::MonitorArgs;
 use crate::failure::Failure;
 use view::View;
 
+/// 25 pictures a second are enough, however fast statuses come.
+const PICTURE: Duration = Duration::from_millis(40);
+/// After so long a silence what was received last is no news any more.
+const SILENT: Duration = Duration::from_secs(1);
+
 /// Shows statuses until `q`, Ctrl-C, or so many of them.
 pub fn monitor(args: &MonitorArgs, out: &Output) -> Result<(), Failure> {
+    let stop = Stop::listen()?;
     let mut session = args.link.session()?;
-    let full = !out.is_json() && std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
-    if full { live(&mut session, args.count) } else { lines(&mut session, args.count, out) }
+    let screen = if out.is_json() { None } else { Screen::take()? };
+    match screen {
+        Some(screen) => live(&mut session, args.count, screen, &stop),
+        None => lines(&mut session, args.count, &stop, out),
+    }
 }
 
-fn lines(session: &mut Session<SerialPort>, count: Option<u64>, out: &Output) -> Result<(), Failure> {
-    let stop = Stop::listen()?;
+fn lines(
+    session: &mut Session<SerialPort>,
+    count: Option<u64>,
+    stop: &Stop,
+    out: &Output,
+) -> Result<(), Failure> {
     let mut left = count.unwrap_or(u64::MAX);
     while left > 0 && !stop.asked() && !Output::gone() {
         let s = session.next_status()?;
@@ -51,49 +63,53 @@ fn lines(session: &mut Session<SerialPort>, count: Option<u64>, out: &Output) ->
     Ok(())
 }
 
-fn live(session: &mut Session<SerialPort>, count: Option<u64>) -> Result<(), Failure> {
+fn live(
+    session: &mut Session<SerialPort>,
+    count: Option<u64>,
+    mut screen: Screen,
+    stop: &Stop,
+) -> Result<(), Failure> {
     let mut view = View::new(session.port().name());
     let mut left = count.unwrap_or(u64::MAX);
-    let mut terminal = ratatui::try_init()?;
-    let mut run = || -> Result<(), Failure> {
-        let mut drawn = Duration::ZERO;
-        let mut heard = session.now();
-        while left > 0 {
-            while event::poll(Duration::ZERO)? {
-                if let Event::Key(key) = event::read()? {
-                    let ctrl_c =
-                        key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
-                    match key.code {
-                        _ if ctrl_c => return Ok(()),
-                        KeyCode::Char('q') | KeyCode::Esc => return Ok(()),
-                        KeyCode::Char('s') => view.said = stop(session),
-                        _ => view.said.clear(),
-                    }
+    let mut drawn: Option<Instant> = None;
+    let mut received = session.now();
+    while left > 0 && !stop.asked() && !screen.gone() {
+        for key in screen.pressed() {
+            match key {
+                Key::Char('q') | Key::Escape => return Ok(()),
+                Key::Char('s') => {
+                    view.said = "stopping".into();
+                    screen.draw(|frame| view.draw(frame));
+                    view.said = stop_motion(session);
+                }
+                key => {
+                    view.said.clear();
+                    view.scroll.key(key);
                 }
             }
-            if let Some(s) = session.poll(Duration::from_millis(100))? {
-                heard = session.now();
+        }
+        match session.poll(PICTURE) {
+            Ok(Some(s)) => {
+                received = session.now();
                 view.push(s);
                 left -= 1;
             }
-            view.silent = session.now().saturating_sub(heard) > Duration::from_secs(1);
-            view.rate = session.statistics().status_rate();
-            view.bad_bytes = session.statistics().bad_bytes;
-            // 25 pictures a second are enough, however fast statuses come.
-            if session.now() - drawn >= Duration::from_millis(40) || drawn == Duration::ZERO {
-                drawn = session.now();
-                terminal.draw(|frame| view.draw(frame))?;
-            }
+            Ok(None) => {}
+            Err(e) => return Err(view.lost(e.into())),
         }
-        Ok(())
-    };
-    let done = run();
-    ratatui::restore();
-    done
+        view.silent = Some(session.now().saturating_sub(received)).filter(|time| *time > SILENT);
+        view.rate = session.statistics().status_rate();
+        view.bad_bytes = session.statistics().bad_bytes;
+        if drawn.is_none_or(|at| at.elapsed() >= PICTURE) {
+            drawn = Some(Instant::now());
+            screen.draw(|frame| view.draw(frame));
+        }
+    }
+    Ok(())
 }
 
-/// Stops the motion on its path; says what became of it.
-fn stop(session: &mut Session<SerialPort>) -> String {
+/// Stops the motion on its path; what became of it.
+fn stop_motion(session: &mut Session<SerialPort>) -> String {
     match session.stop() {
         Ok(()) => "stopping on the path".into(),
         Err(e) => format!("stop: {e}"),

@@ -43,11 +43,11 @@ pub fn as_json(s: &Status) -> Value {
         .collect();
     let gripper = s.gripper.map(|g| {
         json!({
-            "state": words::node_state(g.fsm),
+            "state": gripper_state(s),
             "fsm": g.fsm,
-            "pump": g.pump != 0,
-            "pressure1": g.pressure1 != 0,
-            "pressure2": g.pressure2 != 0,
+            "pump": gripper_answers(s).then_some(g.pump != 0),
+            "pressure1": gripper_answers(s).then_some(g.pressure1 != 0),
+            "pressure2": gripper_answers(s).then_some(g.pressure2 != 0),
             "node_errors": words::node_errors(g.errors),
             "warnings": words::node_warnings(g.warnings),
         })
@@ -82,6 +82,19 @@ pub fn joint_state(s: &Status, j: usize) -> &'static str {
     if silent { "does not answer" } else { words::node_state(fsm) }
 }
 
+/// What the status says of pump and vacuum is what the gripper sent.
+pub fn gripper_answers(s: &Status) -> bool {
+    s.can_current >> 14 & 1 == 0
+}
+
+/// State of the gripper: what it sent last, unless it sends nothing any more.
+pub fn gripper_state(s: &Status) -> &'static str {
+    match s.gripper {
+        Some(g) if gripper_answers(s) => words::node_state(g.fsm),
+        _ => "does not answer",
+    }
+}
+
 /// A status as text.
 pub fn as_text(s: &Status) -> String {
     let mut text = format!(
@@ -113,13 +126,17 @@ pub fn as_text(s: &Status) -> String {
     text += &table(&["", "state", ">position rad", ">velocity rad/s", ">torque N·m", ">°C"], &rows);
     if let Some(g) = s.gripper {
         let is = |level| if level != 0 { "reached" } else { "not reached" };
-        text += &format!(
-            "gripper   {}   pump {}   vacuum 1 {}, 2 {}\n",
-            words::node_state(g.fsm),
-            if g.pump != 0 { "runs" } else { "stands" },
-            is(g.pressure1),
-            is(g.pressure2),
-        );
+        text += &if gripper_answers(s) {
+            format!(
+                "gripper   {}   pump {}   vacuum 1 {}, 2 {}\n",
+                gripper_state(s),
+                if g.pump != 0 { "runs" } else { "stands" },
+                is(g.pressure1),
+                is(g.pressure2),
+            )
+        } else {
+            format!("gripper   {}\n", gripper_state(s))
+        };
     }
     if s.errors != 0 {
         text += &format!("errors: {}\n", words::errors_line(s));

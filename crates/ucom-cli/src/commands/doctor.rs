@@ -41,14 +41,7 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             other => return Err(unexpected(&other)),
         },
     };
-    let state = driver.link().state();
-    let controller = (state.errors != ErrorState::Unknown).then_some(Controller {
-        bus_off: state.errors == ErrorState::BusOff,
-        passive: state.errors == ErrorState::Passive,
-        tec: state.tec,
-        rec: state.rec,
-        ..Default::default()
-    });
+    let controller = controller(&mut driver);
     let profile = driver.master.profile();
     let seen = Observation {
         listened_us: LISTEN.as_micros() as u64,
@@ -72,6 +65,18 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         (true, 0) => Err(Failure::printed(NO_LINK)),
         (true, _) => Err(Failure::printed(DEVICE)),
     }
+}
+
+/// What the CAN adapter says of itself; none where it says nothing.
+pub fn controller(driver: &mut Driver) -> Option<Controller> {
+    let state = driver.link().state();
+    (state.errors != ErrorState::Unknown).then_some(Controller {
+        bus_off: state.errors == ErrorState::BusOff,
+        passive: state.errors == ErrorState::Passive,
+        tec: state.tec,
+        rec: state.rec,
+        ..Default::default()
+    })
 }
 
 fn line(f: &Finding) -> String {

@@ -8,6 +8,7 @@ mod followed;
 mod help;
 mod io;
 mod monitor;
+mod monitor_boards;
 mod monitor_view;
 mod outputs;
 mod params;

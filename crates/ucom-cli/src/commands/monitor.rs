@@ -1,19 +1,19 @@
 //! `ucom monitor`: boards, bus load and foreign frames live. A full view on a terminal, one object a second elsewhere.
 
 use std::collections::VecDeque;
-use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-use cli_kit::Output;
-use crossterm::event::{self, Event as Key, KeyCode, KeyModifiers};
+use cli_kit::view::Scroll;
+use cli_kit::{Key, Lines, Output, Screen};
 use serde_json::{Value, json};
+use ucom::Profile;
 use ucom::master::{Board, Event, Life, Request};
 
-use super::monitor_view as view;
+use super::doctor::controller;
+use super::monitor_view::{self as view, ForeignMaster};
 use crate::args::{LinkArgs, MonitorArgs};
 use crate::driver::{Driver, nothing_shared, shared_numbers, words};
 use crate::failure::Failure;
-use crate::lines::Lines;
 use crate::shape::{bits, info_value, state};
 
 /// Seconds of bus load that the curve shows.
@@ -29,33 +29,40 @@ pub struct Watch {
     pub load: VecDeque<f64>,
     /// What happened, oldest first: time in s and words.
     pub log: VecDeque<(f64, String)>,
-    /// Another PC is master: nothing is asked.
-    pub foreign_master: bool,
+    /// Another PC is master, by what it sent last: nothing is asked.
+    pub foreign_master: Option<ForeignMaster>,
     /// Nothing may be sent.
     pub listen_only: bool,
     /// The boards are to be asked who they are.
     pub ask: bool,
-    /// Rows of boards above the first one that is shown.
-    pub scrolled: usize,
+    /// How the boards read the protocol.
+    pub profile: Profile,
+    /// What became of the last key, until the next one.
+    pub said: String,
     loaded: Instant,
 }
 
+/// So long boards have for their answer before silence is said, µs.
+const QUIET_US: u64 = 2_000_000;
+
 impl Watch {
-    pub(super) fn new(url: String, listen_only: bool) -> Self {
-        let (load, log) = (VecDeque::new(), VecDeque::new());
-        let (foreign_master, ask, loaded) = (false, !listen_only, Instant::now());
-        Self { url, load, log, foreign_master, listen_only, ask, scrolled: 0, loaded }
+    pub(super) fn new(url: String, listen_only: bool, profile: Profile) -> Self {
+        Self {
+            url,
+            load: VecDeque::new(),
+            log: VecDeque::new(),
+            foreign_master: None,
+            listen_only,
+            ask: !listen_only,
+            profile,
+            said: String::new(),
+            loaded: Instant::now(),
+        }
     }
 
-    /// The row that is shown first, where so many of all have room.
-    pub fn first(&self, room: usize, rows: usize) -> usize {
-        self.scrolled.min(rows.saturating_sub(room))
-    }
-
-    /// Shows boards further down, or up.
-    pub fn scroll(&mut self, by: isize, (room, rows): (usize, usize)) {
-        self.scrolled = self.scrolled.saturating_add_signed(by);
-        self.scrolled = self.first(room, rows);
+    /// Who is there has had the time to answer.
+    pub fn quiet_long(&self, now_us: u64) -> bool {
+        now_us >= QUIET_US
     }
 
     /// Lets the bus go on for a moment.
@@ -64,11 +71,11 @@ impl Watch {
         let time_s = driver.now_us() as f64 * 1e-6;
         while let Some(event) = driver.master.take_event() {
             match &event {
-                Event::ForeignMaster { .. } => {
-                    if !self.foreign_master {
+                Event::ForeignMaster { function, to } => {
+                    if self.foreign_master.is_none() {
                         self.note(time_s, "another PC is master of the bus: this view only listens".into());
                     }
-                    self.foreign_master = true;
+                    self.foreign_master = Some((*function, *to));
                 }
                 Event::Note { .. } | Event::Done { .. } => {}
                 other => {
@@ -87,6 +94,22 @@ impl Watch {
         }
         self.question(driver);
         Ok(())
+    }
+
+    /// Stops the control loops of all boards; who is master does not matter for that.
+    fn stop(&mut self, driver: &mut Driver) {
+        if self.listen_only {
+            self.said = "--listen-only: nothing was sent; `ucom stop all` stops the boards".into();
+            return;
+        }
+        driver.stop_at_once(None);
+        self.said = "stop sent to all boards; `ucom stop all` also ends their applications".into();
+    }
+
+    /// Asks the boards again who they are, where that is allowed.
+    fn ask_again(&mut self) {
+        self.ask = !self.listen_only;
+        self.said = if self.listen_only { "--listen-only: nothing is asked" } else { "asked again" }.into();
     }
 
     fn note(&mut self, time_s: f64, text: String) {
@@ -110,12 +133,12 @@ impl Watch {
 /// Shows the bus until `q`, Ctrl-C, or so many views.
 pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = Driver::open(link, out)?;
-    let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only);
-    let full = !out.is_json() && std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
+    let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only, driver.master.profile());
     let left = args.count.unwrap_or(u64::MAX);
-    match full {
-        true => live(&mut driver, &mut watch, left)?,
-        false => lines(&mut driver, &mut watch, left, out)?,
+    let screen = if out.is_json() { None } else { Screen::take()? };
+    match screen {
+        Some(screen) => live(&mut driver, &mut watch, left, screen)?,
+        None => lines(&mut driver, &mut watch, left, out)?,
     }
     nothing_shared(&driver.master)
 }
@@ -158,7 +181,7 @@ fn value(driver: &Driver, watch: &Watch) -> Value {
         "load_percent": statistics.load_percent(now),
         "received": statistics.received,
         "foreign_frames": statistics.foreign_count(),
-        "foreign_master": watch.foreign_master,
+        "foreign_master": watch.foreign_master.is_some(),
         "shared_numbers": shared_numbers(&driver.master),
         "boards": boards.iter().map(board).collect::<Vec<_>>(),
         "events": watch.log.iter().map(|(time_s, text)| json!({ "time_s": time_s, "text": text })).collect::<Vec<_>>(),
@@ -175,7 +198,7 @@ fn text(driver: &Driver) -> String {
         statistics.foreign_count()
     );
     for (number, b) in boards.iter() {
-        let status = b.status().map(|s| bits(s).join(" ")).unwrap_or_default();
+        let status = b.status().filter(|_| is_known(b)).map(|s| bits(s).join(" ")).unwrap_or("?".into());
         text += &format!(
             "  board {number:<2} {:20} {:34} {:8} {:5} frames/s\n",
             b.description.as_deref().unwrap_or("?"),
@@ -190,8 +213,19 @@ fn text(driver: &Driver) -> String {
     text
 }
 
-/// What a board does, in one word: what is heard counts more than an old answer.
+/// What was last received of a board still holds: it is not lost, and has not begun anew.
+pub fn is_known(board: &Board) -> bool {
+    board.life != Life::Lost && !board.rebooted
+}
+
+/// What a board does, in one word: what comes by itself counts more than an old answer.
 pub fn doing(board: &Board, now_us: u64) -> &'static str {
+    if board.rebooted {
+        return "rebooted";
+    }
+    if board.life == Life::Lost {
+        return "lost";
+    }
     if board.running(now_us) {
         return "running";
     }
@@ -217,52 +251,46 @@ pub fn age_s(board: &Board, now_us: u64) -> Option<f64> {
     board.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
 }
 
-fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64) -> Result<(), Failure> {
-    let mut terminal = ratatui::try_init()?;
-    let mut run = || -> Result<(), Failure> {
-        let mut drawn: Option<Instant> = None;
-        let mut counted = Instant::now();
-        let mut room = (0, 0);
-        while left > 0 && !driver.stop_asked() {
-            while event::poll(Duration::ZERO)? {
-                if let Key::Key(key) = event::read()? {
-                    let ctrl_c =
-                        key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
-                    if ctrl_c || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) {
-                        return Ok(());
-                    }
-                    let page = room.0.max(1) as isize;
-                    let by = match key.code {
-                        KeyCode::Down | KeyCode::Char('j') => 1,
-                        KeyCode::Up | KeyCode::Char('k') => -1,
-                        KeyCode::PageDown | KeyCode::Char(' ') => page,
-                        KeyCode::PageUp => -page,
-                        KeyCode::Home => isize::MIN,
-                        KeyCode::End => isize::MAX,
-                        _ => 0,
-                    };
-                    watch.scroll(by, room);
-                    watch.ask |= key.code == KeyCode::Char('r') && !watch.listen_only;
+/// A picture is drawn no more often than this.
+const PICTURE: Duration = Duration::from_millis(100);
+
+fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64, mut screen: Screen) -> Result<(), Failure> {
+    let (mut drawn, mut counted): (Option<Instant>, _) = (None, Instant::now());
+    let mut scroll = Scroll::default();
+    while left > 0 && !driver.stop_asked() && !screen.gone() {
+        for key in screen.pressed() {
+            match key {
+                Key::Char('q') | Key::Escape => return Ok(()),
+                Key::Char('s') => watch.stop(driver),
+                Key::Char('r') => watch.ask_again(),
+                key => {
+                    watch.said.clear();
+                    scroll.key(key);
                 }
             }
-            watch.turn(driver)?;
-            if counted.elapsed() >= Duration::from_secs(1) {
-                counted = Instant::now();
-                left -= 1;
-            }
-            if drawn.is_none_or(|at| at.elapsed() >= Duration::from_millis(100)) {
-                drawn = Some(Instant::now());
-                // Another size of the terminal, or a board that is gone, leaves nothing empty below the last one.
-                watch.scroll(0, room);
-                let (boards, statistics, now) =
-                    (driver.master.boards(), driver.master.statistics(), driver.now_us());
-                let picture = view::Picture { boards: &boards, statistics: &statistics, now, watch };
-                terminal.draw(|frame| room = view::draw(frame, &picture))?;
-            }
         }
-        Ok(())
-    };
-    let done = run();
-    ratatui::restore();
-    done
+        watch.turn(driver)?;
+        if counted.elapsed() >= Duration::from_secs(1) {
+            counted = Instant::now();
+            left -= 1;
+        }
+        if drawn.is_none_or(|at| at.elapsed() >= PICTURE) {
+            drawn = Some(Instant::now());
+            let controller = controller(driver);
+            let shared: Vec<String> =
+                driver.master.shared_numbers().iter().map(ToString::to_string).collect();
+            let (boards, statistics, now) =
+                (driver.master.boards(), driver.master.statistics(), driver.now_us());
+            let picture = view::Picture {
+                boards: &boards,
+                statistics: &statistics,
+                shared: &shared,
+                controller,
+                now,
+                watch,
+            };
+            screen.draw(|frame| view::draw(frame, &picture, &mut scroll));
+        }
+    }
+    Ok(())
 }

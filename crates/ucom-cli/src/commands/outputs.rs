@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use cli_kit::Output;
+use cli_kit::{Lines, Output};
 use serde_json::{Map, Value, json};
 use ucom::files::Edge;
 use ucom::master::Event;
@@ -13,7 +13,6 @@ use crate::args::{LinkArgs, SoArgs};
 use crate::cache::Known;
 use crate::driver::{Driver, nothing_shared};
 use crate::failure::{Failure, NO_LINK};
-use crate::lines::Lines;
 
 /// Keys for so many values: the short names; the whole text where another edge has the same one, with its place where
 /// that does not help either.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use cli_kit::Output;
+use cli_kit::{Lines, Output};
 use serde_json::json;
 use ucom::files::EdgeTable;
 use ucom::master::io::Kind;
@@ -17,7 +17,6 @@ use super::typed::{obey, typed};
 use crate::args::{Boards, CacheArgs, LinkArgs, OnLost, RunArgs};
 use crate::driver::{Driver, nothing_shared, unexpected};
 use crate::failure::{FAULT, Failure};
-use crate::lines::Lines;
 use crate::values::{Prepared, only, with_names};
 
 /// How often `run` says how things are.

@@ -295,7 +295,7 @@ fn boards(o: &Observation, f: &mut Findings) {
             Life::Lost => f.problem(
                 format!("board {n} gives no life sign"),
                 "it lost power or the bus",
-                "`ucom info N`, cable and power of this board",
+                format!("`ucom info {n}`, cable and power of this board"),
             ),
             Life::Late => f.warn(
                 format!("board {n} is late with its life signs"),

@@ -1,9 +1,12 @@
-//! The picture of `jtc monitor`, from a large terminal down to one of 40 columns and 12 rows: what is wrong comes first, the joints
-//! that are not measured lead the table, and curves are drawn where there is room left.
+//! The picture of `jtc monitor`, from a large terminal down to one of 40 columns and 12 rows: what is wrong and the next command come
+//! before anything else, the joints that are not measured lead the table, what has no room scrolls, the keys are always there, and
+//! curves are drawn where there is room left.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use cli_kit::figure;
+use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small};
 use jtc_host::sample::is_measured;
 use jtc_host::words;
 use jtc_wire::Status;
@@ -11,40 +14,36 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Block, BorderType, Cell, Padding, Paragraph, Row, Sparkline, Table};
+use ratatui::widgets::{Paragraph, Sparkline};
 
-use super::super::status::joint_state;
+use super::joints::{self, COLOURS};
+use crate::failure::Failure;
 
 /// Values that the curves show: 8 s of statuses.
 const HISTORY: usize = 200;
-/// From here on there are frames around the parts.
-const FRAMED: (u16, u16) = (80, 24);
 /// Rows from which on there is one for the state of a link that is well.
 const LINK: u16 = 16;
 /// Least height of the curves.
 const CURVES: u16 = 6;
-/// Colours of the joints, as in the report.
-const COLOURS: [Color; 6] = [
-    Color::Rgb(122, 165, 255),
-    Color::Rgb(255, 157, 87),
-    Color::Rgb(67, 211, 158),
-    Color::Rgb(255, 119, 182),
-    Color::Rgb(183, 155, 255),
-    Color::Rgb(227, 200, 76),
-];
+/// Rows of joints that are shown however much is wrong, with their head.
+const LEAST_ROWS: u16 = 3;
+/// Keys, of which the first are shown on terminals that are too small.
+const KEYS: &str = "s stops   q ends";
 
 /// What the view remembers.
 pub struct View {
     port: String,
     last: Option<Status>,
-    /// No status comes.
-    pub silent: bool,
+    /// No status has come for so long.
+    pub silent: Option<Duration>,
     /// Statuses a second.
     pub rate: f64,
     /// Bytes that were in no frame.
     pub bad_bytes: u64,
     /// What became of the last key, until the next one.
     pub said: String,
+    /// How far causes and joints are scrolled.
+    pub scroll: Scroll,
     /// NaN where a joint was not measured.
     position: [VecDeque<f64>; 6],
     torque: [VecDeque<f64>; 6],
@@ -56,10 +55,11 @@ impl View {
         Self {
             port,
             last: None,
-            silent: false,
+            silent: None,
             rate: 0.0,
             bad_bytes: 0,
             said: String::new(),
+            scroll: Scroll::default(),
             position: Default::default(),
             torque: Default::default(),
         }
@@ -81,118 +81,128 @@ impl View {
         self.last = Some(s);
     }
 
+    /// The failure of the port, with what is known of the motion.
+    pub fn lost(&self, failure: Failure) -> Failure {
+        let moving = self.last.is_some_and(|s| s.tes == 3);
+        let message = format!("{}{}", failure.message, if moving { "; THE ARM MAY BE MOVING" } else { "" });
+        Failure { message, ..failure }
+    }
+
     /// Draws all that there is room for.
-    pub fn draw(&self, frame: &mut Frame<'_>) {
-        let area = frame.area();
-        let framed = area.width >= FRAMED.0 && area.height >= FRAMED.1;
-        let edge = if framed { 2 } else { 0 };
-        let Some(s) = &self.last else {
-            let text = if self.silent {
-                "no status comes; `jtc doctor` looks for the reason. q ends"
-            } else {
-                "waiting for a status. q ends"
-            };
-            let lines = wrapped(&text.replace('`', ""), area.width.saturating_sub(2 * edge));
-            frame.render_widget(self.part(lines, &self.port, framed), area);
+    pub fn draw(&mut self, frame: &mut Frame<'_>) {
+        if too_small(frame, KEYS) {
             return;
-        };
-        let inner = area.width.saturating_sub(2 * edge);
-        let mut head = self.head(s, inner);
-        if area.height < LINK && !self.silent {
-            head.truncate(1);
         }
-        // The table is worth more than the last lines of a long list of errors.
-        let most = area.height.saturating_sub(head.len() as u16 + 7 + 3 * edge).max(2);
-        let trouble = self.trouble(s, inner, most.into());
-        let [top, middle, joints, curves] = Layout::vertical([
-            Constraint::Length(head.len() as u16 + edge),
-            Constraint::Length(trouble.len() as u16 + edge),
-            Constraint::Length(7 + edge),
+        let [area, foot] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(frame.area());
+        let framed = area.width >= FRAMED.0 && frame.area().height >= FRAMED.1;
+        let edge = if framed { 2 } else { 0 };
+        let inner = area.width.saturating_sub(2 * edge);
+        let head = self.head(inner, frame.area().height >= LINK);
+        // Joints keep some rows, whatever the causes need; with room for all of them they have all.
+        let rows = if framed { 8 } else { LEAST_ROWS };
+        let most = area.height.saturating_sub(head.len() as u16 + rows + 3 * edge);
+        let (trouble, rest) = self.trouble().lines(inner, most.into());
+        let count = self.last.as_ref().map_or(0, joints::count);
+        let heights = [trouble.len() as u16 + edge, head.len() as u16 + edge];
+        let left = area.height.saturating_sub(heights[0] + heights[1]);
+        let table = if count == 0 { 0 } else { (rest.len() + 1 + count) as u16 + edge };
+        let [first, second, third, curves] = Layout::vertical([
+            Constraint::Length(heights[0]),
+            Constraint::Length(heights[1]),
+            Constraint::Length(table.min(left)),
             Constraint::Fill(1),
         ])
         .areas(area);
-        frame.render_widget(self.part(head, &self.port, framed), top);
-        let title = if s.errors == 0 { "next" } else { "errors" };
-        frame.render_widget(self.part(trouble, title, framed), middle);
-        frame.render_widget(joint_table(s, inner, framed), joints);
+        let title =
+            if self.silent.is_some() || self.last.is_some_and(|s| s.errors != 0) { "errors" } else { "next" };
+        frame.render_widget(part(trouble, title, framed), first);
+        frame.render_widget(part(head, &self.port, framed), second);
+        self.rows(frame, third, rest, framed);
         if framed && curves.height >= CURVES {
             self.curves(frame, curves);
         }
+        let keys = format!("{KEYS}   {}", self.scroll.place());
+        frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
     }
 
-    fn part(&self, lines: Vec<Line<'static>>, title: &str, framed: bool) -> Paragraph<'static> {
-        let paragraph = Paragraph::new(lines);
-        if framed { paragraph.block(panel(&format!(" {title} "))) } else { paragraph }
+    /// Causes that have no room above, and the joints; what has no room here scrolls.
+    fn rows(&mut self, frame: &mut Frame<'_>, area: Rect, rest: Vec<Line<'static>>, framed: bool) {
+        let Some(s) = &self.last else { return };
+        let (edge, heads) = (if framed { 2 } else { 0 }, 1);
+        let all = rest.len() + joints::count(s);
+        self.scroll.fit(usize::from(area.height.saturating_sub(edge + heads)), all);
+        let first = self.scroll.first();
+        let above: Vec<Line<'static>> = rest.iter().skip(first).cloned().collect();
+        let [causes, table] =
+            Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(area);
+        frame.render_widget(Paragraph::new(above), causes);
+        let (inner, skip) = (area.width.saturating_sub(2 * edge), first.saturating_sub(rest.len()));
+        if table.height > heads + edge {
+            frame.render_widget(joints::table(s, self.silent.is_some(), inner, framed, skip), table);
+        }
     }
 
     /// State, place on the trajectory, and the link.
-    fn head(&self, s: &Status, width: u16) -> Vec<Line<'static>> {
+    fn head(&self, width: u16, link: bool) -> Vec<Line<'static>> {
+        let Some(s) = &self.last else { return vec![Line::from(self.port.clone()).dark_gray()] };
+        if self.silent.is_some() {
+            let was = format!("last state {}, trajectory {}", words::state(s.fsm), words::tes(s.tes));
+            return vec![Line::from(was).dark_gray()];
+        }
         let state = Span::styled(format!(" {} ", words::state(s.fsm)), state_style(s.fsm));
         let mut line = vec![state, Span::raw(" trajectory "), words::tes(s.tes).bold()];
         line.push(Span::raw(format!(" {:.2} s", f64::from(s.point) * 1e-3)));
-        if let Some(g) = s.gripper.filter(|_| width >= 60) {
-            line.push(Span::raw(format!("   pump {}", if g.pump != 0 { "runs" } else { "stands" })));
-        }
-        let link = if self.silent {
-            "no status comes any more".red().bold()
-        } else {
-            format!("{:.1} statuses/s, {} bad bytes", self.rate, self.bad_bytes).dark_gray()
-        };
-        vec![Line::from(line), Line::from(link)]
-    }
-
-    /// What is wrong, and what to do, in at most so many lines: of a long list of errors the first ones.
-    fn trouble(&self, s: &Status, width: u16, most: usize) -> Vec<Line<'static>> {
-        let mut lines = if s.errors != 0 {
-            wrapped(&words::errors_line(s), width).into_iter().map(|line| line.red().bold()).collect()
-        } else if s.fsm <= 1 {
-            wrapped(&words::waiting_for(s), width)
-        } else {
-            Vec::new()
-        };
-        let next = format!("next: {}", words::next_step(s).replace('`', ""));
-        let next = wrapped(if self.said.is_empty() { &next } else { &self.said }, width);
-        lines.truncate(most.saturating_sub(next.len()).max(1));
-        lines.extend(next);
-        let keys = wrapped("keys: q ends, s stops the motion", width);
-        if lines.len() + keys.len() <= most {
-            lines.extend(keys.into_iter().map(|line| line.dark_gray()));
+        let mut lines = vec![Line::from(line)];
+        if link {
+            let words = format!("{:.1} statuses/s, {} bad bytes", self.rate, self.bad_bytes);
+            let words =
+                if width >= 60 { words } else { format!("{:.0}/s, {} bad bytes", self.rate, self.bad_bytes) };
+            lines.push(Line::from(words.dark_gray()));
         }
         lines
     }
 
+    /// What is wrong, and what to do.
+    fn trouble(&self) -> Trouble {
+        let said = self.said.clone();
+        let (causes, warnings, next) = match (&self.last, self.silent) {
+            (None, None) => (Vec::new(), vec!["waiting for a status".into()], String::new()),
+            (None, Some(time)) => (vec![silence(time)], Vec::new(), "jtc doctor".into()),
+            (Some(s), Some(time)) => {
+                let moving = if s.tes == 3 { "; THE ARM MAY BE MOVING" } else { "" };
+                let cause = format!("{}, what was received before is not shown{moving}", silence(time));
+                (vec![cause], Vec::new(), "jtc doctor".into())
+            }
+            (Some(s), None) => {
+                let causes = words::causes(s);
+                let mut warnings = words::warnings(s);
+                if causes.is_empty() && s.fsm <= 1 {
+                    warnings.insert(0, words::waiting_for(s));
+                }
+                (causes, warnings, words::next_step(s).to_owned())
+            }
+        };
+        Trouble { causes, warnings, next, said }
+    }
+
     fn curves(&self, frame: &mut Frame<'_>, area: Rect) {
         let grid = Layout::horizontal([Constraint::Ratio(1, 6); 6]).split(area);
+        let silent = self.silent.is_some();
         for j in 0..6 {
             let [top, bottom] = Layout::vertical([Constraint::Fill(1); 2]).areas(grid[j]);
-            frame.render_widget(curve(&self.position[j], j, "q", top.width), top);
-            frame.render_widget(curve(&self.torque[j], j, "τ", bottom.width), bottom);
+            frame.render_widget(curve(&self.position[j], j, "q", top.width, silent), top);
+            frame.render_widget(curve(&self.torque[j], j, "τ", bottom.width, silent), bottom);
         }
     }
 }
 
-fn panel(title: &str) -> Block<'static> {
-    Block::bordered()
-        .border_type(BorderType::Rounded)
-        .border_style(Style::new().dark_gray())
-        .title(title.to_owned())
-        .padding(Padding::horizontal(1))
+fn silence(time: Duration) -> String {
+    format!("no status for {:.0} s", time.as_secs_f64())
 }
 
-/// Broken between words into lines of at most `width` columns; a longer word is cut.
-fn wrapped(text: &str, width: u16) -> Vec<Line<'static>> {
-    let width = usize::from(width.max(1));
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines.into_iter().map(Line::from).collect()
+fn part(lines: Vec<Line<'static>>, title: &str, framed: bool) -> Paragraph<'static> {
+    let paragraph = Paragraph::new(lines);
+    if framed { paragraph.block(panel(title)) } else { paragraph }
 }
 
 fn state_style(fsm: u8) -> Style {
@@ -206,62 +216,7 @@ fn state_style(fsm: u8) -> Style {
     Style::new().bg(colour).fg(Color::White).add_modifier(Modifier::BOLD)
 }
 
-/// A column: head, width, and the least width of the view that has it.
-type Column = (&'static str, u16, u16);
-
-const COLUMNS: [Column; 7] = [
-    ("", 7, 0),
-    ("state", 15, 0),
-    ("  q, rad", 8, 0),
-    ("τ, N·m", 7, 40),
-    ("qd, rad/s", 9, 52),
-    ("  °C", 4, 58),
-    ("", 8, 76),
-];
-
-fn joint_table(s: &Status, width: u16, framed: bool) -> Table<'static> {
-    // What a joint that does not answer had said last is no news of it; it is named before those that work.
-    let mut order: Vec<usize> = (0..6).collect();
-    order.sort_by_key(|j| is_measured(s, *j));
-    let shown = |c: &&Column| width >= c.2;
-    let count = COLUMNS.iter().filter(shown).count();
-    let rows = order.into_iter().map(|j| {
-        let joint = &s.joints[j];
-        let measured = is_measured(s, j);
-        let number = |value: f32, digits: usize, width: usize| {
-            let text = if measured { figure(value.into(), digits) } else { "-".into() };
-            Cell::from(format!("{text:>width$}"))
-        };
-        let mut trouble: Vec<&str> = words::joint_errors(joint.internal);
-        trouble.extend(words::node_errors(joint.errors));
-        trouble.extend(words::motor_faults(joint.mc_current));
-        trouble.extend(words::node_warnings(joint.warnings));
-        let cells = [
-            Cell::from(format!("joint {}", j + 1)).style(Style::new().fg(COLOURS[j])),
-            Cell::from(joint_state(s, j)),
-            number(joint.position, 4, 8),
-            number(joint.torque, 2, 7),
-            number(joint.velocity, 4, 9),
-            number(joint.temperature.into(), 0, 4),
-            Cell::from(trouble.join(", ")).style(Style::new().red()),
-        ];
-        let style = if measured { Style::new() } else { Style::new().red().bold() };
-        Row::new(cells.into_iter().take(count)).style(style)
-    });
-    let mut widths: Vec<Constraint> = COLUMNS.iter().filter(shown).map(|c| Constraint::Length(c.1)).collect();
-    if let Some(last) = widths.get_mut(COLUMNS.len() - 1) {
-        *last = Constraint::Fill(1);
-    }
-    let head = Row::new(COLUMNS.iter().filter(shown).map(|c| {
-        let width = usize::from(c.1);
-        // Heads of figures stand over their last digit.
-        if c.0 == "state" { c.0.to_owned() } else { format!("{:>width$}", c.0) }
-    }));
-    let table = Table::new(rows, widths).header(head.dark_gray());
-    if framed { table.block(panel(" joints ")) } else { table }
-}
-
-fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16) -> Sparkline<'static> {
+fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16, silent: bool) -> Sparkline<'static> {
     let known = || history.iter().copied().filter(|v| v.is_finite());
     let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
     // A resting value is not blown up to full height.
@@ -270,71 +225,16 @@ fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16) -> Sparkline
     // The newest that there is room for beside the frame.
     let old = history.len().saturating_sub(usize::from(width.saturating_sub(4)));
     let heights: Vec<Option<u64>> = history.iter().skip(old).map(height).collect();
-    let last = history.back().filter(|v| v.is_finite());
+    let last = history.back().filter(|v| v.is_finite() && !silent);
     let last = last.map_or("-".into(), |v| figure(*v, 2));
+    let colour = if silent { Color::DarkGray } else { COLOURS[j] };
     Sparkline::default()
         .data(heights)
         .max(101)
-        .style(Style::new().fg(COLOURS[j]))
-        .block(panel(&format!(" {name}{} {last} ", j + 1)))
+        .style(Style::new().fg(colour))
+        .block(panel(&format!("{name}{} {last}", j + 1)))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use ratatui::Terminal;
-    use ratatui::backend::TestBackend;
-
-    /// Joint 3 fell silent while the arm was held.
-    fn silent() -> Status {
-        let mut s = Status { fsm: 5, errors: 0x2A, can_current: 1 << 10, ..Status::default() };
-        for (j, joint) in s.joints.iter_mut().enumerate() {
-            joint.fsm = 3;
-            joint.position = 0.1 + j as f32;
-            joint.temperature = 30;
-        }
-        s.joints[2].position = 0.0;
-        s
-    }
-
-    fn drawn(s: Status, width: u16, height: u16) -> Vec<String> {
-        let mut view = View::new("/tmp/jtc".into());
-        view.push(s);
-        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| view.draw(frame)).unwrap();
-        let cells = terminal.backend().buffer().content().to_vec();
-        cells.chunks(width.into()).map(|row| row.iter().map(|c| c.symbol()).collect()).collect()
-    }
-
-    #[test]
-    fn a_joint_without_measurement_has_no_number_and_is_named_first() {
-        for (width, height) in [(40, 12), (60, 20), (80, 24), (90, 28), (200, 60)] {
-            let rows = drawn(silent(), width, height);
-            let text = rows.join("\n");
-            let place = |words: &str| rows.iter().position(|row| row.contains(words));
-            // What broke stands before anything else that is wrong, and before the table.
-            let named = place("joint 3 does not answer").unwrap_or_else(|| panic!("not named\n{text}"));
-            let row = place("joint 3 does not answer  ").unwrap_or_else(|| panic!("no row\n{text}"));
-            assert!(named < row, "{text}");
-            assert!(!rows[row].contains("0.0000") && rows[row].contains(" - "), "{text}");
-            for joint in [1, 2, 4, 5, 6] {
-                let other = place(&format!("joint {joint} OperationEnable"));
-                assert!(other.is_some_and(|other| row < other), "{width}×{height}: joint {joint}\n{text}");
-            }
-            assert!(text.contains("recover"), "{width}×{height}\n{text}");
-        }
-    }
-
-    #[test]
-    fn a_gap_in_the_measurement_is_a_gap_in_the_curve() {
-        let mut view = View::new(String::new());
-        view.push(silent());
-        assert!(view.position[2][0].is_nan() && view.torque[2][0].is_nan() && view.position[1][0] > 1.0);
-    }
-
-    #[test]
-    fn lines_are_broken_between_words() {
-        let lines: Vec<String> = wrapped("one two three", 7).iter().map(ToString::to_string).collect();
-        assert_eq!(lines, ["one two", "three"]);
-    }
-}
+#[path = "view_tests.rs"]
+mod tests;

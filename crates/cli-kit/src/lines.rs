@@ -1,4 +1,4 @@
-//! Lines that are printed beside the loop: a reader that does not read (`ucom run --json | less`) must not stop life signs.
+//! Lines that are printed by a thread: a reader that does not read (`ucom run --json | less`) must not hold what they are about.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use cli_kit::Output;
+use crate::Output;
+use crate::bar::Stderr;
 
 /// Most lines that wait.
 const WAITING: usize = 1000;
@@ -58,9 +59,9 @@ impl Lines {
         Self::to(std::io::stdout(), true)
     }
 
-    /// To stderr.
+    /// To stderr, above a bar that is there.
     pub fn stderr() -> std::io::Result<Self> {
-        Self::to(std::io::stderr(), false)
+        Self::to(Stderr, false)
     }
 
     fn to(writer: impl Write + Send + 'static, is_stdout: bool) -> std::io::Result<Self> {

@@ -1,0 +1,232 @@
+//! Keys from the terminal one by one. The terminal is put back as it was however the command ends.
+//!
+//! Ctrl-C stays a signal. Ctrl-Z is switched off meanwhile, because a command that sleeps would leave a machine running that nobody
+//! follows, and so is Ctrl-S, which would hold the command at its next word with the stop key unread.
+
+/// A key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Key {
+    /// A letter or sign.
+    Char(char),
+    /// Arrow up.
+    Up,
+    /// Arrow down.
+    Down,
+    /// A page back.
+    PageUp,
+    /// A page on.
+    PageDown,
+    /// To the first row.
+    Home,
+    /// To the last row.
+    End,
+    /// Esc.
+    Escape,
+}
+
+/// The keys of what a terminal has sent; the rest may be the begin of one.
+#[cfg_attr(not(unix), allow(dead_code))]
+fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
+    let (mut keys, mut rest) = (Vec::new(), bytes);
+    while let [first, more @ ..] = rest {
+        if *first != 0x1B {
+            // Signs beyond ASCII are no keys here; each of their bytes would be a wrong one.
+            if first.is_ascii() {
+                keys.push(Key::Char(char::from(*first)));
+            }
+            rest = more;
+            continue;
+        }
+        let [b'[' | b'O', code @ ..] = more else {
+            if more.is_empty() {
+                break;
+            }
+            keys.push(Key::Escape);
+            rest = more;
+            continue;
+        };
+        let Some(end) = code.iter().position(|b| b.is_ascii_alphabetic() || *b == b'~') else { break };
+        let key = match &code[..=end] {
+            b"A" => Some(Key::Up),
+            b"B" => Some(Key::Down),
+            b"H" | b"1~" | b"7~" => Some(Key::Home),
+            b"F" | b"4~" | b"8~" => Some(Key::End),
+            b"5~" => Some(Key::PageUp),
+            b"6~" => Some(Key::PageDown),
+            _ => None,
+        };
+        keys.extend(key);
+        rest = &code[end + 1..];
+    }
+    (keys, rest)
+}
+
+#[cfg(unix)]
+pub use terminal::{Keys, restore};
+
+#[cfg(unix)]
+mod terminal {
+    use std::io::IsTerminal;
+    use std::sync::{Mutex, PoisonError};
+
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    use rustix::process::getpgrp;
+    use rustix::stdio::stdin;
+    use rustix::termios::{
+        InputModes, LocalModes, OptionalActions, SpecialCodeIndex, Termios, tcgetattr, tcgetpgrp, tcsetattr,
+    };
+
+    use super::{Key, parse};
+
+    /// How the terminal was before keys were read.
+    static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
+
+    /// Puts the terminal back as it was. Does nothing the second time.
+    pub fn restore() {
+        if let Some(before) = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            let _ = tcsetattr(stdin(), OptionalActions::Now, &before);
+        }
+    }
+
+    /// Keys from stdin, where it is a terminal of which this process has the foreground.
+    pub struct Keys {
+        /// The begin of a key.
+        begun: Vec<u8>,
+        gone: bool,
+    }
+
+    impl Keys {
+        /// From now on keys come one by one and are not shown; none when there is no terminal to press them at.
+        pub fn listen() -> Option<Self> {
+            if !std::io::stdin().is_terminal() {
+                return None;
+            }
+            // In the background, changing the terminal would put this process to sleep.
+            if tcgetpgrp(stdin()).is_ok_and(|foreground| foreground != getpgrp()) {
+                return None;
+            }
+            let before = tcgetattr(stdin()).ok()?;
+            let mut single = before.clone();
+            single.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO);
+            single.input_modes.remove(InputModes::IXON);
+            single.special_codes[SpecialCodeIndex::VMIN] = 0;
+            single.special_codes[SpecialCodeIndex::VTIME] = 0;
+            single.special_codes[SpecialCodeIndex::VSUSP] = 0;
+            *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
+            let keys = Self { begun: Vec::new(), gone: false };
+            tcsetattr(stdin(), OptionalActions::Now, &single).ok()?;
+            Some(keys)
+        }
+
+        /// Keys pressed since the last look.
+        pub fn pressed(&mut self) -> Vec<Key> {
+            let input = stdin();
+            let mut ready = [PollFd::new(&input, PollFlags::IN)];
+            let waited = poll(&mut ready, Some(&Timespec { tv_sec: 0, tv_nsec: 0 }));
+            let revents = ready[0].revents();
+            if revents.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
+                self.gone = true;
+                return Vec::new();
+            }
+            if !matches!(waited, Ok(1..)) {
+                // The rest of a longer key would have come with its begin.
+                return if std::mem::take(&mut self.begun).is_empty() {
+                    Vec::new()
+                } else {
+                    vec![Key::Escape]
+                };
+            }
+            let mut bytes = [0; 64];
+            let n = rustix::io::read(input, &mut bytes).unwrap_or(0);
+            self.begun.extend_from_slice(&bytes[..n]);
+            let (keys, rest) = parse(&self.begun);
+            self.begun = rest.to_vec();
+            keys
+        }
+
+        /// The terminal has hung up: no key will come any more.
+        pub fn gone(&self) -> bool {
+            self.gone
+        }
+    }
+
+    impl Drop for Keys {
+        fn drop(&mut self) {
+            restore();
+        }
+    }
+}
+
+#[cfg(not(unix))]
+pub use console::{Keys, restore};
+
+#[cfg(not(unix))]
+mod console {
+    use std::io::IsTerminal;
+    use std::time::Duration;
+
+    use crossterm::event::{self, Event, KeyCode, KeyEventKind};
+
+    use super::Key;
+
+    /// A console needs no other mode for single keys: nothing to put back.
+    pub fn restore() {}
+
+    /// Keys from the console.
+    pub struct Keys(());
+
+    impl Keys {
+        /// None when there is no console to press them at.
+        pub fn listen() -> Option<Self> {
+            std::io::stdin().is_terminal().then_some(Self(()))
+        }
+
+        /// Keys pressed since the last look.
+        pub fn pressed(&mut self) -> Vec<Key> {
+            let mut keys = Vec::new();
+            while event::poll(Duration::ZERO).unwrap_or(false) {
+                let Ok(event) = event::read() else { break };
+                let Event::Key(key) = event else { continue };
+                if key.kind != KeyEventKind::Press {
+                    continue;
+                }
+                keys.extend(match key.code {
+                    KeyCode::Char(c) => Some(Key::Char(c)),
+                    KeyCode::Up => Some(Key::Up),
+                    KeyCode::Down => Some(Key::Down),
+                    KeyCode::PageUp => Some(Key::PageUp),
+                    KeyCode::PageDown => Some(Key::PageDown),
+                    KeyCode::Home => Some(Key::Home),
+                    KeyCode::End => Some(Key::End),
+                    KeyCode::Esc => Some(Key::Escape),
+                    _ => None,
+                });
+            }
+            keys
+        }
+
+        /// A console does not hang up before its processes end.
+        pub fn gone(&self) -> bool {
+            false
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_told_apart_and_a_begun_one_waits() {
+        let keys = |bytes: &'static [u8]| parse(bytes);
+        assert_eq!(
+            keys(b"s \x1B[Bq"),
+            (vec![Key::Char('s'), Key::Char(' '), Key::Down, Key::Char('q')], &b""[..])
+        );
+        assert_eq!(keys(b"\x1BOA\x1B[6~\x1B[1~"), (vec![Key::Up, Key::PageDown, Key::Home], &b""[..]));
+        assert_eq!(keys(b"x\x1B[5"), (vec![Key::Char('x')], &b"\x1B[5"[..]));
+        assert_eq!(keys(b"\x1B"), (vec![], &b"\x1B"[..]));
+        // A key that is not known, and a letter that is not ASCII, are none.
+        assert_eq!(keys("\x1B[15~\u{e9}s".as_bytes()), (vec![Key::Char('s')], &b""[..]));
+    }
+}

@@ -1,0 +1,160 @@
+//! A terminal with a person at it, and a command that runs there.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::os::fd::OwnedFd;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags};
+use rustix::io::{FdFlags, fcntl_setfd};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{LocalModes, Winsize, tcgetattr, tcsetwinsize};
+
+use super::Picture;
+
+/// Nothing that a test waits for takes longer.
+const LONG: Duration = Duration::from_secs(60);
+
+/// Reads what the command sends until the terminal is closed.
+fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
+    let mut bytes = [0; 4096];
+    let wait = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
+    while !closed.load(Ordering::Relaxed) {
+        let ready = poll(&mut [PollFd::new(&from, PollFlags::IN)], Some(&wait));
+        if matches!(ready, Ok(1..)) {
+            let Ok(n @ 1..) = from.read(&mut bytes) else { return };
+            if to.send(bytes[..n].to_vec()).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// A pseudo-terminal.
+pub struct Terminal {
+    /// What the person types goes here; closed, the terminal hangs up.
+    person: Option<File>,
+    slave: Option<OwnedFd>,
+    closed: Arc<AtomicBool>,
+    reader: Option<JoinHandle<()>>,
+    sent: Receiver<Vec<u8>>,
+    /// What it shows.
+    pub picture: Picture,
+    /// All bytes that came.
+    pub bytes: Vec<u8>,
+}
+
+impl Terminal {
+    /// Of this size.
+    pub fn new(columns: u16, rows: u16) -> Self {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
+        grantpt(&master).and_then(|()| unlockpt(&master)).expect("it is ours");
+        let name = ptsname(&master, Vec::new()).expect("it has a name");
+        let slave = rustix::fs::open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).expect("it opens");
+        tcsetwinsize(&slave, Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
+            .expect("its size");
+        // A command that had the person's end, too, would keep it from hanging up.
+        for end in [&master, &slave] {
+            fcntl_setfd(end, FdFlags::CLOEXEC).expect("its flags");
+        }
+        let person = File::from(master);
+        let (sender, sent) = channel();
+        let (closed, of_reader) =
+            (Arc::new(AtomicBool::new(false)), person.try_clone().expect("a second handle"));
+        let its_closed = Arc::clone(&closed);
+        let reader = std::thread::spawn(move || read(of_reader, &its_closed, &sender));
+        let picture = Picture::new(columns, rows);
+        Self {
+            person: Some(person),
+            slave: Some(slave),
+            closed,
+            reader: Some(reader),
+            sent,
+            picture,
+            bytes: Vec::new(),
+        }
+    }
+
+    fn end(&self) -> OwnedFd {
+        self.slave.as_ref().expect("it has not hung up").try_clone().expect("a handle")
+    }
+
+    /// Starts a command with this terminal as its own, from which all it reads and to which all it prints, as a shell starts it.
+    pub fn start(&self, command: &Command) -> Child {
+        let mut own = Command::new("setsid");
+        own.arg("--ctty").arg(command.get_program()).args(command.get_args());
+        for (name, value) in command.get_envs() {
+            match value {
+                Some(value) => own.env(name, value),
+                None => own.env_remove(name),
+            };
+        }
+        own.env("TERM", "xterm");
+        own.stdin(Stdio::from(self.end())).stdout(self.end()).stderr(self.end());
+        own.spawn().expect("it starts")
+    }
+
+    /// The person types.
+    pub fn press(&mut self, keys: &str) {
+        self.person.as_mut().expect("it has not hung up").write_all(keys.as_bytes()).expect("it takes keys");
+    }
+
+    /// Takes in what the command sent, until the picture is as it is waited for; panics with the picture if that never comes.
+    pub fn until(&mut self, what: &str, reached: impl Fn(&Picture) -> bool) {
+        let begin = Instant::now();
+        while !reached(&self.picture) {
+            match self.sent.recv_timeout(LONG.saturating_sub(begin.elapsed())) {
+                Ok(bytes) => self.take(&bytes),
+                Err(_) => panic!("{what} does not come:\n{}", self.picture.text()),
+            }
+        }
+    }
+
+    /// The same for words.
+    pub fn until_it_shows(&mut self, words: &str) {
+        self.until(words, |picture| picture.text().contains(words));
+    }
+
+    fn take(&mut self, bytes: &[u8]) {
+        self.picture.take(bytes);
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// Hangs up, as a window that is closed: nobody has the other end any more.
+    pub fn hang_up(&mut self) {
+        (self.person, self.slave) = (None, None);
+        // The thread that reads has the last handle.
+        self.closed.store(true, Ordering::Relaxed);
+        self.reader.take().map(JoinHandle::join);
+    }
+
+    /// Waits for the end of the command: its exit code. What it printed last is in the picture.
+    pub fn ends(&mut self, child: &mut Child) -> i32 {
+        let begin = Instant::now();
+        let code = loop {
+            if let Some(status) = child.try_wait().expect("its end") {
+                break status.code().unwrap_or(-1);
+            }
+            assert!(begin.elapsed() < LONG, "it does not end:\n{}", self.picture.text());
+            if let Ok(bytes) = self.sent.recv_timeout(Duration::from_millis(20)) {
+                self.take(&bytes);
+            }
+        };
+        while let Ok(bytes) = self.sent.recv_timeout(Duration::from_millis(100)) {
+            self.take(&bytes);
+        }
+        code
+    }
+
+    /// Lines are read as before, and keys are shown.
+    pub fn is_as_before(&self) -> bool {
+        let modes = tcgetattr(self.end()).expect("its modes").local_modes;
+        modes.contains(LocalModes::ICANON | LocalModes::ECHO)
+    }
+}

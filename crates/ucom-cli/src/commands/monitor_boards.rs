@@ -1,0 +1,159 @@
+//! Boards as rows of the live view: as many columns as the terminal has room for, and always a board's state, status bits and heartbeat.
+
+use ratatui::layout::Constraint;
+use ratatui::style::{Color, Modifier, Style, Stylize};
+use ratatui::text::Span;
+use ratatui::widgets::{Cell, Row, Table};
+use ucom::Status;
+use ucom::master::{Board, Life, Statistics};
+
+use super::monitor::{age_s, doing, is_known, life};
+use super::monitor_view::Picture;
+
+/// Status bits from the most significant one: a letter each where room is short, a word where there is more.
+pub const BITS: [(Status, char, &str); 8] = [
+    (Status::MSTART, 'M', ""),
+    (Status::ASTART, 'A', "autostart"),
+    (Status::MCARUN, 'R', ""),
+    (Status::EXLRUN, 'X', ""),
+    (Status::INIT, 'I', "init"),
+    (Status::PROG, 'P', "prog"),
+    (Status::OPINIT, 'o', "out-pin"),
+    (Status::IPINIT, 'i', "in-pin"),
+];
+
+/// Columns that a terminal needs for status bits as words, and for flash numbers and programs.
+pub const WIDE: u16 = 130;
+const MEDIUM: u16 = 72;
+/// An answer of a board of which nothing has come since is old after so long, s.
+const OLD_S: f64 = 5.0;
+
+/// A column: its head, its width, and what stands in it.
+struct Column {
+    head: &'static str,
+    width: Constraint,
+    cell: fn(u8, &Board, &Statistics, u64) -> Cell<'static>,
+}
+
+impl Column {
+    const fn new(
+        head: &'static str,
+        width: Constraint,
+        cell: fn(u8, &Board, &Statistics, u64) -> Cell<'static>,
+    ) -> Self {
+        Self { head, width, cell }
+    }
+}
+
+/// The columns that have room, the most needed ones first in line.
+fn columns(width: u16) -> Vec<Column> {
+    let number =
+        Column::new("#", Constraint::Length(2), |number, _, _, _| Cell::from(format!("{number:>2}")));
+    let flash = Column::new("flash", Constraint::Length(6), |_, b, _, _| known(b, |i| i.flash_number));
+    let program = Column::new("program", Constraint::Length(7), |_, b, _, _| match b.info {
+        Some(info) if !info.has_application() => Cell::from("none").yellow(),
+        _ => known(b, |i| i.program_id),
+    });
+    let state = Column::new("state", Constraint::Length(13), |_, b, _, now| state(b, now));
+    let letters = Column::new("MARXIPoi", Constraint::Length(8), |_, b, _, _| letters(b));
+    let heartbeat = Column::new("heartbeat", Constraint::Length(11), |_, b, _, now| heartbeat(b, now));
+    let rate = Column::new("fr/s", Constraint::Length(5), |number, _, statistics, now| {
+        Cell::from(format!("{:>5}", statistics.frames_per_s(number, now)))
+    });
+    let errors = |width| Column::new("errors", width, |_, b, _, _| errors(b));
+    let description = |width| {
+        Column::new("description", width, |_, b, _, _| {
+            Cell::from(b.description.clone().unwrap_or_else(|| "?".into()))
+        })
+    };
+    if width >= WIDE {
+        let bits = Column::new("status", Constraint::Length(34), |_, b, _, _| words(b));
+        let (text, last) = (description(Constraint::Min(18)), errors(Constraint::Min(14)));
+        return vec![number, flash, program, text, state, bits, heartbeat, rate, last];
+    }
+    if width >= MEDIUM {
+        let (text, last) = (description(Constraint::Min(8)), errors(Constraint::Length(6)));
+        return vec![number, flash, program, state, letters, heartbeat, rate, last, text];
+    }
+    if width >= 48 {
+        return vec![number, flash, state, letters, heartbeat];
+    }
+    vec![number, state, letters, heartbeat]
+}
+
+/// The rows from `first` on, as far as the view is wide.
+pub fn table(picture: &Picture<'_>, width: u16, first: usize) -> Table<'static> {
+    let columns = columns(width);
+    let Picture { boards, statistics, now, .. } = picture;
+    let row = |(number, b): (u8, &Board)| {
+        Row::new(columns.iter().map(|c| (c.cell)(number, b, statistics, *now)).collect::<Vec<_>>())
+    };
+    let rows: Vec<Row<'static>> = boards.iter().skip(first).map(row).collect();
+    let head: Vec<&str> = columns.iter().map(|c| c.head).collect();
+    Table::new(rows, columns.iter().map(|c| c.width)).header(Row::new(head).dark_gray())
+}
+
+fn known(board: &Board, number: fn(&ucom::BoardInfo) -> u16) -> Cell<'static> {
+    match &board.info {
+        Some(info) => Cell::from(format!("0x{:04X}", number(info))),
+        None => Cell::from("?").dark_gray(),
+    }
+}
+
+fn state(board: &Board, now: u64) -> Cell<'static> {
+    let colour = match doing(board, now) {
+        "lost" | "rebooted" => Color::Rgb(201, 70, 59),
+        "running" => Color::Rgb(63, 111, 224),
+        "started" => Color::Rgb(47, 131, 124),
+        "programming" => Color::Rgb(201, 131, 59),
+        _ => Color::Rgb(86, 97, 115),
+    };
+    let style = Style::new().bg(colour).fg(Color::White).add_modifier(Modifier::BOLD);
+    Cell::from(Span::styled(format!(" {} ", doing(board, now)), style))
+}
+
+/// A letter for each bit that is set, in its place.
+fn letters(board: &Board) -> Cell<'static> {
+    let Some(status) = board.status().filter(|_| is_known(board)) else { return Cell::from("?").dark_gray() };
+    let letter = |(bit, letter, _): &(Status, char, &str)| if status.has(*bit) { *letter } else { '·' };
+    Cell::from(BITS.iter().map(letter).collect::<String>())
+}
+
+fn words(board: &Board) -> Cell<'static> {
+    let Some(status) = board.status().filter(|_| is_known(board)) else { return Cell::from("?").dark_gray() };
+    let set = BITS.iter().filter(|(bit, _, word)| status.has(*bit) && !word.is_empty());
+    Cell::from(set.map(|(.., word)| *word).collect::<Vec<_>>().join(" "))
+}
+
+fn heartbeat(board: &Board, now: u64) -> Cell<'static> {
+    match (board.life, age_s(board, now)) {
+        (Life::Unarmed, _) | (_, None) => match board.last {
+            // It sends nothing by itself: what is shown of it is as old as its last answer.
+            Some((at, _)) if now.saturating_sub(at) as f64 * 1e-6 >= OLD_S => {
+                Cell::from(format!("{:.0} s old", now.saturating_sub(at) as f64 * 1e-6)).dark_gray()
+            }
+            _ => Cell::from("-").dark_gray(),
+        },
+        (Life::Alive, Some(age)) => Cell::from(format!("{age:.1} s ago")).green(),
+        (_, Some(age)) => Cell::from(format!("{} {age:.1} s", life(board))).red().bold(),
+    }
+}
+
+fn errors(board: &Board) -> Cell<'static> {
+    match board.errors.last() {
+        None => Cell::from("-").dark_gray(),
+        Some((_, code)) => Cell::from(format!("{} × {}", board.error_count, code)).red(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bit_has_its_place() {
+        let byte = BITS.iter().fold(0, |byte, (bit, ..)| byte << 1 | u8::from(Status(0xFF).has(*bit)));
+        assert_eq!(byte, 0xFF);
+        assert!(BITS.windows(2).all(|pair| pair[0].0.0 >> 1 == pair[1].0.0), "from bit 7 to bit 0");
+    }
+}

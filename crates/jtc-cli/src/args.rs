@@ -30,6 +30,7 @@ pub use sim::{DemoArgs, SimArgs, SimSpeed};
                   jtc sim --serial /tmp/jtc             a simulated controller behind a serial port\n  \
                   jtc --json status --port /tmp/jtc     one status, for programs\n  \
                   jtc traj run motion.csv --approach    check, upload, execute, report\n\n\
+                  With --json, commands that take their time print events, the result last: `jtc help events`.\n\
                   --json, --port and --baud may stand before or after the command.\n\
                   Every option can be set by an environment variable, see `jtc COMMAND --help`.\n\
                   Exit codes: 0 done, 1 the controller reported an error, 2 wrong usage or unreadable input,\n\
@@ -104,7 +105,8 @@ pub enum Command {
     Status(LinkArgs),
     /// Live view of the controller and the joints
     #[command(
-        after_help = "On a terminal q ends and s stops a motion on its path.\n\nExamples:\n  jtc monitor\n  jtc --json monitor --count 100 > statuses.jsonl"
+        after_help = "On a terminal of at least 40 columns and 12 rows; s stops a motion on its path, arrows, PageUp, PageDown, Home\n\
+                            and End scroll, q ends. What is wrong and the next command stand first.\n\nExamples:\n  jtc monitor\n  jtc --json monitor --count 100 > statuses.jsonl"
     )]
     Monitor(MonitorArgs),
     /// Arm files
@@ -159,7 +161,8 @@ pub enum Command {
     /// The forms of files, or the help of a command
     #[command(
         after_help = "Examples:\n  jtc help files      trajectories, arms, friction, recordings, with an example each\n  \
-                            jtc help faults     what can go wrong in the simulator\n  jtc help traj run"
+                            jtc help faults     what can go wrong in the simulator\n  \
+                            jtc help events     what a command tells programs while it works\n  jtc help traj run"
     )]
     Help(HelpArgs),
     /// Decode frames: hex or a raw serial capture on stdin

@@ -10,6 +10,7 @@ mod limits;
 mod link;
 mod operator;
 mod output_file;
+mod progress;
 #[cfg(unix)]
 mod serve;
 
@@ -26,7 +27,14 @@ fn main() -> ExitCode {
     };
     let out = Output::new("jtc", cli.json);
     let moves = cli.command.moves();
-    match commands::run(cli.command, &out) {
+    let done = commands::run(cli.command, &out);
+    if let Err(failure) = &done
+        && !failure.printed
+    {
+        out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
+    }
+    Output::finish();
+    match done {
         Ok(()) => match Output::lost() {
             None => ExitCode::SUCCESS,
             Some(why) => {
@@ -36,9 +44,7 @@ fn main() -> ExitCode {
             }
         },
         Err(failure) => {
-            if !failure.printed {
-                out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
-            } else if let Some(why) = Output::lost() {
+            if let Some(why) = Output::lost().filter(|_| failure.printed) {
                 out.note(format_args!("jtc: the result could not be printed: {why}"));
             }
             ExitCode::from(failure.exit)

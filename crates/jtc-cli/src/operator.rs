@@ -12,6 +12,7 @@ use jtc_wire::Status;
 use crate::failure::{FAULT, Failure};
 use crate::keys::{HELP, NO_SPEED, Wish, wish};
 use crate::output_file;
+use crate::progress::Progress;
 
 /// Trajectory execution states, as on the wire.
 const PAUSE: u8 = 2;
@@ -37,6 +38,8 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
 pub struct Operator<'a> {
     /// Where words go.
     pub out: &'a Output,
+    /// What programs are told.
+    pub progress: Progress,
     stop: Stop,
     /// Only while the arm moves: otherwise the terminal is as it was.
     keys: Option<Keys>,
@@ -49,7 +52,7 @@ pub struct Operator<'a> {
 impl<'a> Operator<'a> {
     /// From now on the first SIGINT, SIGTERM or SIGHUP is a wish to end; the second one ends the process at once, with the terminal
     /// as it was and words about the arm.
-    pub fn listen(out: &'a Output) -> Result<Self, Failure> {
+    pub fn listen(out: &'a Output, progress: &Progress) -> Result<Self, Failure> {
         let moving = Arc::new(AtomicBool::new(false));
         let (its_moving, its_out) = (Arc::clone(&moving), *out);
         let stop = Stop::listen_with(move || {
@@ -63,7 +66,7 @@ impl<'a> Operator<'a> {
             };
             ended_at_once(its_out, message, hint)
         })?;
-        Ok(Self { out, stop, keys: None, moving, stopping: false, said: 0 })
+        Ok(Self { out, progress: progress.clone(), stop, keys: None, moving, stopping: false, said: 0 })
     }
 
     /// The command shall end.

@@ -39,7 +39,8 @@ pub enum TrajCommand {
     },
     /// Check, upload, execute, follow, report
     #[command(
-        after_help = "On a terminal space pauses and resumes, s stops. Ctrl-C stops on the path, then ends; a second one ends at once.\n\
+        after_help = "On a terminal space pauses and resumes, s stops; + and - say how to run it at another speed.\n\
+                            Ctrl-C stops on the path, then ends; a second one ends at once.\n\
                             Output files are opened before anything moves. A recording is written while the arm moves, and after a killed\n\
                             program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\
                             moves; if that happens on the way (full disk), it is said at once, the motion goes on as it was checked, and\n\

@@ -56,7 +56,7 @@ pub struct ExampleArgs {
 /// Options of `jtc help`.
 #[derive(Args, Debug)]
 pub struct HelpArgs {
-    /// A page (files, faults) or the words of a command
+    /// A page (files, faults, events) or the words of a command
     pub topic: Vec<String>,
 }
 

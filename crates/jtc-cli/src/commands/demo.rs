@@ -20,6 +20,7 @@ use super::run_report;
 use crate::args::{DemoArgs, SimSpeed};
 use crate::failure::{FAULT, Failure};
 use crate::output_file::{OutputFile, Tape};
+use crate::progress::Progress;
 
 /// Seed of the demo: anyone's demo gives the same figures.
 const SEED: u64 = 1;
@@ -44,6 +45,7 @@ struct Run {
 
 /// Runs the demo and writes its files.
 pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
+    let progress = Progress::begin(out)?;
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::usage(format!("{}: {e}", args.out.display())))?;
     let file = |name: &str| args.out.join(name);
     let open = |name: &str| OutputFile::open(&file(name), args.force.force, &[]);
@@ -55,7 +57,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     for file in [&mut mcap, &mut csv] {
         tapes.push(file.record(&info, "the demo goes on", out)?);
     }
-    let run = execute(args.speed, info, tapes.iter().map(Tape::sink).collect(), out)?;
+    let run = execute(args.speed, info, tapes.iter().map(Tape::sink).collect(), &progress, out)?;
     let facts = [
         run_report::link_facts(&run.upload, &run.link, run.baud),
         Facts {
@@ -106,6 +108,7 @@ fn execute(
     speed: SimSpeed,
     info: RecordingInfo,
     sinks: Vec<SampleSink>,
+    progress: &Progress,
     out: &Output,
 ) -> Result<Run, Failure> {
     let arm = Arm::avena();
@@ -138,10 +141,12 @@ fn execute(
         }
     });
     let mut session = Session::new(port);
+    progress.watch(&mut session);
 
     out.note("parameters: friction, gains and arm model over the serial protocol");
     session.push(&arm.parameter_set(), |p| {
-        out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes))
+        progress.event("parameter", json!(p));
+        out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes));
     })?;
     out.note("drives: waiting until all six hold the arm");
     let here = session.wait_ready(BRING_UP)?.joints.map(|j| f64::from(j.position));
@@ -152,9 +157,11 @@ fn execute(
     let upload = session.upload(&checked, |p| {
         bar.set_length(p.segments as u64);
         bar.set_position(p.segments_done as u64);
+        progress.uploading("motion", p);
         Flow::Continue
     })?;
     bar.finish();
+    progress.event("uploaded", run_report::uploaded("motion", &upload));
     out.note(format!(
         "uploaded: {} points in {} segments, {:.2} s on the line",
         upload.points, upload.segments, upload.time_s
@@ -162,7 +169,8 @@ fn execute(
 
     recording.set(true);
     wait(&mut session, MARGIN)?;
-    let bar = out.bar((trajectory.duration_s() * 1e3) as u64, "motion");
+    let bar = out.motion_bar((trajectory.duration_s() * 1e3) as u64, "motion", "");
+    progress.event("executing", json!({ "phase": "motion", "duration_s": trajectory.duration_s() }));
     session.execute(&checked)?;
     let outcome = session.follow(|s| {
         bar.set_position(u64::from(s.point));

@@ -8,7 +8,11 @@ use crate::args::{Cli, HelpArgs};
 use crate::failure::Failure;
 
 /// Pages that belong to no command.
-const PAGES: [(&str, &str); 2] = [("files", jtc_host::example::FORMS), ("faults", jtc_sim::FAULT_FILE_HELP)];
+const PAGES: [(&str, &str); 3] = [
+    ("files", jtc_host::example::FORMS),
+    ("faults", jtc_sim::FAULT_FILE_HELP),
+    ("events", crate::progress::EVENTS_HELP),
+];
 
 /// Prints a page, or the help of the command that the words name.
 pub fn help(args: &HelpArgs, out: &Output) -> Result<(), Failure> {

@@ -13,6 +13,7 @@ use crate::args::{ClearArgs, GripperArgs, RecoverArgs, Switch};
 use crate::failure::Failure;
 use crate::limits;
 use crate::operator::ended_at_once;
+use crate::progress::Progress;
 
 /// All joints and the gripper.
 const ALL_NODES: u8 = 0x7F;
@@ -51,6 +52,7 @@ pub fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
 
 /// Leads the controller back to HoldPos.
 pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
+    let progress = Progress::begin(out)?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     if args.defaults && arm.is_some() {
         return Err(Failure::usage("--arm (or JTC_ARM) and --defaults name two sets of numbers")
@@ -76,12 +78,14 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         )
     })?;
     let mut session = args.link.session()?;
+    progress.watch(&mut session);
     let mut steps = Vec::new();
     let done = session.recover_until(
         source,
         || stop.asked(),
         |step| {
             out.note(step);
+            progress.event("step", json!({ "text": step.to_string() }));
             steps.push(step.to_string());
         },
     );

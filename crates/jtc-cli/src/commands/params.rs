@@ -10,6 +10,7 @@ use serde_json::json;
 use crate::args::{AcceptArgs, FrictionKind, LinkArgs, ParamsCommand};
 use crate::failure::Failure;
 use crate::limits;
+use crate::progress::Progress;
 
 /// Does one of the family.
 pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
@@ -32,6 +33,7 @@ fn push(
     link: &LinkArgs,
     out: &Output,
 ) -> Result<(), Failure> {
+    let progress = Progress::begin(out)?;
     let read = load(files, out)?;
     let set = read.parameter_set(choice);
     let differences = match &read.arm {
@@ -39,6 +41,7 @@ fn push(
         None => Vec::new(),
     };
     let mut session = link.session()?;
+    progress.watch(&mut session);
     let mut pushed = Vec::new();
     let done = session.push(&set, |p| {
         out.note(format!(
@@ -47,6 +50,7 @@ fn push(
             p.bytes,
             if p.times > 1 { "twice " } else { "" }
         ));
+        progress.event("parameter", json!(p));
         pushed.push(*p);
     });
     done?;

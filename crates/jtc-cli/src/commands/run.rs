@@ -23,12 +23,14 @@ use crate::failure::{FAULT, Failure};
 use crate::limits;
 use crate::operator::Operator;
 use crate::output_file::{OutputFile, Tape};
+use crate::progress::Progress;
 
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(15);
 
 /// Runs a trajectory from a file.
 pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
+    let progress = Progress::begin(out)?;
     if let Some(path) = &args.record {
         Format::of(path)?; // a wrong ending is said before anything moves
     }
@@ -37,10 +39,10 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
     job.config = job.arm.config_on_device();
     job.say_what_is_left_out(out);
-    perform(args, &job, out).map_err(|failure| job.named(failure))
+    perform(args, &job, &progress, out).map_err(|failure| job.named(failure))
 }
 
-fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
+fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Result<(), Failure> {
     let options = UploadOptions { points_per_segment: args.points_per_segment, number: 0 };
     let verdict = job.verdict(&job.trajectory, None, options);
     if !verdict.is_ok() {
@@ -51,8 +53,9 @@ fn perform(args: &RunArgs, job: &Job, out: &Output) -> Result<(), Failure> {
     }
 
     let mut outputs = Outputs::open(args).map_err(Failure::nothing_sent)?;
-    let mut operator = Operator::listen(out)?;
+    let mut operator = Operator::listen(out, progress)?;
     let mut session = args.link.session()?;
+    progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
     let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let source = session.port().name();
@@ -183,8 +186,13 @@ impl Leg {
         operator: &mut Operator,
         record: &mut impl FnMut(&str, u64) -> Result<(RecordingInfo, Option<Tape>), Failure>,
     ) -> Result<Self, Failure> {
-        let what = if phase == APPROACH { APPROACH } else { "upload" };
-        let upload = upload(session, checked, what, operator)?;
+        let warnings: Vec<String> = checked.verdict().warnings().map(ToString::to_string).collect();
+        let (points, duration_s) = (checked.trajectory().points.len(), checked.trajectory().duration_s());
+        let value =
+            json!({ "phase": phase, "duration_s": duration_s, "points": points, "warnings": warnings });
+        operator.progress.event("checked", value);
+        let upload = upload(session, checked, phase, operator)?;
+        operator.progress.event("uploaded", run_report::uploaded(phase, &upload));
         if operator.wants_the_end() {
             return Err(cancelled("upload"));
         }
@@ -192,6 +200,7 @@ impl Leg {
         let (info, tape) = record(phase, start_unix_ns).map_err(not_started)?;
         let Run { outcome, samples } =
             execute(session, checked, phase, tape.as_ref().map(Tape::sink), operator);
+        operator.progress.watch(session);
         Ok(Self { phase, upload, info, tape, samples, outcome })
     }
 }
@@ -269,14 +278,15 @@ impl Job {
 fn upload(
     session: &mut Session<SerialPort>,
     checked: &CheckedTrajectory,
-    what: &str,
+    phase: &str,
     operator: &Operator,
 ) -> Result<UploadReport, Failure> {
     operator.out.note(format!("uploading {} points", checked.trajectory().points.len()));
-    let bar = operator.out.bar(1, what);
+    let bar = operator.out.bar(1, if phase == APPROACH { APPROACH } else { "upload" });
     let report = session.upload(checked, |p| {
         bar.set_length(p.segments as u64);
         bar.set_position(p.segments_done as u64);
+        operator.progress.uploading(phase, p);
         if operator.wants_the_end() { Flow::Cancel } else { Flow::Continue }
     });
     bar.finish_and_clear();
@@ -294,7 +304,9 @@ fn execute(
     operator: &mut Operator,
 ) -> Run {
     operator.motion_begins();
-    let bar = operator.out.bar((checked.trajectory().duration_s() * 1e3) as u64, what);
+    let duration_s = checked.trajectory().duration_s();
+    operator.progress.event("executing", json!({ "phase": what, "duration_s": duration_s }));
+    let bar = operator.out.motion_bar((duration_s * 1e3) as u64, what, operator.keys());
     let record = move |sample: &Sample| {
         if let Some(sink) = &sink {
             sink.write(sample);
@@ -302,7 +314,8 @@ fn execute(
     };
     let run = session.run_observed(checked, record, |s| {
         bar.set_position(u64::from(s.point));
-        bar.set_message(if s.tes == 2 { "paused" } else { what }.to_owned());
+        bar.set_message(run_report::motion_line(s));
+        operator.progress.see(s);
         operator.wish(s)
     });
     operator.motion_ended();

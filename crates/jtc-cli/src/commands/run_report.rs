@@ -5,6 +5,7 @@ use jtc_host::arm::Arm;
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Facts, RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
+use jtc_wire::Status;
 
 /// What a recording of this arm says about itself.
 pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
@@ -85,6 +86,13 @@ pub fn link_facts(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32
     }
 }
 
+/// The keys of an upload as an event.
+pub fn uploaded(phase: &str, upload: &UploadReport) -> serde_json::Value {
+    let mut value = serde_json::to_value(upload).unwrap_or_default();
+    value["phase"] = phase.into();
+    value
+}
+
 /// The link in one line.
 pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
     let share = line_share(upload).map_or(String::new(), |s| format!(" ({s:.1} % of the line)"));
@@ -97,4 +105,20 @@ pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
 /// In percent; none behind a pseudo-terminal that is faster than the rate says.
 fn line_share(upload: &UploadReport) -> Option<f64> {
     upload.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
+}
+
+/// A motion in one line, for below its bar: what it does, and the joint that is nearest to what it can.
+pub fn motion_line(s: &Status) -> String {
+    let what = match s.tes {
+        1 => "stopped",
+        2 => "paused; space goes on",
+        3 => "moving",
+        4 => "finished",
+        _ => "not moving",
+    };
+    let most = s.joints.iter().enumerate().max_by(|a, b| a.1.torque.abs().total_cmp(&b.1.torque.abs()));
+    let torque = most.map_or(String::new(), |(j, joint)| {
+        format!(", most torque: joint {} {} N·m", j + 1, cli_kit::figure(joint.torque.into(), 0))
+    });
+    format!("{what}{}", if s.tes == 3 { &torque } else { "" })
 }

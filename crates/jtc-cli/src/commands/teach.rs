@@ -17,10 +17,15 @@ use crate::args::{LinkArgs, TeachCommand};
 use crate::failure::{FAULT, Failure};
 use crate::operator::ended_at_once;
 use crate::output_file::OutputFile;
+use crate::progress::Progress;
 use taught_file::TaughtFile;
 
 /// Does one of the family.
 pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
+    if matches!(command, TeachCommand::Record { .. }) {
+        // Also where the file cannot be opened.
+        out.stream()?;
+    }
     match command {
         TeachCommand::On(link) => switch(link, true, out),
         TeachCommand::Off(link) => switch(link, false, out),
@@ -46,6 +51,7 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
 }
 
 fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output) -> Result<(), Failure> {
+    let progress = Progress::begin(out)?;
     let (teaching, begun, its_out) =
         (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)), *out);
     let (its_teaching, its_begun) = (Arc::clone(&teaching), Arc::clone(&begun));
@@ -67,6 +73,7 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
         }
     })?;
     let mut session = link.session()?;
+    progress.watch(&mut session);
     let status = session.fresh_status()?;
     if stop.asked() {
         // Teaching would take the hold from an arm that nobody leads any more.
@@ -79,6 +86,7 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
     if !was_on {
         session.teach(true)?;
     }
+    progress.event("teaching", json!({}));
     out.note("teaching: move the arm by hand; Ctrl-C ends the recording");
     let start = session.now();
     let mut taught = TaughtFile::new(file);

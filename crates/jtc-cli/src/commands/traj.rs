@@ -15,6 +15,7 @@ use serde_json::json;
 use super::run;
 use crate::args::{CheckArgs, LinkArgs, TrajCommand};
 use crate::failure::{Failure, REFUSED};
+use crate::progress::Progress;
 
 /// Does one of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
@@ -48,7 +49,10 @@ fn send(
     words: &str,
     out: &Output,
 ) -> Result<(), Failure> {
-    command(&mut link.session()?)?;
+    let progress = Progress::begin(out)?;
+    let mut session = link.session()?;
+    progress.watch(&mut session);
+    command(&mut session)?;
     out.result(&json!({ "command": name, "accepted": true }), || words.to_owned());
     Ok(())
 }

@@ -1,0 +1,113 @@
+//! What a command tells programs while it works: events of `--json`, one object a line, the result as the last one.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use cli_kit::Output;
+use jtc_host::port::Port;
+use jtc_host::sample::is_measured;
+use jtc_host::{Session, session, words};
+use jtc_wire::Status;
+use serde_json::{Value, json};
+
+use crate::failure::Failure;
+
+/// The page of `jtc help events`.
+pub const EVENTS_HELP: &str = include_str!("progress.md");
+
+/// Samples and steps of an upload come no faster than this.
+const MODEST: Duration = Duration::from_millis(200);
+
+/// The events of a command.
+#[derive(Clone)]
+pub struct Progress(Rc<Inner>);
+
+struct Inner {
+    out: Output,
+    /// States that were told last: controller, trajectory, errors.
+    told: Cell<Option<(u8, u8, u16)>>,
+    sampled: Cell<Option<Instant>>,
+    uploaded: Cell<Option<Instant>>,
+    link: RefCell<Value>,
+}
+
+impl Progress {
+    /// From now on results are the last of a stream, where JSON was asked for.
+    pub fn begin(out: &Output) -> Result<Self, Failure> {
+        out.stream()?;
+        Ok(Self(Rc::new(Inner {
+            out: *out,
+            told: Cell::default(),
+            sampled: Cell::default(),
+            uploaded: Cell::default(),
+            link: RefCell::default(),
+        })))
+    }
+
+    /// Something that happens.
+    pub fn event(&self, name: &str, value: Value) {
+        self.0.out.event(name, value);
+    }
+
+    /// From now on the statuses of this session make events; whoever observes it otherwise hands them to [`Progress::see`].
+    pub fn watch<P: Port>(&self, session: &mut Session<P>) {
+        *self.0.link.borrow_mut() = json!({ "port": session.port().name(), "baud": session.port().baud() });
+        let own = self.clone();
+        session.observe(move |_, status| own.see(status));
+    }
+
+    /// A status that came: the first one is the connection, changes of the state are told at once, and measured values at a modest
+    /// rate while the arm moves or may be moved.
+    pub fn see(&self, s: &Status) {
+        let now = (s.fsm, s.tes, s.errors);
+        let state = || json!({ "state": words::state(s.fsm), "trajectory": words::tes(s.tes), "errors": words::causes(s) });
+        match self.0.told.replace(Some(now)) {
+            None => {
+                let mut value = self.0.link.borrow().clone();
+                if let (Value::Object(all), Value::Object(more)) = (&mut value, state()) {
+                    all.extend(more);
+                }
+                self.event("connected", value);
+            }
+            Some(before) if before != now => self.event("state", state()),
+            Some(_) => {}
+        }
+        if matches!(s.fsm, 3 | 4) && due(&self.0.sampled) {
+            self.event("sample", sample(s));
+        }
+    }
+
+    /// How far an upload is; `phase` names the motion that it is of.
+    pub fn uploading(&self, phase: &str, p: &session::Progress) {
+        if due(&self.0.uploaded) || p.segments_done == p.segments {
+            let fraction = if p.segments == 0 { 0.0 } else { p.segments_done as f64 / p.segments as f64 };
+            let value = json!({
+                "phase": phase, "fraction": fraction, "segments_done": p.segments_done, "segments": p.segments,
+            });
+            self.event("uploading", value);
+        }
+    }
+}
+
+fn due(last: &Cell<Option<Instant>>) -> bool {
+    let due = last.get().is_none_or(|at| at.elapsed() >= MODEST);
+    if due {
+        last.set(Some(Instant::now()));
+    }
+    due
+}
+
+/// Measured values of all joints; null where one does not answer.
+fn sample(s: &Status) -> Value {
+    let all = |value: fn(&jtc_wire::JointStatus) -> f32| -> Vec<Option<f32>> {
+        let joints = s.joints.iter().enumerate();
+        joints.map(|(j, joint)| is_measured(s, j).then(|| value(joint) + 0.0)).collect()
+    };
+    json!({
+        "path_s": f64::from(s.point) * 1e-3,
+        "position_rad": all(|j| j.position),
+        "velocity_rad_s": all(|j| j.velocity),
+        "torque_nm": all(|j| j.torque),
+    })
+}

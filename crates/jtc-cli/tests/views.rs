@@ -1,0 +1,139 @@
+//! `jtc` at a terminal: the live view from its begin to its end, and a run with its bar.
+#![cfg(unix)]
+
+mod common;
+
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
+use cli_kit::trial::{Terminal, signal};
+use common::{Sim, command, motion};
+
+/// `jtc` at a simulated controller.
+fn at(sim: &Sim, words: &[&str]) -> std::process::Command {
+    let mut command = command();
+    command.args(words).args(["--port", sim.port.to_str().unwrap()]);
+    command
+}
+
+/// The arm moves slowly, and the command that began it is gone.
+fn moving(sim: &Sim) {
+    let file = sim.path("slow.csv");
+    let row = |i: i32| {
+        let q = 0.2 * (std::f64::consts::PI * f64::from(i) / 300.0).sin().powi(4);
+        format!("{:.1},{q},{q},{q},{q},{q},{q}\n", f64::from(i) * 0.1)
+    };
+    let text: String = (0..=300).map(row).collect();
+    std::fs::write(&file, format!("t,q1,q2,q3,q4,q5,q6\n{text}")).unwrap();
+    let mut run = at(sim, &["--json", "traj", "run", &file]);
+    let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut lines = BufReader::new(run.stdout.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("\"sample\"")), "it does not move");
+    run.kill().unwrap();
+    run.wait().unwrap();
+}
+
+/// The view stops a motion whose own command has gone, shows it, and leaves the terminal as it was.
+#[test]
+fn j33_the_stop_key_of_the_view_stops() {
+    let sim = Sim::start(&["--no-throttle"]);
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    moving(&sim);
+    let mut terminal = Terminal::new(40, 12);
+    let mut child = terminal.start(&at(&sim, &["monitor"]));
+    terminal.until_it_shows(" Operate ");
+    terminal.until_it_shows("s stops   q ends");
+    terminal.press("s");
+    terminal.until_it_shows("stopping on the path");
+    terminal.until_it_shows("trajectory Stop");
+    terminal.press("q");
+    assert_eq!(terminal.ends(&mut child), 0);
+    assert!(terminal.is_as_before());
+}
+
+/// However the view ends, it ends at once, with the terminal as it was.
+#[test]
+fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
+    let sim = Sim::start(&["--no-throttle"]);
+    for name in ["-INT", "-TERM"] {
+        let mut terminal = Terminal::new(80, 24);
+        let mut child = terminal.start(&at(&sim, &["monitor"]));
+        terminal.until_it_shows("joint 6");
+        signal(&child, name);
+        assert_eq!(terminal.ends(&mut child), 0, "{name}");
+        assert!(terminal.is_as_before() && !terminal.picture.text().contains("thread"), "{name}");
+        // The screen from before the view is shown again.
+        assert!(String::from_utf8_lossy(&terminal.bytes).contains("\u{1B}[?1049l"), "{name}");
+    }
+    // The window is closed, for a session of its own and for one that is told nothing of it.
+    for nohup in [false, true] {
+        let mut terminal = Terminal::new(60, 20);
+        let mut monitor = at(&sim, &["monitor"]);
+        if nohup {
+            let mut shell = std::process::Command::new("sh");
+            shell
+                .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
+                .arg(monitor.get_program())
+                .args(monitor.get_args());
+            monitor = shell;
+        }
+        let mut child = terminal.start(&monitor);
+        terminal.until_it_shows("joint 6");
+        terminal.hang_up();
+        assert_eq!(terminal.ends(&mut child), 0, "nohup: {nohup}");
+    }
+    // Lines for whoever is no terminal, until it has read enough.
+    let mut child = at(&sim, &["monitor"]);
+    let mut child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut line = String::new();
+    let mut out = BufReader::new(child.stdout.take().unwrap());
+    out.read_line(&mut line).unwrap();
+    assert!(line.contains("Init") && !line.contains('\u{1B}'), "{line}");
+    drop(out);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+/// On a terminal below 40 columns the keys work, and it is said what is missing.
+#[test]
+fn a_small_terminal_says_so_and_its_keys_work() {
+    let sim = Sim::start(&["--no-throttle"]);
+    let mut terminal = Terminal::new(30, 8);
+    let mut child = terminal.start(&at(&sim, &["monitor"]));
+    terminal.until_it_shows("needs 40 columns");
+    assert!(terminal.picture.rows()[0].starts_with("s stops"), "{}", terminal.picture.text());
+    terminal.press("s");
+    terminal.press("q");
+    assert_eq!(terminal.ends(&mut child), 0);
+}
+
+/// What is said while a bar is drawn stands above it, and no piece of the bar is left; keys that cannot do anything say so.
+#[test]
+fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
+    let sim = Sim::start(&["--no-throttle"]);
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let file = sim.path("motion.csv");
+    std::fs::write(&file, motion(0.2)).unwrap();
+    let mut terminal = Terminal::new(40, 40);
+    let mut child = terminal.start(&at(&sim, &["traj", "run", &file, "--speed", "10"]));
+    terminal.until("the bar", |p| p.text().contains("% of 12.0 s") && p.text().contains("space pauses"));
+    terminal.press(" ");
+    terminal.until_it_shows("paused; space goes on");
+    terminal.press(" ");
+    terminal.until("the motion goes on", |p| p.text().matches("moving").count() >= 3);
+    terminal.press("+");
+    terminal.until("why not", |p| p.text().replace('\n', " ").contains("no command to change the speed"));
+    terminal.press("s");
+    assert_eq!(terminal.ends(&mut child), 5);
+    let text = terminal.picture.text();
+    assert!(!text.contains('━') && !text.contains('╸') && !text.contains("keys:"), "{text}");
+    assert!(text.contains("stopping on the path") && text.contains("stopped"), "{text}");
+    assert!(terminal.is_as_before());
+
+    let mut terminal = Terminal::new(30, 60);
+    let mut child = terminal.start(&at(&sim, &["traj", "run", &file, "--approach", "--speed", "10"]));
+    terminal.until("the size that is needed", |p| {
+        p.text().replace('\n', "").contains("needs 40 columns and 12 rows")
+    });
+    terminal.press("s");
+    assert_eq!(terminal.ends(&mut child), 5);
+}

@@ -57,6 +57,34 @@ pub enum ProblemKind {
 }
 
 impl ProblemKind {
+    /// All of them.
+    pub const ALL: [Self; 21] = {
+        use ProblemKind::*;
+        [
+            Empty,
+            TooManyPoints,
+            TooManySegments,
+            SegmentPoints,
+            StepTime,
+            PositionScale,
+            VelocityScale,
+            AccelerationScale,
+            Jump,
+            Position,
+            Velocity,
+            Acceleration,
+            Torque,
+            HoldTorque,
+            FrictionVelocity,
+            NoStop,
+            PositionSpeed,
+            VelocityMismatch,
+            NotAtRest,
+            StartPose,
+            AccelerationMismatch,
+        ]
+    };
+
     pub(super) fn scale(channel: &str) -> Self {
         match channel {
             "position" => ProblemKind::PositionScale,
@@ -87,7 +115,8 @@ impl ProblemKind {
         }
     }
 
-    fn words(self) -> &'static str {
+    /// The kind in words, without the facts.
+    pub fn words(self) -> &'static str {
         use ProblemKind::*;
         match self {
             Empty => "no points",

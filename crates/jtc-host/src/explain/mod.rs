@@ -1,11 +1,13 @@
 //! One page for each code that a controller, a drive or this library reports: what it means, why, what to do, the next command.
 
+mod check;
 mod controller;
 mod link;
 mod nodes;
 
 use jtc_wire::{DataStatus, FrameStatus};
 
+use crate::check::ProblemKind;
 use crate::words;
 
 /// Which number a page is about.
@@ -34,11 +36,15 @@ pub enum Family {
     Tes,
     /// States of a node.
     NodeState,
+    /// Bits of what a controller has not been given.
+    Missing,
+    /// Kinds of what the check of a trajectory finds.
+    Check,
 }
 
 impl Family {
     /// All, in the order in which a bare number is looked up.
-    pub const ALL: [Family; 11] = [
+    pub const ALL: [Family; 13] = [
         Family::Jtc,
         Family::Joint,
         Family::Can,
@@ -50,6 +56,8 @@ impl Family {
         Family::State,
         Family::Tes,
         Family::NodeState,
+        Family::Missing,
+        Family::Check,
     ];
 
     /// What stands before the colon in `can:0x100`.
@@ -66,6 +74,8 @@ impl Family {
             Family::State => "state",
             Family::Tes => "tes",
             Family::NodeState => "node-state",
+            Family::Missing => "missing",
+            Family::Check => "check",
         }
     }
 
@@ -83,6 +93,8 @@ impl Family {
             Family::State => "state of the controller",
             Family::Tes => "trajectory execution state",
             Family::NodeState => "state of a node",
+            Family::Missing => "word of missing parameters",
+            Family::Check => "kind of a problem of a trajectory",
         }
     }
 
@@ -90,7 +102,13 @@ impl Family {
     pub fn is_bits(self) -> bool {
         matches!(
             self,
-            Family::Jtc | Family::Joint | Family::Can | Family::Node | Family::Warning | Family::Motor
+            Family::Jtc
+                | Family::Joint
+                | Family::Can
+                | Family::Node
+                | Family::Warning
+                | Family::Motor
+                | Family::Missing
         )
     }
 }
@@ -143,11 +161,17 @@ const fn page(family: Family, code: u32, name: &'static str, texts: [&'static st
 
 /// All pages.
 pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
-    controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES)
+    controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES).chain(check::PAGES)
 }
 
-/// The words that commands print for this code, if it has its own.
-fn shown(page: &Page) -> Option<String> {
+/// The words that commands print for this code.
+fn shown(page: &Page) -> Vec<String> {
+    // A frame that is decoded names nodes as the wire counts them.
+    let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
+    own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
+}
+
+fn own_words(page: &Page) -> Option<String> {
     use jtc_wire::words as w;
     let at = |names: &[&str]| names.get(page.code as usize).map(|name| (*name).to_owned());
     let code = u8::try_from(page.code).ok()?;
@@ -163,6 +187,8 @@ fn shown(page: &Page) -> Option<String> {
         Family::Can => words::can_flags(page.number()).pop(),
         Family::Data => DataStatus::from_byte(code).map(|code| words::data_status(code).to_owned()),
         Family::Frame => FrameStatus::from_byte(code).map(|code| words::frame_status(code).to_owned()),
+        Family::Missing => at(&w::JTC_INIT),
+        Family::Check => ProblemKind::ALL.get(page.code as usize).map(|kind| kind.words().to_owned()),
     }
 }
 
@@ -179,9 +205,10 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         Some((node, rest)) if node.starts_with("joint ") || node == "gripper" => rest,
         _ => query,
     };
+    let query = query.strip_suffix(" not given").unwrap_or(query);
     let as_shown = letters(query);
     let on_screen = |fits: fn(&str, &str) -> bool| -> Vec<&'static Page> {
-        pages().filter(|p| shown(p).is_some_and(|text| fits(&letters(&text), &as_shown))).collect()
+        pages().filter(|p| shown(p).iter().any(|text| fits(&letters(text), &as_shown))).collect()
     };
     let exact = on_screen(|text, asked| text == asked);
     if !exact.is_empty() {
@@ -280,6 +307,20 @@ mod tests {
                 has(&format!("joint 3: {name}"), family, code);
             }
         }
+        for kind in ProblemKind::ALL {
+            has(kind.words(), Family::Check, kind as usize);
+            // As JSON names it.
+            let key = serde_json::to_value(kind).unwrap().as_str().unwrap().to_owned();
+            has(&key, Family::Check, kind as usize);
+        }
+        for (bit, name) in w::JTC_INIT.iter().enumerate() {
+            has(name, Family::Missing, bit);
+            has(&format!("{name} not given"), Family::Missing, bit);
+        }
+        for (bit, name) in w::CAN_FLAGS.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
+            has(name, Family::Can, bit);
+        }
+        has(w::node_fsm(99), Family::NodeState, 9);
         for code in [0, 1, 2, 3, 10, 254, 255] {
             has(w::node_fsm(code), Family::NodeState, code.into());
         }
@@ -303,6 +344,8 @@ mod tests {
         assert_eq!(count(Family::Warning), w::NODE_WARNINGS.len());
         assert_eq!(count(Family::Can), w::CAN_FLAGS.iter().filter(|n| !n.is_empty()).count());
         assert_eq!(count(Family::State), w::JTC_FSM.len());
+        assert_eq!(count(Family::Missing), w::JTC_INIT.len());
+        assert_eq!(count(Family::Check), ProblemKind::ALL.len());
         assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));
         for (i, p) in pages().enumerate() {
             assert!(
@@ -310,7 +353,13 @@ mod tests {
                 "{}",
                 p.name
             );
-            assert_eq!(find(p.name), [p]);
+            // Another one may have the same words on a screen.
+            let found = find(p.name);
+            assert!(
+                found.contains(&p) && found.iter().all(|q| q.family != p.family || q == &p),
+                "{}: {found:?}",
+                p.name
+            );
             assert!(
                 !p.command.is_empty()
                     && p.meaning.ends_with('.')

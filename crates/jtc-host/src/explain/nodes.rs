@@ -221,6 +221,17 @@ pub(super) const PAGES: &[Page] = &[
     ),
     page(
         Family::NodeState,
+        9,
+        "unknown-state",
+        [
+            "A state that this program does not know.",
+            "A newer firmware, or a frame that was damaged and passed its check.",
+            "Compare the versions of controller and program.",
+            "jtc decode",
+        ],
+    ),
+    page(
+        Family::NodeState,
         254,
         "node-fault-reaction",
         [

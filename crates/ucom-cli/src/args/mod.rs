@@ -168,7 +168,8 @@ pub enum Command {
     Run(RunArgs),
     /// Live view of boards, bus load and foreign frames; asks once, then listens
     #[command(after_help = "Examples:\n  ucom monitor\n  ucom --json monitor --count 5\n\n\
-                            Keys: arrows, PageUp, PageDown, Home and End scroll, r asks the boards again, q ends.\n\
+                            Keys: s stops the control loops of all boards, r asks the boards again, arrows, PageUp, PageDown,\n\
+                            Home and End scroll, q ends. The terminal needs 40 columns and 12 rows.\n\
                             Status bits where room is short, a dot where one is not set: M MSTART, A ASTART, R MCARUN, X EXLRUN,\n\
                             I INIT, P PROG, o OPINIT, i IPINIT. On wider terminals they are words.")]
     Monitor(MonitorArgs),
@@ -214,6 +215,11 @@ pub enum Command {
     /// What is wrong with bus, chain and boards, with the next command
     #[command(after_help = "Examples:\n  ucom doctor\n  ucom --json doctor")]
     Doctor,
+    /// What a word of a screen means: a status bit, a state, an error, an event
+    #[command(
+        after_help = "Examples:\n  ucom explain\n  ucom explain OPINIT\n  ucom explain DSP_ERROR_FLASH\n  ucom explain left-loop"
+    )]
+    Explain(ExplainArgs),
     /// A DBC file for other CAN tools, with the names of the boards' inputs, outputs and parameters
     #[command(
         after_help = "Examples:\n  ucom dbc --out chain.dbc\n  ucom dbc 1-4 > chain.dbc\n  ucom dbc none > messages.dbc"

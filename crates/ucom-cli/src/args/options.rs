@@ -368,3 +368,10 @@ pub struct DbcArgs {
     #[command(flatten)]
     pub force: ForceArgs,
 }
+
+/// Options of `ucom explain`.
+#[derive(Args, Debug)]
+pub struct ExplainArgs {
+    /// The word as a screen shows it, or the number of an error; without it: the list
+    pub word: Vec<String>,
+}

@@ -4,6 +4,7 @@ mod boards;
 pub mod conformance;
 mod decode;
 mod doctor;
+mod explain;
 mod followed;
 mod help;
 mod io;
@@ -52,6 +53,7 @@ pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failur
         Command::Run(args) => run::run(&args, link, out),
         Command::Monitor(args) => monitor::monitor(&args, link, out),
         Command::Conformance(args) => conformance::conformance(&args, link, out),
+        Command::Explain(args) => explain::explain(&args, out),
         Command::Doctor => doctor::doctor(link, out),
         Command::Probe(args) => doctor::probe(&args, link, out),
         Command::Dbc(args) => io::dbc(&args, link, out),

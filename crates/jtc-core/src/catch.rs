@@ -5,7 +5,7 @@
 //! commanded, which stops every load that it can hold, and the set position *sags* behind the joint: by as much as the computed
 //! torque exceeds the limit. So the joint comes to rest where the limit has stopped it. Held at its old position instead, it
 //! would be thrown upwards and fall again, for ever when there is little friction.
-use crate::coast::STANDING;
+use crate::coast::moves;
 use crate::config::{Config, JointConfig};
 
 /// How long a joint has to have been at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a
@@ -48,7 +48,7 @@ impl Catch {
         }
         self.left_ms -= 1;
         let speed = velocity.abs();
-        if speed > STANDING {
+        if moves(velocity) {
             self.busy_ms = CALM_MS;
             if velocity * self.peak < 0.0 {
                 (self.peak_before, self.peak) = (self.peak.abs(), velocity);
@@ -159,7 +159,7 @@ mod tests {
     /// A load that begins to fall after noise of the other sign has to be caught like any other.
     #[test]
     fn j43_noise_around_standstill_is_no_half_of_a_swing() {
-        for noise in [0.001, 0.01, STANDING] {
+        for noise in [0.001, 0.01, 0.02] {
             assert!(goes_on(&[noise, -0.15]) && goes_on(&[-noise, 0.15]), "{noise} before a fall");
             assert!(goes_on(&[0.2, -noise, 0.15, -noise, 0.19]), "{noise} within a half");
         }
@@ -173,7 +173,7 @@ mod tests {
             assert_eq!(catch.busy(), ms < 1_000, "{ms}");
         }
         let mut stands = begun();
-        (0..100).for_each(|_| assert!(stands.step(STANDING)));
+        (0..100).for_each(|_| assert!(stands.step(0.02)));
         assert!(!stands.busy(), "what counts as standing is calm");
     }
 

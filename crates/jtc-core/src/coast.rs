@@ -3,12 +3,17 @@
 use crate::config::{Config, JointConfig};
 use crate::motion::smooth;
 
-/// Speed below which a joint counts as standing, rad/s.
-pub(crate) const STANDING: f64 = 0.02;
+/// Highest speed at which a joint counts as standing, rad/s.
+const STANDING: f64 = 0.02;
 /// Highest deceleration of a joint that falls while it is enabled, rad/s²: most of its torque is gravity's.
 const CATCH_DECELERATION: f64 = 3.0;
 /// Length of a tick, s.
 const DT: f64 = 0.001;
+
+/// A joint with this velocity (rad/s) moves.
+pub(crate) fn moves(velocity: f64) -> bool {
+    velocity.abs() > STANDING
+}
 
 /// A joint that decelerates from where it was, along a smooth ramp of the velocity.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +83,13 @@ mod tests {
             }
         }
         panic!("it never rests");
+    }
+
+    #[test]
+    fn j33_fifty_seconds_a_radian_is_standing() {
+        for sign in [1.0, -1.0] {
+            assert!(!moves(0.0) && !moves(sign * 0.0199) && !moves(sign / 50.0) && moves(sign * 0.0201));
+        }
     }
 
     #[test]

@@ -274,4 +274,79 @@ mod tests {
             assert_eq!(controller.clock.time, time, "{tes:?}: this is the index that the status shows");
         }
     }
+
+    /// On the path, with a Pause accepted `ms` ago.
+    fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
+        let mut controller = braking(State::Operate, Tes::Execute);
+        controller.path = Path::Running { leave: Some(Tes::Pause) };
+        controller.braking_ms = Some(ms);
+        (controller.clock, controller.clock.time) = (PathClock::start(), 250.0);
+        controller
+    }
+
+    #[test]
+    fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
+        let most = Config::avena().braking_ms_max;
+        for (tes, ms, goes_on, error) in [
+            (Tes::Execute, most - 1, true, 0),
+            (Tes::Execute, most, false, joint_error::TORQUE),
+            // An arm that is held, and moved by something else.
+            (Tes::Pause, most - 1, true, 0),
+            (Tes::Pause, most, false, 0),
+        ] {
+            let mut controller = pausing(ms);
+            (controller.tes, controller.motion.set.velocity[2]) = (tes, -0.03);
+            assert_eq!(controller.brake(), goes_on, "{tes:?} after {ms} ms");
+            let found: [u16; JOINTS] = core::array::from_fn(|j| controller.errors.joint(j).0);
+            assert_eq!(found, [0, 0, error, 0, 0, 0], "{tes:?} after {ms} ms");
+        }
+        let mut controller = pausing(most);
+        controller.brake();
+        assert!(!controller.errors.any(), "it stands");
+    }
+
+    /// The last of a motion may be too slow for torque to end it.
+    #[test]
+    fn j33_an_arm_that_stands_when_its_time_is_over_has_stopped() {
+        let most = Config::avena().stop_ms;
+        for (ms, velocity, tes) in
+            [(most - 1, 0.01, Tes::Execute), (most, 0.01, Tes::Pause), (most, -0.03, Tes::Execute)]
+        {
+            let mut controller = pausing(ms);
+            controller.motion.set.velocity[4] = velocity;
+            controller.brake();
+            assert_eq!(
+                (controller.tes, controller.clock.standing()),
+                (tes, tes == Tes::Pause),
+                "{ms} {velocity}"
+            );
+            assert_eq!(controller.clock.time, 250.0);
+        }
+    }
+
+    #[test]
+    fn j33_a_second_stop_gives_no_more_time_to_brake() {
+        let mut controller = pausing(700);
+        controller.leave_path(ExecCommand::Stop);
+        assert_eq!(controller.braking_ms, Some(700));
+        assert_eq!(controller.path, Path::Running { leave: Some(Tes::Stop) }, "the later command holds");
+    }
+
+    #[test]
+    fn j34_an_arm_exactly_at_the_tolerance_is_at_the_point() {
+        let mut controller = braking(State::HoldPos, Tes::Stop);
+        controller.config.start_tolerance_rad = 0.25;
+        assert!(controller.near(&[0.0, 0.25, -0.25, 0.0, 0.1, 0.0]));
+        assert!(!controller.near(&[0.0, 0.25, -0.2501, 0.0, 0.1, 0.0]));
+        controller.config.start_tolerance_rad = 0.0;
+        assert!(controller.near(&[0.0; JOINTS]));
+    }
+
+    #[test]
+    fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
+        let leave = Some(Tes::Stop);
+        assert_eq!(Path::Running { leave }.leave(), leave);
+        assert_eq!(Path::Gliding { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
+        assert_eq!((Path::BEGIN.leave(), Path::AtStart.leave()), (None, None));
+    }
 }

@@ -7,7 +7,7 @@ use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
 use crate::catch::Catch;
-use crate::coast::{Coast, STANDING};
+use crate::coast::{Coast, moves};
 use crate::config::{Config, PidGains};
 use crate::interpolation::SetPoint;
 use crate::limits::Saturation;
@@ -71,10 +71,10 @@ impl Motion {
     pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);
-        let moves = velocity.iter().any(|v| v.abs() > STANDING);
+        let moving = velocity.iter().any(|&v| moves(v));
         for j in 0..JOINTS {
             // Joints that are enabled later begin on their own.
-            let coasts = moves && self.holding[j];
+            let coasts = moving && self.holding[j];
             self.coast[j] = coasts.then_some(Coast::led(from[j], velocity[j], config, &config.joints[j]));
         }
     }
@@ -108,9 +108,7 @@ impl Motion {
 
     /// Joints that move, by their set values or as measured.
     pub fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
-        core::array::from_fn(|j| {
-            self.set.velocity[j].abs() > STANDING || nodes.velocities()[j].abs() > STANDING
-        })
+        core::array::from_fn(|j| moves(self.set.velocity[j]) || moves(nodes.velocities()[j]))
     }
 
     /// As if every joint were enabled and its position latched.
@@ -143,9 +141,9 @@ impl Motion {
                 self.set.position[j] = measured[j];
                 self.pid[j].reset(0.0);
                 self.catch[j] = if just_enabled[j] { Catch::begin(config) } else { Catch::default() };
-                let moves = just_enabled[j] && velocity[j].abs() > STANDING;
+                let falls = just_enabled[j] && moves(velocity[j]);
                 self.coast[j] =
-                    moves.then_some(Coast::falling(measured[j], velocity[j], config, &config.joints[j]));
+                    falls.then_some(Coast::falling(measured[j], velocity[j], config, &config.joints[j]));
             } else if another {
                 // Its load moves when that of another joint does.
                 self.catch[j] = Catch::begin(config);
@@ -252,5 +250,54 @@ mod tests {
         }
         assert_eq!((at(0.0).position, at(200.0).velocity), (from, [0.0; JOINTS]));
         assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+
+    /// Otherwise it would be without the limits of torque while it stands, and nothing could be begun.
+    #[test]
+    fn j25_an_arm_that_stands_is_held_at_once() {
+        let (config, mut motion) = (Config::avena(), Motion::default());
+        let nodes = Nodes::new(&config);
+        motion.hold_for_test();
+        motion.hold_measured(&nodes, &config);
+        assert!(motion.all_holding());
+        motion.give_way(&nodes, &config);
+        assert!(motion.all_holding() && motion.yielding());
+        motion.stand_firm();
+        assert!(!motion.yielding());
+    }
+
+    #[test]
+    fn j33_a_joint_moves_by_its_set_value_or_as_measured() {
+        let (nodes, mut motion) = (Nodes::new(&Config::avena()), Motion::default());
+        assert_eq!(motion.moving(&nodes), [false; JOINTS]);
+        (motion.set.velocity[1], motion.set.velocity[4]) = (0.03, -0.03);
+        assert_eq!(motion.moving(&nodes), [false, true, false, false, true, false]);
+    }
+
+    #[test]
+    fn j33_on_a_ramp_of_path_time_velocity_and_acceleration_are_those_of_the_scaled_path() {
+        let at = SetPoint { position: [0.5; JOINTS], velocity: [1.2; JOINTS], acceleration: [-3.0; JOINTS] };
+        let mut motion = Motion::default();
+        motion.follow(&at, 0.5, -4.0);
+        // q(s(t)): q'·ṡ, and q''·ṡ² + q'·s̈.
+        assert_eq!((motion.set.position, motion.set.velocity), (at.position, [0.6; JOINTS]));
+        assert!(motion.set.acceleration.iter().all(|a| (a - (-0.75 - 4.8)).abs() < 1e-12));
+    }
+
+    #[test]
+    fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
+        let mut motion = Motion::default();
+        motion.hold_for_test();
+        assert!(motion.all_holding());
+        let config = Config::avena();
+        for j in 0..JOINTS {
+            let mut coasts = motion.clone();
+            coasts.coast[j] = Some(Coast::led(0.0, 0.3, &config, &config.joints[j]));
+            let mut catches = motion.clone();
+            catches.catch[j] = Catch::begin(&config);
+            let mut limp = motion.clone();
+            limp.holding[j] = false;
+            assert!([coasts, catches, limp].iter().all(|motion| !motion.all_holding()), "joint {}", j + 1);
+        }
     }
 }

@@ -229,10 +229,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !inputs.safety_input {
             self.errors.raise_emergency_input();
         }
-        let flags = self.nodes.can_flags(inputs, &self.config);
-        if flags != 0 {
-            self.errors.raise_can(flags);
-        }
+        self.errors.raise_can(self.nodes.can_flags(inputs, &self.config));
         self.errors.show_can(self.nodes.gripper_flags(&self.config));
         if self.nodes.external_error(self.powered()) {
             self.errors.raise_external_joints();

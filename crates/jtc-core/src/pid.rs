@@ -168,4 +168,53 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn j25_the_integral_takes_over_a_torque_as_far_as_it_can() {
+        let taken = |gains: PidGains, torque: f64| {
+            let mut pid = Pid::default();
+            pid.reset(0.3);
+            pid.take_over(&gains, torque);
+            let torque = pid.step(&gains, 0.0, true, None);
+            assert_eq!((torque.p, torque.d), (0.0, 0.0));
+            torque.i
+        };
+        let wide = PidGains { int_min: -9.0, int_max: 9.0, ..GAINS };
+        assert_eq!((taken(wide, 24.0), taken(wide, -24.0)), (24.0, -24.0));
+        assert_eq!((taken(GAINS, 24.0), taken(GAINS, -24.0)), (10.0 * 0.003, 10.0 * -0.002));
+        let none = PidGains { ki: 0.0, ..wide };
+        assert_eq!((taken(none, 24.0), taken(none, 0.0)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn j43_a_commanded_position_that_is_moved_is_no_motion() {
+        let mut pid = Pid::default();
+        pid.reset(0.05);
+        pid.shift(-0.02);
+        for _ in 0..10 {
+            assert_eq!(pid.step(&GAINS, 0.05 - 0.02, false, None).d, 0.0);
+        }
+    }
+
+    #[test]
+    fn j41_the_torque_is_the_sum_of_the_three_parts() {
+        assert_eq!(PidTorque { p: 1.0, i: 2.0, d: 4.0 }.sum(), 7.0);
+    }
+
+    /// A position that the bus has rounded by a hundredth of a step is still within the step.
+    #[test]
+    fn j41_a_step_is_a_step_after_rounding() {
+        const STEP: f64 = 1e-4;
+        for sign in [1.0, -1.0] {
+            let mut pid = Pid::default();
+            pid.reset(0.0);
+            let mut held = |steps: f64| {
+                let before = pid.integral;
+                pid.step(&GAINS, sign * steps * STEP, false, Some(STEP));
+                pid.integral == before
+            };
+            assert!(!held(1.02) && held(1.0 + ROUNDING), "settles");
+            assert!(held(4.0 + ROUNDING) && !held(4.02), "goes on");
+        }
+    }
 }

@@ -164,4 +164,87 @@ mod tests {
         let nan = fitted([f64::NAN; JOINTS], &[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(nan.mass, 0.0);
     }
+
+    #[test]
+    fn j25_next_to_nothing_is_known_at_once_and_a_load_after_a_while() {
+        let config = Config::avena();
+        let known_after = |missing: [f64; JOINTS]| {
+            let mut payload = Payload::default();
+            let observations = (0..1_000).take_while(|_| {
+                let known = payload.is_known(&config);
+                payload.observe(&missing);
+                !known
+            });
+            observations.count()
+        };
+        let share = |share: f64| config.joints.map(|joint| share * joint.torque_max);
+        assert_eq!((known_after([0.0; JOINTS]), known_after(share(-0.099))), (1, 1));
+        assert_eq!((known_after(share(LITTLE)), known_after(share(-0.5))), (400, 400));
+        for j in 0..JOINTS {
+            let mut one = [0.0; JOINTS];
+            one[j] = 0.2 * config.joints[j].torque_max;
+            assert_eq!(known_after(one), 400, "joint {} is enough", j + 1);
+        }
+    }
+
+    #[test]
+    fn j25_what_is_missing_is_the_mean_and_then_a_slow_average() {
+        let mut payload = Payload::default();
+        for n in 1..=99 {
+            payload.observe(&[f64::from(n); JOINTS]);
+            assert!((payload.missing[3] - 0.5 * f64::from(n + 1)).abs() < 1e-9, "{n}");
+        }
+        let mut payload = Payload::default();
+        (0..1_000).for_each(|_| payload.observe(&[2.0; JOINTS]));
+        (0..100).for_each(|_| payload.observe(&[3.0; JOINTS]));
+        // A time constant of 100 ms: 1 − 1/e of the step.
+        assert!((payload.missing[3] - 2.632).abs() < 0.005, "{}", payload.missing[3]);
+    }
+
+    /// What was found before the arm moved says nothing about where it is now.
+    #[test]
+    fn j25_what_was_found_is_forgotten_when_the_arm_is_not_held() {
+        let (config, q) = (Config::avena(), [0.3, 0.8, -0.9, 0.4, 0.7, 0.2]);
+        let mut payload = fitted([9.0; JOINTS], &q);
+        payload.forget();
+        assert!(!payload.is_known(&config));
+        payload.fit(&dynamics(), &q, &config);
+        assert_eq!(payload.torque(&dynamics(), &q, &[0.0; JOINTS], &config), [0.0; JOINTS]);
+        payload.observe(&[4.0; JOINTS]);
+        assert_eq!(payload.missing, [4.0; JOINTS]);
+    }
+
+    #[test]
+    fn j25_a_mass_is_fitted_as_far_as_it_loads_the_joints() {
+        let mut last = 0.0;
+        for k in 0..150 {
+            let q = [0.0, 0.01 * f64::from(k), 0.0, 0.0, 0.0, 0.0];
+            let unit = dynamics().flange_torque(&q);
+            let load = unit.iter().map(|u| u * u).sum::<f64>().sqrt();
+            let mass = fitted(unit.map(|u| 1.5 * u), &q).mass;
+            if load <= LOAD.0 {
+                assert_eq!(mass, 0.0, "{load} N·m/kg");
+            } else if load >= LOAD.1 {
+                assert!((mass - 1.5).abs() < 1e-9, "{load} N·m/kg: {mass}");
+            }
+            assert!(mass >= last - 1e-9 && mass < last + 0.2, "{load} N·m/kg: {last} to {mass}");
+            last = mass;
+        }
+        assert!((last - 1.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn j25_a_torque_that_drives_a_joint_fades_with_its_speed() {
+        let config = Config::avena();
+        let slow = config.teach_payload_velocity;
+        for torque in [8.0, -8.0] {
+            let at = |times: f64| driving(torque, times * slow * f64::signum(torque), &config) / torque;
+            for against in [-100.0, -3.0, -1.0, 0.0, 0.5, 1.0] {
+                assert_eq!(at(against), 1.0, "{torque} N·m at {against}");
+            }
+            assert!((at(2.0) - 0.5).abs() < 1e-9);
+            assert!(at(3.0).abs() < 1e-9 && at(5.0) == 0.0);
+            assert!((10..30).all(|k| at(0.1 * f64::from(k)) > at(0.1 * f64::from(k + 1))));
+        }
+    }
 }

@@ -184,3 +184,25 @@ fn j21_occurred_errors_are_not_reported_as_current() {
     assert_eq!(status.joints[JOINT].internal_occurred, latched.joints[JOINT].internal_occurred);
     assert!(status.occurred != 0 && status.can_occurred != 0 && status.joints[JOINT].internal_occurred != 0);
 }
+
+/// The drive goes through Init for it: with the last parameter in the very next frame the arm is held only after that.
+#[test]
+fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
+    let mut rig = Rig::new(Config::avena());
+    rig.run(300);
+    rig.send(FrameType::PidParamUseDefault, &[]);
+    rig.send(FrameType::ArmModelUseDefault, &[]);
+    rig.run(20);
+    rig.nodes[2].report.mc_occurred = 4;
+    rig.run(20);
+    assert_eq!((rig.state(), rig.status().node_init), (State::Init, 0));
+    rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
+    rig.send(FrameType::FrictionPolynomialUseDefault, &[]);
+    rig.nodes[2].stays_ready = true;
+    for _ in 0..50 {
+        rig.tick();
+        assert_eq!(rig.state(), State::Init);
+    }
+    rig.nodes[2].stays_ready = false;
+    rig.until(500, |rig| rig.state() == State::HoldPos);
+}

@@ -1,7 +1,7 @@
 //! What is no frame, no command and no status, however right the rest of it is.
 use jtc_wire::{
-    ALL_NODES, Command, DataStatus, Floats, FrameRef, FrameType, HEADER, RawPoint, Segment, Status, crc16,
-    fixed,
+    ALL_NODES, Command, DataStatus, Floats, FrameRef, FrameStatus, FrameType, HEADER, LinkEvent, RawPoint,
+    Response, Segment, Status, crc16, fixed,
 };
 
 /// Bytes with their CRC behind them.
@@ -79,6 +79,16 @@ fn j06_only_bit_0_of_the_first_mask_is_the_controller() {
         let frame = sealed(&[HEADER, FrameType::ClearCurrentErrors as u8, 0, 10, mask, 0x41, 0, 0]);
         let parsed = Command::parse(FrameRef::new_checked(&frame).expect("a good frame"));
         assert_eq!(parsed, Ok(Command::ClearCurrentErrors { jtc: mask % 2 == 1, nodes: 0x41 }));
+    }
+}
+
+#[test]
+fn j05_every_event_says_how_it_arrived() {
+    let good = FrameRef::new_checked(&fixed::STOP).expect("a good frame");
+    assert_eq!(LinkEvent::Frame(good).status(), FrameStatus::NoError);
+    for status in [FrameStatus::IncorrectHeader, FrameStatus::IncorrectCrc, FrameStatus::DiscontinuousFrame] {
+        let record = Response::bad(0, status, 0);
+        assert_eq!([LinkEvent::Bad(record).status(), LinkEvent::Noise(record).status()], [status; 2]);
     }
 }
 

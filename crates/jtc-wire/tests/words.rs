@@ -59,6 +59,9 @@ fn what_is_no_frame_in_words() {
     says(&[0x9B, 0x0C, 0, 6, 0xCD, 0x27, 0], "TeachingModeEnable: 7 bytes of 6");
     says(&fixed::TEACHING_MODE_ENABLE, "TeachingModeEnable");
     says(&fixed::PUMP_ON, "GripperControl: pump on");
+    says(&fixed::STOP, "TrajSetExecStatus: stop");
+    says(&fixed::PAUSE, "TrajSetExecStatus: pause");
+    says(&fixed::EXECUTE, "TrajSetExecStatus: execute");
     says(&fixed::clear_current_errors(false, 0), "ClearCurrentErrors: nodes: -");
 }
 

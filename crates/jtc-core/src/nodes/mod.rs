@@ -9,6 +9,8 @@ use crate::{JOINTS, NODES};
 mod bring_up;
 mod measure;
 mod node;
+#[cfg(test)]
+mod tests;
 
 use measure::{Reading, Tick};
 use node::starting;
@@ -244,12 +246,10 @@ impl Nodes {
         for (n, node) in self.nodes.iter_mut().enumerate() {
             let (answered, usable) = (answered & (1 << n) != 0, usable & (1 << n) != 0);
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
-            let unanswered = !answered && self.sent_move && on_the_bus && node.boot_left == 0;
+            let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
             // Nobody was there to answer, and the bus is not given up yet: the joint is predicted all the same (J-63).
-            let predicted = !on_the_bus
-                && self.sent_move
-                && node.valid
-                && (1..config.missed_moves_max).contains(&self.unacknowledged);
+            let predicted =
+                self.sent_move && node.valid && (1..config.missed_moves_max).contains(&self.unacknowledged);
             let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
             if answered {
                 node.silent = 0;

@@ -1,0 +1,416 @@
+//! What one tick makes of a node, state by state (J-14, J-16, J-20, J-21, J-23).
+use jtc_bus::{Frame, GripperReport, Target};
+use jtc_wire::UrgentCommands;
+
+use super::*;
+use crate::io::BusState;
+use crate::records::HOST_LINES;
+
+const SCALE: Scale = Scale { velocity: 2.0 };
+const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
+const START_TO_INIT: u8 = 10;
+const INIT_TO_READY: u8 = 11;
+
+fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {
+    let inputs = Inputs {
+        bus,
+        bus_state,
+        safety_input: true,
+        missed_ticks: 0,
+        urgent: [UrgentCommands::NONE; HOST_LINES],
+        host: &[],
+        status_free: true,
+    };
+    nodes.take(&inputs, &Config::avena(), Goal::Ready, &[0.0; JOINTS]);
+}
+
+/// Every node configured and ready, and a Move just sent.
+fn ready() -> Nodes {
+    let mut nodes = Nodes::new(&Config::avena());
+    for node in &mut nodes.nodes {
+        *node = Node { seen: true, configured: true, valid: true, ..Node::default() };
+        node.report.fsm = fsm::READY;
+    }
+    nodes.sent_move = true;
+    nodes
+}
+
+fn joint(node: u8, state: u8) -> Frame {
+    Answer::Joint { node, report: JointReport { fsm: state, ..JointReport::default() } }.emit(SCALE)
+}
+
+fn gripper(state: u8) -> Frame {
+    Answer::Gripper(GripperReport { fsm: state, ..GripperReport::default() }).emit(SCALE)
+}
+
+fn all(state: u8) -> [Frame; NODES] {
+    core::array::from_fn(|n| if n == GRIPPER { gripper(state) } else { joint(n as u8, state) })
+}
+
+#[test]
+fn j16_joints_may_be_enabled_when_they_were_slow_and_rested_for_long_enough() {
+    let (config, mut nodes) = (Config::avena(), ready());
+    let time = config.enable_still_ms;
+    for (still, rest, may) in
+        [(0, 0, false), (time - 1, 0, false), (time, 0, true), (time + 1, 0, true), (time, 1, false)]
+    {
+        (nodes.still_ms, nodes.rest_ms) = (still, rest);
+        assert_eq!(nodes.may_enable(&config), may, "{still} ms, {rest} ms");
+    }
+}
+
+/// The time for which the arm is slow begins when all its joints are known.
+#[test]
+fn j16_an_arm_that_is_not_known_is_not_still() {
+    let mut nodes = ready();
+    (0..7).for_each(|_| tick(&mut nodes, &all(fsm::READY), GOOD));
+    assert_eq!(nodes.still_ms, 7);
+    nodes.nodes[3].configured = false;
+    nodes.nodes[3].valid = false;
+    tick(&mut nodes, &all(fsm::READY), GOOD);
+    assert_eq!(nodes.still_ms, 0);
+}
+
+#[test]
+fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
+    let lost = BusState { acknowledged: false, bus_off: false };
+    // On a bus that is off nobody can have answered, whatever was acknowledged before.
+    let off = BusState { acknowledged: true, bus_off: true };
+    for (state, sent_move, unacknowledged, silent) in [
+        (GOOD, true, 0, 1),
+        (GOOD, false, 0, 0),
+        (lost, true, 1, 0),
+        (lost, false, 0, 0),
+        (off, true, 1, 0),
+        (off, false, 0, 0),
+    ] {
+        let mut nodes = ready();
+        nodes.sent_move = sent_move;
+        // One that boots is not missed yet.
+        nodes.nodes[4].boot_left = 100;
+        tick(&mut nodes, &[], state);
+        assert_eq!(nodes.unacknowledged, unacknowledged, "{state:?} {sent_move}");
+        for (n, node) in nodes.nodes.iter().enumerate() {
+            assert_eq!(node.silent, if n == 4 { 0 } else { silent }, "{state:?} {sent_move}, node {n}");
+        }
+        // What answers is there.
+        nodes.sent_move = true;
+        tick(&mut nodes, &all(fsm::READY), GOOD);
+        assert_eq!((nodes.unacknowledged, nodes.nodes[4].boot_left), (0, 0));
+        assert!(nodes.nodes.iter().all(|node| node.silent == 0));
+    }
+    let mut booting = ready();
+    booting.nodes.iter_mut().for_each(|node| node.boot_left = 100);
+    tick(&mut booting, &[], lost);
+    assert_eq!(booting.unacknowledged, 0, "nobody is there to acknowledge");
+}
+
+/// Until the bus is given up, a joint that nobody can have answered for is predicted, and that counts as missing its answer.
+#[test]
+fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known() {
+    let lost = BusState { acknowledged: false, bus_off: false };
+    for (unacknowledged, sent_move, valid, missed) in [
+        (0, true, true, 1),
+        (3, true, true, 1),
+        // Given up in this tick: the transmit timeout stands for all of them.
+        (4, true, true, 0),
+        (2, false, true, 0),
+        (2, true, false, 0),
+    ] {
+        let mut nodes = ready();
+        (nodes.unacknowledged, nodes.sent_move, nodes.nodes[1].valid) = (unacknowledged, sent_move, valid);
+        tick(&mut nodes, &[], lost);
+        let node = nodes.node(1);
+        assert_eq!((node.missed, node.silent), (missed, 0), "{unacknowledged} {sent_move} {valid}");
+    }
+}
+
+#[test]
+fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
+    let mut nodes = ready();
+    tick(&mut nodes, &all(fsm::READY), GOOD);
+    let far = JointReport { fsm: fsm::READY, position: 1.0, ..JointReport::default() };
+    for ms in 1..=5 {
+        let mut bus = all(fsm::READY);
+        bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
+        tick(&mut nodes, &bus, GOOD);
+        assert_eq!(nodes.node(2).misbehaved, ms == 5, "after {ms}");
+        assert!(!nodes.node(2).fresh() && nodes.node(1).fresh() && nodes.node(2).silent == 0);
+    }
+    // Then it is taken as it is.
+    let mut bus = all(fsm::READY);
+    bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
+    tick(&mut nodes, &bus, GOOD);
+    assert!(nodes.node(2).fresh() && !nodes.node(2).misbehaved);
+    assert!((nodes.positions()[2] - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn j16_a_joint_that_leaves_operation_enable_or_does_not_reach_it_misbehaves() {
+    let config = Config::avena();
+    let watched = |enabled: bool, state: u8, wait: u32, still: u16, goal: Goal| {
+        let mut nodes = ready();
+        nodes.still_ms = still;
+        let node = &mut nodes.nodes[2];
+        (node.enabled, node.report.fsm, node.enable_wait) = (enabled, state, wait);
+        nodes.watch(&config, goal);
+        let node = nodes.node(2);
+        (node.misbehaved, node.enabled, node.enable_wait)
+    };
+    let (most, still) = (config.enable_timeout_ms, config.enable_still_ms);
+    assert_eq!(watched(false, fsm::READY, 7, still, Goal::Enabled), (false, false, 8));
+    assert_eq!(watched(false, fsm::READY, 7, 0, Goal::Enabled), (false, false, 7), "nothing is asked for");
+    assert_eq!(watched(false, fsm::READY, most - 1, still, Goal::Enabled), (false, false, most));
+    assert_eq!(watched(false, fsm::READY, most, still, Goal::Enabled), (true, false, 0));
+    assert_eq!(watched(false, fsm::ENABLED, 7, still, Goal::Enabled), (false, true, 0));
+    assert_eq!(watched(true, fsm::ENABLED, 0, 0, Goal::Enabled), (false, true, 0));
+    assert_eq!(watched(true, fsm::READY, 0, 0, Goal::Enabled), (true, false, 0));
+    // That is J-20.
+    assert_eq!(watched(true, fsm::INIT, 0, 0, Goal::Enabled), (false, false, 0));
+    for goal in [Goal::Ready, Goal::Down] {
+        assert_eq!(watched(true, fsm::READY, 7, still, goal), (false, false, 0), "it was asked to");
+    }
+    let mut nodes = ready();
+    nodes.nodes[2].report.warnings = warning::POSITION_NOT_ACCURATE;
+    nodes.nodes[3].report.warnings = !warning::POSITION_NOT_ACCURATE;
+    nodes.watch(&config, Goal::Enabled);
+    assert_eq!([2, 3].map(|n| nodes.node(n).misbehaved), [true, false]);
+}
+
+#[test]
+fn j21_a_clear_is_for_the_nodes_in_its_mask_that_have_something_to_clear() {
+    let cleared = |mask: u8, limp: bool, n: usize, change: fn(&mut Node)| {
+        let mut nodes = ready();
+        change(&mut nodes.nodes[n]);
+        nodes.clear(mask, limp);
+        core::array::from_fn::<bool, NODES, _>(|n| nodes.nodes[n].clear).iter().position(|&clear| clear)
+    };
+    assert_eq!(cleared(0x7F, true, 3, |_| {}), None);
+    assert_eq!(cleared(0x7F, false, 3, |node| node.report.errors = 1), Some(3));
+    assert_eq!(cleared(0x77, false, 3, |node| node.report.errors = 1), None);
+    assert_eq!(cleared(0x08, true, 3, |node| node.report.mc_occurred = 1), Some(3));
+    assert_eq!(
+        cleared(0x7F, false, 3, |node| node.report.mc_occurred = 1),
+        None,
+        "no reason to drop the arm"
+    );
+    assert_eq!(cleared(0x7F, false, GRIPPER, |node| node.report.errors = 1), Some(GRIPPER));
+    assert_eq!(cleared(0x7F, true, GRIPPER, |node| node.report.mc_occurred = 1), None);
+}
+
+#[test]
+fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
+    let config = Config::avena();
+    let mut nodes = ready();
+    nodes.nodes[GRIPPER].report.fsm = fsm::ENABLED;
+    let inputs = |bus_state| Inputs {
+        bus: &[],
+        bus_state,
+        safety_input: true,
+        missed_ticks: 0,
+        urgent: [UrgentCommands::NONE; HOST_LINES],
+        host: &[],
+        status_free: true,
+    };
+    for ms in 1..=6u8 {
+        let answers = [0, 1, 3, 4, 5].map(|n| joint(n, fsm::READY));
+        tick(&mut nodes, &answers, GOOD);
+        let (flags, shown) = if ms < 5 { (0, 0) } else { (1 << (8 + 2), GRIPPER_FLAG) };
+        assert_eq!(nodes.can_flags(&inputs(GOOD), &config), flags, "after {ms}");
+        assert_eq!(nodes.gripper_flags(&config), shown, "after {ms}");
+        assert_eq!(nodes.nodes[2].configured, ms < 5, "it may have lost its supply");
+        assert!(nodes.nodes[GRIPPER].configured, "it is enabled: its state will tell");
+    }
+    assert_eq!(nodes.can_flags(&inputs(BusState { bus_off: true, ..GOOD }), &config) & 1, 1);
+    let absent = Nodes::new(&Config { gripper: false, ..Config::avena() });
+    assert_eq!(absent.gripper_flags(&config), 0, "none is expected");
+}
+
+#[test]
+fn j20_a_node_that_falls_back_has_lost_its_configuration_and_does_not_count() {
+    for (before, now, kept) in [
+        (fsm::READY, fsm::READY, true),
+        (fsm::INIT, fsm::INIT, true),
+        (fsm::INIT, fsm::READY, true),
+        (START_TO_INIT, fsm::INIT, true),
+        (INIT_TO_READY, fsm::READY, true),
+        (fsm::READY, fsm::INIT, false),
+        (fsm::ENABLED, fsm::INIT, false),
+        (fsm::READY, START_TO_INIT, false),
+        (fsm::INIT, fsm::START, false),
+        (fsm::START, fsm::START, false),
+    ] {
+        let mut nodes = ready();
+        nodes.nodes[2].report.fsm = before;
+        tick(&mut nodes, &[joint(2, now)], GOOD);
+        let node = nodes.node(2);
+        assert_eq!((node.configured, node.valid), (kept, kept), "{before} to {now}");
+        assert!(nodes.node(1).valid);
+    }
+}
+
+#[test]
+fn j21_a_node_is_cleared_when_it_is_in_init_and_not_on_the_way_there() {
+    for (now, clearing) in [
+        (fsm::INIT, false),
+        (fsm::START, false),
+        (START_TO_INIT, true),
+        (fsm::READY, true),
+        (fsm::FAULT, true),
+    ] {
+        let mut nodes = ready();
+        (nodes.nodes[2].report.fsm, nodes.nodes[2].clear) = (fsm::FAULT, true);
+        tick(&mut nodes, &[joint(2, now)], GOOD);
+        assert_eq!(nodes.clearing(), clearing, "{now}");
+    }
+}
+
+#[test]
+fn j16_a_configuration_accepted_in_this_tick_counts_from_the_next_answer() {
+    let mut nodes = ready();
+    (nodes.nodes[2].configured, nodes.nodes[2].valid) = (false, false);
+    nodes.nodes[2].report.fsm = fsm::INIT;
+    let accepted = Answer::Mode { node: 2, accepted: true }.emit(SCALE);
+    tick(&mut nodes, &[accepted, joint(2, fsm::INIT)], GOOD);
+    assert!(nodes.node(2).configured && !nodes.node(2).valid);
+    tick(&mut nodes, &[joint(2, fsm::INIT)], GOOD);
+    assert!(nodes.node(2).valid);
+    // A refusal afterwards does not take it back.
+    tick(&mut nodes, &[Answer::Mode { node: 2, accepted: false }.emit(SCALE)], GOOD);
+    assert!(nodes.node(2).configured && nodes.node(2).refused);
+    // After a reset nothing that still arrives counts.
+    nodes.nodes[2].restart(&Config::avena());
+    tick(&mut nodes, &[accepted, joint(2, fsm::READY)], GOOD);
+    assert!(!nodes.node(2).configured && !nodes.node(2).seen);
+}
+
+/// A pump is on from its command until the gripper leaves OperationEnable or loses its configuration.
+#[test]
+fn j23_a_gripper_is_lost_when_it_leaves_what_it_was_in() {
+    for (configured, before, now, lost) in [
+        (true, fsm::ENABLED, fsm::ENABLED, false),
+        (true, fsm::ENABLED, fsm::READY, true),
+        (true, fsm::ENABLED, fsm::FAULT, true),
+        (true, fsm::READY, fsm::READY, false),
+        (true, fsm::READY, fsm::ENABLED, false),
+        (true, fsm::READY, fsm::INIT, true),
+        (false, fsm::INIT, fsm::INIT, false),
+        (false, fsm::START, fsm::INIT, false),
+    ] {
+        let mut nodes = ready();
+        (nodes.nodes[GRIPPER].configured, nodes.nodes[GRIPPER].report.fsm) = (configured, before);
+        tick(&mut nodes, &[gripper(now)], GOOD);
+        assert_eq!(nodes.gripper_lost(), lost, "{configured} {before} to {now}");
+    }
+}
+
+#[test]
+fn j16_a_node_is_an_error_by_its_state_its_errors_or_its_safety_line() {
+    let faulty = |change: fn(&mut Node)| {
+        let mut node = ready().nodes[0];
+        change(&mut node);
+        node.faulty()
+    };
+    assert!(!faulty(|_| {}));
+    assert!(faulty(|node| node.report.fsm = fsm::FAULT) && faulty(|node| node.report.fsm = 254));
+    assert!(faulty(|node| node.report.errors = 2) && faulty(|node| node.report.mc_current = 4));
+    assert!(faulty(|node| node.report.warnings = warning::SAFETY_LINE));
+    assert!(!faulty(|node| (node.report.warnings, node.valid) = (warning::SAFETY_LINE, false)));
+    assert!(!faulty(|node| node.report.warnings = !warning::SAFETY_LINE), "other warnings are none");
+    assert!(!faulty(|node| node.report.mc_occurred = 4), "that was before");
+    assert!(!faulty(|node| (node.report.errors, node.seen) = (2, false)), "not seen since its reset");
+}
+
+#[test]
+fn j21_an_error_that_is_being_cleared_counts_only_while_torque_is_on() {
+    for (misbehaved, fault, clear, powered, error) in [
+        (false, false, false, true, false),
+        (false, false, true, true, false),
+        (true, false, false, false, true),
+        (true, false, true, true, true),
+        (false, true, false, false, true),
+        (false, true, false, true, true),
+        (false, true, true, false, false),
+        (false, true, true, true, true),
+    ] {
+        let mut nodes = ready();
+        let node = &mut nodes.nodes[5];
+        (node.misbehaved, node.clear, node.report.errors) = (misbehaved, clear, u8::from(fault));
+        assert_eq!(nodes.external_error(powered), error, "{misbehaved} {fault} {clear} {powered}");
+    }
+    let mut nodes = ready();
+    nodes.nodes[GRIPPER].report.fsm = fsm::FAULT;
+    assert!(!nodes.external_error(true), "a gripper never takes the arm's torque away");
+}
+
+#[test]
+fn j20_the_word_of_missing_nodes_tells_what_keeps_the_controller_in_init() {
+    let config = Config::avena();
+    let word = |n: usize, change: fn(&mut Node)| {
+        let mut nodes = ready();
+        change(&mut nodes.nodes[n]);
+        (nodes.init_word(&config), nodes.fallen_back(), nodes.all_ready(&config))
+    };
+    assert_eq!(word(3, |_| {}), (0, false, true));
+    assert_eq!(word(3, |node| node.valid = false), (1 << 3, true, false));
+    assert_eq!(word(3, |node| node.report.fsm = fsm::INIT), (1 << 3, true, false));
+    assert_eq!(word(3, |node| node.report.fsm = fsm::ENABLED), (0, false, false));
+    assert_eq!(word(3, |node| node.report.warnings = warning::POSITION_NOT_ACCURATE), (1 << 3, false, false));
+    assert_eq!(word(3, |node| node.report.warnings = !warning::POSITION_NOT_ACCURATE), (0, false, true));
+    assert_eq!(word(6, |node| node.report.warnings = 0xFF), (0, false, true), "a gripper knows no warnings");
+    assert_eq!(word(6, |node| node.silent = 4), (0, false, true));
+    assert_eq!(word(6, |node| node.silent = 5), (1 << 6, false, false));
+    assert_eq!(word(6, |node| node.valid = false), (1 << 6, false, false));
+    assert_eq!(word(6, |node| node.report.fsm = fsm::ENABLED), (0, false, false), "its part is dropped here");
+}
+
+#[test]
+fn j16_j20_what_a_node_is_asked_for() {
+    use Target::{Enable, Init, NoChange, Ready};
+    let asked = |goal, state, configured, refused| {
+        let mut node = Node { seen: true, configured, refused, ..Node::default() };
+        node.report.fsm = state;
+        node.request(goal)
+    };
+    for (state, unconfigured, configured) in [
+        (fsm::START, [Init, NoChange, NoChange], [Init, NoChange, NoChange]),
+        (START_TO_INIT, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
+        (fsm::INIT, [NoChange, NoChange, NoChange], [Ready, NoChange, Ready]),
+        (INIT_TO_READY, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
+        (fsm::READY, [NoChange, Enable, NoChange], [NoChange, Enable, NoChange]),
+        (fsm::ENABLED, [Ready, NoChange, Ready], [Ready, NoChange, Ready]),
+        (fsm::FAULT, [NoChange; 3], [NoChange; 3]),
+    ] {
+        for refused in [false, true] {
+            for (expected, is_configured) in [(unconfigured, false), (configured, true)] {
+                let mut expected = expected;
+                if refused && !is_configured && state == fsm::READY {
+                    // It takes its configuration in Init only.
+                    expected[0] = Init;
+                }
+                let got = [Goal::Ready, Goal::Enabled, Goal::Down]
+                    .map(|goal| asked(goal, state, is_configured, refused));
+                assert_eq!(got, expected, "in {state}, configured {is_configured}, refused {refused}");
+            }
+        }
+        let mut node = Node { seen: true, clear: true, ..Node::default() };
+        node.report.fsm = state;
+        for goal in [Goal::Ready, Goal::Enabled, Goal::Down] {
+            // A drive ignores Init while it is enabled.
+            assert_eq!(node.request(goal), if state == fsm::ENABLED { Ready } else { Init });
+            assert_eq!(Node { seen: false, ..node }.request(goal), NoChange);
+        }
+    }
+}
+
+#[test]
+fn j20_a_node_is_configured_in_init_and_ready_once() {
+    for state in [fsm::START, fsm::INIT, START_TO_INIT, fsm::READY, fsm::ENABLED, fsm::FAULT] {
+        let mut node = Node { seen: true, ..Node::default() };
+        node.report.fsm = state;
+        assert_eq!(node.wants_configuration(), matches!(state, fsm::INIT | fsm::READY), "{state}");
+        assert!(!Node { configured: true, ..node }.wants_configuration());
+        assert!(!Node { clear: true, ..node }.wants_configuration());
+        assert!(!Node { seen: false, ..node }.wants_configuration());
+    }
+}

@@ -230,3 +230,17 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     rig.run(400);
     assert_eq!((rig.state(), rig.nodes[GRIPPER].report.fsm, rig.pump), (State::HoldPos, fsm::ENABLED, false));
 }
+
+/// A command that was given while the gripper was brought up is carried out once it is; one from before its reset is not.
+#[test]
+fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
+    let mut rig = Rig::new(Config::avena());
+    rig.run(20);
+    assert!(rig.nodes[GRIPPER].booting > 0 && !rig.nodes[GRIPPER].configured);
+    pump(&mut rig, true);
+    rig.run(400);
+    assert_eq!((rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm), (State::Init, true, fsm::READY));
+    rig.nodes[GRIPPER].restart();
+    rig.run(400);
+    assert_eq!((rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm), (State::Init, false, fsm::READY));
+}

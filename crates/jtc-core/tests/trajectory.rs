@@ -68,6 +68,8 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     rig.upload(&motion(100, 10), 10);
     let p = [rest(0)];
     assert_eq!(traj(&mut rig, 1, 0, 101, 10, &p), TooManySegments);
+    assert_eq!(traj(&mut rig, 1, 100, 100, 10, &p), TooManySegments);
+    assert_eq!(traj(&mut rig, 1, 99, 99, 10, &p), IncorrectSegmentOrder);
     assert_eq!(traj(&mut rig, 1, 0, 0, 10, &p), IncorrectSegmentOrder);
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &vec![rest(0); 1501]), TooManyPoints);
     assert_eq!(traj(&mut rig, 1, 0, 1, 0, &p), IncorrectStepTime);
@@ -80,6 +82,10 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     assert_eq!(traj(&mut rig, 9, 8, 9, 1, &p), TooManyPoints);
     assert_eq!(traj(&mut rig, 9, 0, 1, 1, &vec![rest(0); 1500]), NoError);
     assert_eq!(rig.tes(), Tes::Stop);
+    for s in 0..100 {
+        assert_eq!((rig.tes() == Tes::Stop, traj(&mut rig, 9, s, 100, 10, &p)), (s == 0, NoError), "{s}");
+    }
+    assert_eq!(rig.tes(), Tes::Stop, "as many segments as there may be");
 }
 
 #[test]

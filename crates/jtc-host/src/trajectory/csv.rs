@@ -27,11 +27,23 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
             return Err(FileError::at(Place::line(line), problem));
         }
         n => {
-            let problem = format!(
-                "{n} columns and no header; known without a header: 19 (time, 6 positions, 6 velocities, 6 \
-                 accelerations), with one: t,q1..q6[,qd1..qd6][,qdd1..qdd6]"
+            let names = |parts: &[&str]| {
+                let names = parts.iter().flat_map(|p| (1..=JOINTS).map(move |j| format!(",{p}{j}")));
+                "t".to_owned() + &names.collect::<String>()
+            };
+            let guess = match n {
+                JOINTS => Some((names(&["q"]), "a time in front of each line and ")),
+                7 => Some((names(&["q"]), "")),
+                13 => Some((names(&["q", "qd"]), "")),
+                _ => None,
+            };
+            let help = guess.map_or(
+                "known without a header: 19 (time, 6 positions, 6 velocities, 6 accelerations), with one: t,q1..q6[,qd1..qd6]\
+                 [,qdd1..qdd6]"
+                    .to_owned(),
+                |(header, more)| format!("the header is missing: write {more}the line {header} before all others"),
             );
-            return Err(FileError::at(Place::line(line), problem));
+            return Err(FileError::at(Place::line(line), format!("{n} columns and no header; {help}")));
         }
     }
     // The float form always has a fraction somewhere; the int16 form never.
@@ -89,7 +101,13 @@ fn int16(text: &str) -> Result<Loaded, FileError> {
             after.0, after.1, before.1
         ));
     }
-    Ok(Loaded { trajectory: Trajectory { step_ms, points }, form: Form::Int16, notes })
+    Ok(Loaded {
+        trajectory: Trajectory { step_ms, points },
+        form: Form::Int16,
+        notes,
+        overshoot: Vec::new(),
+        units_named: true,
+    })
 }
 
 fn float(text: &str) -> Result<Loaded, FileError> {
@@ -126,7 +144,7 @@ impl Samples {
 fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileError> {
     let times = samples.times.clone();
     match samples.fit() {
-        Ok(fitted) => Ok(Loaded { trajectory: fitted.trajectory, form, notes: fitted.notes }),
+        Ok(fitted) => Ok(Loaded::fitted(fitted, form)),
         Err(FitError::Time(i)) => {
             let problem = format!("{} s does not lie after {} s of the line before", times[i], times[i - 1]);
             Err(FileError::at(Place::line(lines[i]).named("time"), problem))
@@ -205,7 +223,9 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
     if lines.is_empty() {
         return Err(FileError::at(Place::line(header_line), "a header and no points"));
     }
-    finish(samples, &lines, Form::Csv)
+    let named = |name: &&str| ["_rad", "_deg"].iter().any(|unit| name.to_ascii_lowercase().contains(unit));
+    let loaded = finish(samples, &lines, Form::Csv)?;
+    Ok(Loaded { units_named: header.iter().any(named), ..loaded })
 }
 
 impl Trajectory {

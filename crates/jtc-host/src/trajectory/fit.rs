@@ -22,7 +22,8 @@
 //! # Overshoot
 //!
 //! A spline passes through every sample, and between samples it may leave the interval of its two neighbours: after a step it swings
-//! over, by some 10 % of the step where the samples are equally far apart. Nothing is limited here. What the fit made of the samples,
+//! over, by some 10 % of the step where the samples are equally far apart. Nothing is limited here; [`Fitted::overshoot`] says how far
+//! each joint goes. What the fit made of the samples,
 //! between the points too, is what [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) looks at. Samples closer to each
 //! other where the direction changes keep it small.
 //!
@@ -46,6 +47,7 @@ use std::cmp::Ordering;
 
 use jtc_core::{JOINTS, POINTS_MAX};
 
+use super::overshoot::{Overshoot, overshoots};
 use super::{Point, Trajectory};
 
 /// Samples of a motion, as files have them.
@@ -68,6 +70,8 @@ pub struct Fitted {
     pub trajectory: Trajectory,
     /// What was derived and resampled, in words.
     pub notes: Vec<String>,
+    /// Where the spline through positions alone leaves the interval between two samples, by joint; none where velocities were given.
+    pub overshoot: Vec<Overshoot>,
 }
 
 /// Step that irregular files are resampled to, ms.
@@ -128,12 +132,17 @@ impl Samples {
             notes.push("accelerations are derived by a spline through the velocities".to_owned());
         }
         let points = self.points();
+        if points.len() == 1 {
+            notes.push("a single point is a pose and no motion".to_owned());
+        }
+        let overshoot = if self.velocity.is_none() { overshoots(&self.times, &points) } else { Vec::new() };
         if let Some(step_ms) = self.regular_step() {
-            return Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes });
+            return Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes, overshoot });
         }
         let step_ms = resampled_step(duration);
         notes.push(format!("times are irregular or no whole milliseconds: resampled to {step_ms} ms"));
-        Ok(Fitted { trajectory: Trajectory { step_ms, points: self.resample(&points, step_ms) }, notes })
+        let points = self.resample(&points, step_ms);
+        Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes, overshoot })
     }
 
     /// As many samples in each channel as there are times, all of them numbers.

@@ -2,6 +2,7 @@
 
 mod csv;
 pub mod fit;
+mod overshoot;
 mod replay;
 mod structured;
 #[cfg(test)]
@@ -11,6 +12,8 @@ use std::path::Path;
 
 use jtc_core::JOINTS;
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
+
+pub use overshoot::{Overshoot, overshoot_words};
 
 use crate::file::{FileError, read_text};
 
@@ -61,9 +64,18 @@ pub struct Loaded {
     pub form: Form,
     /// What was derived, resampled or left out.
     pub notes: Vec<String>,
+    /// How far the curve goes beyond the waypoints of a file that has positions alone.
+    pub overshoot: Vec<Overshoot>,
+    /// The file says in which units its numbers are.
+    pub units_named: bool,
 }
 
 impl Loaded {
+    fn fitted(fitted: fit::Fitted, form: Form) -> Self {
+        let fit::Fitted { trajectory, notes, overshoot } = fitted;
+        Self { trajectory, form, notes, overshoot, units_named: matches!(form, Form::Json | Form::Recording) }
+    }
+
     /// From a file of any form; `joint_names` are those of the arm, where they are known.
     ///
     /// # Errors
@@ -81,6 +93,24 @@ impl Loaded {
         let read =
             if yaml { structured::read_yaml(&text, joint_names) } else { Self::parse(&text, joint_names) };
         read.map_err(|e| e.in_file(path))
+    }
+
+    /// The same numbers as degrees, degrees/s and degrees/s²; an error where the file names its units itself.
+    pub fn in_degrees(mut self) -> Result<Self, FileError> {
+        if self.units_named {
+            let form = "the units of this file are known: its numbers are not taken as degrees";
+            return Err(FileError::form(form));
+        }
+        for point in &mut self.trajectory.points {
+            for channel in [&mut point.position, &mut point.velocity, &mut point.acceleration] {
+                *channel = channel.map(f64::to_radians);
+            }
+        }
+        for over in &mut self.overshoot {
+            over.beyond_rad = over.beyond_rad.to_radians();
+            over.position_rad = over.position_rad.to_radians();
+        }
+        Ok(self)
     }
 
     /// From a text, told by its content.

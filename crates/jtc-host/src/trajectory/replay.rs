@@ -130,8 +130,9 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
     let mut notes = vec![format!(
         "the last execution in the recording, {from:.3}..{to:.3} s of its path, known at {count} places at most {longest} ms apart"
     )];
-    notes.extend(fitted.notes);
-    Ok(Loaded { trajectory: fitted.trajectory, form: Form::Recording, notes })
+    let loaded = Loaded::fitted(fitted, Form::Recording);
+    notes.extend(loaded.notes);
+    Ok(Loaded { notes, ..loaded })
 }
 
 #[cfg(test)]

@@ -198,7 +198,7 @@ fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
     }
     let times = samples.times.clone();
     match samples.fit() {
-        Ok(fitted) => Ok(Loaded { trajectory: fitted.trajectory, form, notes: fitted.notes }),
+        Ok(fitted) => Ok(Loaded::fitted(fitted, form)),
         Err(FitError::Time(i)) => {
             let problem =
                 format!("time {} s does not lie after {} s of the point before", times[i], times[i - 1]);

@@ -1,0 +1,100 @@
+//! How far the curve through waypoints goes beyond them.
+
+use jtc_core::JOINTS;
+
+use super::Point;
+
+/// The furthest place of one joint outside of the interval between two waypoints.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Overshoot {
+    /// Joint from 1.
+    pub joint: usize,
+    /// How far it is outside, rad.
+    pub beyond_rad: f64,
+    /// Where it is then, rad.
+    pub position_rad: f64,
+    /// Waypoint (from 1) after which that is.
+    pub after: usize,
+}
+
+/// Less than this, rad, is no overshoot that anybody could see: 1 mm at a metre.
+const LEAST: f64 = 1e-3;
+
+/// Of each joint that has one the largest, for the cubics with these positions and velocities at these times (s).
+pub(super) fn overshoots(times: &[f64], points: &[Point]) -> Vec<Overshoot> {
+    let of_joint = |j: usize| {
+        let intervals = points.windows(2).zip(times.windows(2)).enumerate();
+        let all = intervals.filter_map(|(i, (p, t))| {
+            let (a, b, h) = (p[0].position[j], p[1].position[j], t[1] - t[0]);
+            let turns = extrema(b - a, p[0].velocity[j] * h, p[1].velocity[j] * h);
+            let (low, high) = (a.min(b), a.max(b));
+            let places = turns.into_iter().flatten().map(|d| a + d);
+            let furthest = places.max_by(|x, y| outside(*x, low, high).total_cmp(&outside(*y, low, high)))?;
+            let beyond_rad = outside(furthest, low, high);
+            Some(Overshoot { joint: j + 1, beyond_rad, position_rad: furthest, after: i + 1 })
+        });
+        all.filter(|o| o.beyond_rad >= LEAST).max_by(|x, y| x.beyond_rad.total_cmp(&y.beyond_rad))
+    };
+    (0..JOINTS).filter_map(of_joint).collect()
+}
+
+fn outside(x: f64, low: f64, high: f64) -> f64 {
+    (x - high).max(low - x)
+}
+
+/// Where a cubic over the unit interval turns round, from 0 to `d` with the slopes `v0` and `v1`.
+fn extrema(d: f64, v0: f64, v1: f64) -> [Option<f64>; 2] {
+    let (c2, c3) = (3.0 * d - 2.0 * v0 - v1, v0 + v1 - 2.0 * d);
+    // v0 + 2·c2·u + 3·c3·u² = 0, in the form that does not lose digits.
+    let root = (c2 * c2 - 3.0 * c3 * v0).sqrt();
+    let q = -(c2 + root.copysign(c2));
+    [q / (3.0 * c3), v0 / q].map(|u| (u > 0.0 && u < 1.0).then_some(u * (v0 + u * (c2 + u * c3))))
+}
+
+/// All of them in one sentence; none where there is none.
+pub fn overshoot_words(all: &[Overshoot]) -> Option<String> {
+    let each = all.iter().map(|o| {
+        format!(
+            "joint {} by {:.3} rad (to {:+.3} rad, after waypoint {})",
+            o.joint, o.beyond_rad, o.position_rad, o.after
+        )
+    });
+    let each: Vec<String> = each.collect();
+    (!each.is_empty()).then(|| {
+        format!(
+            "between waypoints the curve goes beyond them: {}; waypoints closer together, or with velocities, keep it nearer",
+            each.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Loaded;
+    use super::*;
+
+    #[test]
+    fn what_the_curve_does_beyond_its_waypoints_is_known_before_it_runs() {
+        let text =
+            "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1,0.5,0,0,0,0,-0.1\n2,0.5,0,0,0,0,-0.2\n3,0,0,0,0,0,-0.3\n";
+        let loaded = Loaded::parse(text, None).unwrap();
+        let [over] = loaded.overshoot[..] else { panic!("{:?}", loaded.overshoot) };
+        assert_eq!((over.joint, over.after), (1, 2));
+        // The spline through 0, 0.5, 0.5, 0 at rest at its ends turns at 1.5 s: slopes ±0.5 rad/s there and back.
+        assert!(
+            (over.beyond_rad - 0.125).abs() < 1e-9 && (over.position_rad - 0.625).abs() < 1e-9,
+            "{over:?}"
+        );
+        let words = overshoot_words(&loaded.overshoot).unwrap();
+        assert!(words.contains("joint 1 by 0.125 rad (to +0.625 rad, after waypoint 2)"), "{words}");
+        // Times that are resampled change nothing.
+        let uneven = text.replace("\n3,", "\n3.0004,");
+        let over = Loaded::parse(&uneven, None).unwrap().overshoot;
+        assert!(over.len() == 1 && (over[0].beyond_rad - 0.125).abs() < 1e-3, "{over:?}");
+        // Along a line there is none.
+        let straight =
+            "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1,0.1,0,0,0,0,0\n2,0.3,0,0,0,0,0\n3,0.4,0,0,0,0,0\n";
+        assert_eq!(Loaded::parse(straight, None).unwrap().overshoot, []);
+        assert_eq!(overshoot_words(&[]), None);
+    }
+}

@@ -2,11 +2,12 @@
 
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
-use super::verdict::{ProblemKind, Verdict};
+use super::verdict::{ProblemKind, Suspicion, Verdict};
 
 impl Verdict {
     /// The speed (% of the file's own) at which nothing would be too fast any more; `None` where speed is not what is wrong.
-    fn slower(&self, now_pct: f64) -> Option<f64> {
+    /// It is estimated from the worst values; [`plan::at_speed`](crate::plan::at_speed) and another check tell.
+    pub fn slower(&self, now_pct: f64) -> Option<f64> {
         use ProblemKind::*;
         let mut speed = 1.0f64;
         for p in self.refusals() {
@@ -28,13 +29,6 @@ impl Verdict {
         (speed < 1.0).then(|| (now_pct * speed).floor()).filter(|&percent| percent >= 1.0)
     }
 
-    /// Positions far outside of what a joint can have, which would be usual ones were they divided by 57.3.
-    fn seems_degrees(&self) -> bool {
-        let turn = std::f64::consts::TAU;
-        let far = self.joints.iter().map(|j| j.position_max_rad.max(-j.position_min_rad)).fold(0.0, f64::max);
-        far > turn && far <= turn.to_degrees()
-    }
-
     /// The next command or act that helps, with `FILE` for the trajectory's file.
     pub fn hint(&self) -> String {
         self.hint_for("FILE", 100.0)
@@ -43,6 +37,11 @@ impl Verdict {
     /// The next command or act that helps for a trajectory that was checked at `speed_pct` of its own speed. `file` is its name as it
     /// is typed, with the options that belong to it.
     pub fn hint_for(&self, file: &str, speed_pct: f64) -> String {
+        self.hint_with(file, speed_pct, self.slower(speed_pct))
+    }
+
+    /// As [`Verdict::hint_for`], where it is known which speed (% of the file's own) passes the check, if any does.
+    pub fn hint_with(&self, file: &str, speed_pct: f64, passes: Option<f64>) -> String {
         let has = |kind| self.problems.iter().any(|p| p.kind == kind);
         let only = |kind| self.refusals().all(|p| p.kind == kind);
         let speed = if speed_pct == 100.0 { String::new() } else { format!(" --speed {speed_pct}") };
@@ -61,7 +60,7 @@ impl Verdict {
             )
         } else if only(ProblemKind::StartPose) {
             format!("`jtc traj run {file}{speed} --approach` moves the arm to the first point before")
-        } else if self.seems_degrees() {
+        } else if self.suspicion() == Suspicion::Degrees {
             "the positions look like degrees: all numbers of a trajectory are in rad, rad/s and rad/s² (90° = 1.5708)"
                 .into()
         } else if has(ProblemKind::Jump) {
@@ -73,7 +72,7 @@ impl Verdict {
             "the speed does not change what standing still takes: begin, rest and end in poses that take less (less stretched out), \
              or with a lighter payload in the arm model"
                 .into()
-        } else if let Some(percent) = self.slower(speed_pct) {
+        } else if let Some(percent) = passes {
             let load = if has(ProblemKind::NoStop) || has(ProblemKind::Torque) {
                 ", or with a lighter payload in the arm model"
             } else {

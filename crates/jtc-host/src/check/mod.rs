@@ -5,6 +5,7 @@
 //! passes here is what the controller will compute. The controller's own check (J-36) runs on the same numbers, so that what
 //! passes here is not refused there.
 
+mod cause;
 mod checked;
 mod hint;
 mod holding;
@@ -18,9 +19,10 @@ use jtc_core::{
 };
 use jtc_dynamics::{ArmModel, Dynamics};
 
+pub use cause::{Cause, Seen};
 pub use checked::{CheckOptions, CheckedTrajectory};
 pub use holding::HOLD_SHARE;
-pub use verdict::{JointFigures, Problem, ProblemKind, Verdict};
+pub use verdict::{JointFigures, Problem, ProblemKind, Suspicion, Verdict};
 
 use crate::session::UploadOptions;
 use crate::trajectory::Trajectory;

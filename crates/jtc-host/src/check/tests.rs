@@ -172,6 +172,44 @@ fn degrees_are_recognised() {
     assert!(verdict.to_string().lines().count() < 30, "{verdict}");
 }
 
+/// One cause for all joints and all points, with where it is first and where it is worst.
+#[test]
+fn long_lists_are_summed_by_cause() {
+    let mut t = smooth();
+    let n = t.points.len();
+    // Joint 2 too fast at three points in the middle, joint 6 at one before them.
+    for (i, joint, velocity) in [(n / 2, 1, 1.6), (n / 2 + 1, 1, -1.9), (n / 2 + 2, 1, 1.7), (n / 4, 5, 1.8)]
+    {
+        t.points[i].velocity[joint] = velocity;
+    }
+    let config = Config::avena();
+    let verdict = check(&t);
+    let cause = verdict.causes.iter().find(|c| c.kind == ProblemKind::Velocity).expect("found");
+    assert_eq!(cause.joints, [2, 6]);
+    assert_eq!(
+        (cause.worst.joint, cause.worst.point, cause.worst.limit),
+        (Some(2), n / 2 + 1, -1.5),
+        "{verdict}"
+    );
+    assert!((cause.worst.value + 1.9).abs() < 1e-3, "{verdict}");
+    // Between points the controller's velocity passes the limit before it is at the point.
+    assert_eq!((cause.first.joint, cause.first.point), (Some(6), n / 4 - 1), "{verdict}");
+    let time = (cause.first.point as f64 * f64::from(t.step_ms) + cause.first.ms) * 1e-3;
+    assert_eq!(cause.first.time_s, time);
+    assert!((4..=7).contains(&cause.points), "{}", cause.points);
+    let text = verdict.to_string();
+    assert!(
+        text.contains("velocity over its limit: joints 2 and 6, at ")
+            && text.contains("    worst: joint 2: "),
+        "{text}"
+    );
+    assert!(text.contains(&format!("({:.3} s)", cause.worst.time_s)), "{text}");
+    let kinds: Vec<ProblemKind> = verdict.causes.iter().map(|c| c.kind).collect();
+    let once: std::collections::BTreeSet<ProblemKind> = kinds.iter().copied().collect();
+    assert_eq!(kinds.len(), once.len(), "{text}");
+    assert_eq!(config.joints[1].velocity_max, 1.5);
+}
+
 /// J-36: what the controller refuses is refused here, with the same words for all of it.
 #[test]
 fn j36_nothing_passes_that_the_controller_refuses() {

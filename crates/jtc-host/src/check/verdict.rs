@@ -5,7 +5,7 @@ use std::fmt;
 use jtc_core::JOINTS;
 use serde::Serialize;
 
-use super::HOLD_SHARE;
+use super::cause::{Cause, Places, Seen, causes};
 use crate::trajectory::Trajectory;
 
 /// What can be wrong.
@@ -102,7 +102,7 @@ impl ProblemKind {
         )
     }
 
-    fn unit(self) -> &'static str {
+    pub(super) fn unit(self) -> &'static str {
         use ProblemKind::*;
         match self {
             Jump | Position | StartPose | PositionScale => "rad",
@@ -151,12 +151,14 @@ pub struct Problem {
     pub kind: ProblemKind,
     /// Joint from 1; `None`: the trajectory as a whole.
     pub joint: Option<usize>,
-    /// First point (from 0) where it is; with `ms` > 0 between this and the next.
-    pub first_point: usize,
+    /// Where it is first along the path.
+    pub first: Seen,
     /// Point (from 0) where it is worst.
     pub point: usize,
     /// ms after `point` where it is worst.
     pub ms: f64,
+    /// Time along the path where it is worst, s.
+    pub time_s: f64,
     /// Worst value, in the unit of its kind.
     pub value: f64,
     /// Its limit, or what the other channel says.
@@ -171,7 +173,14 @@ pub struct Problem {
 const SEAMS: usize = 20;
 
 impl Problem {
-    fn excess(&self) -> f64 {
+    /// Where it is worst.
+    pub(super) fn worst(&self) -> Seen {
+        let Self { joint, point, ms, time_s, value, limit, .. } = *self;
+        Seen { joint, point, ms, time_s, value, limit }
+    }
+
+    /// How far it is over its limit, as a multiple of that where there is one.
+    pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
                 (self.value - self.limit).abs()
@@ -185,54 +194,9 @@ impl Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        use ProblemKind::*;
-        let Problem { kind, point, ms, value, limit, .. } = self;
-        let unit = kind.unit();
-        let next = point + 1;
-        if let Some(joint) = self.joint {
-            write!(f, "joint {joint}: ")?;
-        }
-        match kind {
-            Empty | StepTime => write!(f, "{}", kind.words())?,
-            TooManyPoints | TooManySegments => write!(f, "{}: {value}, at most {limit}", kind.words())?,
-            SegmentPoints => write!(f, "{}: {value}, 1 to {limit} are possible", kind.words())?,
-            Jump => {
-                return write!(
-                    f,
-                    "jump of {value:+.4} rad between points {point} and {next} (at most {limit:.4} rad in a step)"
-                );
-            }
-            StartPose => {
-                return write!(f, "{value:+.4} rad away from the first point (tolerance {limit} rad)");
-            }
-            NoStop => write!(
-                f,
-                "a stop in time from {ms} ms after point {point} needs {value:+.1} N·m, more than the {limit} N·m \
-                 that there are"
-            )?,
-            HoldTorque => {
-                let most = limit.abs() / HOLD_SHARE;
-                let (share, limit) = (100.0 * value.abs() / most, limit.abs());
-                return write!(
-                    f,
-                    "standing still at point {point} takes {value:+.1} N·m, {share:.1} % of the torque limit ({most:.1} N·m); \
-                     at most {:.0} % ({limit:.1} N·m), or the noise of the encoder drops the arm later",
-                    100.0 * HOLD_SHARE
-                );
-            }
-            NotAtRest => write!(f, "{}: {value:+.4} {unit} at point {point}", kind.words())?,
-            VelocityMismatch | AccelerationMismatch => write!(
-                f,
-                "{}: {value:+.4} {unit} between points {point} and {next} where {limit:+.4} {unit} is said",
-                kind.words()
-            )?,
-            _ if *ms > 0.0 => {
-                write!(f, "{}: {value:+.4} {unit} (limit {limit}) {ms} ms after point {point}", kind.words())?
-            }
-            _ => write!(f, "{}: {value:+.4} {unit} (limit {limit}) at point {point}", kind.words())?,
-        }
-        if self.count > 1 {
-            write!(f, "; {} times, first at point {}", self.count, self.first_point)?;
+        f.write_str(&self.worst().words(self.kind))?;
+        if self.count > 1 && self.kind != ProblemKind::HoldTorque {
+            write!(f, "; {} times, first at point {}", self.count, self.first.point)?;
         }
         Ok(())
     }
@@ -277,6 +241,20 @@ impl JointFigures {
     }
 }
 
+/// What a refused trajectory looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Suspicion {
+    /// Nothing in particular.
+    Nothing,
+    /// Positions far outside of what a joint can have, which would be usual ones were they divided by 57.3.
+    Degrees,
+    /// Put together from pieces that do not meet.
+    Pieces,
+    /// At another speed it would pass, perhaps.
+    TooFast,
+}
+
 /// Result of a check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
@@ -286,14 +264,18 @@ pub struct Verdict {
     pub step_ms: u16,
     /// First to last point, s.
     pub duration_s: f64,
-    /// What is wrong, worst first.
+    /// What is wrong, worst first: of each kind and joint one, and each jump.
     pub problems: Vec<Problem>,
+    /// The same summed by kind: what does most to an arm first.
+    pub causes: Vec<Cause>,
+    #[serde(skip)]
+    places: Places,
     /// What the joints do along the path.
     pub joints: [JointFigures; JOINTS],
 }
 
-/// Lines of a verdict in words.
-const LINES: usize = 24;
+/// Points this far apart, ms, are waypoints and no samples of a motion.
+const WAYPOINTS_MS: u16 = 100;
 
 impl Verdict {
     pub(super) fn new(t: &Trajectory) -> Self {
@@ -303,6 +285,8 @@ impl Verdict {
             step_ms: t.step_ms,
             duration_s: t.duration_s(),
             problems: Vec::new(),
+            causes: Vec::new(),
+            places: Places::new(),
             joints,
         }
     }
@@ -317,16 +301,19 @@ impl Verdict {
         limit: f64,
     ) {
         let joint = joint.map(|j| j + 1);
-        let new =
-            Problem { kind, joint, first_point: point, point, ms, value, limit, count: 1, warning: false };
+        let time_s = (point as f64 * f64::from(self.step_ms) + ms) * 1e-3;
+        let first = Seen { joint, point, ms, time_s, value, limit };
+        let new = Problem { kind, joint, first, point, ms, time_s, value, limit, count: 1, warning: false };
+        self.places.entry(kind).or_default().insert(point);
         let same = |p: &&mut Problem| p.kind == kind && p.joint == joint && kind != ProblemKind::Jump;
         match self.problems.iter_mut().find(same) {
             Some(known) => {
                 let count = known.count + 1;
+                let first = if time_s < known.first.time_s { first } else { known.first };
                 if new.excess() > known.excess() {
-                    *known = Problem { first_point: known.first_point, ..new };
+                    *known = new;
                 }
-                known.count = count;
+                (known.count, known.first) = (count, first);
             }
             None => self.problems.push(new),
         }
@@ -350,22 +337,34 @@ impl Verdict {
             };
             a.warning.cmp(&b.warning).then(a.kind.cmp(&b.kind)).then(within)
         });
+        self.causes = causes(&self.problems, &self.places);
         self
     }
 
-    /// Pieces that do not meet make single jumps. Where every fifth step or more is one, the path is too fast all along, or not
-    /// in radians: one line per joint says so.
+    /// Pieces that do not meet make single jumps from one sample to the next. Where every fifth step or more is one, the path is too
+    /// fast all along, or not in radians; a long way in a long step between waypoints, or in many steps in a row, is a move that is too
+    /// fast. One line per joint says so.
     fn part_haste_from_seams(&mut self) {
         let is_jump = |p: &Problem| p.kind == ProblemKind::Jump;
         let mut places: Vec<usize> = self.problems.iter().filter(|p| is_jump(p)).map(|p| p.point).collect();
         places.sort_unstable();
         places.dedup();
-        if 5 * places.len() < self.points {
-            return;
-        }
+        let all = 5 * places.len() >= self.points || self.step_ms >= WAYPOINTS_MS;
+        // Pieces meet at one step; a way of many steps in a row is one move.
+        let on_the_way = |point: usize| {
+            let has = |p: Option<usize>| p.is_some_and(|p| places.binary_search(&p).is_ok());
+            let (before, after) = (point.checked_sub(1), Some(point + 1));
+            has(before) && has(after)
+                || has(before) && has(point.checked_sub(2))
+                || has(after) && has(Some(point + 2))
+        };
+        let is_haste = |p: &Problem| is_jump(p) && (all || on_the_way(p.point));
         let (jumps, rest): (Vec<_>, Vec<_>) =
-            std::mem::take(&mut self.problems).into_iter().partition(is_jump);
+            std::mem::take(&mut self.problems).into_iter().partition(is_haste);
         self.problems = rest;
+        if let Some(places) = self.places.get_mut(&ProblemKind::Jump) {
+            places.retain(|point| jumps.iter().all(|p| p.point != *point));
+        }
         let h = f64::from(self.step_ms) * 1e-3;
         for Problem { joint, point, value, limit, .. } in jumps {
             let joint = joint.map(|j| j - 1);
@@ -376,6 +375,43 @@ impl Verdict {
     /// Nothing forbids to run it.
     pub fn is_ok(&self) -> bool {
         self.problems.iter().all(|p| p.warning)
+    }
+
+    /// What the whole of the problems looks like.
+    pub fn suspicion(&self) -> Suspicion {
+        use ProblemKind::*;
+        let too_fast = |p: &Problem| {
+            matches!(
+                p.kind,
+                Velocity
+                    | Acceleration
+                    | Torque
+                    | NoStop
+                    | PositionSpeed
+                    | VelocityScale
+                    | AccelerationScale
+                    | FrictionVelocity
+            )
+        };
+        let turn = std::f64::consts::TAU;
+        if self.is_ok() {
+            Suspicion::Nothing
+        } else if self.furthest().is_some_and(|(_, far)| far.abs() > turn && far.abs() <= turn.to_degrees()) {
+            Suspicion::Degrees
+        } else if self.problems.iter().any(|p| p.kind == Jump) {
+            Suspicion::Pieces
+        } else if self.refusals().all(too_fast) {
+            Suspicion::TooFast
+        } else {
+            Suspicion::Nothing
+        }
+    }
+
+    /// The joint (from 1) that goes furthest from zero, and where to, rad.
+    fn furthest(&self) -> Option<(usize, f64)> {
+        let ends = self.joints.iter().enumerate();
+        let ends = ends.flat_map(|(j, f)| [(j + 1, f.position_min_rad), (j + 1, f.position_max_rad)]);
+        ends.filter(|(_, q)| q.is_finite()).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
     /// What forbids to run it.
@@ -394,18 +430,18 @@ impl fmt::Display for Verdict {
         let (points, step, s) = (self.points, self.step_ms, self.duration_s);
         let word = if self.is_ok() { "passed" } else { "refused" };
         write!(f, "{word}: {points} points, step {step} ms, {s:.2} s")?;
-        let jumps: Vec<&Problem> = self.problems.iter().filter(|p| p.kind == ProblemKind::Jump).collect();
-        if jumps.len() > 1 {
-            let worst = jumps.iter().map(|p| p.value.abs()).fold(0.0, f64::max);
-            let mut places: Vec<usize> = jumps.iter().map(|p| p.point).collect();
-            places.dedup();
-            write!(f, "; jumps at {} places, up to {worst:.2} rad", places.len())?;
+        let (mut shown, mut left) = (self.causes.len(), 0);
+        if let (Suspicion::Degrees, Some(far)) = (self.suspicion(), self.furthest()) {
+            write!(f, "\n  the positions look like degrees: joint {} is at {:.1}", far.0, far.1)?;
+            // What else is wrong comes from that.
+            shown = self.causes.iter().take_while(|c| c.kind <= ProblemKind::Position).count().max(1);
+            left = self.causes.len().saturating_sub(shown);
         }
-        for p in self.problems.iter().take(LINES) {
-            write!(f, "\n  {}{p}", if p.warning { "warning: " } else { "" })?;
+        for cause in self.causes.iter().take(shown) {
+            write!(f, "\n  {cause}")?;
         }
-        if self.problems.len() > LINES {
-            write!(f, "\n  and {} more", self.problems.len() - LINES)?;
+        if left > 0 {
+            write!(f, "\n  and {left} further kinds, which follow from it")?;
         }
         Ok(())
     }

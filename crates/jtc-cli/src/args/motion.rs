@@ -16,6 +16,9 @@ pub struct CheckArgs {
     /// Speed in percent of the file's own, 1 to 200: 50 takes twice the time, with the same path
     #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
     pub speed: f64,
+    /// The numbers of the file are degrees, for files that do not say; a CSV header does with q1_deg..q6_deg
+    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    pub deg: bool,
 }
 
 /// `jtc traj …`
@@ -36,6 +39,9 @@ pub enum TrajCommand {
     Info {
         /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
         file: PathBuf,
+        /// The numbers of the file are degrees, for files that do not say
+        #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+        deg: bool,
     },
     /// Check, upload, execute, follow, report
     #[command(

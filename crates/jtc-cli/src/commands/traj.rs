@@ -5,10 +5,10 @@ use std::path::Path;
 use cli_kit::{Output, figure, table};
 use jtc_core::{Config, JOINTS};
 use jtc_host::arm::Arm;
-use jtc_host::check::{Checker, Verdict};
+use jtc_host::check::{Checker, Suspicion, Verdict};
 use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
-use jtc_host::trajectory::{Form, Loaded, Trajectory};
+use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
 use jtc_host::{Error, Session, plan};
 use serde_json::json;
 
@@ -17,11 +17,14 @@ use crate::args::{CheckArgs, LinkArgs, TrajCommand};
 use crate::failure::{Failure, REFUSED};
 use crate::progress::Progress;
 
+/// Speeds tried between one that passes and one that does not.
+const TRIES: usize = 4;
+
 /// Does one of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TrajCommand::Check { file, check: args } => check(file, args, out),
-        TrajCommand::Info { file } => info(file, out),
+        TrajCommand::Info { file, deg } => info(file, *deg, out),
         TrajCommand::Run(args) => run::run(args, out),
         TrajCommand::Replay(args) => {
             if Loaded::load(&args.file, None)?.form != Form::Recording {
@@ -105,7 +108,9 @@ impl Job {
             out.note(format!("note: {warning}"));
         }
         let loaded = Loaded::load(file, Some(&arm.joint_names))?;
-        for note in &loaded.notes {
+        let loaded = if args.deg { loaded.in_degrees().map_err(|e| e.in_file(file))? } else { loaded };
+        let overshoot = overshoot_words(&loaded.overshoot);
+        for note in loaded.notes.iter().chain(&overshoot) {
             out.note(format!("note: {note}"));
         }
         let trajectory = if args.speed == 100.0 {
@@ -115,13 +120,56 @@ impl Job {
         };
         let config = arm.config();
         let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
-        let words = typed(file) + &arm_words;
+        let words = typed(file) + if args.deg { " --deg" } else { "" } + &arm_words;
         Ok(Self { loaded, trajectory, arm, config, words, speed: args.speed })
     }
 
     /// What helps after a verdict, with the names that the person typed.
     fn hint(&self, verdict: &Verdict) -> String {
-        verdict.hint_for(&self.words, self.speed)
+        if verdict.suspicion() == Suspicion::Degrees && self.passes_as_degrees() {
+            let words = &self.words;
+            let columns = match self.loaded.form {
+                Form::Csv => "; for good, name its columns q1_deg..q6_deg",
+                _ => "",
+            };
+            return format!(
+                "the positions look like degrees, and as such they pass: `jtc traj check {words} --deg`{columns}"
+            );
+        }
+        verdict.hint_with(&self.words, self.speed, self.passing_speed(verdict))
+    }
+
+    /// The file's numbers are degrees, and nothing else is wrong with them.
+    fn passes_as_degrees(&self) -> bool {
+        let degrees = self.loaded.clone().in_degrees().map(|loaded| loaded.trajectory);
+        let at_speed = degrees.ok().and_then(|t| plan::at_speed(&t, self.speed).ok());
+        at_speed.is_some_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
+    }
+
+    /// The highest whole percentage that is tried and passes; none where no speed does, or speed is not what is wrong.
+    pub fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
+        let passes = |percent: f64| {
+            let slower = plan::at_speed(&self.loaded.trajectory, percent);
+            slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
+        };
+        // The estimate may be too bold where torque is what is short, or too timid.
+        let mut good = verdict.slower(self.speed)?;
+        let mut bad = self.speed;
+        while !passes(good) {
+            bad = good;
+            good = (0.7 * good).floor();
+            if good < 1.0 {
+                return None;
+            }
+        }
+        for _ in 0..TRIES {
+            let middle = (0.5 * (good + bad)).floor();
+            if middle <= good {
+                break;
+            }
+            if passes(middle) { good = middle } else { bad = middle }
+        }
+        Some(good)
     }
 
     /// Prints a verdict that refuses, and ends with exit code 4.
@@ -129,6 +177,8 @@ impl Job {
         let hint = self.hint(verdict);
         let value = json!({
             "outcome": "refused",
+            "suspicion": verdict.suspicion(),
+            "passing_speed_percent": self.passing_speed(verdict),
             "verdict": verdict,
             "error": { "code": "check", "message": verdict.to_string(), "hint": hint, "exit": REFUSED },
         });
@@ -203,7 +253,15 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
     }
     let verdict = job.verdict(&job.trajectory, None, UploadOptions::default());
     let value = json!({
-        "ok": verdict.is_ok(), "form": job.loaded.form, "notes": job.loaded.notes, "left_out": job.left_out(), "verdict": verdict,
+        "ok": verdict.is_ok(),
+        "form": job.loaded.form,
+        "notes": job.loaded.notes,
+        "overshoot": job.loaded.overshoot,
+        "left_out": job.left_out(),
+        "suspicion": verdict.suspicion(),
+        "passing_speed_percent": job.passing_speed(&verdict),
+        "hint": job.hint(&verdict),
+        "verdict": verdict,
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
@@ -230,8 +288,8 @@ fn figures(verdict: &Verdict) -> String {
     table(&["", ">position rad", ">peak rad/s", ">peak rad/s²", ">peak N·m"], &rows)
 }
 
-fn info(file: &Path, out: &Output) -> Result<(), Failure> {
-    let args = CheckArgs { arm: None, speed: 100.0 };
+fn info(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
+    let args = CheckArgs { arm: None, speed: 100.0, deg };
     let job = Job::load(file, &args, out)?;
     let (t, upload) = (&job.trajectory, UploadOptions::default());
     let verdict = job.verdict(t, None, upload);
@@ -241,6 +299,7 @@ fn info(file: &Path, out: &Output) -> Result<(), Failure> {
     let value = json!({
         "form": job.loaded.form,
         "notes": job.loaded.notes,
+        "overshoot": job.loaded.overshoot,
         "points": t.points.len(),
         "step_ms": t.step_ms,
         "duration_s": t.duration_s(),
@@ -257,7 +316,7 @@ fn info(file: &Path, out: &Output) -> Result<(), Failure> {
             t.step_ms,
             t.duration_s(),
             figures(&verdict),
-            typed(file),
+            job.words,
         )
     });
     Ok(())

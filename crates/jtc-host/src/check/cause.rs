@@ -6,7 +6,8 @@ use std::fmt;
 use serde::Serialize;
 
 use super::HOLD_SHARE;
-use super::verdict::{Problem, ProblemKind};
+use super::kind::ProblemKind;
+use super::verdict::Problem;
 
 /// A place of the path where something is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

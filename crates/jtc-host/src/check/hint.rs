@@ -2,7 +2,8 @@
 
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
-use super::verdict::{ProblemKind, Suspicion, Verdict};
+use super::kind::ProblemKind;
+use super::verdict::{Suspicion, Verdict};
 
 impl Verdict {
     /// The speed (% of the file's own) at which nothing would be too fast any more; `None` where speed is not what is wrong.

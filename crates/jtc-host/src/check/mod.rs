@@ -9,6 +9,7 @@ mod cause;
 mod checked;
 mod hint;
 mod holding;
+mod kind;
 mod stopping;
 mod verdict;
 
@@ -22,7 +23,8 @@ use jtc_dynamics::{ArmModel, Dynamics};
 pub use cause::{Cause, Seen};
 pub use checked::{CheckOptions, CheckedTrajectory};
 pub use holding::HOLD_SHARE;
-pub use verdict::{JointFigures, Problem, ProblemKind, Suspicion, Verdict};
+pub use kind::ProblemKind;
+pub use verdict::{JointFigures, Problem, Suspicion, Verdict};
 
 use crate::session::UploadOptions;
 use crate::trajectory::Trajectory;

@@ -150,8 +150,8 @@ fn campaign(package: &str, survivors: bool, resume: bool) -> Result<()> {
 fn update(whole: &mut Value, part: &Value) {
     let mut statuses = BTreeMap::new();
     for mutant in part["files"].as_object().into_iter().flatten().flat_map(|(_, file)| mutants(file)) {
-        if let (Some(id), Some(status)) = (mutant["id"].as_str(), mutant["status"].as_str()) {
-            statuses.insert(id, status);
+        if let Some(id) = mutant["id"].as_str() {
+            statuses.insert(id, outcome(mutant));
         }
     }
     for file in whole["files"].as_object_mut().into_iter().flat_map(|files| files.values_mut()) {
@@ -168,6 +168,15 @@ fn mutants(file: &Value) -> impl Iterator<Item = &Value> {
     file["mutants"].as_array().into_iter().flatten()
 }
 
+/// What became of a mutant. One that never ended is a survivor in the report, with the reason beside it.
+fn outcome(mutant: &Value) -> &str {
+    let text = |key: &str| mutant[key].as_str().unwrap_or_default();
+    match text("status") {
+        "Survived" if text("statusReason").starts_with("timed out") => "Timeout",
+        status => status,
+    }
+}
+
 fn read_report(path: &Path) -> Result<Value> {
     let text = read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     Ok(serde_json::from_str(&text)?)
@@ -180,7 +189,7 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
     for (file, content) in report["files"].as_object().context("the report has no files")? {
         let lines: Vec<&str> = content["source"].as_str().unwrap_or_default().lines().collect();
         for mutant in mutants(content) {
-            match mutant["status"].as_str().unwrap_or_default() {
+            match outcome(mutant) {
                 "Killed" => tally.killed += 1,
                 "Timeout" => tally.endless += 1,
                 "Survived" | "NoCoverage" => {
@@ -239,9 +248,11 @@ mod tests {
     #[test]
     fn survivors_are_told_unless_the_page_explains_them() {
         let mutant = |status: &str, line: u64| json!({"status": status, "description": "replace < with <=", "location": {"start": {"line": line}}});
+        let mut endless = mutant("Survived", 3);
+        endless["statusReason"] = "timed out: the test run exceeded its budget".into();
         let report = json!({"files": {"crates/jtc-bus/src/a.rs": {
             "source": "fn f() {\n    a < b\n    c < d\n}\n",
-            "mutants": [mutant("Killed", 2), mutant("Survived", 2), mutant("NoCoverage", 3), mutant("Timeout", 3), mutant("CompileError", 3)],
+            "mutants": [mutant("Killed", 2), mutant("Survived", 2), mutant("NoCoverage", 3), endless, mutant("CompileError", 3)],
         }}});
         let page = "### crates/jtc-bus/src/a.rs\n- `a < b` → `replace < with <=`: they are never equal.\n";
         let bus = tally(&report, page).unwrap();

@@ -20,9 +20,9 @@ pub fn accept(arm: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>
         return Ok(differences);
     }
     let message = format!(
-        "{}: {} values of this arm cannot be given to the controller, which uses its own; nothing was sent",
+        "{}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent",
         arm.name,
-        differences.len()
+        if differences.len() == 1 { "1 value".to_owned() } else { format!("{} values", differences.len()) }
     );
     let hint = format!(
         "no frame carries {NOT_CARRIED}. Build the firmware for this arm, or, where the controller's values are safe for it, add \

@@ -107,7 +107,7 @@ pub enum Error {
     #[error("{0}")]
     Check(Box<Verdict>),
     /// The arm has values that no frame carries and that the controller uses otherwise (J-55); nothing was sent.
-    #[error("{arm}: {} values of this arm cannot be given to the controller, which uses its own; nothing was sent ({})", differences.len(), listed(differences))]
+    #[error("{arm}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent ({})", values(differences.len()), listed(differences))]
     DeviceLimits {
         /// Name of the arm.
         arm: String,
@@ -206,6 +206,10 @@ fn not_paused(tes: u8) -> &'static str {
     }
 }
 
+fn values(n: usize) -> String {
+    if n == 1 { "1 value".into() } else { format!("{n} values") }
+}
+
 fn listed(differences: &[Difference]) -> String {
     differences.iter().map(Difference::to_string).collect::<Vec<_>>().join("; ")
 }
@@ -286,6 +290,10 @@ impl Error {
                  `jtc traj run FILE --approach`"
                     .into()
             }
+            // Execution from there is refused for another reason, and resume is not sent.
+            Error::Refused {
+                request: FrameType::TrajSetExecStatus, code: DataStatus::NotAllowed, state: 2, tes: 0 | 1 | 4
+            } => "nothing is being executed, so there is nothing to pause or stop; `jtc status` shows the state".into(),
             Error::Refused { code, state, .. } => refused(*code, *state).into(),
             Error::BeyondBounds { .. } => {
                 "such a number would throw or drop the arm: correct the file (`jtc params show FILE`); what the controller had before \

@@ -249,6 +249,12 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     let error = silent.next_status().unwrap_err();
     assert_eq!((error.exit_code(), error.code()), (3, "no-link"));
     assert_eq!(silent.clear(true, 0).unwrap_err().exit_code(), 3);
+    // A file is none of the things that one can plug in.
+    let error = jtc_host::port::SerialPort::open("Cargo.toml", 115_200).map(drop).unwrap_err();
+    assert_eq!(error.to_string(), "Cargo.toml is no serial port");
+    let mut s = ready(Some(921_600));
+    let error = s.stop().unwrap_err();
+    assert!(error.hint().contains("nothing to pause or stop"), "{}", error.hint());
     let mut s = session(Some(921_600));
     let error = upload(&mut s, &trajectory(50)).unwrap_err();
     assert!(matches!(error, Error::SegmentRefused { segment: 0, .. }), "{error}");

@@ -55,6 +55,12 @@ pub enum PortError {
         /// Names found.
         paths: Vec<String>,
     },
+    /// The path is that of a file or a directory.
+    #[error("{path} is no serial port")]
+    NoPort {
+        /// Name given.
+        path: String,
+    },
     /// Anything else that the operating system reports.
     #[error("{path}: {source}")]
     Io {
@@ -69,7 +75,7 @@ impl PortError {
     /// The next command or act that helps.
     pub fn hint(&self) -> String {
         match self {
-            PortError::NotFound { .. } => "`jtc ports` lists the ports that are there".into(),
+            PortError::NotFound { .. } | PortError::NoPort { .. } => "`jtc ports` lists the ports that are there".into(),
             PortError::Permission { path } if cfg!(target_os = "linux") => {
                 format!("`sudo usermod -aG dialout $USER`, then log in again (owner and group: `ls -l {path}`)")
             }

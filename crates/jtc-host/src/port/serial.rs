@@ -1,6 +1,8 @@
 //! Serial ports of this computer, pseudo-terminals included: 8N1, no flow control, opened for this program alone.
 
 use std::io::{self, Read, Write};
+#[cfg(unix)]
+use std::os::unix::fs::FileTypeExt as _;
 use std::time::{Duration, Instant};
 
 use super::{Port, PortError};
@@ -35,6 +37,11 @@ impl SerialPort {
         // The builder says "not found" in several words; ask the file system first.
         if cfg!(unix) && !std::path::Path::new(path).exists() {
             return Err(PortError::NotFound { path: path.to_owned() });
+        }
+        // A file would be "not a typewriter".
+        #[cfg(unix)]
+        if std::fs::metadata(path).is_ok_and(|m| !m.file_type().is_char_device()) {
+            return Err(PortError::NoPort { path: path.to_owned() });
         }
         let port = serialport::new(path, baud)
             .data_bits(serialport::DataBits::Eight)

@@ -19,5 +19,10 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut reactions = cargo(&["test", "--package", "jtc-core", "--test", "reactions"]);
     run(reactions.env("UPDATE_DOCS", "1"))?;
     println!("wrote the table of reactions of docs/safety.md");
+    for (package, part) in [("jtc-cli", "jtc"), ("ucom-cli", "ucom")] {
+        let mut troubles = cargo(&["test", "--package", package, "--test", "troubles"]);
+        run(troubles.env("UPDATE_DOCS", "1"))?;
+        println!("wrote the part of docs/troubles.md about {part}");
+    }
     Ok(ExitCode::SUCCESS)
 }

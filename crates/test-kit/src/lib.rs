@@ -1,5 +1,8 @@
-//! What the tests of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain.
+//! What the tests of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain, and documents that show
+//! what commands print.
 #![forbid(unsafe_code)]
+
+pub mod page;
 
 use std::fs::read_dir;
 use std::path::{Path, PathBuf};

@@ -77,6 +77,11 @@ impl Sim {
         line
     }
 
+    /// Its number among the processes.
+    pub fn pid(&self) -> String {
+        self.child.id().to_string()
+    }
+
     /// A path in its directory.
     pub fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()

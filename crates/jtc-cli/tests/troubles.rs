@@ -1,0 +1,147 @@
+//! The part of docs/troubles.md that is about `jtc`: each case is run by the real program, mostly against `jtc sim`.
+//! `UPDATE_DOCS=1` writes it again.
+#![cfg(target_os = "linux")]
+
+mod common;
+#[path = "troubles/desk.rs"]
+mod desk;
+#[path = "troubles/files.rs"]
+mod files;
+
+use std::process::Command;
+
+use desk::{Desk, Line};
+use test_kit::page::Page;
+
+#[test]
+fn the_page_of_troubles_says_what_jtc_prints() {
+    let mut page = Page::new("troubles.md", "jtc");
+    let desk = Desk::new();
+    files::write(desk.dir());
+    trajectory_files(&mut page, &desk);
+    arms(&mut page, &desk);
+    link(&mut page, &desk);
+    moving(&mut page);
+    outputs(&mut page);
+    page.finish();
+}
+
+fn trajectory_files(page: &mut Page, desk: &Desk) {
+    page.group("jtc: files");
+    for (title, command) in [
+        ("A file that is not there", "jtc traj check nothing.csv"),
+        ("Degrees instead of radians", "jtc traj check degrees.csv"),
+        ("Decimal commas", "jtc traj check commas.csv"),
+        ("No header", "jtc traj check no-header.csv"),
+        ("A column too few", "jtc traj check column.csv"),
+        ("Too fast", "jtc traj check fast.csv"),
+        ("Outside the limits of a joint", "jtc traj check outside.csv"),
+        ("Two points that are far apart", "jtc traj check step.csv"),
+        ("A fault file that counts joints from 0", "jtc sim --serial /tmp/jtc --faults old-faults.toml"),
+    ] {
+        page.case(title, command, &desk.run(command));
+    }
+}
+
+fn arms(page: &mut Page, desk: &Desk) {
+    page.group("jtc: the arm");
+    for (title, command) in [
+        ("A URDF with seven axes", "jtc arm import seven.urdf -o arm.toml"),
+        ("A URDF whose joints turn without end", "jtc arm import continuous.urdf -o arm.toml"),
+        ("A URDF with a gripper that moves", "jtc arm import gripper.urdf -o arm.toml"),
+        ("An arm file of an older form", "jtc params show old.toml"),
+        ("A trajectory instead of an arm file", "jtc traj check motion.csv --arm motion.csv"),
+        ("An arm whose limits the controller does not have", "jtc traj run motion.csv --arm slower.toml"),
+    ] {
+        page.case(title, command, &desk.run(command));
+    }
+}
+
+fn link(page: &mut Page, desk: &Desk) {
+    page.group("jtc: the link");
+    page.case("A port that is not there", "jtc status", &desk.run("jtc status"));
+    page.case(
+        "A file instead of a port",
+        "jtc status --port motion.csv",
+        &desk.run("jtc status --port motion.csv"),
+    );
+    let silent = Desk::at(Line::new(""));
+    page.case("Nothing answers", "jtc status", &silent.run("jtc status").blurred());
+    let noisy = Desk::at(Line::new("a rate that is not ours makes noise\n"));
+    page.case("Another rate, or another device", "jtc status", &noisy.run("jtc status").blurred());
+    let sim = Desk::simulated(&["--speed", "max", "--no-throttle"]);
+    page.case("No parameters yet", "jtc traj run motion.csv", &sim.run("jtc traj run motion.csv"));
+    sim.run("jtc params use-defaults");
+    let second = "jtc sim --serial /tmp/jtc";
+    page.case("A second simulator at the same place", second, &sim.run(second));
+    page.case("Stop, and nothing moves", "jtc traj stop", &sim.run("jtc traj stop"));
+    page.case("Resume, and nothing is paused", "jtc traj resume", &sim.run("jtc traj resume"));
+    let busy = sim.hold_port();
+    page.case("Another program has the port", "jtc status", &sim.run("jtc status"));
+    drop(busy);
+}
+
+fn moving(page: &mut Page) {
+    page.group("jtc: while the arm moves");
+    let ready = |options: &[&str]| {
+        let desk = Desk::simulated(&[&["--no-throttle"], options].concat());
+        assert_eq!(desk.run("jtc recover --defaults").code, 0);
+        desk
+    };
+    let run = "jtc traj run motion.csv";
+    let elsewhere = "jtc traj run elsewhere.csv";
+    page.case(
+        "The arm is not where the motion begins",
+        elsewhere,
+        &ready(&["--speed", "max"]).run(elsewhere),
+    );
+    page.case_of_a_moment("Ctrl-C", run, || {
+        let desk = ready(&[]);
+        desk.moving(run, |jtc, _| cli_kit::trial::signal(jtc, "-INT")).blurred()
+    });
+    page.case_of_a_moment("The cable is pulled", run, || {
+        let desk = ready(&[]);
+        desk.moving(run, |_, sim| drop(Command::new("kill").args(["-KILL", &sim.pid()]).status())).blurred()
+    });
+    for (title, fault) in [
+        ("A drive reports a fault", "kind = \"motor-fault\"\njoint = 3\nbits = 2"),
+        ("A drive falls silent", "kind = \"node-silent\"\njoint = 2\nfor_s = 0.05"),
+        ("Somebody pushes the arm", "kind = \"push\"\njoint = 3\ntorque_nm = 110\nfor_s = 0.5"),
+    ] {
+        let desk = Desk::new();
+        let file = desk.dir().join("fault.toml");
+        std::fs::write(&file, format!("format = 2\n[[fault]]\n{fault}\nat_point = 1500\n")).unwrap();
+        page.case_of_a_moment(title, run, || {
+            ready(&["--speed", "max", "--faults", file.to_str().unwrap()]).run(run).blurred()
+        });
+    }
+    let file = Desk::new();
+    let fault = file.dir().join("fault.toml");
+    let text =
+        "format = 2\n[[fault]]\nkind = \"push\"\njoint = 3\ntorque_nm = 110\nfor_s = 0.5\nat_point = 1500\n";
+    std::fs::write(&fault, text).unwrap();
+    let pushed = ready(&["--speed", "max", "--faults", fault.to_str().unwrap()]);
+    pushed.run(run);
+    page.case("What is wrong after it", "jtc doctor", &pushed.run("jtc doctor").blurred());
+    page.case("The way back", "jtc recover", &pushed.run("jtc recover"));
+}
+
+fn outputs(page: &mut Page) {
+    page.group("jtc: terminal and outputs");
+    let desk = Desk::simulated(&["--speed", "max", "--no-throttle"]);
+    assert_eq!(desk.run("jtc recover --defaults").code, 0);
+    desk.run("touch old.csv; ln -s /dev/full full.csv");
+    for (title, command) in [
+        ("The recording is there already", "jtc traj run motion.csv --record old.csv"),
+        ("A recording of no known form", "jtc traj run motion.csv --record run.txt"),
+        ("The disk is full", "jtc traj run motion.csv --record full.csv --force"),
+        ("The result has no place", "jtc status > /dev/full"),
+        ("A word that is no command", "jtc traj chek motion.csv"),
+        ("The same for a program", "jtc --json traj chek motion.csv 2> /dev/null"),
+        ("A file that is not there, for a program", "jtc --json traj check nothing.csv 2> /dev/null"),
+    ] {
+        page.case(title, command, &desk.run(command));
+    }
+    let shown = "jtc help files | head -1";
+    page.case("A reader that has gone", shown, &desk.run(shown));
+}

@@ -1,0 +1,193 @@
+//! Parts of a document that show what commands print: made by running them, and compared with what the document says.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Longest output that is shown whole, lines.
+const LINES_MAX: usize = 12;
+/// Lines that are shown of a longer one: its beginning and its end.
+const SHOWN: (usize, usize) = (5, 4);
+/// How often a case is run whose output depends on a moment before it counts as another one.
+const TRIES: usize = 4;
+
+/// Words whose number is kept: it tells one thing from another.
+const KEPT: [&str; 9] =
+    ["joint ", "joints ", "board ", "boards ", "number ", "code ", "stop ", "certain: ", "localhost:"];
+
+/// One part of a document.
+pub struct Page {
+    file: PathBuf,
+    name: &'static str,
+    /// What the document says now.
+    old: String,
+    text: String,
+}
+
+/// What a command printed, both streams as they came, and its exit code.
+pub struct Printed {
+    /// Exit code.
+    pub code: i32,
+    /// Both streams.
+    pub text: String,
+}
+
+impl Page {
+    /// The part `name` of `docs/FILE`, between `<!-- NAME begin -->` and `<!-- NAME end -->`.
+    ///
+    /// # Panics
+    /// When the document or its marks are not there.
+    pub fn new(file: &str, name: &'static str) -> Self {
+        let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs")).join(file);
+        let whole = std::fs::read_to_string(&file).expect("the document is there");
+        let (begin, end) = marks(&whole, name);
+        Self { file, name, old: whole[begin..end].to_owned(), text: "\n".into() }
+    }
+
+    /// A heading over the cases that follow.
+    pub fn group(&mut self, title: &str) {
+        let _ = write!(self.text, "## {title}\n\n");
+    }
+
+    /// A case: what somebody did wrong, the command, and what it printed.
+    pub fn case(&mut self, title: &str, command: &str, printed: &Printed) {
+        self.text += &block(title, command, printed);
+    }
+
+    /// A case whose output depends on a moment: it is run again when it is another one than the document has.
+    pub fn case_of_a_moment(&mut self, title: &str, command: &str, mut run: impl FnMut() -> Printed) {
+        let mut made = String::new();
+        for _ in 0..TRIES {
+            made = block(title, command, &run());
+            if updating() || self.old.contains(&made) {
+                break;
+            }
+            eprintln!("another output this time:\n{made}");
+        }
+        self.text += &made;
+    }
+
+    /// Compares with the document, or writes it with `UPDATE_DOCS=1`.
+    ///
+    /// # Panics
+    /// When the document says something else, with the first lines that differ.
+    pub fn finish(self) {
+        if self.old == self.text {
+            return;
+        }
+        if updating() {
+            // Read again: another part may have been written meanwhile.
+            let whole = std::fs::read_to_string(&self.file).expect("the document is there");
+            let (begin, end) = marks(&whole, self.name);
+            let new = format!("{}{}{}", &whole[..begin], self.text, &whole[end..]);
+            std::fs::write(&self.file, new).expect("the document can be written");
+            return;
+        }
+        let mut lines = self.old.lines().zip(self.text.lines()).enumerate();
+        let first = lines.find(|(_, (old, new))| old != new);
+        let (line, (old, new)) = first.unwrap_or((0, ("", "one is longer than the other")));
+        panic!(
+            "{} does not say what the commands print, first at line {line} of the part `{}`:\n  document: {old}\n  command:  {new}\n\
+             look at the difference, then write it again with UPDATE_DOCS=1\n{}",
+            self.file.display(),
+            self.name,
+            self.text
+        );
+    }
+}
+
+fn updating() -> bool {
+    std::env::var_os("UPDATE_DOCS").is_some()
+}
+
+fn marks(whole: &str, name: &str) -> (usize, usize) {
+    let mark = format!("<!-- {name} begin -->\n");
+    let begin = whole.find(&mark).expect("the document has the beginning mark") + mark.len();
+    let end = whole.find(&format!("<!-- {name} end -->")).expect("the document has the end mark");
+    (begin, end)
+}
+
+fn block(title: &str, command: &str, printed: &Printed) -> String {
+    let mut text = format!("### {title}\n\n```console\n");
+    for line in command.lines() {
+        let _ = writeln!(text, "$ {line}");
+    }
+    let lines: Vec<&str> = printed.text.lines().map(str::trim_end).collect();
+    let left_out = if lines.len() > LINES_MAX { lines.len() - SHOWN.0 - SHOWN.1 } else { 0 };
+    for (i, line) in lines.iter().enumerate() {
+        match i.checked_sub(SHOWN.0) {
+            Some(0) if left_out > 0 => {
+                let _ = writeln!(text, "  ({left_out} lines more)");
+            }
+            Some(n) if n < left_out => {}
+            _ => {
+                let _ = writeln!(text, "{line}");
+            }
+        }
+    }
+    let _ = write!(text, "exit code {}\n```\n\n", printed.code);
+    text
+}
+
+/// The text without what differs from run to run: tables of figures are left out, and numbers become `…`, but for those of joints
+/// and boards and those that are part of a name.
+pub fn blurred(text: &str) -> String {
+    let mut out = String::new();
+    for line in text.lines().filter(|line| !is_figures(line)) {
+        let mut rest = line;
+        while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+            let (before, from) = rest.split_at(at);
+            let end = from.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(from.len());
+            // A full stop at the end of a sentence is no part of the number.
+            let number = from[..end].trim_end_matches('.').len();
+            let hex = from
+                .strip_prefix("0x")
+                .map(|digits| 2 + digits.find(|c: char| !c.is_ascii_hexdigit()).unwrap_or(digits.len()));
+            let end = hex.unwrap_or(number);
+            let named = KEPT.iter().any(|w| before.ends_with(w));
+            // Part of a date.
+            let named = named
+                || from[end..].strip_prefix('-').is_some_and(|r| r.starts_with(|c: char| c.is_ascii_digit()));
+            let part = before.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '-');
+            out += before;
+            out += if named || part || hex.is_some() { &from[..end] } else { "…" };
+            rest = &from[end..];
+        }
+        out += rest;
+        out.push('\n');
+    }
+    out
+}
+
+/// A row of a table of figures, or its head.
+fn is_figures(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let number =
+        |w: &&str| w.trim_start_matches(['-', '−']).starts_with(|c: char| c.is_ascii_digit() || c == '–');
+    let numbers = words.iter().filter(|w| number(w)).count();
+    (line.contains("   ") && numbers >= 4) || line.contains("RMS mrad") || line.contains("commanded rad")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_differs_from_run_to_run_is_blurred() {
+        let text = "fault: 1.68 s\njoint 1      0.162      0.373        0.410       17.9\njoint 3: over at point 1479 (1.479 s).\n";
+        assert_eq!(blurred(text), "fault: … s\njoint 3: over at point … (… s).\n");
+        assert_eq!(
+            blurred("board 2: run.csv is v1, 0xF1 in 5 tries"),
+            "board 2: run.csv is v1, 0xF1 in … tries\n"
+        );
+    }
+
+    #[test]
+    fn long_output_is_shortened() {
+        let text: String = (0..20).map(|i| format!("line {i}\n")).collect();
+        let shown = block("a", "jtc x", &Printed { code: 4, text });
+        assert!(
+            shown.contains("line 4\n  (11 lines more)\nline 16\n") && shown.ends_with("exit code 4\n```\n\n"),
+            "{shown}"
+        );
+    }
+}

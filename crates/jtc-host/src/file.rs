@@ -45,6 +45,14 @@ pub enum FileError {
         /// Six that could be the arm, with commas between them.
         six: String,
     },
+    /// A robot description without six rotary joints in a chain: no option makes an arm for this controller of it.
+    #[error("{}: {problem}", path.display())]
+    FewJoints {
+        /// The file.
+        path: PathBuf,
+        /// Which joints there are.
+        problem: String,
+    },
     /// The file as a whole is none of the known forms.
     #[error("{}: {problem}", path.display())]
     Form {
@@ -110,6 +118,11 @@ impl FileError {
                 "say which six are the arm, the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
                 path.display()
             ),
+            FileError::FewJoints { .. } => {
+                "this controller drives arms of six revolute or continuous joints, no arms with fewer axes and no prismatic ones; \
+                 `jtc example arm` writes one that it drives"
+                    .into()
+            }
             FileError::At { .. } | FileError::Form { .. } => {
                 "`jtc help files` shows the forms of files, `jtc example` writes one of each".into()
             }
@@ -122,6 +135,7 @@ impl FileError {
         | FileError::TooLarge { path, .. }
         | FileError::At { path, .. }
         | FileError::Joints { path, .. }
+        | FileError::FewJoints { path, .. }
         | FileError::Form { path, .. }) = &mut self;
         *path = file.to_owned();
         self

@@ -122,6 +122,9 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let say = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
     assert!(say(&urdf("0 0 0", "revolute")).contains("no direction"));
     assert!(say("<robot name=\"x\"></robot>").contains("0 rotary joints"));
+    // No form of file and no option helps there.
+    let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
+    assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
     assert!(say(&"<a>".repeat(100_000)).contains("nested"));
     assert!(
         say(&urdf("0 0 1", "revolute").replace("<mass value=\"7.5\"/>", "<mass value=\"-7.5\"/>"))

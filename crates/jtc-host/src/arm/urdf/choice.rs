@@ -156,8 +156,9 @@ fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileErro
     if longest.len() < JOINTS {
         if choice.tip.is_some() {
             text += "; is --tip the last link of the arm?";
+            return FileError::form(text);
         }
-        return FileError::form(text);
+        return FileError::FewJoints { path: PathBuf::new(), problem: text };
     }
     FileError::Joints { path: PathBuf::new(), problem: text, six: names(&longest[..JOINTS]).join(",") }
 }

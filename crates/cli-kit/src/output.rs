@@ -86,7 +86,7 @@ impl Output {
         }
     }
 
-    /// Prints a result: `value` as one line of JSON, or the text.
+    /// Prints a result: `value` as one line of JSON, or the text, which is broken between words on a terminal.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
         if STREAM.get().is_some() {
             let value = serde_json::to_value(value)
@@ -94,7 +94,8 @@ impl Output {
             Self::last("report", value);
             return;
         }
-        let line = self.words(value, text);
+        let width = if self.json { None } else { stdout_width() };
+        let line = within(&self.words(value, text), width);
         Self::bytes(format!("{}\n", line.trim_end()).as_bytes());
     }
 

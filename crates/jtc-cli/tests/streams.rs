@@ -3,8 +3,12 @@
 
 mod common;
 
+use std::io::{BufRead, BufReader, Write};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
 use cli_kit::trial::Said;
-use common::{Sim, jtc, motion};
+use common::{Sim, command, jtc, motion};
 use serde_json::Value;
 
 /// The events of a command, whose last one is its result.
@@ -117,4 +121,32 @@ fn the_demo_is_a_stream_and_its_events_are_documented() {
     for event in &events {
         assert!(page.contains(&format!("| `{}` |", name(event))), "{event}");
     }
+}
+
+/// A reader that takes nothing (`… | less`) does not keep a run from hearing Ctrl-C.
+#[test]
+fn j33_a_reader_that_does_not_read_holds_no_run() {
+    let sim = Sim::start(&["--no-throttle"]);
+    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let file = sim.path("motion.csv");
+    std::fs::write(&file, motion(0.2)).unwrap();
+    let (reader, mut writer) = std::io::pipe().unwrap();
+    // What a pipe holds.
+    writer.write_all(&[b'\n'; 65_536]).unwrap();
+    let mut run = command();
+    run.args(["--json", "traj", "run", &file, "--speed", "5", "--port", sim.port.to_str().unwrap()]);
+    let mut run = run.stdin(Stdio::null()).stdout(writer).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("uploading")));
+    std::thread::sleep(Duration::from_secs(1));
+    cli_kit::trial::signal(&run, "-INT");
+    let begin = Instant::now();
+    while run.try_wait().unwrap().is_none() {
+        assert!(begin.elapsed() < Duration::from_secs(20), "it does not end");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(run.wait().unwrap().code(), Some(5));
+    drop(reader);
+    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()), "{status}");
 }

@@ -61,18 +61,16 @@ fn columns(width: u16) -> Vec<Column> {
         Cell::from(format!("{:>5}", statistics.frames_per_s(number, now)))
     });
     let errors = |width| Column::new("errors", width, |_, b, _, _| errors(b));
-    let description = |width| {
-        Column::new("description", width, |_, b, _, _| {
-            Cell::from(b.description.clone().unwrap_or_else(|| "?".into()))
-        })
+    let description = |head, width| {
+        Column::new(head, width, |_, b, _, _| Cell::from(b.description.clone().unwrap_or_else(|| "?".into())))
     };
     if width >= WIDE {
         let bits = Column::new("status", Constraint::Length(34), |_, b, _, _| words(b));
-        let (text, last) = (description(Constraint::Min(18)), errors(Constraint::Min(14)));
+        let (text, last) = (description("description", Constraint::Min(18)), errors(Constraint::Min(14)));
         return vec![number, flash, program, text, state, bits, heartbeat, rate, last];
     }
     if width >= MEDIUM {
-        let (text, last) = (description(Constraint::Min(8)), errors(Constraint::Length(6)));
+        let (text, last) = (description("text", Constraint::Min(8)), errors(Constraint::Length(6)));
         return vec![number, flash, program, state, letters, heartbeat, rate, last, text];
     }
     if width >= 48 {

@@ -128,6 +128,9 @@ fn no_board_vanishes() {
             };
             assert!(all.iter().any(row), "{size:?}: board {number}\n{place}");
         }
+        // What stands in a line of facts or heads stands there whole.
+        assert!(size.0 >= 60 || !place.contains("socketcand"), "{place}");
+        assert!(!place.contains("descriptio ") && !place.contains("descriptio│"), "{place}");
         assert!(size.1 > 12 || keys.contains("↑↓ 1-"), "{size:?}: {keys}");
     }
 }

@@ -70,7 +70,7 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
         frame.render_widget(summary(picture), facts);
         frame.render_widget(load(picture, usize::from(width - 4)), curve);
     } else {
-        frame.render_widget(facts(picture, boards), second);
+        frame.render_widget(facts(picture, boards, second.width), second);
     }
     scroll.fit(usize::from(middle.height.saturating_sub(edge + 1)), rest.len() + usize::from(boards));
     let block = panel(&format!("boards {boards}"));
@@ -83,7 +83,8 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     let [causes, table] =
         Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(place);
     frame.render_widget(Paragraph::new(above), causes);
-    if boards > 0 && table.height > 0 {
+    // A head without a row below it says nothing.
+    if boards > 0 && table.height > 1 {
         frame.render_widget(rows::table(picture, inner, skip), table);
     }
     events(frame, picture.watch, last, framed);
@@ -144,12 +145,14 @@ fn nobody(watch: &Watch) -> &'static str {
     }
 }
 
-/// The bus in one line.
-fn facts(picture: &Picture<'_>, boards: u16) -> Line<'static> {
+/// The bus in one line, with its name where that fits whole.
+fn facts(picture: &Picture<'_>, boards: u16, width: u16) -> Line<'static> {
     let load = picture.statistics.load_percent(picture.now);
     let foreign = picture.statistics.foreign_count();
     let foreign = if foreign > 0 { format!("  {foreign} foreign frames") } else { String::new() };
-    Line::from(format!("{boards} boards  load {load:.1} %{foreign}  {}", picture.watch.url)).dark_gray()
+    let facts = format!("{boards} boards  load {load:.1} %{foreign}");
+    let whole = format!("{facts}  {}", picture.watch.url);
+    Line::from(if whole.chars().count() <= usize::from(width) { whole } else { facts }).dark_gray()
 }
 
 fn summary(picture: &Picture<'_>) -> Paragraph<'static> {

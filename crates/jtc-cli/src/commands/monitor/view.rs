@@ -137,6 +137,7 @@ impl View {
             Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(area);
         frame.render_widget(Paragraph::new(above), causes);
         let (inner, skip) = (area.width.saturating_sub(2 * edge), first.saturating_sub(rest.len()));
+        // A head without a row below it says nothing.
         if table.height > heads + edge {
             frame.render_widget(joints::table(s, self.silent.is_some(), inner, framed, skip), table);
         }

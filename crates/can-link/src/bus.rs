@@ -22,6 +22,12 @@ pub trait CanBus {
     fn state(&mut self) -> ControllerState {
         ControllerState::default()
     }
+
+    /// How often this member's controller has left the bus, as far as is known from what was received so far. It may be back by
+    /// now: what was sent meanwhile is lost all the same. Nothing is asked of the adapter; 0 where it does not report.
+    fn times_bus_off(&self) -> u64 {
+        0
+    }
 }
 
 impl<B: CanBus + ?Sized> CanBus for &mut B {
@@ -34,6 +40,9 @@ impl<B: CanBus + ?Sized> CanBus for &mut B {
     fn state(&mut self) -> ControllerState {
         (**self).state()
     }
+    fn times_bus_off(&self) -> u64 {
+        (**self).times_bus_off()
+    }
 }
 
 impl<B: CanBus + ?Sized> CanBus for Box<B> {
@@ -45,6 +54,9 @@ impl<B: CanBus + ?Sized> CanBus for Box<B> {
     }
     fn state(&mut self) -> ControllerState {
         (**self).state()
+    }
+    fn times_bus_off(&self) -> u64 {
+        (**self).times_bus_off()
     }
 }
 

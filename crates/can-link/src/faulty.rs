@@ -229,6 +229,10 @@ impl<B: CanBus> CanBus for Faulty<B> {
     fn state(&mut self) -> ControllerState {
         self.bus.state()
     }
+
+    fn times_bus_off(&self) -> u64 {
+        self.bus.times_bus_off()
+    }
 }
 
 #[cfg(test)]

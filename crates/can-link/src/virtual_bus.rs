@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use crate::{CanBus, CanError, CanFrame, ControllerState};
+use crate::{CanBus, CanError, CanFrame, ControllerState, ErrorState};
 
 /// Frames that wait for a member at most.
 const QUEUE: usize = 4096;
@@ -47,8 +47,17 @@ struct State {
     members: BTreeMap<u64, Member>,
 }
 
+/// What waits for a member, in the order in which it happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Heard {
+    /// A frame of another member.
+    Frame(CanFrame),
+    /// Its own controller is in this state now.
+    State(ErrorState),
+}
+
 struct Member {
-    waiting: VecDeque<CanFrame>,
+    waiting: VecDeque<Heard>,
     /// Frames that wait at most.
     limit: usize,
     /// Nobody waits for it: it let a sender wait in vain and has taken nothing since, or is a guest.
@@ -76,7 +85,14 @@ impl Member {
             self.stalled = true;
             self.missed += 1;
         } else {
-            self.waiting.push_back(*frame);
+            self.waiting.push_back(Heard::Frame(*frame));
+        }
+    }
+
+    /// States are few and are never missed.
+    fn becomes(&mut self, state: ErrorState) {
+        if !self.deaf {
+            self.waiting.push_back(Heard::State(state));
         }
     }
 }
@@ -128,6 +144,14 @@ impl VirtualHub {
     pub(crate) fn deliver_to(&self, frame: &CanFrame, number: u64) {
         if let Some(member) = self.shared.state().members.get_mut(&number) {
             member.hear(frame);
+        }
+        self.shared.changed.notify_all();
+    }
+
+    /// Reports to one member the state of its own controller, between the frames before and after.
+    pub(crate) fn report_state(&self, state: ErrorState, number: u64) {
+        if let Some(member) = self.shared.state().members.get_mut(&number) {
+            member.becomes(state);
         }
         self.shared.changed.notify_all();
     }
@@ -204,15 +228,15 @@ impl VirtualBus {
         self.shared().changed.notify_all();
     }
 
-    /// Waits for frames and moves at most `most` of them to `frames`; false when it has left the bus.
-    pub(crate) fn take_some(&self, most: usize, timeout: Duration, frames: &mut Vec<CanFrame>) -> bool {
+    /// Waits for frames and states and moves at most `most` of them to `heard`; false when it has left the bus.
+    pub(crate) fn take_some(&self, most: usize, timeout: Duration, heard: &mut Vec<Heard>) -> bool {
         let mut state = self.shared().state();
         let deadline = Instant::now() + timeout;
         loop {
             let Some(member) = state.members.get_mut(&self.number()) else { return false };
             if !member.waiting.is_empty() {
                 let count = member.waiting.len().min(most);
-                frames.extend(member.waiting.drain(..count));
+                heard.extend(member.waiting.drain(..count));
                 member.stalled = member.guest;
                 self.shared().changed.notify_all();
                 return true;
@@ -259,11 +283,15 @@ impl CanBus for VirtualBus {
         let mut state = shared.state();
         loop {
             if let Some(member) = state.members.get_mut(&self.number())
-                && let Some(frame) = member.waiting.pop_front()
+                && let Some(heard) = member.waiting.pop_front()
             {
                 member.stalled = member.guest;
                 shared.changed.notify_all();
-                return Ok(Some(frame));
+                match heard {
+                    Heard::Frame(frame) => return Ok(Some(frame)),
+                    // Only guests of a server have one, and it writes these out itself.
+                    Heard::State(_) => continue,
+                }
             }
             let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));
             if left.is_zero() {

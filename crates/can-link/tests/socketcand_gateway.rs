@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use can_link::{CanBus, CanFrame, ClientEvent, Happening, Id, SocketcandGateway, TimedBus, open};
+use can_link::{CanBus, CanFrame, ClientEvent, ErrorState, Happening, Id, SocketcandGateway, TimedBus, open};
 
 /// Only something broken waits so long.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -115,4 +115,24 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
         host.join().unwrap()
     });
     assert_eq!(stats.frames, u64::from(2 * count));
+}
+
+/// A client is told that its own controller is bus-off and that it is back, between the frames before and after; others are not.
+#[test]
+fn a_client_is_told_of_its_own_bus_off() {
+    let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();
+    let mut own = open(&gateway.url("can0")).unwrap();
+    let client = gateway.next(PATIENCE).unwrap().client;
+    let mut other = open(&gateway.url("can0")).unwrap();
+    gateway.next(PATIENCE).unwrap();
+    let states = [ErrorState::BusOff, ErrorState::Active];
+    for (number, state) in (0..).zip(states) {
+        gateway.report_state(client, state);
+        gateway.deliver(0, &numbered(number), None);
+        assert_eq!(take(&mut own), numbered(number));
+        assert_eq!(own.state().errors, state);
+        assert_eq!(take(&mut other), numbered(number));
+        assert_eq!(other.state().errors, ErrorState::Unknown);
+    }
+    assert_eq!((own.times_bus_off(), other.times_bus_off()), (1, 0));
 }

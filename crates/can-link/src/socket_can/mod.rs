@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use socketcan::{CanFdSocket, Socket, SocketOptions};
 
-use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState};
+use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
 use convert::{Heard, from_kernel, to_kernel};
 use insist::insist;
 
@@ -28,6 +28,7 @@ pub struct SocketCanBus {
     interface: String,
     socket: CanFdSocket,
     state: ControllerState,
+    times_bus_off: u64,
 }
 
 impl SocketCanBus {
@@ -48,7 +49,13 @@ impl SocketCanBus {
         socket.set_error_filter_accept_all().map_err(failed)?;
         socket.set_nonblocking(true).map_err(failed)?;
         let url = CanUrl::SocketCan { interface: interface.to_owned() }.to_string();
-        Ok(Self { url, interface: interface.to_owned(), socket, state: ControllerState::default() })
+        Ok(Self {
+            url,
+            interface: interface.to_owned(),
+            socket,
+            state: ControllerState::default(),
+            times_bus_off: 0,
+        })
     }
 
     fn failed(&self, step: &'static str, source: io::Error) -> CanError {
@@ -101,7 +108,12 @@ impl CanBus for SocketCanBus {
             match read {
                 Ok(raw) => match from_kernel(&raw, self.state) {
                     Heard::Frame(frame) => return Ok(Some(frame)),
-                    Heard::State(state) => self.state = state,
+                    Heard::State(state) => {
+                        let left =
+                            state.errors == ErrorState::BusOff && self.state.errors != ErrorState::BusOff;
+                        self.times_bus_off += u64::from(left);
+                        self.state = state;
+                    }
                     Heard::Nothing => {}
                 },
                 Err(error) if is_no_data(&error) => {}
@@ -122,6 +134,10 @@ impl CanBus for SocketCanBus {
     /// From the error frames that [`receive`](CanBus::receive) has seen; none come when all is well from the start.
     fn state(&mut self) -> ControllerState {
         self.state
+    }
+
+    fn times_bus_off(&self) -> u64 {
+        self.times_bus_off
     }
 }
 

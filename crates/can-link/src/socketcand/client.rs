@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-use super::text::{Reply, Splitter, has_form, push_send};
+use super::text::{CLASS_BUS_OFF, CLASS_RESTARTED, Reply, Splitter, has_form, push_send};
 use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
 
 /// How long connecting and each answer while opening may take.
@@ -20,10 +20,6 @@ const END_PATIENCE: Duration = Duration::from_millis(250);
 const READ: usize = 16 * 1024;
 /// Received frames that are kept while sending waits.
 const INBOX: usize = 100_000;
-
-/// Classes of error frames (Linux, `can/error.h`).
-const CLASS_BUS_OFF: u32 = 0x40;
-const CLASS_RESTARTED: u32 = 0x100;
 
 /// A bus behind a server of the socketcand protocol: classic data frames only.
 ///
@@ -40,6 +36,7 @@ pub struct SocketcandBus {
     timeout: Option<Duration>,
     closed: bool,
     errors: ErrorState,
+    times_bus_off: u64,
     ignored: u64,
 }
 
@@ -60,6 +57,7 @@ impl SocketcandBus {
             timeout: Some(PATIENCE),
             closed: false,
             errors: ErrorState::Unknown,
+            times_bus_off: 0,
             ignored: 0,
         };
         bus.set_up().map_err(bus.failed("setting the socket"))?;
@@ -183,7 +181,10 @@ impl SocketcandBus {
         while let Some(message) = self.splitter.next(&mut bytes) {
             match Reply::parse(message) {
                 Reply::Frame(frame) => self.inbox.push_back(frame),
-                Reply::ErrorFrame(class) if class & CLASS_BUS_OFF != 0 => self.errors = ErrorState::BusOff,
+                Reply::ErrorFrame(class) if class & CLASS_BUS_OFF != 0 => {
+                    self.errors = ErrorState::BusOff;
+                    self.times_bus_off += 1;
+                }
                 Reply::ErrorFrame(class) if class & CLASS_RESTARTED != 0 => self.errors = ErrorState::Active,
                 Reply::ErrorFrame(_) => {}
                 _ => self.ignored += 1,
@@ -266,6 +267,10 @@ impl CanBus for SocketcandBus {
     /// The protocol only tells of bus-off and of the way back.
     fn state(&mut self) -> ControllerState {
         ControllerState::without_counters(self.errors)
+    }
+
+    fn times_bus_off(&self) -> u64 {
+        self.times_bus_off
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::server::{Channel, Route};
 use super::session::Happened;
 use super::{ClientId, ServerStats, SocketcandServer};
-use crate::{CanError, CanFrame, VirtualHub};
+use crate::{CanError, CanFrame, ErrorState, VirtualHub};
 
 /// What clients did and the host has not taken yet; beyond that their connections wait.
 const WAITING: usize = 1024;
@@ -77,6 +77,13 @@ impl SocketcandGateway {
     /// [`TimedBus`](crate::TimedBus). Never waits.
     pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
         self.server.deliver_to(client, frame);
+    }
+
+    /// Reports to a client that its own controller has left the bus ([`ErrorState::BusOff`]) or is back
+    /// ([`ErrorState::Active`]), as an error frame between the frames before and after. The protocol's error frames carry no
+    /// data: other states have no form there and are not reported. Never waits.
+    pub fn report_state(&self, client: ClientId, state: ErrorState) {
+        self.server.report_state(client, state);
     }
 
     /// Where it listens, with the port that was taken.

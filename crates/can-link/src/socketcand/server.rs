@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::session;
-use crate::{CanError, CanFrame, CanUrl, VirtualBus, VirtualHub};
+use crate::{CanError, CanFrame, CanUrl, ErrorState, VirtualBus, VirtualHub};
 
 /// Clients at a time.
 const MOST_CLIENTS: usize = 64;
@@ -209,6 +209,15 @@ impl SocketcandServer {
             && let Some(channel) = self.inner.channels.get(channel)
         {
             channel.hub.deliver_to(frame, number);
+        }
+    }
+
+    pub(super) fn report_state(&self, client: ClientId, state: ErrorState) {
+        let member = self.inner.member_number(client);
+        if let Some((channel, number)) = member
+            && let Some(channel) = self.inner.channels.get(channel)
+        {
+            channel.hub.report_state(state, number);
         }
     }
 

@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::server::{ClientId, Inner, Route};
-use super::text::{Request, Splitter, has_form, push_frame};
+use super::text::{Request, Splitter, has_form, push_frame, push_state};
+use crate::virtual_bus::Heard;
 use crate::{CanBus, CanFrame, VirtualBus};
 
 /// No frame leaves so soon after the answer to `rawmode`: python-can compares all that one read gives with that answer.
@@ -190,18 +191,18 @@ fn write_frames(
 ) -> io::Result<std::thread::JoinHandle<()>> {
     let (inner, out) = (Arc::clone(inner), Arc::clone(out));
     std::thread::Builder::new().name("socketcand frames".into()).spawn(move || {
-        let mut frames = Vec::with_capacity(BATCH);
+        let mut heard = Vec::with_capacity(BATCH);
         let mut text = String::new();
-        while member.take_some(BATCH, Duration::from_secs(1), &mut frames) {
-            let carried = write_batch(&frames, &mut text);
-            count(&inner.not_carried, frames.len() - carried);
+        while member.take_some(BATCH, Duration::from_secs(1), &mut heard) {
+            let (carried, not_carried) = write_batch(&heard, &mut text);
+            count(&inner.not_carried, not_carried);
             if speak_frames(&out, &text).is_err() {
                 // The reading thread ends with the socket.
                 let _ = out.lock().stream.shutdown(Shutdown::Both);
                 return;
             }
             count(&inner.sent, carried);
-            frames.clear();
+            heard.clear();
         }
     })
 }
@@ -210,16 +211,22 @@ fn count(counter: &AtomicU64, number: usize) {
     counter.fetch_add(number as u64, Ordering::Relaxed);
 }
 
-/// The lines of the frames that have a form; how many.
-fn write_batch(frames: &[CanFrame], text: &mut String) -> usize {
+/// The lines of the frames and states that have a form; how many frames are there and how many are left out.
+fn write_batch(heard: &[Heard], text: &mut String) -> (usize, usize) {
     text.clear();
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    let mut carried = 0;
-    for frame in frames.iter().filter(|frame| has_form(frame)) {
-        push_frame(text, frame, now);
-        carried += 1;
+    let (mut carried, mut not_carried) = (0, 0);
+    for heard in heard {
+        match heard {
+            Heard::Frame(frame) if has_form(frame) => {
+                push_frame(text, frame, now);
+                carried += 1;
+            }
+            Heard::Frame(_) => not_carried += 1,
+            Heard::State(state) => push_state(text, *state, now),
+        }
     }
-    carried
+    (carried, not_carried)
 }
 
 fn speak_frames(out: &Out, text: &str) -> io::Result<()> {

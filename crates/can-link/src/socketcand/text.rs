@@ -3,10 +3,14 @@
 use std::fmt::Write;
 use std::time::Duration;
 
-use crate::{CanFrame, Id};
+use crate::{CanFrame, ErrorState, Id};
 
 /// Longest message that is kept; the longest of the protocol, a CAN FD frame with blanks between its bytes, has 240.
 pub(crate) const LONGEST: usize = 512;
+
+/// Classes of error frames (Linux, `can/error.h`): `CAN_ERR_BUSOFF` and `CAN_ERR_RESTARTED`.
+pub(crate) const CLASS_BUS_OFF: u32 = 0x40;
+pub(crate) const CLASS_RESTARTED: u32 = 0x100;
 
 /// Finds messages in a stream that may be cut anywhere, in bounded memory.
 pub(crate) struct Splitter {
@@ -222,6 +226,18 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     written.expect("a String takes everything");
 }
 
+/// Appends `< error CLASS TIME >` for a controller that has left the bus or is back; other states would need the data of an
+/// error frame, which the protocol does not carry.
+pub(crate) fn push_state(text: &mut String, state: ErrorState, time: Duration) {
+    let class = match state {
+        ErrorState::BusOff => CLASS_BUS_OFF,
+        ErrorState::Active => CLASS_RESTARTED,
+        _ => return,
+    };
+    let (s, us) = (time.as_secs(), time.subsec_micros());
+    write!(text, "< error {class:03X} {s}.{us:06} >").expect("a String takes everything");
+}
+
 /// Appends `< send … >`.
 pub(crate) fn push_send(text: &mut String, frame: &CanFrame) {
     let written = write!(text, "< send {} {:X} ", frame.id(), frame.len()).and_then(|()| {
@@ -368,6 +384,21 @@ mod tests {
             let mut text = String::new();
             push_send(&mut text, &frame);
             assert_eq!(text, send);
+        }
+    }
+
+    /// As socketcand writes error frames and python-can 4.6.1 reads them: three digits of the class, then the time.
+    #[test]
+    fn bus_off_and_the_way_back_are_error_frames() {
+        let time = Duration::from_micros(12_000_345);
+        for (state, line) in [
+            (ErrorState::BusOff, "< error 040 12.000345 >"),
+            (ErrorState::Active, "< error 100 12.000345 >"),
+            (ErrorState::Passive, ""),
+        ] {
+            let mut text = String::new();
+            push_state(&mut text, state, time);
+            assert_eq!(text, line);
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
-use cli_kit::{Lines, Output, Stop};
+use cli_kit::{Lines, Stop};
 use serde_json::{Value, json};
 use ucom::Profile;
 use ucom::master::{
@@ -11,6 +11,7 @@ use ucom::master::{
 };
 
 use crate::args::{Boards, LinkArgs};
+use crate::bus_off;
 use crate::commands::conformance::told;
 use crate::failure::{FAULT, Failure, NO_LINK};
 use crate::link::Link;
@@ -37,12 +38,12 @@ struct Loss {
 
 impl Driver {
     /// Opens the bus of the command line.
-    pub fn open(args: &LinkArgs, out: &Output) -> Result<Self, Failure> {
-        Self::with_profile(args, args.profile()?, out)
+    pub fn open(args: &LinkArgs) -> Result<Self, Failure> {
+        Self::with_profile(args, args.profile()?)
     }
 
     /// The same with another profile than the command line's.
-    pub fn with_profile(args: &LinkArgs, profile: Profile, _: &Output) -> Result<Self, Failure> {
+    pub fn with_profile(args: &LinkArgs, profile: Profile) -> Result<Self, Failure> {
         let undone = Undone::default();
         let (stop, notes) = (undone.listen()?, Lines::stderr()?);
         let (master, link, pump) = (Master::new(profile), args.open()?, Pump::default());
@@ -66,7 +67,11 @@ impl Driver {
 
     /// Hands over what has come and sends what is due, waiting for either no longer than `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), Failure> {
-        self.pump.turn(&mut self.master, &mut self.link, patience)
+        let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
+        if let Some(news) = self.link.news() {
+            self.note(news);
+        }
+        turned
     }
 
     /// Runs a procedure to its end. Ctrl-C cancels it: what it has to undo on the boards it still does.
@@ -97,12 +102,21 @@ impl Driver {
         see: &mut dyn FnMut(&Event),
     ) -> Result<Outcome, Failure> {
         self.undone.begin(&request);
+        let times_off = self.link.times_bus_off();
         let result = match self.master.start(self.link.now_us(), request.clone()) {
             Ok(id) => self.finish(id, can_be_cancelled, see),
             Err(error) => Err(error.into()),
         };
         self.undone.end(&request, result.is_ok());
-        result
+        // Who does not answer may never have been asked.
+        result.map_err(|failure| match self.link.times_bus_off() > times_off && failure.exit == NO_LINK {
+            true => {
+                let message =
+                    format!("{}; the CAN controller of this computer was bus-off meanwhile", failure.message);
+                Failure { message, ..failure }.hint(bus_off::next(self.link.url()))
+            }
+            false => failure,
+        })
     }
 
     fn finish(

@@ -7,6 +7,7 @@ use ucom::files::recording::{FrameKind, RecordedFrame};
 use ucom::{Foreign, Format, Frame, Profile};
 
 use crate::args::LinkArgs;
+use crate::bus_off::BusOff;
 use crate::failure::{FAULT, Failure, NO_LINK};
 use crate::pump::Line;
 
@@ -39,7 +40,7 @@ impl LinkArgs {
     /// Opens the bus.
     pub fn open(&self) -> Result<Link, Failure> {
         let url = self.url()?.to_owned();
-        Ok(Link { bus: can_link::open(&url)?, url, start: Instant::now() })
+        Ok(Link { bus: can_link::open(&url)?, url, start: Instant::now(), bus_off: BusOff::default() })
     }
 }
 
@@ -48,6 +49,7 @@ pub struct Link {
     bus: Box<dyn CanBus + Send>,
     url: String,
     start: Instant,
+    bus_off: BusOff,
 }
 
 impl Link {
@@ -92,6 +94,17 @@ impl Link {
     /// How the adapter gets on with the bus.
     pub fn state(&mut self) -> ControllerState {
         self.bus.state()
+    }
+
+    /// How often the controller of this computer has left the bus.
+    pub fn times_bus_off(&self) -> u64 {
+        self.bus.times_bus_off()
+    }
+
+    /// What is to be said of the controller of this computer: that it has left the bus, and what to do.
+    pub fn news(&mut self) -> Option<String> {
+        let (times, now_us) = (self.bus.times_bus_off(), self.now_us());
+        self.bus_off.look(times, now_us, &self.url)
     }
 }
 

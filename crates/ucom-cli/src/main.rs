@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod bus_off;
 mod cache;
 mod commands;
 mod driver;

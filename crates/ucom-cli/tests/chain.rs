@@ -329,23 +329,6 @@ fn several_boards_are_changed_only_when_all_answer() {
     assert!(said["error"]["hint"].as_str().unwrap().contains("start all"), "{said}");
 }
 
-/// ISO 11898-1: boards that were bus-off are back when the wire is sound again, and so is a client.
-#[test]
-fn bus_off_is_not_for_ever() {
-    let mut sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
-    let mut peer = sim.peer();
-    sim.fault("disturbed share=1 for_s=2");
-    // Each frame of the client and of the boards is tried until its sender is bus-off.
-    let during = sim.ucom(&["scan"]);
-    assert_ne!(during.code, 0, "{}", during.out);
-    std::thread::sleep(std::time::Duration::from_millis(2_000));
-    peer.send("240#");
-    peer.wait("4");
-    let boards = sim.ucom(&["--json", "scan"]).ends(0).json();
-    assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
-}
-
 /// D-T21: two boards with one flash number report at the same moment with the same bits: one frame, and one board too many.
 #[test]
 fn d_t21_reports_that_are_alike_are_one_frame() {

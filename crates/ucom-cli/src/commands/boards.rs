@@ -13,7 +13,7 @@ use crate::shape::{bits, board_table, board_value, info_value, state};
 
 /// Who is there; changes nothing.
 pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let report = match driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
@@ -85,7 +85,7 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let compared = known.as_ref().filter(|_| !args.renew);
     let expected =
         compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let options = InitOptions { expected, force: args.force.force };
     let report = match driver.run(Request::Init(options))? {
@@ -141,7 +141,7 @@ fn inventory(report: &InitReport, known: Option<&Inventory>) -> Result<Inventory
 
 /// What boards say about themselves.
 pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
@@ -169,7 +169,7 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     if let Some(bytes) = args.raw {
         return raw_status(args, bytes, link, out);
     }
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let boards = driver.numbers(&args.boards)?;
     let all = match set | clear {
@@ -193,7 +193,7 @@ fn raw_status(
     link: &LinkArgs,
     out: &Output,
 ) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let numbers = driver.numbers(&args.boards)?;
     all_there(&mut driver, &numbers)?;
     let targets: Vec<(Option<u8>, Vec<u8>)> = match args.boards {
@@ -275,7 +275,7 @@ fn lines_of(all: &[(u8, BoardInfo)]) -> String {
 
 /// PC_RESET, to all at once or one by one.
 pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let force = args.force.force;
     let boards: Vec<Option<u8>> = match &args.boards {
         Boards::All => vec![None],
@@ -316,7 +316,7 @@ fn act(
     out: &Output,
     request: fn(u8, bool) -> Request,
 ) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let boards = driver.numbers(&args.boards)?;
     let all = change_each(&mut driver, &boards, |board| request(board, args.force.force))?;
@@ -361,7 +361,7 @@ fn after(failure: Failure, done: &[u8]) -> Failure {
 
 /// Outputs, control and application, as far as asked. Stopping is always allowed: no other PC can forbid it.
 pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
     // Before anything is asked: no board goes on because another one does not answer.

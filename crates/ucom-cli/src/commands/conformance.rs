@@ -36,7 +36,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
         Some(path) => Some(program(args, path, date(&profile), out)?),
         None => None,
     };
-    let mut driver = Driver::with_profile(link, profile, out)?;
+    let mut driver = Driver::with_profile(link, profile)?;
     let boards = driver.numbers(&args.boards)?;
     let options = ConformanceOptions {
         boards,

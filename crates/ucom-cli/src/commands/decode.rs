@@ -58,7 +58,9 @@ fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut decoder = Decoder::new(link.profile()?);
     let mut bus = link.open()?;
     while left > 0 && !stop.asked() && !Output::gone() {
-        if let Some(frame) = bus.receive(Duration::from_millis(100))? {
+        let received = bus.receive(Duration::from_millis(100))?;
+        bus.news().iter().for_each(|news| out.note(news));
+        if let Some(frame) = received {
             print(&mut decoder, bus.now_us() * 1000, &recorded(&frame), out);
             left -= 1;
         }

@@ -21,7 +21,7 @@ const LISTEN: Duration = Duration::from_millis(1500);
 
 /// Looks at everything; ends with 0 when nothing is a problem, 3 without any frame, else 1.
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     out.note(format!("listening on {}", link.url()?));
     let start = Instant::now();
     let mut foreign_master = None;
@@ -72,6 +72,7 @@ pub fn controller(driver: &mut Driver) -> Option<Controller> {
     let state = driver.link().state();
     (state.errors != ErrorState::Unknown).then_some(Controller {
         bus_off: state.errors == ErrorState::BusOff,
+        times_bus_off: driver.link().times_bus_off(),
         passive: state.errors == ErrorState::Passive,
         tec: state.tec,
         rec: state.rec,
@@ -105,7 +106,7 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         }
         None => None,
     };
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let options = ProbeOptions { init: args.init, alive: args.alive, image, force: args.force.force };
     let report = match driver.run(Request::Probe(options))? {
         Outcome::Probe(report) => report,

@@ -23,7 +23,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(file) = &args.template {
         not_there(file, args.force.force, "`--template -` shows the table, to be added by hand")?;
     }
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
         let known = args.cache.known(&mut driver, &edges, board);
@@ -135,7 +135,7 @@ fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
 /// Shows initial inputs, or sets some; with `--for` the board moves under supervision.
 pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let edges = link.edges()?;
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let board = args.board;
     only(&[board], &args.values, "set")?;
     if let Some(duration) = args.duration {
@@ -258,7 +258,7 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let (profile, edges) = (link.profile()?, link.edges()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {
-        let mut driver = Driver::open(link, out)?;
+        let mut driver = Driver::open(link)?;
         for number in driver.numbers(&args.boards)? {
             let known = args.cache.known(&mut driver, &edges, number)?;
             boards.push(DbcBoard::new(number, &known.names, &known.edges));

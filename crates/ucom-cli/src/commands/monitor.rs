@@ -132,7 +132,7 @@ impl Watch {
 
 /// Shows the bus until `q`, Ctrl-C, or so many views.
 pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only, driver.master.profile());
     let left = args.count.unwrap_or(u64::MAX);
     let screen = if out.is_json() { None } else { Screen::take()? };

@@ -51,7 +51,7 @@ pub fn finish(stdout: &mut Lines, driver: &Driver) {
 
 /// Outputs of boards as they come; only listens once their names are known.
 pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let boards = driver.numbers(&args.boards)?;
     let edges = link.edges()?;
     let mut all = BTreeMap::new();

@@ -33,7 +33,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     if let Some(file) = &args.save {
         not_there(file, args.force.force, "take another name")?;
     }
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.values, "set")?;
     let mut all = Vec::new();
@@ -329,7 +329,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
             path.display()
         )));
     }
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     file.identities(&mut driver)?;
     let known = file.numbers().into_iter().map(|board| described(args, &mut driver, &edges, board));
     let known = known.collect::<Result<Vec<Known>, Failure>>()?;

@@ -99,7 +99,9 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
             flushed = Instant::now();
             sink.flush().map_err(failed)?;
         }
-        let Some(frame) = bus.receive(rest.min(Duration::from_millis(100)))? else { continue };
+        let received = bus.receive(rest.min(Duration::from_millis(100)))?;
+        bus.news().iter().for_each(|news| out.note(news));
+        let Some(frame) = received else { continue };
         let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let frame = recorded(&frame);
         master.handle(bus.now_us(), protocol_frame(&frame));
@@ -185,6 +187,7 @@ fn play(records: &[&Record], speed: f64, bus: &mut Link, stop: &Stop, out: &Outp
             }
             // What others say is of no interest here, and must not pile up.
             bus.receive(rest.min(Duration::from_millis(100)))?;
+            bus.news().iter().for_each(|news| out.note(news));
         }
         if stop.asked() {
             break;

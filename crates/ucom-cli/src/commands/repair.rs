@@ -18,7 +18,7 @@ pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         Some(flash) => flash,
         None => known(args)?,
     };
-    let mut driver = Driver::open(link, out)?;
+    let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let seen = match driver.run(Request::Repair { board, flash_number, force: args.force.force })? {
         Outcome::Repaired(seen) => seen,

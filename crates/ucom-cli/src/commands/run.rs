@@ -32,7 +32,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
             OnLost::StopAll => ucom::profile::OnLost::StopAll,
         };
     }
-    let mut driver = Driver::with_profile(link, profile, out)?;
+    let mut driver = Driver::with_profile(link, profile)?;
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.ci, "run")?;
     only(&boards, &args.par, "run")?;

@@ -1,5 +1,7 @@
 //! `ucom send`: single frames as they are.
 
+use std::time::{Duration, Instant};
+
 use cli_kit::Output;
 use serde_json::json;
 use ucom::files::recording::RecordedFrame;
@@ -7,8 +9,12 @@ use ucom::files::recording::RecordedFrame;
 use super::decode::parsed;
 use super::record::is_intrusive;
 use crate::args::{LinkArgs, SendArgs};
-use crate::failure::{Failure, REFUSED};
+use crate::bus_off::{WHY, next};
+use crate::failure::{Failure, NO_LINK, REFUSED};
 use crate::link::replayed;
+
+/// How long the adapter is listened to afterwards: a controller that leaves the bus does so within some 32 tries of a frame.
+const SENT: Duration = Duration::from_millis(50);
 
 /// Sends frames in the order given; all are looked at before the first one leaves.
 pub fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -28,6 +34,15 @@ pub fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let mut bus = link.open()?;
     for frame in &wire {
         bus.send_wire(frame)?;
+    }
+    let end = Instant::now() + SENT;
+    while Instant::now() < end {
+        bus.receive(end.saturating_duration_since(Instant::now()))?;
+    }
+    if bus.times_bus_off() > 0 {
+        let what =
+            format!("the CAN controller of this computer went bus-off: {WHY}; not all frames were sent");
+        return Err(Failure::new(NO_LINK, "bus-off", what).hint(next(bus.url())));
     }
     let texts: Vec<String> = frames.iter().map(ToString::to_string).collect();
     out.result(&json!({ "sent": texts }), || format!("sent: {}", texts.join(" ")));

@@ -1,6 +1,6 @@
 //! `ucom sim`: a simulated chain behind a server of the socketcand protocol.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -102,8 +102,10 @@ struct Server<'a> {
     started: Instant,
     start_us: u64,
     words: Receiver<String>,
-    /// The last frame on the wire that clients were given, and when it ended, ns.
-    carried: Option<(u64, CanFrame)>,
+    /// What clients receive of the last frame on the wire, and when it ended, ns.
+    carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
+    /// Clients whose controller is bus-off, as they were told.
+    off: BTreeSet<ClientId>,
     /// When it was last said that a controller has left the bus, ns.
     off_said_ns: Option<u64>,
     out: &'a Output,
@@ -125,6 +127,7 @@ impl<'a> Server<'a> {
             start_us: 0,
             words: words(),
             carried: None,
+            off: BTreeSet::new(),
             off_said_ns: None,
             out,
         }
@@ -204,8 +207,8 @@ impl<'a> Server<'a> {
         self.chain.advance(event.at_ns / 1000);
         let place = |member: &MemberId| self.inside.iter().position(|m| m == member);
         match &event.what {
-            Happening::Received { member, frame } => {
-                if let Some(i) = place(member) {
+            Happening::Received { member, frame } => match place(member) {
+                Some(i) => {
                     let format = Format {
                         extended: frame.is_extended(),
                         remote: frame.is_remote(),
@@ -213,26 +216,28 @@ impl<'a> Server<'a> {
                     };
                     self.chain.hear(i, frame.id().value(), format, frame.data());
                 }
-            }
-            Happening::Sent { member, frame } => match place(member) {
-                Some(i) => {
-                    if let Ok(protocol) = plain(frame) {
-                        self.chain.sent(i, &protocol);
-                    }
-                    // Frames of several members that are alike bit for bit are one on the wire (D-07).
-                    if self.carried.replace((event.at_ns, *frame)) != Some((event.at_ns, *frame)) {
-                        for frame in through(&mut self.chain, frame) {
-                            self.gateway.deliver(0, &frame, None);
-                        }
-                    }
-                }
+                // A client that is bus-off receives nothing, like any controller.
                 None => {
-                    let client = self.clients.iter().find(|(_, m)| *m == member).map(|(client, _)| *client);
-                    if self.carried.replace((event.at_ns, *frame)) != Some((event.at_ns, *frame)) {
-                        self.gateway.deliver(0, frame, client);
+                    let copies = self.carried.iter().flat_map(|(_, _, copies)| copies);
+                    for (client, frame) in
+                        self.client_of(*member).into_iter().flat_map(|c| copies.clone().map(move |f| (c, f)))
+                    {
+                        self.gateway.deliver_to(client, frame);
                     }
                 }
             },
+            Happening::Sent { member, frame } => {
+                let board = place(member);
+                if let (Some(i), Ok(protocol)) = (board, plain(frame)) {
+                    self.chain.sent(i, &protocol);
+                }
+                // Frames of several members that are alike bit for bit are one on the wire (D-07).
+                if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
+                    // Frames of clients have met these faults on their way to the bus.
+                    let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
+                    self.carried = Some((event.at_ns, *frame, copies));
+                }
+            }
             Happening::Failed { member, frame } => {
                 if let (Some(i), Ok(frame)) = (place(member), plain(frame)) {
                     self.chain.not_sent(i, &frame);
@@ -245,20 +250,35 @@ impl<'a> Server<'a> {
                     "{time_s:.3} s: two members send {id} at once with different data; both are destroyed (D-05)"
                 ));
             }
-            Happening::State { member, state } if state.errors == ErrorState::BusOff => {
-                self.is_off(*member, event.at_ns)
-            }
-            Happening::Error { .. } | Happening::State { .. } => {}
+            Happening::State { member, state } => self.is_in_state(*member, state.errors, event.at_ns),
+            Happening::Error { .. } => {}
+        }
+    }
+
+    fn client_of(&self, member: MemberId) -> Option<ClientId> {
+        self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| *client)
+    }
+
+    /// A controller is in another state: a client is told that its own has left the bus, and that it is back.
+    fn is_in_state(&mut self, member: MemberId, state: ErrorState, at_ns: u64) {
+        let off = state == ErrorState::BusOff;
+        if let Some(client) = self.client_of(member)
+            && if off { self.off.insert(client) } else { self.off.remove(&client) }
+        {
+            self.gateway.report_state(client, if off { state } else { ErrorState::Active });
+        }
+        if off {
+            self.say_off(member, at_ns);
         }
     }
 
     /// A controller has left the bus; it comes back by itself. Said once a second at most: on a bad wire it happens all the time.
-    fn is_off(&mut self, member: MemberId, at_ns: u64) {
+    fn say_off(&mut self, member: MemberId, at_ns: u64) {
         if self.off_said_ns.is_some_and(|said| at_ns.saturating_sub(said) < 1_000_000_000) {
             return;
         }
         self.off_said_ns = Some(at_ns);
-        let client = self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| client.to_string());
+        let client = self.client_of(member).map(|client| client.to_string());
         let who = match self.inside.iter().position(|m| *m == member) {
             Some(i) => format!("the board at position {}", i + 1),
             None => client.unwrap_or_else(|| "a client that has gone".into()),
@@ -283,6 +303,7 @@ impl<'a> Server<'a> {
             ClientEvent::Left => {
                 self.leaving.push(member);
                 self.clients.remove(&client);
+                self.off.remove(&client);
             }
         }
     }

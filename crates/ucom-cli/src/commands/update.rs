@@ -20,7 +20,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let profile = link.profile()?;
     let files = Files::read(args, &profile, out)?;
     let day = day(args.date.as_deref(), &profile)?;
-    let mut driver = Driver::with_profile(link, profile, out)?;
+    let mut driver = Driver::with_profile(link, profile)?;
     let numbers = match numbers(&mut driver, args) {
         Err(failure) if driver.stop_asked() => return Err(cancelled(failure, args, &profile, out)),
         numbers => numbers?,

@@ -136,6 +136,11 @@ impl Peer {
         self.bus.send(&CanFrame::classic(id, &data).expect("8 bytes")).expect("sent");
     }
 
+    /// How often its controller has left the bus, by what the server reported.
+    pub fn times_bus_off(&self) -> u64 {
+        self.bus.times_bus_off()
+    }
+
     /// The next frame within a time.
     pub fn hear(&mut self, within_ms: u64) -> Option<String> {
         let frame = self.bus.receive(Duration::from_millis(within_ms)).expect("the bus works")?;

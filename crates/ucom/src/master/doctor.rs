@@ -12,6 +12,8 @@ use crate::{Function, Profile};
 pub struct Controller {
     /// It has left the bus.
     pub bus_off: bool,
+    /// How often it has left the bus while it was looked at; it may be back.
+    pub times_bus_off: u64,
     /// It is error passive.
     pub passive: bool,
     /// Transmit error counter.
@@ -117,13 +119,15 @@ fn bus(o: &Observation, f: &mut Findings) {
     }
     if let Some(c) = &o.controller {
         let counters = format!("TEC {}, REC {}", count(c.tec), count(c.rec));
+        let off_why = "too many of its frames failed: wrong bit rate, no termination, or CAN_H and CAN_L swapped or shorted";
         if c.bus_off {
-            let why = "too many of its frames failed: wrong bit rate, or CAN_H and CAN_L swapped or shorted";
-            f.problem(
-                format!("the adapter is bus-off ({counters})"),
-                why,
-                "check rate and cable, then restart the interface",
-            );
+            let next = "check rate and cable, then restart the interface";
+            f.problem(format!("the adapter is bus-off ({counters})"), off_why, next);
+        } else if c.times_bus_off > 0 {
+            let times =
+                if c.times_bus_off == 1 { "once".into() } else { format!("{} times", c.times_bus_off) };
+            let what = format!("the adapter has left the bus {times} meanwhile (bus-off) and is back");
+            f.problem(what, off_why, "check rate, cable and termination, then ucom doctor again");
         } else if c.no_acknowledge > 0 && heard == 0 {
             let why = "no powered board is connected, or all of them listen at another bit rate";
             f.problem(

@@ -1,0 +1,46 @@
+//! Controllers that leave the bus (bus-off) and come back: boards and clients of `ucom sim`.
+#![cfg(unix)]
+
+mod common;
+
+use common::Sim;
+
+/// ISO 11898-1: boards that were bus-off are back when the wire is sound again, and so is a client.
+#[test]
+fn bus_off_is_not_for_ever() {
+    let mut sim = Sim::start(&["--boards", "3"]);
+    sim.ucom(&["init"]).ends(0);
+    let mut peer = sim.peer();
+    sim.fault("disturbed share=1 for_s=2");
+    // Each frame of the client and of the boards is tried until its sender is bus-off.
+    let during = sim.ucom(&["scan"]);
+    assert_ne!(during.code, 0, "{}", during.out);
+    std::thread::sleep(std::time::Duration::from_millis(2_000));
+    peer.send("240#");
+    peer.wait("4");
+    let boards = sim.ucom(&["--json", "scan"]).ends(0).json();
+    assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
+}
+
+/// A client learns of its own bus-off, not only the simulator's stderr: as an error frame, and `ucom` in words with what to do.
+#[test]
+fn who_is_bus_off_is_told() {
+    let mut sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let (mut sender, mut listener) = (sim.peer(), sim.peer());
+    sim.fault("disturbed share=1 for_s=60");
+    let said = sim.ucom(&["info", "1"]).ends(3);
+    assert!(said.err.contains("the CAN controller of this computer is bus-off"), "{}", said.err);
+    assert!(said.err.contains("next: ucom doctor"), "{}", said.err);
+    let said = sim.ucom(&["--json", "info", "1"]).ends(3).json();
+    assert!(said["error"]["message"].as_str().unwrap().contains("was bus-off meanwhile"), "{said}");
+    assert!(said["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{said}");
+    let said = sim.ucom(&["--json", "send", "201#"]).ends(3).json();
+    assert_eq!(said["error"]["code"], "bus-off", "{said}");
+    let said = sim.ucom(&["--json", "doctor"]).ends(3).json();
+    assert!(said["findings"].to_string().contains("has left the bus"), "{said}");
+    sender.send("202#");
+    assert_eq!(sender.all(500), [""; 0]);
+    assert_eq!((sender.times_bus_off(), listener.times_bus_off()), (1, 0));
+    assert_eq!(listener.all(100), [""; 0]);
+}

@@ -1,0 +1,197 @@
+//! Files that a command writes: opened before anything is sent or moved, never written over unless that was asked for.
+
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use crate::exit::{REFUSED, USAGE};
+
+/// Why an output is not written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutputError {
+    /// Exit code of the process.
+    pub exit: u8,
+    /// Short name for programs: `exists`, `same-file` or `io`.
+    pub code: &'static str,
+    /// What is wrong, with the file.
+    pub message: String,
+    /// The next act; empty when there is none.
+    pub hint: &'static str,
+}
+
+/// Outputs that this process made and has not written yet.
+static UNWRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes outputs that were made and never written, before the process is ended without any `Drop`.
+pub fn abandon() {
+    for path in UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+/// The output at `path` is written or gone.
+fn settled(path: &Path) {
+    UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).retain(|p| p != path);
+}
+
+/// An output that is open and still empty, or still what it was. Dropped before it was written, it leaves no trace.
+pub struct OutputFile {
+    path: PathBuf,
+    file: File,
+    /// It was not there before.
+    made: bool,
+    written: bool,
+}
+
+impl OutputFile {
+    /// Opens `path` for writing. A file that is there is refused without `force`, and one of `others` (what the command reads, and
+    /// its other outputs) always.
+    pub fn open(path: &Path, force: bool, others: &[&Path]) -> Result<Self, OutputError> {
+        if let Some(other) = others.iter().find(|other| same(path, other)) {
+            let message =
+                format!("{} is {}, which this command uses itself", path.display(), other.display());
+            return Err(refused("same-file", message, "name another file; --force does not cover this"));
+        }
+        let io = |e| io(format!("{}: {e}; nothing was sent", path.display()));
+        match OpenOptions::new().write(true).create_new(true).open(path) {
+            Ok(file) => {
+                UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+                return Ok(Self { path: path.to_owned(), file, made: true, written: false });
+            }
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+            Err(e) => return Err(io(e)),
+        }
+        // A pipe or a device holds nothing that could be lost.
+        if !force && path.is_file() {
+            let message = format!("{} is there already; nothing was sent", path.display());
+            return Err(refused("exists", message, "name another file; --force writes over it"));
+        }
+        let file = OpenOptions::new().write(true).open(path).map_err(io)?;
+        Ok(Self { path: path.to_owned(), file, made: false, written: false })
+    }
+
+    /// As people name it.
+    pub fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes all of the file.
+    pub fn write(mut self, bytes: impl AsRef<[u8]>) -> Result<(), OutputError> {
+        let mut file = self.begin()?;
+        let done = file.write_all(bytes.as_ref()).and_then(|()| settle(&file));
+        done.map_err(|e| self.failure(&e))
+    }
+
+    /// A handle to write with; what was in the file goes only now. [`settle`] it at the end.
+    pub fn begin(&mut self) -> Result<File, OutputError> {
+        self.written = true;
+        settled(&self.path);
+        let emptied =
+            self.file.metadata().and_then(|m| if m.is_file() { self.file.set_len(0) } else { Ok(()) });
+        emptied.and_then(|()| self.file.try_clone()).map_err(|e| self.failure(&e))
+    }
+
+    /// What is at its path now was put there by other means, as by renaming a file that is whole.
+    pub fn is_written(mut self) {
+        self.written = true;
+        settled(&self.path);
+    }
+
+    /// Why writing failed.
+    pub fn failure(&self, e: &std::io::Error) -> OutputError {
+        io(format!("{}: {e}", self.name()))
+    }
+}
+
+impl Drop for OutputFile {
+    fn drop(&mut self) {
+        if self.made && !self.written {
+            settled(&self.path);
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Waits until the bytes are on the disk: a full one may show only then.
+pub fn settle(file: &File) -> std::io::Result<()> {
+    if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
+}
+
+fn refused(code: &'static str, message: String, hint: &'static str) -> OutputError {
+    OutputError { exit: REFUSED, code, message, hint }
+}
+
+fn io(message: String) -> OutputError {
+    OutputError { exit: USAGE, code: "io", message, hint: "" }
+}
+
+/// Both names lead to the same file that is there.
+fn same(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b) || one_inode(a, b)
+}
+
+/// A file of two names (a hard link) is one file.
+#[cfg(unix)]
+fn one_inode(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let number = |path: &Path| path.metadata().ok().map(|m| (m.dev(), m.ino()));
+    number(a).is_some_and(|n| number(b) == Some(n))
+}
+
+/// Only Unix has numbers for files that the standard library shows.
+#[cfg(not(unix))]
+fn one_inode(_: &Path, _: &Path) -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_is_opened_at_once_and_nothing_is_lost_before_it_is_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let (old, new, input) = (dir.path().join("old"), dir.path().join("new"), dir.path().join("input"));
+        std::fs::write(&old, "precious").unwrap();
+        std::fs::write(&input, "read").unwrap();
+        let code = |result: Result<OutputFile, OutputError>| result.err().map(|f| (f.exit, f.code));
+        assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists")));
+        assert_eq!(code(OutputFile::open(&input, true, &[&input])), Some((4, "same-file")));
+        let around = dir.path().join(".").join("input");
+        assert_eq!(code(OutputFile::open(&around, true, &[&input])), Some((4, "same-file")));
+        assert_eq!(code(OutputFile::open(&dir.path().join("no/where"), false, &[])), Some((2, "io")));
+        #[cfg(unix)]
+        {
+            let link = dir.path().join("link");
+            std::fs::hard_link(&input, &link).unwrap();
+            assert_eq!(code(OutputFile::open(&link, true, &[&input])), Some((4, "same-file")));
+        }
+        drop(OutputFile::open(&old, true, &[]).unwrap());
+        assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
+        let opened = OutputFile::open(&new, false, &[]).unwrap();
+        assert!(new.exists());
+        drop(opened);
+        assert!(!new.exists());
+        OutputFile::open(&old, true, &[]).unwrap().write("short").unwrap();
+        OutputFile::open(&new, false, &[]).unwrap().write("text").unwrap();
+        let renamed = dir.path().join("renamed");
+        OutputFile::open(&renamed, false, &[]).unwrap().is_written();
+        assert!(renamed.exists());
+        let read = |path| std::fs::read_to_string(path).unwrap();
+        assert_eq!((read(&old).as_str(), read(&new).as_str()), ("short", "text"));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_an_error_that_says_so() {
+        let failure =
+            OutputFile::open(Path::new("/dev/full"), false, &[]).unwrap().write("text").unwrap_err();
+        assert!(failure.message.contains("No space left"), "{}", failure.message);
+    }
+}

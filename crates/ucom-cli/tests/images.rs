@@ -37,3 +37,41 @@ fn d40_a_text_is_never_flashed() {
     let said = sim.ucom(&["update", "1", &file, "--flash-id", "0x21"]).ends(0);
     assert!(said.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", said.err);
 }
+
+/// S-records of the boards' tool chain count words, those of other tools bytes: the records tell, or `--addresses` does.
+#[test]
+fn s_records_count_words_or_bytes() {
+    let sim = Sim::start(&["--boards", "1", "--flash-ids", "0x21"]);
+    sim.ucom(&["init"]).ends(0);
+    let line = |address: u16, data: &[u8]| {
+        let mut bytes = vec![data.len() as u8 + 3, (address >> 8) as u8, address as u8];
+        bytes.extend(data);
+        let sum: u32 = bytes.iter().map(|b| u32::from(*b)).sum();
+        bytes.push(!(sum as u8));
+        format!("S1{}\n", bytes.iter().map(|b| format!("{b:02X}")).collect::<String>())
+    };
+    let content = image(64, 3);
+    let file = |step: usize, records: usize| {
+        let lines = content.chunks(16).take(records).enumerate();
+        lines.map(|(i, data)| line((0x40 + i * step) as u16, data)).collect::<String>() + "S9030000FC\n"
+    };
+    let mut peer = sim.peer();
+    let update = |name: &str, text: String, more: &[&str], code: i32| {
+        let file = sim.file(name, text.as_bytes());
+        sim.ucom(&[&["update", "1", &file, "--flash-id", "0x21", "--dry-run"], more].concat()).ends(code).err
+    };
+    let said = update("words.s19", file(8, 4), &[], 0);
+    assert!(said.contains("64 bytes from word 0x40, addresses in words"), "{said}");
+    let said = update("bytes.s19", file(16, 4), &[], 0);
+    assert!(said.contains("64 bytes from word 0x20, addresses in bytes"), "{said}");
+    assert!(said.contains("only so the records follow each other"), "{said}");
+    // Two records may have a hole between them that is meant.
+    peer.all(100);
+    let said = update("two.s19", file(16, 2), &[], 2);
+    assert!(said.contains("0x48") && said.contains("--addresses byte"), "{said}");
+    assert!(peer.all(50).is_empty(), "nothing was sent");
+    let said = update("two.s19", file(16, 2), &["--addresses", "byte"], 0);
+    assert!(said.contains("32 bytes from word 0x20, addresses in bytes"), "{said}");
+    let said = update("bytes.s19", file(16, 4), &["--addresses", "word"], 2);
+    assert!(said.contains("are in no record"), "{said}");
+}

@@ -5,8 +5,17 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::FalseyValueParser;
 
-use super::ForceArgs;
 use super::boards::{Boards, flash_id};
+use super::{ForceArgs, ValueEnum};
+
+/// What an address of a record counts.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub enum Addresses {
+    /// Bytes.
+    Byte,
+    /// Words of two bytes.
+    Word,
+}
 
 /// Options of `ucom update`.
 #[derive(Args, Debug)]
@@ -20,6 +29,10 @@ pub struct UpdateArgs {
     /// Send the files as they are, whatever they hold: text and files not named .bin are refused otherwise
     #[arg(long, env = "UCOM_RAW_IMAGE", value_parser = FalseyValueParser::new())]
     pub raw: bool,
+    /// What the addresses of Intel HEX and S-records count; default: words in S-records and bytes in Intel HEX, unless the records
+    /// follow each other in the other unit alone
+    #[arg(long, env = "UCOM_ADDRESSES", value_enum, value_name = "UNIT")]
+    pub addresses: Option<Addresses>,
     /// The flash number that the board must have
     #[arg(long, env = "UCOM_FLASH_ID", value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,

@@ -10,7 +10,7 @@ use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use boards::{Assignment, Boards};
-pub use firmware::{RepairArgs, UpdateArgs};
+pub use firmware::{Addresses, RepairArgs, UpdateArgs};
 pub use options::*;
 
 /// Motor boards on a CAN bus from your terminal.
@@ -117,7 +117,8 @@ pub enum Command {
                             ucom update 1-4 firmware.s19 --dry-run\n  ucom update 1-4 firmware.hex --group\n  \
                             ucom update 3 app.hex --exloader loader.hex\n  ucom update 3 program.hex --data data.hex\n  \
                             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
-                            Image formats: raw binary, Intel HEX, Motorola S-record, told apart by their content. Whether two\n\
+                            Image formats: raw binary, Intel HEX, Motorola S-record, told apart by their content. What the addresses\n\
+                            of records count, bytes or words, is told by records that follow each other; --addresses names it. Whether two\n\
                             files are sent is the profile's matter: `prog.plan`, see `ucom help profile`.\n\
                             `all` are the boards that answer and those of the inventory: one that is missing is reported.\n\
                             Exit codes: 0 verified, or already up to date (or written where the profile leaves nothing to verify,\n\

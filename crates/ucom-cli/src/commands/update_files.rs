@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use cli_kit::Output;
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
-use ucom::files::image::Format;
+use ucom::files::image::{AddressUnit, Format};
 use ucom::files::{Image, ImageOptions};
 use ucom::master::update::UpdateImage;
 use ucom::profile::{HeaderForm, Plan};
 
-use crate::args::UpdateArgs;
+use crate::args::{Addresses, UpdateArgs};
 use crate::failure::Failure;
 
 /// What the files hold.
@@ -34,8 +34,8 @@ impl Files {
             ));
         }
         let other = second(args, profile.prog_plan)?;
-        let (image, first) = image(&args.image, args.raw, out)?;
-        let second = other.map(|file| self::image(file, args.raw, out)).transpose()?;
+        let (image, first) = image(&args.image, args, out)?;
+        let second = other.map(|file| self::image(file, args, out)).transpose()?;
         let (second, more) = second.unzip();
         let told = [Some(first), more].into_iter().flatten().collect();
         let names = [Some(args.image.as_path()), other].into_iter().flatten().map(Path::to_owned).collect();
@@ -43,19 +43,31 @@ impl Files {
     }
 }
 
-fn image(file: &Path, raw: bool, out: &Output) -> Result<(UpdateImage, String), Failure> {
-    let options = ImageOptions { format: raw.then_some(Format::Bin), ..Default::default() };
+fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, String), Failure> {
+    let address_unit = args.addresses.map(|unit| match unit {
+        Addresses::Byte => AddressUnit::Byte,
+        Addresses::Word => AddressUnit::Word,
+    });
+    let options =
+        ImageOptions { format: args.raw.then_some(Format::Bin), address_unit, ..Default::default() };
     let image = Image::read(file, &options).map_err(|e| {
         // Some mistakes name the file themselves.
         let (path, text) = (file.display().to_string(), e.to_string());
-        Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") })
-            .hint("formats are Intel HEX, S-record, and raw bytes in a .bin; --raw sends a file as it is")
+        let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
+        failure.hint(if e.is_of_addresses() {
+            "--addresses byte or --addresses word says what the addresses count: S-records of the boards' tool chain count words, \
+             those of objcopy and srec_cat bytes"
+        } else {
+            "formats are Intel HEX, S-record, and raw bytes in a .bin; --raw sends a file as it is"
+        })
     })?;
     for note in image.notes() {
         out.note(format!("note: {}: {note}", file.display()));
     }
+    let count =
+        image.address_unit(&options).map_or_else(String::new, |unit| format!(", addresses in {unit}s"));
     let told = format!(
-        "{}: {}, {} bytes from word 0x{:X}",
+        "{}: {}, {} bytes from word 0x{:X}{count}",
         file.display(),
         image.format_name(),
         image.bytes().len(),

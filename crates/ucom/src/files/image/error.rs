@@ -168,6 +168,17 @@ pub enum LineProblem {
 }
 
 impl ImageError {
+    /// The records are sound, but their addresses leave gaps, overlap or go too far: perhaps they count something else.
+    pub fn is_of_addresses(&self) -> bool {
+        use LineProblem::{HalfWord, Overlap, TooLarge};
+        matches!(
+            self,
+            Self::Gap { .. }
+                | Self::AddressRange { .. }
+                | Self::Line { problem: HalfWord { .. } | Overlap { .. } | TooLarge { .. }, .. }
+        )
+    }
+
     pub(super) fn line(line: usize, column: usize, problem: LineProblem) -> Self {
         Self::Line { line, column, problem }
     }

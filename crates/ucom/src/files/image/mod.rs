@@ -2,7 +2,9 @@
 //! unless it is asked for.
 //!
 //! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of
-//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Both can be overridden.
+//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are told by
+//! their records: where those leave gaps or overlap in one unit and follow each other without any in the other one. What one
+//! record or two can mean is not guessed; the unit can always be given.
 
 use std::prelude::v1::*;
 
@@ -22,6 +24,12 @@ use segments::Segments;
 
 /// Most bytes of an image unless [`ImageOptions::max_bytes`] says otherwise: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
+
+/// So many records in a row are no coincidence: a hole as long as the record before it may be meant once, and in a table of
+/// interrupt vectors behind each, whose records are short.
+const EVIDENCE: usize = 3;
+/// Bytes that they have on average at least; linkers write 16 and more.
+const EVIDENCE_BYTES: usize = 12;
 
 /// Form of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +75,15 @@ pub enum AddressUnit {
     Word,
 }
 
+impl fmt::Display for AddressUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Byte => "byte",
+            Self::Word => "word",
+        })
+    }
+}
+
 /// What to do with addresses between the first and the last byte that no record fills.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Gaps {
@@ -82,7 +99,8 @@ pub enum Gaps {
 pub struct ImageOptions {
     /// Form of the file, whatever it holds; `None` decides by content and name, and takes no text for raw bytes.
     pub format: Option<Format>,
-    /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX.
+    /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX, and the other one where at least three records
+    /// follow each other in that one alone.
     pub address_unit: Option<AddressUnit>,
     /// Gaps between records.
     pub gaps: Gaps,
@@ -119,6 +137,8 @@ pub enum ImageNote {
     },
     /// The last word had one byte; 0xFF was added.
     LastWordPadded,
+    /// The records follow each other only if their addresses count this, which is not what their form usually counts.
+    AddressesCount(AddressUnit),
 }
 
 impl fmt::Display for ImageNote {
@@ -128,6 +148,9 @@ impl fmt::Display for ImageNote {
                 write!(f, "gap of {bytes} bytes at word address 0x{address_words:X} filled with FF")
             }
             Self::LastWordPadded => f.write_str("odd number of bytes: FF added to fill the last word"),
+            Self::AddressesCount(unit) => {
+                write!(f, "addresses taken as those of {unit}s: only so the records follow each other")
+            }
         }
     }
 }
@@ -156,20 +179,9 @@ impl Image {
             return Err(ImageError::Empty);
         }
         let format = options.format.map_or_else(|| Format::of(name, content), Ok)?;
-        let unit = |usual| options.address_unit.unwrap_or(usual);
         let mut image = match format {
             Format::Bin => Self::raw(content, options)?,
-            Format::IntelHex => {
-                let unit = unit(AddressUnit::Byte);
-                let mut segments = Segments::new(unit, options.max_bytes);
-                hex::read(content, &mut segments)?;
-                Self::joined(segments, format, options)?
-            }
-            Format::SRecord => {
-                let mut segments = Segments::new(unit(AddressUnit::Word), options.max_bytes);
-                srec::read(content, &mut segments)?;
-                Self::joined(segments, format, options)?
-            }
+            Format::IntelHex | Format::SRecord => Self::records(content, format, options)?,
         };
         if image.bytes.len() % 2 == 1 {
             image.bytes.push(0xFF);
@@ -207,10 +219,40 @@ impl Image {
         Ok(Self { bytes: content.to_vec(), address_words: 0, format: Format::Bin, notes: Vec::new() })
     }
 
-    fn joined(segments: Segments, format: Format, options: &ImageOptions) -> Result<Self, ImageError> {
-        let mut notes = Vec::new();
-        let (address_words, bytes) = segments.join(options.gaps, &mut notes)?;
-        Ok(Self { bytes, address_words, format, notes })
+    /// An image of records, in the unit of their form or in the one in which alone they follow each other.
+    fn records(content: &[u8], format: Format, options: &ImageOptions) -> Result<Self, ImageError> {
+        let (usual, other) = match format {
+            Format::SRecord => (AddressUnit::Word, AddressUnit::Byte),
+            _ => (AddressUnit::Byte, AddressUnit::Word),
+        };
+        let read = |unit, gaps| {
+            let mut segments = Segments::new(unit, options.max_bytes);
+            match format {
+                Format::SRecord => srec::read(content, &mut segments)?,
+                _ => hex::read(content, &mut segments)?,
+            }
+            let (records, mut notes) = (segments.records(), Vec::new());
+            let (address_words, bytes) = segments.join(gaps, &mut notes)?;
+            Ok((Self { bytes, address_words, format, notes }, records))
+        };
+        if let Some(unit) = options.address_unit {
+            return read(unit, options.gaps).map(|(image, _)| image);
+        }
+        match read(usual, Gaps::Refuse) {
+            Ok((image, _)) => Ok(image),
+            Err(e) => match read(other, Gaps::Refuse) {
+                Ok((mut image, records))
+                    if e.is_of_addresses()
+                        && records >= EVIDENCE
+                        && image.bytes.len() >= records * EVIDENCE_BYTES =>
+                {
+                    image.notes.push(ImageNote::AddressesCount(other));
+                    Ok(image)
+                }
+                _ if options.gaps == Gaps::Fill => read(usual, Gaps::Fill).map(|(image, _)| image),
+                _ => Err(e),
+            },
+        }
     }
 
     /// The bytes in wire order; an even number of them, at least two.
@@ -240,6 +282,20 @@ impl Image {
     /// Form of the file it came from.
     pub fn format(&self) -> Format {
         self.format
+    }
+
+    /// What its records' addresses count; `None` for raw bytes, which have none.
+    pub fn address_unit(&self, options: &ImageOptions) -> Option<AddressUnit> {
+        let detected = self.notes.iter().find_map(|note| match note {
+            ImageNote::AddressesCount(unit) => Some(*unit),
+            _ => None,
+        });
+        let usual = match self.format {
+            Format::Bin => return None,
+            Format::IntelHex => AddressUnit::Byte,
+            Format::SRecord => AddressUnit::Word,
+        };
+        Some(options.address_unit.or(detected).unwrap_or(usual))
     }
 
     /// What was changed on the way.

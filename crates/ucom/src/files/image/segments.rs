@@ -10,11 +10,12 @@ pub(super) struct Segments {
     unit: AddressUnit,
     limit: usize,
     runs: BTreeMap<u64, Vec<u8>>,
+    records: usize,
 }
 
 impl Segments {
     pub(super) fn new(unit: AddressUnit, limit: usize) -> Self {
-        Self { unit, limit, runs: BTreeMap::new() }
+        Self { unit, limit, runs: BTreeMap::new(), records: 0 }
     }
 
     /// Takes the data of one record at `address` in the file's unit.
@@ -22,6 +23,7 @@ impl Segments {
         if data.is_empty() {
             return Ok(());
         }
+        self.records += 1;
         let start = match self.unit {
             AddressUnit::Byte => address,
             AddressUnit::Word if data.len().is_multiple_of(2) => address * 2,
@@ -58,6 +60,11 @@ impl Segments {
         }
         self.put(at, rest);
         Ok(())
+    }
+
+    /// Records with data so far.
+    pub(super) fn records(&self) -> usize {
+        self.records
     }
 
     /// Starts of the runs that share addresses with `start..end`.

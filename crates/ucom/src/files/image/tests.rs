@@ -58,12 +58,44 @@ fn s_records_as_published_count_words_here() {
                 S111003848656C6C6F20776F726C642E0A0042\n\
                 S5030003F9\n\
                 S9030000FC\n";
-    assert!(matches!(parse(text), Err(ImageError::Gap { address_words: 14, bytes: 28 })));
+    let words = ImageOptions { address_unit: Some(AddressUnit::Word), ..Default::default() };
+    let gap = Image::parse(text.as_bytes(), &words);
+    assert!(matches!(gap, Err(ImageError::Gap { address_words: 14, bytes: 28 })));
     let options = ImageOptions { address_unit: Some(AddressUnit::Byte), ..Default::default() };
     let image = Image::parse(text.as_bytes(), &options).unwrap();
     assert_eq!(image.bytes().len(), 70);
     assert!(image.bytes().ends_with(b"Hello world.\n\0"));
     assert_eq!(problem(&text.replace("S5030003F9", "S5030002FA")).2, LineProblem::Count { said: 2, has: 3 });
+}
+
+/// Which unit addresses count is told by records that follow each other in one unit alone; one or two records tell nothing.
+#[test]
+fn the_unit_of_addresses_is_told_by_the_records() {
+    let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
+    let file = |count: usize, length: usize, step: u32| {
+        let lines = bytes.chunks(length).take(count).zip(0..);
+        lines.map(|(data, i)| s_line(1, 2, 0x100 + i * step, data)).collect::<String>()
+            + &s_line(9, 2, 0, &[])
+    };
+    let told = |text: &str| {
+        let image = parse(text)?;
+        let unit = image.address_unit(&ImageOptions::default());
+        Ok::<_, ImageError>((image.address_words(), image.bytes().to_vec(), unit, image.notes().to_vec()))
+    };
+    let in_words = told(&file(4, 16, 8)).unwrap();
+    assert_eq!(in_words, (0x100, bytes.clone(), Some(AddressUnit::Word), vec![]));
+    let in_bytes = told(&file(4, 16, 16)).unwrap();
+    let note = ImageNote::AddressesCount(AddressUnit::Byte);
+    assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
+    // A hole that is meant, or one unit or the other: it is not guessed.
+    assert!(matches!(told(&file(2, 16, 16)), Err(ImageError::Gap { address_words: 0x108, bytes: 16 })));
+    // A table of vectors: two words in each place of four.
+    assert!(matches!(told(&file(16, 4, 4)), Err(ImageError::Gap { address_words: 0x102, bytes: 4 })));
+    // Intel HEX whose addresses count words: their bytes lie over each other otherwise.
+    let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
+    let hex = lines.collect::<String>() + ":00000001FF\n";
+    let note = ImageNote::AddressesCount(AddressUnit::Word);
+    assert_eq!(told(&hex).unwrap(), (0x100, bytes.clone(), Some(AddressUnit::Word), vec![note]));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use serde_json::json;
 
 const TABLE: &str = "[program.ci]\nset_position = { scale = 0.01, unit = \"deg\", min = -60, max = 60 }\n\
                      [program.so]\nposition = { scale = 0.01, unit = \"deg\" }\nnobody = {}\n\
-                     [program.par]\nkd = { scale = 0.1 }\n";
+                     [program.par]\nkd = { scale = 0.1, unit = \"mA s/deg\" }\nmin_position = { scale = 0.5 }\n";
 
 /// A chain with numbers, an edge table of the first board, and all applications up.
 fn started() -> (Sim, String) {
@@ -50,11 +50,15 @@ fn d11_values_have_the_units_of_the_edge_table() {
     assert!((9.0..11.0).contains(&position), "{position} deg");
     ucom(&["par", "1", "kd=0x0102", "kp=3"]).ends(0);
     assert_eq!(peer.wait("3C1#"), "3C1#01000201");
-    let rounded = ucom(&["par", "1", "kd=0.04"]).ends(0);
-    assert!(rounded.err.contains("0.04 → 0.0"), "{}", rounded.err);
-    for words in [["par", "1", "kd=2"], ["ci", "1", "set_position=1deg"]] {
+    let rounded = ucom(&["par", "1", "kd=0.04mA s/deg"]).ends(0);
+    assert!(rounded.err.contains("0.04 mA s/deg → 0.0 mA s/deg"), "{}", rounded.err);
+    for words in [["par", "1", "kd=2mA s/deg"], ["ci", "1", "set_position=1deg"]] {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
+    // Scaled without a unit: a bare number would be the word where the table is missing.
+    let said = ucom(&["par", "1", "min_position=2"]).ends(4).json();
+    assert!(said["error"]["message"].as_str().unwrap().contains("names no unit"), "{said}");
+    ucom(&["par", "1", "min_position=0x0004"]).ends(0);
     // A number that would wrap is refused as any other value.
     assert!(sim.ucom(&["ci", "1", "set_position=40000"]).ends(4).err.contains("outside -32768..32767"));
     let dbc = sim.ucom(&["--edges", &table, "dbc", "1"]).ends(0);
@@ -102,6 +106,31 @@ fn files_are_not_written_over() {
         assert_ne!(std::fs::read(&file).unwrap(), b"mine");
         sim.file("mine", b"mine");
     }
+}
+
+/// A place where nothing can be written is found out before anything is sent, and a file that was made for nothing is gone.
+#[test]
+fn outputs_are_opened_before_anything_is_sent() {
+    let (sim, _) = started();
+    let mut peer = sim.peer();
+    let nowhere = sim.path("no/where");
+    for words in [
+        &["par", "1", "kp=3mA/deg", "--save", &nowhere][..],
+        &["io", "1", "--template", &nowhere],
+        &["dbc", "all", "--out", &nowhere],
+        &["probe", "--init", "--force", "--out", &nowhere],
+        &["record", &nowhere],
+        &["init", "--force", "--inventory", &nowhere],
+    ] {
+        let said = sim.ucom(words).ends(2);
+        assert!(said.err.contains("nothing was sent"), "{words:?}: {}", said.err);
+    }
+    assert_eq!(peer.all(100), [""; 0]);
+    // Nobody is board 9: the files that were opened for it are gone.
+    let file = sim.path("new");
+    sim.ucom(&["par", "9", "--save", &file]).ends(3);
+    sim.ucom(&["dbc", "9", "--out", &file]).ends(3);
+    assert!(!std::path::Path::new(&file).exists());
 }
 
 /// D-35: nothing answers to a parameter, so the application must still be there afterwards; else the value is unknown.

@@ -5,7 +5,8 @@ use std::prelude::v1::*;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::Given;
+use super::value_error::space;
+use super::{Given, ValueError};
 use crate::Profile;
 
 /// What kind of number a word is.
@@ -44,71 +45,8 @@ pub struct Edge {
     pub raw_only: bool,
 }
 
-/// Why a value cannot be written to an edge.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ValueError {
-    /// Too large or too small.
-    #[error("{given} is outside {min}..{max}{}", space(unit))]
-    Range {
-        /// What was given.
-        given: String,
-        /// Smallest value.
-        min: String,
-        /// Largest value.
-        max: String,
-        /// Their unit.
-        unit: String,
-    },
-    /// Given in another unit than the edge's.
-    #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]
-    Unit {
-        /// What was given.
-        given: String,
-        /// The edge's unit.
-        unit: String,
-    },
-    /// A number alone, where it could be the word or a value in the signal's unit.
-    #[error("{given}: the unit is missing: `{given}{unit}`, or the word itself as 0x0000")]
-    NoUnit {
-        /// What was given.
-        given: String,
-        /// The edge's unit.
-        unit: String,
-    },
-    /// Between two words.
-    #[error("{given}: it is a whole number")]
-    Fraction {
-        /// What was given.
-        given: String,
-    },
-    /// Not 0 or 1, on or off.
-    #[error("{given}: it is on or off")]
-    Switch {
-        /// What was given.
-        given: String,
-    },
-    /// A number or a switch, and nobody knows what it means here.
-    #[error(
-        "{given}: the edge table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
-    )]
-    Meaning {
-        /// What was given.
-        given: String,
-    },
-    /// On or off, but the edge is a number.
-    #[error("{given}: it is a number")]
-    NoSwitch {
-        /// What was given.
-        given: String,
-    },
-}
-
 /// What calculating with fractions may lose, as a share.
 const SLACK: f64 = 1e-9;
-
-fn space(unit: &str) -> String {
-    if unit.is_empty() { String::new() } else { format!(" {unit}") }
-}
 
 impl Edge {
     /// An edge that no table knows: a bare word, signed or not by the profile.
@@ -267,7 +205,7 @@ impl Edge {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
                 // Which of the two a bare number means would hang on what table lies in the directory.
-                if unit.is_empty() && !self.unit.is_empty() {
+                if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }
                 let steps = (value - self.offset) / self.scale;
@@ -357,6 +295,15 @@ mod tests {
         assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
         let down = edge(EdgeType::Int16, -0.5, 0.0, "");
         assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
+        // It would be the word where the table is missing; without a unit there is only the word to be given.
+        let said = word(&down, "2").unwrap_err().to_string();
+        assert!(
+            said.starts_with("2: the table scales it and names no unit") && said.contains("0x0000"),
+            "{said}"
+        );
+        assert_eq!(word(&down, "0x0002"), Ok(2));
+        // A number that the table does not scale is the word with it and without.
+        assert_eq!(word(&edge(EdgeType::Int16, 1.0, 0.0, ""), "2"), Ok(2));
     }
 
     #[test]
@@ -379,11 +326,11 @@ mod tests {
             (word(&coarse, "150mA"), word(&coarse, "149mA"), word(&coarse, "40mA")),
             (Ok(1), Ok(1), Ok(0))
         );
-        let down = Edge { min: Some(-150.0), ..edge(EdgeType::Int16, -100.0, 0.0, "") };
-        assert_eq!((word(&down, "-150"), word(&down, "-151").is_err()), (Ok(1), true));
+        let down = Edge { min: Some(-150.0), ..edge(EdgeType::Int16, -100.0, 0.0, "A") };
+        assert_eq!((word(&down, "-150A"), word(&down, "-151A").is_err()), (Ok(1), true));
         // What fractions lose is no violation.
-        let tenths = Edge { max: Some(0.3), ..edge(EdgeType::Int16, 0.1, 0.0, "") };
-        assert_eq!((word(&tenths, "0.3"), word(&tenths, "0x0003")), (Ok(3), Ok(3)));
+        let tenths = Edge { max: Some(0.3), ..edge(EdgeType::Int16, 0.1, 0.0, "A") };
+        assert_eq!((word(&tenths, "0.3A"), word(&tenths, "0x0003")), (Ok(3), Ok(3)));
         let odd = Edge { min: Some(-0.125), max: Some(3276.65), ..edge(EdgeType::Int16, 0.1, 0.0, "") };
         assert_eq!(odd.limits(), ("-0.125".into(), "3276.65".into()));
     }
@@ -420,13 +367,13 @@ mod tests {
         #[test]
         fn d11_the_sent_word_keeps_the_limits(scale in prop::sample::select(vec![-7.0, -0.3, 0.01, 0.3, 1.5, 100.0]), offset in -50..50_i32, a in -2000..2000_i32, b in -2000..2000_i32, value in -2500..2500_i32) {
             let (min, max) = (f64::from(a.min(b)) / 8.0, f64::from(a.max(b)) / 8.0);
-            let edge = Edge { min: Some(min), max: Some(max), ..edge(EdgeType::Int16, scale, f64::from(offset), "") };
+            let edge = Edge { min: Some(min), max: Some(max), ..edge(EdgeType::Int16, scale, f64::from(offset), "u") };
             let value = f64::from(value) / 8.0;
             let means = |w: i32| f64::from(w) * scale + f64::from(offset);
             let inside = |x: f64| (min - 1e-6..=max + 1e-6).contains(&x);
             let best = (-32768..=32767).map(means).filter(|x| inside(*x)).map(|x| (x - value).abs()).fold(f64::INFINITY, f64::min);
             prop_assume!(best.is_finite());
-            match edge.word(&Given::Number { value, unit: String::new() }) {
+            match edge.word(&Given::Number { value, unit: "u".into() }) {
                 Ok(word) => {
                     let sent = means(i32::from(word as i16));
                     prop_assert!(inside(value) && inside(sent), "{value} {sent}");

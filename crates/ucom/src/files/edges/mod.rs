@@ -2,12 +2,15 @@
 //! board tells more than a text.
 
 mod edge;
+mod form;
 mod given;
 mod table;
+mod value_error;
 
-pub use edge::{Edge, EdgeType, ValueError};
+pub use edge::{Edge, EdgeType};
 pub use given::{Given, GivenError};
 pub use table::{EDGE_HELP, EdgeTable, EdgeTableError, ProgramEdges};
+pub use value_error::ValueError;
 
 use std::prelude::v1::*;
 

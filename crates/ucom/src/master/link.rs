@@ -198,6 +198,11 @@ impl Link {
         Ok(())
     }
 
+    /// This PC is the master of the bus.
+    pub(crate) fn is_master(&self) -> bool {
+        self.with(|core| core.session != Session::Quiet)
+    }
+
     /// Listens until `master.listen` has passed, refuses when another PC was heard in that time (D-08). Not when this PC
     /// is master already, or is forced.
     pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {

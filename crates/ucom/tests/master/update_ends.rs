@@ -1,7 +1,7 @@
 //! Updates that do not go to their end: a bus that fails, a cancel, another board in the place of the one that is meant.
 
 use ucom::master::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateReport};
-use ucom::master::{Error, Event, Outcome, Request};
+use ucom::master::{Error, Event, Master, Outcome, Request};
 use ucom::{Frame, Status};
 
 use crate::bench::{Bench, From, Member, OLD, Script};
@@ -336,4 +336,45 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let code = report.boards[0].failure.as_ref().map(UpdateFailure::code);
     assert_eq!((code, report.boards[0].outcome), (Some("still-programming"), UpdateOutcome::UpToDate));
     assert_ne!(report.exit_code(), 0);
+}
+
+/// P-12: cancelled at any time while such boards are looked at and taken out of programming mode: none stays in it that is called
+/// up to date and not named. The same where the bus fails.
+#[test]
+fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
+    let left = || {
+        let mut bench = initialised(&[0x21, 0x42]);
+        update(&mut bench, options(&[1, 2], 64));
+        for board in [1, 2] {
+            bench.go(Request::XReset { board, force: false }, 20).unwrap();
+        }
+        // A tool that starts anew listens for another PC before it sends what changes anything (D-08).
+        bench.master = Master::new(ucom::Profile::default());
+        bench
+    };
+    let (mut whole, since) = (left(), left().now);
+    update(&mut whole, options(&[1, 2], 64));
+    let took = whole.now - since;
+    let cancel: fn(&mut Bench, ucom::master::ProcedureId) = |bench, id| bench.master.cancel(id);
+    for end in [cancel, unplugged] {
+        let (mut taken_out, mut named) = (0, 0);
+        for after in (0..=took).step_by(10_000) {
+            let mut bench = left();
+            let at = bench.now + after;
+            let report = ended(&mut bench, options(&[1, 2], 64), |b| b.now >= at, end);
+            for (i, result) in report.boards.iter().enumerate() {
+                let code = result.failure.as_ref().map(UpdateFailure::code);
+                if !bench.board(i).status().has(Status::PROG) {
+                    taken_out += 1;
+                } else if result.outcome == UpdateOutcome::UpToDate {
+                    assert_eq!(code, Some("still-programming"), "after {after} µs: {result:?}");
+                    named += 1;
+                } else {
+                    // It was not looked at yet.
+                    assert!(matches!(code, Some("cancelled" | "bus")), "after {after} µs: {result:?}");
+                }
+            }
+        }
+        assert!(named > 0 && taken_out > 0, "{named} named, {taken_out} taken out");
+    }
 }

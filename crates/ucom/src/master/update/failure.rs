@@ -146,7 +146,10 @@ impl UpdateFailure {
     pub fn hint(&self) -> String {
         match self {
             Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::NotRunning(e) => e.hint(),
-            Self::StillProgramming(e) => format!("{}; `ucom status N --clear PROG` ends it", e.hint()),
+            Self::StillProgramming(e) => match e.hint() {
+                hint if hint.is_empty() => "`ucom status N --clear PROG` ends it".into(),
+                hint => format!("{hint}; `ucom status N --clear PROG` ends it"),
+            },
             Self::After(e) => format!("{}; then run the update again to get an application back", e.hint()),
             Self::MayBeErased(_) => {
                 "when the board answers again (`ucom repair`, `ucom init`): run the update again".into()

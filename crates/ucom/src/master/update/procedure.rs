@@ -33,6 +33,11 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     if let Err(error @ (Error::Cancelled | Error::NumberShared { .. })) = end {
         end = link.or_cancel(broken_off(&link, &mut run, &error)).await;
     }
+    if let Err(error) = &end {
+        for board in core::mem::take(&mut run.programming) {
+            leave_programming_to_user(&mut run, board, error);
+        }
+    }
     match end {
         Ok(()) => {}
         // Asked once more: what was still to be undone is not.
@@ -79,6 +84,7 @@ async fn broken_off(link: &Link, run: &mut Campaign, why: &Error) -> Result<(), 
             why => run.fail_with(board, why.clone()),
         }
     }
+    still_programming(link, run, why).await;
     if *why != Error::Cancelled {
         refuse(run, why);
         let waiting = core::mem::take(&mut run.to_start);
@@ -94,7 +100,7 @@ async fn broken_off(link: &Link, run: &mut Campaign, why: &Error) -> Result<(), 
 /// A board that has the image already may still be in programming mode, as after an update whose tool was killed: it would take
 /// program data that are meant for others.
 async fn end_programming(link: &Link, run: &mut Campaign) -> Result<(), Error> {
-    while let Some(board) = run.programming.pop() {
+    while let Some(board) = run.programming.first().copied() {
         let ended = match link.become_master(run.options.force).await {
             Ok(()) => set_status(link, board, Status::PROG, Status(0)).await.map(drop),
             Err(error) => Err(error),
@@ -102,13 +108,31 @@ async fn end_programming(link: &Link, run: &mut Campaign) -> Result<(), Error> {
         match ended {
             Ok(()) => link.note(format!("board {board} was in programming mode: ended")),
             Err(error) => {
-                let failure = UpdateFailure::StillProgramming(Box::new(error));
-                run.end(board, UpdateOutcome::UpToDate, Some(failure));
-                run.to_start.retain(|b| *b != board);
+                leave_programming_to_user(run, board, &error);
             }
         }
+        run.programming.retain(|b| *b != board);
     }
     Ok(())
+}
+
+/// Boards that were found in programming mode and are still to be taken out of it when the update is ended early: they are, where
+/// this PC is the master already; else they are named, as nothing may be sent to them (D-08).
+async fn still_programming(link: &Link, run: &mut Campaign, why: &Error) {
+    while let Some(board) = run.programming.first().copied() {
+        let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
+        match ended {
+            true => link.note(format!("board {board} was in programming mode: ended")),
+            false => leave_programming_to_user(run, board, why),
+        }
+        run.programming.retain(|b| *b != board);
+    }
+}
+
+fn leave_programming_to_user(run: &mut Campaign, board: u8, why: &Error) {
+    let failure = UpdateFailure::StillProgramming(Box::new(why.clone()));
+    run.end(board, UpdateOutcome::UpToDate, Some(failure));
+    run.to_start.retain(|b| *b != board);
 }
 
 async fn all(link: &Link, run: &mut Campaign) -> Result<(), Error> {

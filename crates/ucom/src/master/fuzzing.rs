@@ -2,10 +2,11 @@
 
 use std::prelude::v1::*;
 
-use super::control::{AdminChange, StopLevel};
+use super::control::AdminChange;
 use super::init::InitOptions;
 use super::probe::ProbeOptions;
 use super::run::{RunBoard, RunOptions};
+use super::stop::StopLevel;
 use super::update::{UpdateImage, UpdateOptions, UpdateTarget};
 use super::{Event, Master, Request};
 use crate::{Format, Frame, Profile, Status};

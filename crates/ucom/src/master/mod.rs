@@ -37,8 +37,10 @@ mod boards;
 mod byte_order;
 pub mod conformance;
 mod control;
+mod counted;
 pub mod doctor;
 mod error;
+mod error_codes;
 mod event;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
@@ -57,6 +59,7 @@ mod run;
 mod scan;
 mod shared;
 mod statistics;
+mod stop;
 mod supervise;
 
 mod times;
@@ -68,7 +71,8 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 
 pub use boards::{Board, Boards, Life};
-pub use control::{AdminChange, StopLevel};
+pub use control::AdminChange;
+pub use counted::counted;
 pub use error::{Error, Heard, Incomplete, LastHeard};
 pub use event::{Event, Supervision};
 pub use init::{InitFinding, InitOptions, InitReport};
@@ -78,6 +82,7 @@ pub use raw_status::{RawStatus, expected_status};
 pub use run::{RunBoard, RunOptions, RunReport, Setting};
 pub use scan::{Reports, ScanFinding, ScanReport};
 pub use statistics::{Rate, Statistics, WINDOW_US};
+pub use stop::StopLevel;
 
 use crate::{BoardInfo, Foreign, Frame, Profile};
 use io::{DescriptionKey, IoDescription, Kind, ParValue};

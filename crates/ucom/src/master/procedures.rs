@@ -2,7 +2,7 @@
 
 use std::prelude::v1::*;
 
-use super::control::{self, AdminChange, StopLevel};
+use super::control::{self, AdminChange};
 use super::holders;
 use super::init::{self, InitOptions, InitReport};
 use super::io::{self, IoDescription};
@@ -10,6 +10,7 @@ use super::link::Link;
 use super::raw_status::{self, RawStatus};
 use super::run::{self, RunOptions, RunReport};
 use super::scan::{self, Reports, ScanReport};
+use super::stop::{StopLevel, stop};
 use super::{BoardSeen, Error, conformance, probe, update};
 use crate::{Admin, BoardInfo, Status};
 
@@ -260,7 +261,7 @@ pub(super) fn work(link: Link, request: Request) -> Work {
         Request::Reset { board, force } => Box::pin(control::reset(link, board, force)),
         Request::XReset { board, force } => Box::pin(control::xreset(link, board, force)),
         Request::Start { board, force } => Box::pin(control::start(link, board, force)),
-        Request::Stop { board, level, force } => Box::pin(control::stop(link, board, level, force)),
+        Request::Stop { board, level, force } => Box::pin(stop(link, board, level, force)),
         Request::Admin { board, change, force } => {
             Box::pin(control::admin_procedure(link, board, change, force))
         }

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use std::prelude::v1::*;
 
 use super::boards::Life;
-use super::control::{AdminChange, StopLevel, change_flags, start_from, stop_board};
+use super::control::{AdminChange, change_flags, start_from};
 use super::holders::one_board_each;
 use super::io::{DescriptionKey, IoDescription, Kind, describe, read_initial_inputs};
 use super::link::Link;
 use super::load::LoadForecast;
 use super::request::{info, mca_start};
 use super::shared::Core;
+use super::stop::{StopLevel, stop_board};
 use super::{Error, Outcome};
 use crate::profile::OnLost;
 use crate::{Admin, BoardInfo, BufferPackage, Dimensions, Status, ToBoard};

@@ -1,0 +1,19 @@
+//! Numbers with their noun.
+
+use std::format;
+use std::string::String;
+
+/// `1 board`, `3 boards`: for nouns whose plural takes an s.
+pub fn counted(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::counted;
+
+    #[test]
+    fn one_is_not_many() {
+        assert_eq!([0, 1, 2].map(|n| counted(n, "board")), ["0 boards", "1 board", "2 boards"]);
+    }
+}

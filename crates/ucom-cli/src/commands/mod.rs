@@ -1,6 +1,7 @@
 //! The commands, one file each or one file a family.
 
 mod boards;
+mod chain;
 pub mod conformance;
 mod decode;
 mod doctor;
@@ -36,8 +37,8 @@ use crate::failure::Failure;
 pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Sim(args) => sim::sim(&args, link, out),
-        Command::Scan => boards::scan(link, out),
-        Command::Init(args) => boards::init(&args, link, out),
+        Command::Scan => chain::scan(link, out),
+        Command::Init(args) => chain::init(&args, link, out),
         Command::Info(args) => boards::info(&args, link, out),
         Command::Status(args) => boards::status(&args, link, out),
         Command::Reset(args) => boards::reset(&args, link, out),

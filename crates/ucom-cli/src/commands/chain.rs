@@ -1,0 +1,145 @@
+//! `ucom scan` and `init`: who is in the chain, and which numbers boards have.
+
+use cli_kit::{Output, OutputFile};
+use serde_json::json;
+use ucom::files::{Inventory, InventoryBoard};
+use ucom::master::{InitOptions, InitReport, Outcome, Request, ScanFinding, counted};
+
+use crate::args::{InitArgs, LinkArgs};
+use crate::driver::{Driver, nothing_shared, unexpected};
+use crate::failure::{Failure, NO_LINK};
+use crate::shape::{board_table, board_value};
+
+/// Who is there; changes nothing.
+pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut driver = Driver::open(link)?;
+    let profile = driver.master.profile();
+    let report = match driver.run(Request::Scan)? {
+        Outcome::Scan(report) => report,
+        other => return Err(unexpected(&other)),
+    };
+    let mut value = json!({
+        "reports": report.reports.ids,
+        "boards": report.boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>(),
+        "findings": texts(&report.findings),
+    });
+    let shared = nothing_shared(&driver.master).err();
+    if let Some(f) = &shared {
+        value["error"] = json!({ "code": f.code, "message": f.message, "hint": f.hint, "exit": f.exit });
+    }
+    if report.boards.is_empty() && report.reports.ids.is_empty() {
+        let failure =
+            Failure::new(NO_LINK, "no-boards", "no board answers").hint("ucom doctor looks for the reason");
+        return Err(failure);
+    }
+    out.result(&value, || {
+        let mut text = String::new();
+        if !report.boards.is_empty() {
+            text += &board_table(&report.boards, &profile);
+        }
+        let (numbered, there) = (report.boards.len(), report.reports.ids.len());
+        let are = if there == 1 { "is" } else { "are" };
+        text += &format!("{} {are} there, {numbered} with a number\n", counted(there, "board"));
+        let unnumbered = report.findings.iter().filter(|f| is_unnumbered(f)).count();
+        if unnumbered > 0 {
+            text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
+        }
+        text + &lines(&report.findings.iter().filter(|f| !is_unnumbered(f)).collect::<Vec<_>>())
+    });
+    match shared {
+        // stdout has it already.
+        Some(failure) => {
+            out.note(format!("{}\n  {}", failure.message, failure.hint));
+            Err(Failure::printed(failure.exit))
+        }
+        None => Ok(()),
+    }
+}
+
+fn is_unnumbered(finding: &ScanFinding) -> bool {
+    matches!(finding, ScanFinding::Unnumbered { .. })
+}
+
+fn unnumbered_ids(findings: &[ScanFinding]) -> String {
+    let id = |finding: &ScanFinding| match finding {
+        ScanFinding::Unnumbered { ucom_id } => Some(format!("0x{ucom_id:02X}")),
+        _ => None,
+    };
+    findings.iter().filter_map(id).collect::<Vec<_>>().join(" ")
+}
+
+fn texts(findings: &[impl ToString]) -> Vec<String> {
+    findings.iter().map(ToString::to_string).collect()
+}
+
+fn lines(findings: &[impl ToString]) -> String {
+    texts(findings).iter().map(|text| format!("! {text}\n")).collect()
+}
+
+/// Resets and numbers the whole chain; writes an inventory.
+pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let known = match args.inventory.exists() {
+        true => Some(Inventory::read(&args.inventory).map_err(Failure::usage)?),
+        false => None,
+    };
+    let compared = known.as_ref().filter(|_| !args.renew);
+    let expected =
+        compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
+    // It can be written: that is found out before the chain is numbered anew.
+    let file = OutputFile::open(&args.inventory, true, &[])?;
+    let mut driver = Driver::open(link)?;
+    let profile = driver.master.profile();
+    let options = InitOptions { expected, force: args.force.force };
+    let report = match driver.run(Request::Init(options))? {
+        Outcome::Init(report) => report,
+        other => return Err(unexpected(&other)),
+    };
+    let written = report.is_ok();
+    if written {
+        inventory(&report, known.as_ref())?.write(&args.inventory).map_err(Failure::usage)?;
+    }
+    let name = file.name();
+    if written {
+        file.is_written();
+    }
+    let value = json!({
+        "ok": report.is_ok(),
+        "boards": report.boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>(),
+        "reports": report.reports.ids,
+        "findings": texts(&report.findings),
+        "inventory": written.then_some(&name),
+    });
+    out.result(&value, || {
+        let end = match (written, report.boards.len()) {
+            (true, n) => format!("{} numbered; inventory: {name}\n", counted(n, "board")),
+            (false, n) => format!("{} numbered; the inventory {name} is not touched\n", counted(n, "board")),
+        };
+        let renew = match compared {
+            Some(_) if !written => "if the chain was changed on purpose: ucom init --renew\n",
+            _ => "",
+        };
+        board_table(&report.boards, &profile) + &lines(&report.findings) + &end + renew
+    });
+    match report.exit_code() {
+        0 => Ok(()),
+        code => Err(Failure::printed(code)),
+    }
+}
+
+/// The boards of a report, with the names that people have given them.
+fn inventory(report: &InitReport, known: Option<&Inventory>) -> Result<Inventory, Failure> {
+    let mut inventory = Inventory::default();
+    for board in &report.boards {
+        let entry = InventoryBoard {
+            number: board.number,
+            flash_number: board.info.flash_number,
+            description: board.description.clone().unwrap_or_default(),
+            name: String::new(),
+        };
+        inventory.insert(entry).map_err(Failure::usage)?;
+    }
+    if let Some(known) = known {
+        inventory.keep_names(known);
+    }
+    Ok(inventory)
+}

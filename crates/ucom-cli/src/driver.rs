@@ -239,7 +239,10 @@ impl Driver {
                     n => Failure::new(
                         NO_LINK,
                         "no-numbers",
-                        format!("{n} boards are there, none has a number"),
+                        match n {
+                            1 => "1 board is there, without a number".to_owned(),
+                            n => format!("{n} boards are there, none has a number"),
+                        },
                     )
                     .hint("ucom init numbers them"),
                 })

@@ -7,7 +7,7 @@ use cli_kit::{Lines, Output};
 use serde_json::json;
 use ucom::files::EdgeTable;
 use ucom::master::io::Kind;
-use ucom::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
+use ucom::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel, counted};
 
 use super::followed::{Followed, Said};
 use super::outputs::{finish, named, units};
@@ -63,7 +63,9 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     });
     stdout.push_always(out.words(&running, || {
         let outputs = if args.active { "outputs active" } else { "outputs safe; `active on` enables them" };
-        format!("{} boards run, {outputs}; {}\nCtrl-C stops them", report.boards.len(), report.load)
+        let (run, them) = if report.boards.len() == 1 { ("runs", "it") } else { ("run", "them") };
+        let boards = counted(report.boards.len(), "board");
+        format!("{boards} {run}, {outputs}; {}\nCtrl-C stops {them}", report.load)
     }));
     let mut followed = Followed::new(prepared.known.keys().copied(), driver.now_us());
     let result = want_texts(&mut driver, args, &boards)

@@ -12,6 +12,7 @@ use can_link::{
 use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::chain::{ChainConfig, ChainSim, Fault};
+use ucom::master::counted;
 use ucom::{Format, Frame, Profile};
 
 use crate::args::{LinkArgs, SimArgs};
@@ -51,10 +52,10 @@ pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let stats = server.bus.stats();
     let load = stats.load_since(&BusStats::default()) * 100.0;
     out.note(format!(
-        "ended after {:.1} s; {} frames on the bus, {load:.1} % load, {} collisions",
+        "ended after {:.1} s; {} on the bus, {load:.1} % load, {}",
         stats.now_ns as f64 * 1e-9,
-        stats.frames,
-        stats.collisions
+        counted(stats.frames as usize, "frame"),
+        counted(stats.collisions as usize, "collision")
     ));
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::prelude::v1::*;
 
 use serde::Serialize;
 
-use super::{Boards, InitFinding, InitReport, Life, ScanFinding, ScanReport, Statistics};
+use super::{Boards, InitFinding, InitReport, Life, ScanFinding, ScanReport, Statistics, counted};
 use crate::{Function, Profile};
 
 /// What the CAN controller says of itself.
@@ -198,7 +198,11 @@ fn traffic(o: &Observation, f: &mut Findings) {
     if o.statistics.undecodable > 0 {
         let why =
             "too short or impossible values: another reading of the protocol, or two boards with one number";
-        f.warn(format!("{} frames of boards cannot be read", o.statistics.undecodable), why, "`ucom probe`");
+        f.warn(
+            format!("{} of boards cannot be read", counted(o.statistics.undecodable as usize, "frame")),
+            why,
+            "`ucom probe`",
+        );
     }
 }
 
@@ -230,7 +234,10 @@ fn chain(o: &Observation, f: &mut Findings) {
             f.problem(finding.to_string(), "", next);
         }
         if init.is_ok() {
-            f.good(format!("{} boards have their numbers", init.boards.len()));
+            f.good(match init.boards.len() {
+                1 => "1 board has its number".into(),
+                n => format!("{n} boards have their numbers"),
+            });
         }
     }
     let Some(scan) = &o.scan else { return };
@@ -246,20 +253,31 @@ fn chain(o: &Observation, f: &mut Findings) {
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {
         f.warn(
-            format!("{unnumbered} boards, none has a number"),
-            "they were powered up or reset",
+            match unnumbered {
+                1 => "1 board, without a number".into(),
+                n => format!("{n} boards, none has a number"),
+            },
+            "powered up or reset since they were numbered",
             "`ucom init`",
         );
     } else if unnumbered > 0 {
         let after = scan.boards.last().map_or(0, |b| b.number);
-        let why = format!("they rebooted, or the init wire behind board {after} is broken");
+        let why = format!("a reboot, or the init wire behind board {after} is broken");
         f.problem(
-            format!("{unnumbered} boards have no number beside {} that have one", scan.boards.len()),
+            match (unnumbered, scan.boards.len()) {
+                (n, numbered) if n + numbered == 2 => "1 board has no number beside 1 that has one".into(),
+                (n, 1) => format!("{n} boards have no number beside 1 that has one"),
+                (1, numbered) => format!("1 board has no number beside {numbered} that have one"),
+                (n, numbered) => format!("{n} boards have no number beside {numbered} that have one"),
+            },
             why,
             "`ucom init` names the place",
         );
     } else if !scan.boards.is_empty() {
-        f.good(format!("{} boards already have numbers", scan.boards.len()));
+        f.good(match scan.boards.len() {
+            1 => "1 board already has a number".into(),
+            n => format!("{n} boards already have numbers"),
+        });
     }
     let told = |x: &&ScanFinding| matches!(x, ScanFinding::Unnumbered { .. }) || x.error().is_some();
     for finding in scan.findings.iter().filter(|x| !told(x)) {

@@ -15,7 +15,7 @@ pub(crate) use super::repair::{repair, repair_procedure};
 use super::request::{Answer, TRIES, ask_info, confirmed, info, set_status};
 use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
 use super::times::MS;
-use super::{BoardSeen, Error, Outcome};
+use super::{BoardSeen, Error, Outcome, counted};
 use crate::profile::Endian;
 use crate::{FromBoard, Function, Sequence, Status, ToBoard};
 
@@ -83,7 +83,9 @@ pub enum InitFinding {
     },
     /// More boards than reports: boards share the low byte of their flash number.
     #[error(
-        "more boards than reports: {boards} boards, {reports} reports; flash ids must be unique in their low byte"
+        "more boards than reports: {}, {}; flash ids must be unique in their low byte",
+        counted(*boards as usize, "board"),
+        counted(*reports as usize, "report")
     )]
     MoreBoardsThanReports {
         /// Boards with a number.

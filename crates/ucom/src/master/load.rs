@@ -57,7 +57,11 @@ impl fmt::Display for LoadForecast {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { boards, bitrate, limit, .. } = self;
         let percent = self.percent();
-        write!(f, "bus load {percent:.0} % of {bitrate} bit/s with {boards} boards running, limit {limit} %")
+        write!(
+            f,
+            "bus load {percent:.0} % of {bitrate} bit/s with {} running, limit {limit} %",
+            super::counted(*boards as usize, "board")
+        )
     }
 }
 

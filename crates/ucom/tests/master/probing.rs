@@ -164,9 +164,7 @@ fn doctor_names_what_is_wrong_in_the_chain() {
     let o = observe(&mut bench);
     let t = text(&o);
     assert!(
-        t.contains(
-            "1 boards have no number beside 1 that have one / they rebooted, or the init wire behind board 1"
-        ),
+        t.contains("1 board has no number beside 1 that has one / a reboot, or the init wire behind board 1"),
         "{t}"
     );
     assert!(t.contains("board 2 rebooted"), "{t}");

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::prelude::v1::*;
 
+use super::super::counted;
 use super::measure::status_of;
 use super::{ProbeReport, ProbeRow};
 use crate::profile::{AliveMode, Broadcast, Endian, KEYS, ReportMode};
@@ -112,8 +113,9 @@ fn reports(rows: &mut Rows, seen: &Seen) {
     let observed = match most {
         None => "no report".into(),
         Some(n) => format!(
-            "{} boards, up to {n} functions each; identifier and data {}",
-            boards.len(),
+            "{}, up to {} each; identifier and data {}",
+            counted(boards.len(), "board"),
+            counted(n, "function"),
             if agree { "agree" } else { "disagree" }
         ),
     };
@@ -130,8 +132,10 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };
-    let observed =
-        format!("{zero} boards answer PC_INFO to 0, {top} to 31, {} to their number", seen.infos.len());
+    let observed = format!(
+        "boards that answer PC_INFO: {zero} to 0, {top} to 31, {} to their own number",
+        seen.infos.len()
+    );
     let value = broadcast.map(|b| b.to_string());
     // Before the numbers' start: 0 cannot be both.
     let first = if seen.zero_answers {

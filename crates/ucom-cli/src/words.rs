@@ -8,6 +8,8 @@ use ucom::{
     StringAssembler, ToBoard,
 };
 
+use crate::shape::date;
+
 /// A frame in words.
 pub struct Described {
     /// Function, or why it is foreign.
@@ -149,7 +151,7 @@ impl Decoder {
             match function {
                 Function::DspInfo => {
                     if let Some(info) = BoardInfo::parse(&payload, profile.endian) {
-                        return info_words(&info);
+                        return info_words(&info, &profile);
                     }
                 }
                 Function::DumpIo => {
@@ -190,7 +192,7 @@ fn foreign(why: Foreign) -> Described {
     }
 }
 
-fn info_words(info: &BoardInfo) -> (String, Value) {
+fn info_words(info: &BoardInfo, profile: &Profile) -> (String, Value) {
     let program = if info.has_application() {
         format!("program 0x{:04X}", info.program_id)
     } else {
@@ -204,6 +206,7 @@ fn info_words(info: &BoardInfo) -> (String, Value) {
         "status": info.status.0,
         "program_id": info.program_id,
         "date": info.date,
+        "flash_date": info.has_application().then(|| date(profile, info.date)),
     });
     (text, value)
 }

@@ -324,35 +324,20 @@ fn a_lost_result_of_what_acts_is_a_fault() {
     }
 }
 
-/// A terminal that is closed ends what runs and what is programmed, as Ctrl-C does.
-#[test]
-fn a_hangup_stops_in_order() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
-    let child = sim.spawn(&["run", "1,2", "--active"]);
-    sim.peer().wait("602#01010000");
-    std::thread::sleep(Duration::from_millis(300));
-    signal(&child, "-HUP");
-    ended(child).ends(0);
-    let image = sim.file("image.bin", &vec![7; 60_000]);
-    let child = sim.spawn(&["update", "1", &image]);
-    sim.peer().wait("2C1#");
-    signal(&child, "-HUP");
-    let said = ended(child);
-    assert!([4, 5].contains(&said.code), "{}: {}", said.code, said.err);
-    let status = sim.ucom(&["--json", "status"]).ends(0).json();
-    assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2]);
-}
-
 /// The second Ctrl-C ends every command alike: 5, and what is left undone.
 #[test]
 fn a_second_ctrl_c_is_the_same_everywhere() {
     let sim = Sim::start(&["--boards", "1"]);
     sim.ucom(&["init"]).ends(0);
     let log = sim.file("bus.log", b"(0.0) can0 240#\n(90.0) can0 240#\n");
-    for words in
-        [&["record", "-"][..], &["decode", "--live"], &["replay", &log], &["sim", "--listen", "127.0.0.1:0"]]
-    {
+    let big = sim.file("big.log", "(0.0) can0 240#\n".repeat(10_000).as_bytes());
+    for words in [
+        &["record", "-"][..],
+        &["decode", "--live"],
+        &["decode", &big],
+        &["replay", &log],
+        &["sim", "--listen", "127.0.0.1:0"],
+    ] {
         // Nobody reads what it prints, and its pipe is full: the first one is heard and not obeyed.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
@@ -371,4 +356,18 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         let alike = said.code == 5 && said.err.contains("ended at once; nothing was changed");
         assert!(alike || (words[0] == "replay" && said.code == 0), "{words:?}: {} {}", said.code, said.err);
     }
+}
+
+/// A decoder that waits for its stdin hears Ctrl-C all the same; what came before is decoded.
+#[test]
+fn a_decoder_of_stdin_hears_ctrl_c() {
+    let sim = Sim::start(&["--boards", "0"]);
+    let mut child = sim.spawn(&["decode", "-"]);
+    child.stdin.as_mut().unwrap().write_all(b"240#\n").unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    signal(&child, "-INT");
+    let kept_open = child.stdin.take();
+    let said = ended(child).ends(0);
+    assert!(said.out.contains("PC_REPORT"), "{}", said.out);
+    drop(kept_open);
 }

@@ -1,9 +1,10 @@
 //! `ucom decode`: frames in words, from a recording, stdin or the live bus.
 
 use std::io::BufRead;
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
-use cli_kit::Output;
+use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 
@@ -14,6 +15,11 @@ use crate::link::{protocol_frame, recorded};
 use crate::signal::Undone;
 use crate::words::Decoder;
 
+/// Lines that are read before they are decoded, at most.
+const READ_AHEAD: usize = 64;
+/// How often Ctrl-C is looked at while stdin brings nothing.
+const LOOK: Duration = Duration::from_millis(50);
+
 /// Decodes to the end, or until Ctrl-C. Exit code 2 when nothing in a file is a frame.
 pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let left = args.count.unwrap_or(u64::MAX);
@@ -22,8 +28,9 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     let stdin = args.file.as_os_str() == "-";
     let mut profile = link.profile()?;
+    let stop = Undone::default().listen()?;
     let records: Box<dyn Iterator<Item = Result<Record, Failure>>> = if stdin {
-        Box::new(lines(std::io::stdin().lock()))
+        Box::new(heard(&stop)?)
     } else {
         let recording = Recording::read(&args.file)
             .map_err(|e| Failure::usage(e).hint("forms are candump -L, FZI-CAN 1.2 and MCAP"))?;
@@ -39,14 +46,14 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let mut start = None;
     for record in records {
         let record = record?;
-        if frames == left || Output::gone() {
+        if frames == left || Output::gone() || stop.asked() {
             return Ok(());
         }
         frames += 1;
         let start_ns = *start.get_or_insert(record.time_ns);
         print(&mut decoder, record.time_ns.saturating_sub(start_ns), &record.frame, out);
     }
-    if frames == 0 {
+    if frames == 0 && !stop.asked() {
         return Err(Failure::usage("no frame in the input")
             .hint("a candump log, or bare frames, one a line: 141#2100011934126E38"));
     }
@@ -85,6 +92,24 @@ fn print(decoder: &mut Decoder, time_ns: u64, frame: &RecordedFrame, out: &Outpu
         let frame = frame.to_string();
         format!("{time_s:11.6}  {frame:20}  {:14} {:24} {}", described.who, described.name, described.text)
     });
+}
+
+/// Lines of stdin as they come; Ctrl-C ends them, also while none comes.
+fn heard(stop: &Stop) -> Result<impl Iterator<Item = Result<Record, Failure>> + use<>, Failure> {
+    let (sender, lines_read) = sync_channel(READ_AHEAD);
+    let read = move || lines(std::io::stdin().lock()).try_for_each(|record| sender.send(record));
+    std::thread::Builder::new().name("stdin".into()).spawn(read)?;
+    let stop = stop.clone();
+    Ok(std::iter::from_fn(move || {
+        while !stop.asked() {
+            match lines_read.recv_timeout(LOOK) {
+                Ok(record) => return Some(record),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
+        }
+        None
+    }))
 }
 
 /// candump lines, or bare frames; empty lines are none.

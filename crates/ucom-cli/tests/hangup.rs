@@ -1,0 +1,92 @@
+//! A terminal that is closed (SIGHUP) and `kill` (SIGTERM) end commands as Ctrl-C does.
+#![cfg(unix)]
+
+mod common;
+
+use std::time::Duration;
+
+use cli_kit::trial::{ended, signal};
+use common::Sim;
+
+/// A terminal that is closed ends what runs and what is programmed, as Ctrl-C does.
+#[test]
+fn a_hangup_stops_in_order() {
+    let sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let child = sim.spawn(&["run", "1,2", "--active"]);
+    sim.peer().wait("602#01010000");
+    std::thread::sleep(Duration::from_millis(300));
+    signal(&child, "-HUP");
+    ended(child).ends(0);
+    let image = sim.file("image.bin", &vec![7; 60_000]);
+    let child = sim.spawn(&["update", "1", &image]);
+    sim.peer().wait("2C1#");
+    signal(&child, "-HUP");
+    let said = ended(child);
+    assert!([4, 5].contains(&said.code), "{}: {}", said.code, said.err);
+    let status = sim.ucom(&["--json", "status"]).ends(0).json();
+    assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2]);
+}
+
+/// `ci --for` stops the board, `monitor` ends, and a recording is whole.
+#[test]
+fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    for name in ["-HUP", "-TERM"] {
+        let mut peer = sim.peer();
+        let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
+        peer.wait("601#01010000");
+        peer.wait("381#");
+        signal(&child, name);
+        peer.wait("601#00000000");
+        ended(child).ends(0);
+        let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+        assert_eq!(status["boards"][0]["state"], "started", "{name}: the loop was stopped");
+
+        let view = sim.spawn(&["--json", "monitor"]);
+        for ending in ["log", "fzi", "mcap"] {
+            let file = sim.path(&format!("{}.{ending}", &name[1..]));
+            let child = sim.spawn(&["--json", "record", &file]);
+            std::thread::sleep(Duration::from_millis(500));
+            (0..5).for_each(|_| peer.send("240#"));
+            std::thread::sleep(Duration::from_millis(200));
+            signal(&child, name);
+            let recorded = ended(child).ends(0).json();
+            assert!(recorded["frames"].as_u64().unwrap() >= 5, "{name} {ending}: {recorded}");
+            let said = sim.ucom(&["decode", &file]).ends(0);
+            assert_eq!(
+                said.out.lines().count() as u64,
+                recorded["frames"].as_u64().unwrap(),
+                "{name} {ending}"
+            );
+            assert!(said.err.is_empty(), "{name} {ending}: {}", said.err);
+        }
+        signal(&view, name);
+        ended(view).ends(0);
+    }
+}
+
+/// A recorder that is killed at once loses no more than a second, in each form; that the rest is missing is told where the form
+/// shows it.
+#[test]
+fn a_killed_recorder_leaves_what_was_recorded() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    let run = sim.spawn(&["run", "1"]);
+    sim.peer().wait("381#");
+    for ending in ["log", "fzi", "mcap"] {
+        let file = sim.path(&format!("killed.{ending}"));
+        let child = sim.spawn(&["record", &file]);
+        std::thread::sleep(Duration::from_millis(3_300));
+        signal(&child, "-KILL");
+        ended(child);
+        let said = sim.ucom(&["decode", &file]).ends(0);
+        // Two packages every 10 ms and more, for more than a second.
+        let frames = said.out.lines().count();
+        assert!(frames > 200, "{ending}: {frames} frames; {}", said.err);
+        assert!(ending != "mcap" || said.err.contains("broken off"), "{ending}: {}", said.err);
+    }
+    signal(&run, "-INT");
+    ended(run).ends(0);
+}

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 
 use can_link::CanError;
+use cli_kit::output_file::OutputError;
 
 pub use cli_kit::exit::{DEVICE, FAULT, NO_LINK, REFUSED, USAGE};
 
@@ -49,6 +50,12 @@ impl From<CanError> for Failure {
             CanError::Url(e) => Self::usage(e).hint("ucom --help shows the forms of --bus"),
             e => Self::new(NO_LINK, "bus", e).hint("is the bus there and up? ucom sim makes a simulated one"),
         }
+    }
+}
+
+impl From<OutputError> for Failure {
+    fn from(e: OutputError) -> Self {
+        Self { exit: e.exit, code: e.code.into(), hint: e.hint.into(), ..Self::usage(e.message) }
     }
 }
 

@@ -60,6 +60,8 @@ impl Undone {
         let undone = self.clone();
         Stop::listen_with(move || {
             let words = undone.lock().words();
+            // Files that were made and not written.
+            cli_kit::output_file::abandon();
             say_at_most(PATIENCE, move || {
                 let _ = std::io::stderr().write_all(words.as_bytes());
             });

@@ -3,14 +3,13 @@
 use std::time::{Duration, Instant};
 
 use can_link::ErrorState;
-use cli_kit::Output;
+use cli_kit::{Output, OutputFile};
 use serde_json::json;
 use ucom::files::{Image, ImageOptions};
 use ucom::master::doctor::{Controller, Finding, Observation, Severity, findings};
 use ucom::master::probe::ProbeOptions;
 use ucom::master::{Event, Outcome, Request};
 
-use super::params::not_there;
 use crate::args::{LinkArgs, ProbeArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
@@ -97,9 +96,7 @@ fn line(f: &Finding) -> String {
 
 /// Measures and writes a profile.
 pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    if let Some(file) = &args.out {
-        not_there(file, args.force.force, "another name after --out keeps it")?;
-    }
+    let output = args.out.as_deref().map(|file| OutputFile::open(file, args.force.force, &[])).transpose()?;
     let image = match &args.image {
         Some(path) => {
             Some(Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?.bytes().to_vec())
@@ -120,14 +117,13 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     if report.boards.is_empty() {
         let n = report.reports;
         out.note(format!(
-            "{n} boards report and none has a number: only reports were measured; ucom probe --init measures more, or ucom init first"
+            "{n} board{s} without a number: only reports were measured; ucom probe --init measures more, or ucom init first",
+            s = if n == 1 { "" } else { "s" }
         ));
     }
     let toml = report.profile.to_toml();
-    let file = args.out.as_ref().map(|path| path.display().to_string());
-    if let Some(path) = &args.out {
-        std::fs::write(path, &toml).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-    }
+    let file = output.as_ref().map(OutputFile::name);
+    output.map_or(Ok(()), |output| output.write(&toml))?;
     let value = json!({ "rows": report.rows, "boards": report.boards, "profile": toml, "file": file });
     out.result(&value, || match &file {
         Some(file) => format!("{}\nprofile: {file}; use it with --profile {file}\n", report.table()),

@@ -2,15 +2,15 @@
 
 use std::time::{Duration, Instant};
 
-use cli_kit::{Output, table};
+use cli_kit::{Output, OutputFile, table};
 use serde_json::{Value, json};
 use ucom::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
 use ucom::master::io::{IoDescription, Kind};
-use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel};
+use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel, counted};
 
 use super::followed::Followed;
 use super::outputs::{named, units};
-use super::params::{arrived, become_master, deliver, not_there};
+use super::params::{arrived, become_master, deliver, file_or_stdout};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 use crate::cache::{Known, of_several};
 use crate::driver::{Driver, nothing_shared, unexpected};
@@ -20,9 +20,12 @@ use crate::values::{Prepared, Word, only, tell_rounded, with_names, words};
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let edges = link.edges()?;
-    if let Some(file) = &args.template {
-        not_there(file, args.force.force, "`--template -` shows the table, to be added by hand")?;
-    }
+    let file = args.template.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose();
+    // What is there is a table that somebody has filled in.
+    let file = file.map_err(|e| match e.code == "exists" {
+        true => e.hint("--template - shows the table, to be added by hand; --force writes over it"),
+        false => e,
+    })?;
     let mut driver = Driver::open(link)?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
@@ -40,7 +43,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         };
         boards.push((known, initial));
     }
-    if let Some(file) = &args.template {
+    if let Some(file) = file {
         let mut programs: Vec<(u16, &IoDescription)> = Vec::new();
         for (known, _) in &boards {
             if programs.iter().all(|(id, _)| *id != known.info.program_id) {
@@ -51,8 +54,8 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         let text = EdgeTable::template(&programs);
         return deliver(file, &text, json!({ "programs": ids }), out, |file| {
             format!(
-                "{file}: a table of {} programs to be looked over; `ucom help edges` explains it",
-                ids.len()
+                "{file}: a table of {} to be looked over; `ucom help edges` explains it",
+                counted(ids.len(), "program")
             )
         });
     }
@@ -252,9 +255,7 @@ fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output
 
 /// Writes a DBC file with the boards' names.
 pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    if let Some(file) = &args.out {
-        not_there(file, args.force.force, "another name after --out keeps it")?;
-    }
+    let file = args.out.as_deref().map(|file| OutputFile::open(file, args.force.force, &[])).transpose()?;
     let (profile, edges) = (link.profile()?, link.edges()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {
@@ -265,16 +266,18 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         }
     }
     let text = dbc_text(&boards, profile.endian);
-    match &args.out {
+    match file {
         None if out.is_json() => out.result(&json!({ "text": text }), String::new),
         None => Output::bytes(&windows(&text)),
-        Some(path) => {
-            std::fs::write(path, windows(&text))
-                .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-            let file = path.display().to_string();
+        Some(output) => {
+            let file = output.name();
+            output.write(windows(&text))?;
             let numbers: Vec<u8> = boards.iter().map(|b| b.number).collect();
             out.result(&json!({ "file": file, "boards": numbers }), || {
-                format!("{file}: messages of the protocol, process data of {} boards", numbers.len())
+                format!(
+                    "{file}: messages of the protocol, process data of {}",
+                    counted(numbers.len(), "board")
+                )
             });
         }
     }

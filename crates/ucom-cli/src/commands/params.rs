@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cli_kit::{Output, table};
+use cli_kit::{Output, OutputFile, table};
 use serde_json::{Value, json};
 use ucom::Status;
 use ucom::files::params::{
@@ -11,7 +11,7 @@ use ucom::files::params::{
 };
 use ucom::files::{EdgeTable, Inventory};
 use ucom::master::io::{Kind, ParValue};
-use ucom::master::{AdminChange, Outcome, Request};
+use ucom::master::{AdminChange, Outcome, Request, counted};
 
 use super::seen;
 use crate::args::{Boards, LinkArgs, ParArgs};
@@ -30,9 +30,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         return Err(Failure::usage("--dry-run goes with --apply FILE"));
     }
     let edges = link.edges()?;
-    if let Some(file) = &args.save {
-        not_there(file, args.force.force, "take another name")?;
-    }
+    let file = args.save.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose()?;
     let mut driver = Driver::open(link)?;
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.values, "set")?;
@@ -50,7 +48,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         all.push(Parameters { known, words, history });
     }
     write(&mut driver, &mut all, args.force.force)?;
-    if let Some(file) = &args.save {
+    if let Some(file) = file {
         return save(args, file, &all, out);
     }
     print(&driver, &all, matches!(args.boards, Boards::Some(ref n) if n.len() == 1), out);
@@ -112,13 +110,13 @@ pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), Failure> {
     }
 }
 
-/// A file is not written over without being asked to; told before anything is sent.
-pub fn not_there(file: &Path, force: bool, instead: &str) -> Result<(), Failure> {
-    if force || !file.is_file() {
-        return Ok(());
+/// The file to write, opened before anything is sent and not written over unless that was asked for; `-`, and so `None`, is
+/// stdout.
+pub fn file_or_stdout(file: &Path, force: bool) -> Result<Option<OutputFile>, Failure> {
+    match file.as_os_str() == "-" {
+        true => Ok(None),
+        false => Ok(Some(OutputFile::open(file, force, &[])?)),
     }
-    let said = format!("{} is there already; nothing was written", file.display());
-    Err(Failure::new(REFUSED, "exists", said).hint(format!("{instead}; --force writes over it")))
 }
 
 fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
@@ -166,7 +164,7 @@ fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, 
 }
 
 /// Writes a parameter file: what was written last as values, all other names as comments.
-fn save(args: &ParArgs, file: &Path, all: &[Parameters], out: &Output) -> Result<(), Failure> {
+fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Output) -> Result<(), Failure> {
     let names = inventory(&args.inventory)?;
     let board = |p: &Parameters| {
         let par = p.known.edges.all(Kind::Par).iter().enumerate().map(|(i, edge)| {
@@ -192,27 +190,29 @@ fn save(args: &ParArgs, file: &Path, all: &[Parameters], out: &Output) -> Result
     let result = json!({ "boards": numbers, "values": values, "parameters": whole });
     deliver(file, &params_text(&saved), result, out, |file| {
         format!(
-            "{file}: {values} of {whole} parameters of {} boards with the value this tool wrote last; the others are comments",
-            numbers.len()
+            "{file}: {values} of {whole} parameters of {} with the value this tool wrote last; the others are comments",
+            counted(numbers.len(), "board")
         )
     })
 }
 
 /// A text that was asked for: into a file, or to stdout for `-`.
 pub fn deliver(
-    file: &Path,
+    file: Option<OutputFile>,
     text: &str,
     mut result: Value,
     out: &Output,
     words: impl FnOnce(&str) -> String,
 ) -> Result<(), Failure> {
-    if file == Path::new("-") {
+    let Some(file) = file else {
         result["text"] = json!(text);
         out.result(&result, || text.into());
         return Ok(());
-    }
-    ucom::files::write_text(file, text).map_err(Failure::usage)?;
-    let name = file.display().to_string();
+    };
+    // Whole or not at all: what was there is people's own work.
+    ucom::files::write_text(file.path(), text).map_err(Failure::usage)?;
+    let name = file.name();
+    file.is_written();
     result["file"] = json!(name);
     out.result(&result, || words(&name));
     Ok(())

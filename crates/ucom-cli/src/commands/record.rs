@@ -3,15 +3,14 @@
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use cli_kit::{Output, Stop};
+use cli_kit::{Output, OutputFile, Stop};
 use serde_json::json;
 use ucom::files::recording::{
     CandumpWriter, Record, RecordedFrame, Recording, RecordingError, RecordingFormat, RecordingWriter,
     profile_path,
 };
-use ucom::master::Master;
+use ucom::master::{Master, counted};
 
-use super::params::not_there;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::driver::shared_numbers;
 use crate::failure::{FAULT, Failure};
@@ -53,7 +52,8 @@ fn failed(e: RecordingError) -> Failure {
 pub fn tell_broken_off(recording: &Recording, file: &Path, out: &Output) {
     if let Some(why) = &recording.broken_off {
         let (file, whole) = (file.display(), recording.records.len());
-        out.note(format!("{file}: {why}; the {whole} frames before are whole"));
+        let are = if whole == 1 { "is" } else { "are" };
+        out.note(format!("{file}: {why}; the {} before {are} whole", counted(whole, "frame")));
     }
 }
 
@@ -73,17 +73,18 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
                 Failure::usage(what).hint("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP")
             );
         }
-        let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
-        for file in [Some(args.file.clone()), beside].iter().flatten() {
-            not_there(file, args.force.force, "another name keeps it")?;
-        }
     }
+    let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
+    let files = [Some(args.file.clone()), beside].into_iter().flatten().filter(|_| !stdout);
+    let files: Vec<OutputFile> =
+        files.map(|file| OutputFile::open(&file, args.force.force, &[])).collect::<Result<_, _>>()?;
     let mut bus = link.open()?;
     let mut sink = if stdout {
         Sink::Stdout(CandumpWriter::new(std::io::stdout()))
     } else {
         Sink::File(RecordingWriter::create(&args.file, format, &profile.to_toml()).map_err(Failure::usage)?)
     };
+    files.into_iter().for_each(OutputFile::is_written);
     let channel = bus.url().rsplit(['/', ':']).next().unwrap_or("can0").to_owned();
     let mut decoder = Decoder::new(profile);
     // It only listens: who answers to which number.
@@ -137,7 +138,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     out.result(&value, || {
         let missing =
             if left_out > 0 { format!(", {left_out} foreign ones left out") } else { String::new() };
-        format!("{file}: {frames} frames in {time_s:.1} s{missing}")
+        format!("{file}: {} in {time_s:.1} s{missing}", counted(frames as usize, "frame"))
     });
     Ok(())
 }
@@ -167,7 +168,7 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
                 ", {n} left out that reset, number, program, start or move boards (--intrusive sends them)"
             ),
         };
-        format!("{sent} frames sent{hint}")
+        format!("{} sent{hint}", counted(sent as usize, "frame"))
     });
     Ok(())
 }

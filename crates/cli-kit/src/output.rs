@@ -1,7 +1,7 @@
 //! Where words go: results to stdout as text or JSON, progress and logs to stderr.
 //!
-//! A command that streams prints events while it works, one JSON object a line with the key `event`, and its result as the last of
-//! them, `report`. A reader that does not read holds no command: events wait in a queue and are dropped where too many do.
+//! With JSON, a command that takes its time prints events to stderr while it works, one object a line with the key `event`; stdout has
+//! its result alone. A reader that does not read holds no command: events wait in a queue and are dropped where too many do.
 
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -47,10 +47,10 @@ impl Output {
         self.json
     }
 
-    /// From now on events are printed as they happen, and the result as the last one, where JSON was asked for.
+    /// From now on events are printed as they happen, and notes as events, where JSON was asked for.
     pub fn stream(&self) -> std::io::Result<()> {
         if self.json && STREAM.get().is_none() {
-            let _ = STREAM.set(Mutex::new(Stream { lines: Lines::stdout()?, began: Instant::now() }));
+            let _ = STREAM.set(Mutex::new(Stream { lines: Lines::stderr()?, began: Instant::now() }));
         }
         Ok(())
     }
@@ -67,13 +67,10 @@ impl Output {
         stream.lines.push(event.to_string());
     }
 
-    /// Prints what still waits of a stream, as long as it is read. Events that nobody will see are a lost result.
+    /// Prints what still waits of a stream, as long as it is read.
     pub fn finish() {
         let Some(stream) = STREAM.get() else { return };
-        let unseen = stream.lock().unwrap_or_else(PoisonError::into_inner).lines.finish();
-        if unseen > 0 {
-            let _ = LOST.set(format!("{unseen} lines were not read"));
-        }
+        stream.lock().unwrap_or_else(PoisonError::into_inner).lines.finish();
     }
 
     /// A result as it is printed: `value` as one line of JSON, or the text.
@@ -88,25 +85,9 @@ impl Output {
 
     /// Prints a result: `value` as one line of JSON, or the text, which is broken between words on a terminal.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
-        if STREAM.get().is_some() {
-            let value = serde_json::to_value(value)
-                .unwrap_or_else(|e| json!({ "error": { "message": e.to_string() } }));
-            Self::last("report", value);
-            return;
-        }
         let width = if self.json { None } else { stdout_width() };
         let line = within(&self.words(value, text), width);
         Self::bytes(format!("{}\n", line.trim_end()).as_bytes());
-    }
-
-    /// The last line of a stream: a result, or why there is none.
-    fn last(name: &str, value: Value) {
-        let Some(stream) = STREAM.get() else { return };
-        let mut event = json!({ "event": name });
-        if let (Some(event), Value::Object(value)) = (event.as_object_mut(), value) {
-            event.extend(value);
-        }
-        stream.lock().unwrap_or_else(PoisonError::into_inner).lines.push_always(event.to_string());
     }
 
     /// Prints a result that is a file of its own, as it is.
@@ -139,6 +120,10 @@ impl Output {
 
     /// One line of a log. A terminal that has gone is no reason to leave a machine alone: what cannot be printed is dropped.
     pub fn note(&self, text: impl std::fmt::Display) {
+        if STREAM.get().is_some() {
+            self.event("note", json!({ "text": text.to_string().trim() }));
+            return;
+        }
         let text = within(&text.to_string(), bar::stderr_width());
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
@@ -162,11 +147,7 @@ impl Output {
     pub fn failure(&self, exit: u8, code: &str, message: &str, hint: &str) {
         if self.json {
             let error = json!({ "code": code, "message": message, "hint": hint, "exit": exit });
-            if STREAM.get().is_some() {
-                Self::last("error", json!({ "error": error }));
-            } else {
-                let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error }));
-            }
+            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error }));
         }
         self.warn(message, hint);
     }

@@ -32,10 +32,10 @@ impl Said {
         serde_json::from_str(self.out.trim().lines().last().unwrap_or_default()).unwrap_or_else(error)
     }
 
-    /// The lines of its stdout as JSON objects; panics if one is none.
+    /// The lines of its stderr as JSON objects; panics if one is none.
     pub fn events(&self) -> Vec<Value> {
         let parse = |line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line:?}"));
-        self.out.lines().map(parse).collect()
+        self.err.lines().map(parse).collect()
     }
 
     /// The same, once it ended with this code; panics if it ended with another.

@@ -1,4 +1,4 @@
-//! What a command tells programs while it works: events of `--json`, one object a line, the result as the last one.
+//! What a command reports to programs while it works: events of `--json`, one object a line on stderr.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -33,7 +33,7 @@ struct Inner {
 }
 
 impl Progress {
-    /// From now on results are the last of a stream, where JSON was asked for.
+    /// From now on events are printed, where JSON was asked for.
     pub fn begin(out: &Output) -> Result<Self, Failure> {
         out.stream()?;
         Ok(Self(Rc::new(Inner {

@@ -102,13 +102,8 @@ impl Session {
         }
         let modes = tcgetattr(&self.slave).unwrap().local_modes;
         assert!(modes.contains(LocalModes::ICANON | LocalModes::ECHO), "the terminal was left changed");
-        Ended { code, value: serde_json::from_str(result(&out)).unwrap_or_default(), err, sim: self.sim }
+        Ended { code, value: serde_json::from_str(out.trim()).unwrap_or_default(), err, sim: self.sim }
     }
-}
-
-/// The last line of a stream.
-fn result(out: &str) -> &str {
-    out.lines().last().unwrap_or_default()
 }
 
 /// Exit code, what was printed on stdout, what was left of stderr, and the simulator.
@@ -234,7 +229,7 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     let mut out = String::new();
     child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
     let code = child.wait().unwrap().code().unwrap_or(-1);
-    (code, serde_json::from_str(result(&out)).unwrap_or_else(|e| panic!("{e}: {out:?}")))
+    (code, serde_json::from_str(out.trim()).unwrap_or_else(|e| panic!("{e}: {out:?}")))
 }
 
 /// Ctrl-C in each wait before the motion: nothing moves, and that is said, with exit code 5.

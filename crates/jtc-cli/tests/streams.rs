@@ -1,9 +1,9 @@
-//! Streams of `--json`: what happens is told as it happens, and the result is the last line.
+//! Events of `--json`: stderr has what happens as it happens, stdout the result alone.
 #![cfg(unix)]
 
 mod common;
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -11,14 +11,14 @@ use cli_kit::trial::Said;
 use common::{Sim, command, jtc, motion};
 use serde_json::Value;
 
-/// The events of a command, whose last one is its result.
-fn stream(said: &Said, last: &str) -> Vec<Value> {
+/// The events of a command, and its result.
+fn stream(said: &Said) -> (Vec<Value>, Value) {
     let events = said.events();
-    assert_eq!(events.last().expect("a line")["event"], last, "{}", said.out);
-    for event in &events[..events.len() - 1] {
-        assert!(event["time_s"].is_f64() && !["report", "error"].contains(&name(event)), "{event}");
+    for event in &events {
+        assert!(event["time_s"].is_f64() && event["event"].is_string(), "{event}");
     }
-    events
+    let result = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {:?}", said.out));
+    (events, result)
 }
 
 fn name(event: &Value) -> &str {
@@ -32,26 +32,25 @@ fn first<'a>(events: &'a [Value], wanted: &str) -> (usize, &'a Value) {
 }
 
 #[test]
-fn a_command_tells_what_happens_and_then_its_result() {
+fn a_command_reports_what_happens_and_then_its_result() {
     let sim = Sim::start(&["--no-throttle"]);
-    let events = stream(&sim.jtc(&["--json", "params", "push", "../../arms/avena.toml"]).ends(0), "report");
-    assert_eq!(name(&events[0]), "connected");
-    assert_eq!(events[0]["port"], sim.port.to_str().unwrap());
+    let (events, result) = stream(&sim.jtc(&["--json", "params", "push", "../../arms/avena.toml"]).ends(0));
+    assert_eq!(first(&events, "connected").1["port"], sim.port.to_str().unwrap());
     assert_eq!(events.iter().filter(|e| name(e) == "parameter").count(), 3);
-    assert!(events.last().unwrap()["pushed"].is_array());
+    assert!(result["pushed"].is_array());
 
-    let events = stream(&sim.jtc(&["--json", "recover"]).ends(0), "report");
+    let (events, result) = stream(&sim.jtc(&["--json", "recover"]).ends(0));
     assert!(first(&events, "step").1["text"].as_str().unwrap().contains("found"));
-    assert!(events.last().unwrap()["steps"].is_array());
-    assert_eq!(events.last().unwrap()["status"]["state"], "HoldPos");
+    assert!(result["steps"].is_array());
+    assert_eq!(result["status"]["state"], "HoldPos");
 
     let file = sim.path("motion.csv");
     std::fs::write(&file, motion(0.2)).unwrap();
     let said = sim.jtc(&["--json", "traj", "run", &file, "--speed", "50"]).ends(0);
-    let events = stream(&said, "report");
-    let order = ["connected", "checked", "uploading", "uploaded", "executing", "sample", "report"];
+    let (events, report) = stream(&said);
+    let order = ["connected", "checked", "uploading", "uploaded", "executing", "sample"];
     let places = order.map(|wanted| first(&events, wanted).0);
-    assert!(places.is_sorted(), "{places:?} {}", said.out);
+    assert!(places.is_sorted(), "{places:?} {}", said.err);
     let full = events.iter().rfind(|e| name(e) == "uploading").unwrap();
     assert_eq!((full["fraction"].as_f64(), &full["phase"]), (Some(1.0), &Value::from("motion")));
     // 2.4 s of motion: more than one sample, and not one a status.
@@ -61,7 +60,6 @@ fn a_command_tells_what_happens_and_then_its_result() {
     let states: Vec<&str> =
         events.iter().filter(|e| name(e) == "state").filter_map(|e| e["trajectory"].as_str()).collect();
     assert!(states.contains(&"Execute") && states.last() == Some(&"Finish"), "{states:?}");
-    let report = events.last().unwrap();
     for key in [
         "outcome",
         "phase",
@@ -79,19 +77,21 @@ fn a_command_tells_what_happens_and_then_its_result() {
         assert!(report.get(key).is_some(), "{key}");
     }
 
-    let said = sim.jtc(&["--json", "traj", "pause"]).ends(1);
-    assert_eq!(stream(&said, "error").last().unwrap()["error"]["exit"], 1);
+    let (events, result) = stream(&sim.jtc(&["--json", "traj", "pause"]).ends(1));
+    assert_eq!(result["error"]["exit"], 1);
+    let note = first(&events, "note").1["text"].as_str().unwrap_or_default();
+    assert!(note.contains(result["error"]["message"].as_str().unwrap()), "{note}");
     std::fs::write(&file, "no trajectory").unwrap();
-    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(2);
-    assert_eq!(stream(&said, "error").len(), 1);
+    let (_, result) = stream(&sim.jtc(&["--json", "traj", "run", &file]).ends(2));
+    assert_eq!(result["error"]["exit"], 2);
     std::fs::write(&file, motion(9.0)).unwrap();
-    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(4);
-    assert_eq!(stream(&said, "report").last().unwrap()["outcome"], "refused");
+    let (_, result) = stream(&sim.jtc(&["--json", "traj", "run", &file]).ends(4));
+    assert_eq!(result["outcome"], "refused");
 }
 
-/// What breaks in motion is told at once, the first cause first.
+/// What breaks in motion is reported at once, the first cause first.
 #[test]
-fn what_breaks_in_motion_is_told_at_once() {
+fn what_breaks_in_motion_is_reported_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let faults = dir.path().join("faults.toml");
     let fault =
@@ -101,52 +101,57 @@ fn what_breaks_in_motion_is_told_at_once() {
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let file = sim.path("motion.csv");
     std::fs::write(&file, motion(0.2)).unwrap();
-    let events = stream(&sim.jtc(&["--json", "traj", "run", &file]).ends(5), "report");
+    let (events, result) = stream(&sim.jtc(&["--json", "traj", "run", &file]).ends(5));
     let error = events.iter().find(|e| name(e) == "state" && e["state"] == "Error").expect("the error");
     assert!(error["errors"].to_string().contains("joint 3 does not answer"), "{error}");
-    assert_eq!(events.last().unwrap()["outcome"], "fault");
+    assert_eq!(result["outcome"], "fault");
 }
 
 #[test]
-fn the_demo_is_a_stream_and_its_events_are_documented() {
+fn the_demo_has_events_and_all_events_are_documented() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("demo");
     let said = jtc(&["--json", "demo", "--out", out.to_str().unwrap()]).ends(0);
-    let events = stream(&said, "report");
+    let (events, result) = stream(&said);
     for wanted in ["connected", "parameter", "uploading", "uploaded", "executing", "sample"] {
         first(&events, wanted);
     }
-    assert!(events.last().unwrap()["files"].is_array());
+    assert!(result["files"].is_array());
     let page = jtc(&["help", "events"]).ends(0).out;
     for event in &events {
         assert!(page.contains(&format!("| `{}` |", name(event))), "{event}");
     }
 }
 
-/// A reader that takes nothing (`… | less`) does not keep a run from hearing Ctrl-C.
+/// A reader that takes nothing of the events (`2>&1 >report.json | less`) does not keep a run from moving or hearing Ctrl-C.
 #[test]
 fn j33_a_reader_that_does_not_read_holds_no_run() {
     let sim = Sim::start(&["--no-throttle"]);
     sim.jtc(&["recover", "--defaults"]).ends(0);
-    let file = sim.path("motion.csv");
+    let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
     // What a pipe holds.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = command();
-    run.args(["--json", "traj", "run", &file, "--speed", "5", "--port", sim.port.to_str().unwrap()]);
-    let mut run = run.stdin(Stdio::null()).stdout(writer).stderr(Stdio::piped()).spawn().unwrap();
-    let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map_while(Result::ok);
-    assert!(lines.any(|line| line.contains("uploading")));
-    std::thread::sleep(Duration::from_secs(1));
+    run.args(["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
+    run.args(["--port", sim.port.to_str().unwrap()]);
+    let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();
+    let wait = |until: &mut dyn FnMut() -> bool| {
+        let begin = Instant::now();
+        while !until() {
+            assert!(begin.elapsed() < Duration::from_secs(60), "it does not come");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    wait(&mut || std::fs::read_to_string(&recording).is_ok_and(|text| text.lines().count() > 25));
     cli_kit::trial::signal(&run, "-INT");
-    let begin = Instant::now();
-    while run.try_wait().unwrap().is_none() {
-        assert!(begin.elapsed() < Duration::from_secs(20), "it does not end");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    assert_eq!(run.wait().unwrap().code(), Some(5));
+    wait(&mut || run.try_wait().unwrap().is_some());
     drop(reader);
+    let ended = run.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(5));
+    let result: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(result["outcome"], "stopped", "{result}");
     let status = sim.jtc(&["--json", "status"]).ends(0).json();
     assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()), "{status}");
 }

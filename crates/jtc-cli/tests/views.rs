@@ -26,8 +26,8 @@ fn moving(sim: &Sim) {
     let text: String = (0..=300).map(row).collect();
     std::fs::write(&file, format!("t,q1,q2,q3,q4,q5,q6\n{text}")).unwrap();
     let mut run = at(sim, &["--json", "traj", "run", &file]);
-    let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    let mut lines = BufReader::new(run.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let mut run = run.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line.contains("\"sample\"")), "it does not move");
     run.kill().unwrap();
     run.wait().unwrap();

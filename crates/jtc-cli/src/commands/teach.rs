@@ -23,7 +23,7 @@ use taught_file::TaughtFile;
 /// Does one of the family.
 pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
-        // Also where the file cannot be opened.
+        // Notes about a file that cannot be opened are events, too.
         out.stream()?;
     }
     match command {

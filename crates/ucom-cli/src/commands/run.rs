@@ -71,7 +71,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let result = want_texts(&mut driver, args, &boards)
         .and_then(|()| supervise(&mut driver, args, &prepared, &mut followed, &stdout, out));
     followed.ask_no_more(&mut driver.master);
-    let running = halt(&mut driver, &boards);
+    let running = halt(&mut driver, &boards, result.as_ref().err());
     let list = || running.iter().map(u8::to_string).collect::<Vec<_>>();
     let stopped = match running.is_empty() {
         true => json!({ "event": "stopped" }),
@@ -193,13 +193,17 @@ fn supervise(
 
 /// Control loops and applications end: all loops at once, then each board in turn. Returns those whose end is not certain;
 /// why is said.
-fn halt(driver: &mut Driver, boards: &[u8]) -> Vec<u8> {
+fn halt(driver: &mut Driver, boards: &[u8], why: Option<&Failure>) -> Vec<u8> {
     driver.stop_at_once(Some(boards));
+    // A bus that is gone is gone for all boards, and is the reason that is printed last.
+    let mut printed: BTreeSet<String> = why.map(|failure| failure.message.clone()).into_iter().collect();
     let mut running = BTreeSet::new();
     for level in [StopLevel::Loop, StopLevel::Application] {
         for board in boards.iter().rev() {
             if let Err(e) = driver.stop_board(*board, level) {
-                driver.note(format!("board {board}: {}", e.message));
+                if printed.insert(e.message.clone()) {
+                    driver.note(format!("board {board}: {}", e.message));
+                }
                 running.insert(*board);
             } else if level == StopLevel::Application {
                 running.remove(board);

@@ -45,7 +45,7 @@ fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
     arm.joints[1].torque_max = 1.0;
     let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
     let error = CheckedTrajectory::check(&motion(0.5), &arm, &[0.0; 6], &options).unwrap_err();
-    assert!(error.to_string().contains("joint 2: torque over its limit"), "{error}");
+    assert!(error.to_string().contains("torque over its limit: joint 2"), "{error}");
 }
 
 /// J-34: the first point is within 0.02 rad of where the arm stands.
@@ -81,11 +81,11 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     let bend = plan::joint_move(&[0.0; 6], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], &weak.config(), 20.0).unwrap();
     assert!(check(&weightless, &bend, true).is_ok());
     let error = check(&weak, &bend, true).unwrap_err().to_string();
-    assert!(error.contains("joint 2: torque over its limit"), "{error}");
+    assert!(error.contains("torque over its limit: joint 2"), "{error}");
     // A limit of the arm's own, where it is tighter.
     arm.joints[0].velocity_max = 0.1;
     let error = check(&arm, &motion(0.5), true).unwrap_err().to_string();
-    assert!(error.contains("joint 1: velocity over its limit") && error.contains("(limit 0.1)"), "{error}");
+    assert!(error.contains("velocity over its limit: joint 1") && error.contains("(limit 0.1)"), "{error}");
 }
 
 #[test]

@@ -243,6 +243,19 @@ mod tests {
         assert_eq!(DateForm::Fat.encode(2107, 12, 31), Some(0xFF9F));
         assert_eq!(DateForm::Days2000.decode(0xFFFF), None);
         assert_eq!(DateForm::Raw.encode(2009, 6, 1), None);
+        assert_eq!(DateForm::Fat.decode(0x3AC1), Some((2009, 6, 1)));
+        assert_eq!(DateForm::Days2000.decode(9497), Some((2026, 1, 1)));
+        assert_eq!(DateForm::Bcd.decode(0x2611), Some((2026, 11, 1)));
+    }
+
+    #[test]
+    fn d45_days_beyond_a_form_are_none() {
+        for form in [DateForm::Fat, DateForm::Days2000, DateForm::Bcd] {
+            assert_eq!((form.encode(2026, 1, 0), form.encode(2026, 13, 1)), (None, None), "{form}");
+        }
+        assert_eq!((DateForm::Fat.encode(1979, 12, 31), DateForm::Fat.encode(2108, 1, 1)), (None, None));
+        assert_eq!((DateForm::Bcd.encode(1999, 12, 31), DateForm::Bcd.encode(2100, 1, 1)), (None, None));
+        assert_eq!(DateForm::Days2000.encode(1999, 12, 31), None);
     }
 
     proptest! {
@@ -253,6 +266,16 @@ mod tests {
                     prop_assert_eq!(form.encode(year, month, day), Some(date));
                 }
             }
+        }
+
+        #[test]
+        fn d45_days_round_trip(year in 2000..2100u16, month in 1..=12u8, day in 1..=28u8) {
+            for form in [DateForm::Fat, DateForm::Days2000] {
+                prop_assert_eq!(form.encode(year, month, day).and_then(|date| form.decode(date)), Some((year, month, day)));
+            }
+            // This form has no day.
+            let date = DateForm::Bcd.encode(year, month, day);
+            prop_assert_eq!(date.and_then(|date| DateForm::Bcd.decode(date)), Some((year, month, 1)));
         }
 
         /// Pieces of any size give the same number as the whole.

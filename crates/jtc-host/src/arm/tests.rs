@@ -28,6 +28,15 @@ fn the_delivered_arm_is_the_controller_s_default() {
 }
 
 #[test]
+fn a_file_of_another_kind_is_called_no_arm_file() {
+    for (text, begin) in [("\nt,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n", "t,q1,q2,q3,q4,q5,q6"), ("", "")] {
+        let message = Arm::parse(text).unwrap_err().to_string();
+        assert!(message.contains("no arm file") && message.contains(&format!("\"{begin}\"")), "{message}");
+    }
+    assert!(!Arm::parse("name = ").unwrap_err().to_string().contains("no arm file"));
+}
+
+#[test]
 fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
     let whole = Arm::avena();
     assert!(AVENA_TOML.contains("\nformat = 2\n") && whole.to_toml().starts_with("format = 2\n"));

@@ -5,7 +5,7 @@ use jtc_dynamics::{ArmModel, Link, Origin};
 use serde::{Deserialize, Serialize};
 
 use super::{Arm, Warning};
-use crate::file::{FileError, Place};
+use crate::file::{FileError, Place, short};
 
 /// Format of the arm files that are read. Files without it are older and mean the same.
 pub(super) const FORMAT: i64 = 2;
@@ -86,6 +86,11 @@ impl Arm {
             let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());
             FileError::at(Place { line, ..Place::default() }, e.message().to_owned())
         };
+        let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+        if !text.lines().any(|line| line.contains('=') || line.starts_with('[')) {
+            let problem = format!("neither TOML nor URDF: no arm file (it begins with \"{}\")", short(first));
+            return Err(FileError::form(problem));
+        }
         // Before the keys, which another format may have others of.
         if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
             && format.as_integer() != Some(FORMAT)

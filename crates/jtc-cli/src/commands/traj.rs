@@ -124,8 +124,8 @@ impl Job {
         Ok(Self { loaded, trajectory, arm, config, words, speed: args.speed })
     }
 
-    /// What helps after a verdict, with the names that the person typed.
-    fn hint(&self, verdict: &Verdict) -> String {
+    /// What helps after a verdict, with the names that the person typed and the [passing speed](Self::passing_speed).
+    fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> String {
         if verdict.suspicion() == Suspicion::Degrees && self.passes_as_degrees() {
             let words = &self.words;
             let columns = match self.loaded.form {
@@ -136,7 +136,7 @@ impl Job {
                 "the positions look like degrees, and as such they pass: `jtc traj check {words} --deg`{columns}"
             );
         }
-        verdict.hint_with(&self.words, self.speed, self.passing_speed(verdict))
+        verdict.hint_with(&self.words, self.speed, passing_speed)
     }
 
     /// The file's numbers are degrees, and nothing else is wrong with them.
@@ -174,11 +174,12 @@ impl Job {
 
     /// Prints a verdict that refuses, and ends with exit code 4.
     pub fn refuse(&self, verdict: &Verdict, out: &Output) -> Failure {
-        let hint = self.hint(verdict);
+        let passing_speed = self.passing_speed(verdict);
+        let hint = self.hint(verdict, passing_speed);
         let value = json!({
             "outcome": "refused",
             "suspicion": verdict.suspicion(),
-            "passing_speed_percent": self.passing_speed(verdict),
+            "passing_speed_percent": passing_speed,
             "verdict": verdict,
             "error": { "code": "check", "message": verdict.to_string(), "hint": hint, "exit": REFUSED },
         });
@@ -252,6 +253,8 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
         ));
     }
     let verdict = job.verdict(&job.trajectory, None, UploadOptions::default());
+    let passing_speed = job.passing_speed(&verdict);
+    let hint = job.hint(&verdict, passing_speed);
     let value = json!({
         "ok": verdict.is_ok(),
         "form": job.loaded.form,
@@ -259,13 +262,13 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
         "overshoot": job.loaded.overshoot,
         "left_out": job.left_out(),
         "suspicion": verdict.suspicion(),
-        "passing_speed_percent": job.passing_speed(&verdict),
-        "hint": job.hint(&verdict),
+        "passing_speed_percent": passing_speed,
+        "hint": hint,
         "verdict": verdict,
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
-        format!("{verdict}\n{}{without}next: {}", figures(&verdict), job.hint(&verdict).replace('`', ""))
+        format!("{verdict}\n{}{without}next: {}", figures(&verdict), hint.replace('`', ""))
     });
     if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(REFUSED)) }
 }

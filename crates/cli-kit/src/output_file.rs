@@ -1,7 +1,7 @@
 //! Files that a command writes: opened before anything is sent or moved, never written over unless that was asked for.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -46,14 +46,14 @@ pub struct OutputFile {
 
 impl OutputFile {
     /// Opens `path` for writing. A file that is there is refused without `force`, and one of `others` (what the command reads, and
-    /// its other outputs) always.
+    /// its other outputs) always. To say that nothing was sent is left to commands that send.
     pub fn open(path: &Path, force: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             let message =
                 format!("{} is {}, which this command uses itself", path.display(), other.display());
             return Err(refused("same-file", message, "name another file; --force does not cover this"));
         }
-        let io = |e| io(format!("{}: {e}; nothing was sent", path.display()));
+        let io = |e| io(format!("{}: {e}", path.display()));
         match OpenOptions::new().write(true).create_new(true).open(path) {
             Ok(file) => {
                 UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
@@ -64,7 +64,7 @@ impl OutputFile {
         }
         // A pipe or a device holds nothing that could be lost.
         if !force && path.is_file() {
-            let message = format!("{} is there already; nothing was sent", path.display());
+            let message = format!("{} is there already", path.display());
             return Err(refused("exists", message, "name another file; --force writes over it"));
         }
         let file = OpenOptions::new().write(true).open(path).map_err(io)?;
@@ -92,15 +92,27 @@ impl OutputFile {
     pub fn begin(&mut self) -> Result<File, OutputError> {
         self.written = true;
         settled(&self.path);
-        let emptied =
-            self.file.metadata().and_then(|m| if m.is_file() { self.file.set_len(0) } else { Ok(()) });
-        emptied.and_then(|()| self.file.try_clone()).map_err(|e| self.failure(&e))
+        self.emptied().map_err(|e| self.failure(&e))
+    }
+
+    fn emptied(&self) -> std::io::Result<File> {
+        let mut file = self.file.try_clone()?;
+        if file.metadata()?.is_file() {
+            file.set_len(0)?;
+            file.rewind()?;
+        }
+        Ok(file)
     }
 
     /// What is at its path now was put there by other means, as by renaming a file that is whole.
     pub fn is_written(mut self) {
         self.written = true;
         settled(&self.path);
+    }
+
+    /// What was written is of no use to anyone: dropped like this, the output leaves no trace if it was not there before.
+    pub fn is_worthless(&mut self) {
+        self.written = false;
     }
 
     /// Why writing failed.
@@ -161,6 +173,9 @@ mod tests {
         std::fs::write(&old, "precious").unwrap();
         std::fs::write(&input, "read").unwrap();
         let code = |result: Result<OutputFile, OutputError>| result.err().map(|f| (f.exit, f.code));
+        // Commands without a port or bus send nothing whatever happens.
+        let there = OutputFile::open(&old, false, &[]).err().unwrap();
+        assert!(there.message.ends_with("is there already"), "{}", there.message);
         assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists")));
         assert_eq!(code(OutputFile::open(&input, true, &[&input])), Some((4, "same-file")));
         let around = dir.path().join(".").join("input");

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use cli_kit::output_file::OutputError;
 use jtc_host::port::PortError;
 use jtc_host::recording::RecordingError;
 
@@ -51,14 +52,16 @@ impl Failure {
     }
 
     /// Of a command that has a port: it was not used.
-    pub fn nothing_sent(self) -> Self {
-        Self { message: format!("{}; nothing was sent", self.message), ..self }
+    pub fn nothing_sent(failure: impl Into<Self>) -> Self {
+        let failure = failure.into();
+        Self { message: format!("{}; nothing was sent", failure.message), ..failure }
     }
 
     /// What was measured cannot be written, after it was measured: what the command was run for is lost.
-    pub fn output_lost(self) -> Self {
-        let message = format!("{}; what was recorded is lost", self.message);
-        Self { exit: FAULT, code: "output-lost".into(), message, ..self }
+    pub fn output_lost(failure: impl Into<Self>) -> Self {
+        let failure = failure.into();
+        let message = format!("{}; what was recorded is lost", failure.message);
+        Self { exit: FAULT, code: "output-lost".into(), message, ..failure }
             .hint("make room or name another place, and run again")
     }
 
@@ -96,6 +99,12 @@ impl From<jtc_host::file::FileError> for Failure {
 impl From<RecordingError> for Failure {
     fn from(e: RecordingError) -> Self {
         Self { code: "recording".into(), ..Self::usage(e) }
+    }
+}
+
+impl From<OutputError> for Failure {
+    fn from(e: OutputError) -> Self {
+        Self { exit: e.exit, code: e.code.into(), hint: e.hint.into(), ..Self::usage(e.message) }
     }
 }
 

@@ -9,10 +9,10 @@ mod keys;
 mod limits;
 mod link;
 mod operator;
-mod output_file;
 mod progress;
 #[cfg(unix)]
 mod serve;
+mod tape;
 
 use std::process::ExitCode;
 

@@ -11,8 +11,8 @@ use jtc_wire::Status;
 
 use crate::failure::{FAULT, Failure};
 use crate::keys::{HELP, NO_SPEED, Wish, wish};
-use crate::output_file;
 use crate::progress::Progress;
+use cli_kit::output_file;
 
 /// Trajectory execution states, as on the wire.
 const PAUSE: u8 = 2;

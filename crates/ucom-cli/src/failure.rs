@@ -38,6 +38,12 @@ impl Failure {
         Self { hint: hint.to_string(), ..self }
     }
 
+    /// Of a command that has a bus: it was not used.
+    pub fn nothing_sent(failure: impl Into<Self>) -> Self {
+        let failure = failure.into();
+        Self { message: format!("{}; nothing was sent", failure.message), ..failure }
+    }
+
     /// A verdict that was printed as the command's result.
     pub fn printed(exit: u8) -> Self {
         Self { printed: true, ..Self::new(exit, "", "") }

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use crate::args::{ArmCommand, ImportArgs};
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use cli_kit::OutputFile;
 
 /// Does one of the family.
 pub fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
@@ -20,7 +20,7 @@ fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     let arm = Arm::import(&args.urdf, &choice)?;
     let file = OutputFile::open(&args.out, args.force.force, &[&args.urdf])?;
     let name = file.name();
-    file.write(&arm.to_toml())?;
+    file.write(arm.to_toml())?;
     let missing: Vec<&str> = arm.parameter_set().missing();
     let value = json!({
         "file": name, "arm": arm.name, "joints": arm.joint_names, "warnings": arm.warnings, "missing": missing,

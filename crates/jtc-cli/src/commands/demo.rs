@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use cli_kit::Output;
+use cli_kit::{Output, OutputFile};
 use jtc_host::arm::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::SimPort;
@@ -19,8 +19,8 @@ use serde_json::json;
 use super::run_report;
 use crate::args::{DemoArgs, SimSpeed};
 use crate::failure::{FAULT, Failure};
-use crate::output_file::{OutputFile, Tape};
 use crate::progress::Progress;
+use crate::tape::Tape;
 
 /// Seed of the demo: anyone's demo gives the same figures.
 const SEED: u64 = 1;
@@ -55,7 +55,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let info = run_report::info(&Arm::avena(), "simulator", "Six joints, ten seconds", 0);
     let mut tapes = Vec::new();
     for file in [&mut mcap, &mut csv] {
-        tapes.push(file.record(&info, "the demo goes on", out)?);
+        tapes.push(Tape::begin(file, &info, "the demo goes on", out)?);
     }
     let run = execute(args.speed, info, tapes.iter().map(Tape::sink).collect(), &progress, out)?;
     let facts = [
@@ -73,8 +73,8 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let ending = Ending { outcome: "finished".into(), ..Ending::default() };
     tapes.into_iter().try_for_each(|tape| tape.finish(&ending))?;
     let input = ReportInput { info: &run.info, samples: &run.samples, facts: &facts, failure: None };
-    page.write(&report::html(&input)).map_err(Failure::output_lost)?;
-    picture.write(&report::picture_svg(&input)).map_err(Failure::output_lost)?;
+    page.write(report::html(&input)).map_err(Failure::output_lost)?;
+    picture.write(report::picture_svg(&input)).map_err(Failure::output_lost)?;
     let files: Vec<String> = NAMES.iter().map(|n| file(n).display().to_string()).collect();
     let value = json!({
         "outcome": "finished",

@@ -11,7 +11,7 @@ use serde_json::json;
 use super::run_report;
 use crate::args::ReportArgs;
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use cli_kit::OutputFile;
 
 /// Writes the page and says the figures.
 pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
@@ -37,8 +37,8 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let failure = RunFailure::of_recording(&info, &recording.samples, &recording.ending);
     let input =
         ReportInput { info: &info, samples: &recording.samples, facts: &[], failure: failure.as_ref() };
-    page_file.write(&html(&input))?;
-    picture_file.write(&picture_svg(&input))?;
+    page_file.write(html(&input))?;
+    picture_file.write(picture_svg(&input))?;
     let summary = Summary::of(&info, &recording.samples);
     let value = json!({
         "recorded_s": summary.recorded_s,

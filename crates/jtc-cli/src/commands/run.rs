@@ -5,7 +5,7 @@ mod approach;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use cli_kit::Output;
+use cli_kit::{Output, OutputFile};
 use jtc_host::check::ProblemKind;
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
@@ -22,8 +22,8 @@ use crate::args::RunArgs;
 use crate::failure::{FAULT, Failure};
 use crate::limits;
 use crate::operator::Operator;
-use crate::output_file::{OutputFile, Tape};
 use crate::progress::Progress;
+use crate::tape::Tape;
 
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(15);
@@ -342,7 +342,7 @@ impl Outputs {
 
     /// Begins the recording, from its start where it was begun before.
     fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
-        self.record.as_mut().map(|file| file.record(info, "the motion goes on", out)).transpose()
+        self.record.as_mut().map(|file| Tape::begin(file, info, "the motion goes on", out)).transpose()
     }
 
     /// Completes all of them; one that is lost does not cost the other. Returns the names of those that are whole.
@@ -350,7 +350,7 @@ impl Outputs {
         let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
         let report = self
             .report
-            .map(|file| (file.name(), file.write(&report::html(input)).map_err(Failure::output_lost)));
+            .map(|file| (file.name(), file.write(report::html(input)).map_err(Failure::output_lost)));
         let (mut files, mut lost) = (Vec::new(), Vec::new());
         for (name, done) in record.into_iter().chain(report) {
             match done {

@@ -24,8 +24,9 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use serde_json::json;
 
     use super::run_report;
-    use crate::output_file::{OutputFile, Tape};
     use crate::serve::{Pty, Server, Typed};
+    use crate::tape::Tape;
+    use cli_kit::OutputFile;
     use cli_kit::Stop;
 
     if let Some(path) = &args.record {
@@ -67,7 +68,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     };
     let tap = args.bus.as_deref().map(bus).transpose()?;
     let info = run_report::info(&arm, "simulator", "", 0);
-    let begin = |mut file: OutputFile| file.record(&info, "the simulation goes on", out);
+    let begin = |mut file: OutputFile| Tape::begin(&mut file, &info, "the simulation goes on", out);
     let tape = file.map(begin).transpose()?;
     let time_s = Server::new(world, pty, tap, Typed::listen())
         .recorded(tape.as_ref().map(Tape::sink))

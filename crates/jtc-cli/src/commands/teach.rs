@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cli_kit::{Output, Stop};
+use cli_kit::{Output, OutputFile, Stop};
 use jtc_host::trajectory::Loaded;
 use jtc_host::words;
 use jtc_wire::Status;
@@ -16,7 +16,6 @@ use super::traj::typed;
 use crate::args::{LinkArgs, TeachCommand};
 use crate::failure::{FAULT, Failure};
 use crate::operator::ended_at_once;
-use crate::output_file::OutputFile;
 use crate::progress::Progress;
 use taught_file::TaughtFile;
 

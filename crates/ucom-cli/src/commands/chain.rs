@@ -86,7 +86,7 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let expected =
         compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
     // It can be written: that is found out before the chain is numbered anew.
-    let file = OutputFile::open(&args.inventory, true, &[])?;
+    let file = OutputFile::open(&args.inventory, true, &[]).map_err(Failure::nothing_sent)?;
     let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
     let options = InitOptions { expected, force: args.force.force };

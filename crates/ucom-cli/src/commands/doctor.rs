@@ -10,6 +10,7 @@ use ucom::master::doctor::{Controller, Finding, Observation, Severity, findings}
 use ucom::master::probe::ProbeOptions;
 use ucom::master::{Event, Outcome, Request};
 
+use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
@@ -96,7 +97,7 @@ fn line(f: &Finding) -> String {
 
 /// Measures and writes a profile.
 pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let output = args.out.as_deref().map(|file| OutputFile::open(file, args.force.force, &[])).transpose()?;
+    let output = args.out.as_deref().map(|file| open_output(file, args.force.force)).transpose()?;
     let image = match &args.image {
         Some(path) => {
             Some(Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?.bytes().to_vec())

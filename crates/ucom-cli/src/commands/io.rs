@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use cli_kit::{Output, OutputFile, table};
+use cli_kit::{Output, table};
 use serde_json::{Value, json};
 use ucom::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
 use ucom::master::io::{IoDescription, Kind};
@@ -10,7 +10,7 @@ use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel, cou
 
 use super::followed::Followed;
 use super::outputs::{named, units};
-use super::params::{arrived, become_master, deliver, file_or_stdout};
+use super::params::{arrived, become_master, deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 use crate::cache::{Known, of_several};
 use crate::driver::{Driver, nothing_shared, unexpected};
@@ -255,7 +255,7 @@ fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output
 
 /// Writes a DBC file with the boards' names.
 pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let file = args.out.as_deref().map(|file| OutputFile::open(file, args.force.force, &[])).transpose()?;
+    let file = args.out.as_deref().map(|file| open_output(file, args.force.force)).transpose()?;
     let (profile, edges) = (link.profile()?, link.edges()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {

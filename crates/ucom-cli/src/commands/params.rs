@@ -110,12 +110,17 @@ pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), Failure> {
     }
 }
 
-/// The file to write, opened before anything is sent and not written over unless that was asked for; `-`, and so `None`, is
+/// The file to write, opened before anything is sent and not written over unless that was asked for.
+pub fn open_output(file: &Path, force: bool) -> Result<OutputFile, Failure> {
+    OutputFile::open(file, force, &[]).map_err(Failure::nothing_sent)
+}
+
+/// [`open_output`], but `-`, and so `None`, is
 /// stdout.
 pub fn file_or_stdout(file: &Path, force: bool) -> Result<Option<OutputFile>, Failure> {
     match file.as_os_str() == "-" {
         true => Ok(None),
-        false => Ok(Some(OutputFile::open(file, force, &[])?)),
+        false => open_output(file, force).map(Some),
     }
 }
 

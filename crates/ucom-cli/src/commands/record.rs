@@ -11,6 +11,7 @@ use ucom::files::recording::{
 };
 use ucom::master::{Master, counted};
 
+use super::params::open_output;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::driver::shared_numbers;
 use crate::failure::{FAULT, Failure};
@@ -77,7 +78,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
     let files = [Some(args.file.clone()), beside].into_iter().flatten().filter(|_| !stdout);
     let files: Vec<OutputFile> =
-        files.map(|file| OutputFile::open(&file, args.force.force, &[])).collect::<Result<_, _>>()?;
+        files.map(|file| open_output(&file, args.force.force)).collect::<Result<_, _>>()?;
     let mut bus = link.open()?;
     let mut sink = if stdout {
         Sink::Stdout(CandumpWriter::new(std::io::stdout()))

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Write;
 
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use cli_kit::OutputFile;
 
 /// Movement below this is standing still, rad.
 const STILL: f64 = 0.002;
@@ -81,7 +81,7 @@ impl TaughtFile {
         let fresh = match &self.file {
             Some(_) => before,
             None if self.in_motion() >= LEAST => {
-                self.file = self.output.take().map(OutputFile::pieces).transpose()?;
+                self.file = self.output.take().map(|mut output| output.begin()).transpose()?;
                 0
             }
             None => return Ok(()),

@@ -137,7 +137,6 @@ impl PathClock {
         let wanted = ramp.next(now, distance);
         let (low, high) = (-bounds.easy.1, -bounds.easy.0);
         let eased = if low <= high { wanted.min(high).max(low.min(wanted)) } else { 0.0 };
-        let eased = if now < 0.0 { eased } else { eased.max(0.0) };
 
         // What it takes to be in time, rounded at the end.
         let left_s = 0.001 * (PUNCTUAL * stop_ms - self.halting_ms);
@@ -277,6 +276,48 @@ mod tests {
             }
             assert!(ms < 479, "{clock:?}");
         }
+    }
+
+    /// One tick of a stop along ramps of 200 ms, whose slope changes by at most 0.1125 1/s in a tick, or eight times that in a hurry.
+    #[test]
+    fn j33_each_tick_of_a_stop() {
+        let (rounded, hurried) = (4.5 / 0.04 * DT, 8.0 * (4.5 / 0.04 * DT));
+        let on_time = 0.001 * (PUNCTUAL * 500.0);
+        for (rate, slope, easy, full, expected) in [
+            (1.0, 0.0, FREE, FREE, -rounded),
+            // Margins that leave one slope only, and more than is wanted; that contradict each other; that leave nothing.
+            (1.0, 0.0, (-1.0, -1.0), FREE, -rounded),
+            (1.0, 0.0, (1.0, -1.0), FREE, -hurried),
+            (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
+            // Within its margins, and just in time: that is no hurry.
+            (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
+            // At full speed it does not get any faster, whatever the arm does.
+            (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
+            // The last step: it stands, and does not slow down any more.
+            (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),
+            // What is left is nothing, although the limits leave no slope for it.
+            (1e-10, -5.0, (0.0, 0.0), (0.0, 0.0), 0.0),
+        ] {
+            let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
+            clock.halt();
+            clock.slow_down(200.0, 500.0, &SlopeBounds { easy, full });
+            let what = (rate, slope, easy, full, clock);
+            assert!((clock.slope - expected).abs() < 1e-12, "{what:?}");
+            assert!((clock.rate - (rate + expected * DT)).abs() < 2e-4, "{what:?}");
+            assert_eq!(clock.standing(), rate < 0.001, "{what:?}");
+            assert_eq!(clock.hurried, matches!(easy, (1.0, -1.0) | (0.0, 0.0) | (2.0, 5.0)), "{what:?}");
+        }
+    }
+
+    /// Ramps are shortened to what a stop leaves them.
+    #[test]
+    fn j33_a_stop_sooner_than_the_ramp_shortens_the_ramp() {
+        let mut clock = PathClock::start();
+        clock.halt();
+        let free = SlopeBounds { easy: FREE, full: FREE };
+        clock.slow_down(1_000.0, 500.0, &free);
+        // An S of 400 ms.
+        assert!((clock.slope + 4.5 / 0.16 * DT).abs() < 1e-12, "{clock:?}");
     }
 
     #[test]

@@ -124,3 +124,33 @@ impl SpeedRange {
         [self.low, self.high].map(|(steps, point)| (f64::from(steps) * VELOCITY_STEP, point))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Or what rounding does would let something pass that the exact check refuses.
+    #[test]
+    fn j36_the_screen_keeps_a_distance_to_each_limit_that_is_more_than_its_rounding() {
+        for (speed, friction) in
+            [(1.5, (-9.0, 9.0)), (3.0, (-0.7, 9.0)), (3.0, (-9.0, 0.7)), (0.01, (-9.0, 9.0))]
+        {
+            for step in [0.001, 0.01, 0.1] {
+                let bounds = JointBounds { position: (-3.0, 2.0), speed, acceleration: 8.0, friction };
+                let screen = Screen::new(&[bounds; JOINTS], step);
+                let slowest = if speed > 1.5 { 0.7 } else { speed };
+                // Eight roundings, and a tenth of a step for what they do to positions.
+                let share = 1.0 - 8.0 * f64::from(f32::EPSILON);
+                let [low, high] = [screen.position_low[0], screen.position_high[0]].map(f64::from);
+                assert!(low >= -3.0 / POSITION_STEP + 0.09 && high <= 2.0 / POSITION_STEP - 0.09);
+                let way = f64::from(screen.speed[5]) * POSITION_STEP;
+                assert!(way <= slowest * step * share - 0.09 * POSITION_STEP, "{speed} {friction:?} {step}");
+                // But it is no other limit.
+                assert!(
+                    way >= slowest * step * 0.999_99 - 0.2 * POSITION_STEP,
+                    "{speed} {friction:?} {step}"
+                );
+            }
+        }
+    }
+}

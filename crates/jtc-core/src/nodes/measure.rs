@@ -202,7 +202,7 @@ mod tests {
 
     use super::*;
 
-    const VELOCITY_MAX: f64 = 1.5;
+    const VELOCITY_MAX: f64 = 2.0;
 
     fn tick(answer: Option<f64>, velocity: f64) -> Tick {
         let answer = answer.map(|position| Reading { position, velocity });
@@ -250,7 +250,7 @@ mod tests {
     fn j35_the_reach_grows_with_the_time_since_the_last_usable_answer() {
         for silent in 0..4 {
             let reach = 3.0 * VELOCITY_MAX * f64::from(silent + 1) * DT;
-            for (distance, usable) in [(0.99 * reach, true), (1.01 * reach, false), (-1.01 * reach, false)] {
+            for (distance, usable) in [(reach, true), (1.01 * reach, false), (-1.01 * reach, false)] {
                 let mut joint = moving(0.0);
                 for _ in 0..silent {
                     joint.step(&tick(None, 0.0), &Config::avena());
@@ -295,6 +295,72 @@ mod tests {
             (0.01 - after_100_ms.position).abs() < 0.2 * 0.01
                 && (0.5 - after_100_ms.velocity).abs() < 0.2 * 0.5
         );
+    }
+
+    #[test]
+    fn j63_a_long_tick_is_predicted_for_its_length() {
+        let mut joint = moving(0.4);
+        joint.step(&Tick { elapsed_ms: 3, ..tick(None, 0.4) }, &Config::avena());
+        assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < 1e-12);
+    }
+
+    /// A joint at `rate` that reports another velocity, until an answer comes `off` the way and the next is missing: how much is
+    /// carried on.
+    fn carried_after(rate: f64, reported: f64, off: f64) -> f64 {
+        let mut joint = Measurement::default();
+        let answer = |k: f64, off: f64| Tick {
+            answer: Some(Reading { position: rate * k * DT + off, velocity: reported }),
+            ..tick(None, 0.0)
+        };
+        for k in -20..0 {
+            assert!(joint.step(&answer(f64::from(k), 0.0), &Config::avena()));
+        }
+        assert!(joint.step(&answer(0.0, off), &Config::avena()));
+        let before = joint.used().position;
+        joint.step(&tick(None, 0.0), &Config::avena());
+        (joint.used().position - before) / DT
+    }
+
+    #[test]
+    fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
+        let unexpected = 0.1 * 3.0 * VELOCITY_MAX * DT;
+        for (rate, reported, off, carried) in [
+            (0.4, 0.5, 0.0, 0.4),
+            (0.4, 0.3, 0.0, 0.4),
+            // What was a way of 5 ms is now longer by a tenth of what no joint does in one.
+            (0.0, 0.0, unexpected, unexpected / (5.0 * DT)),
+            (0.0, 0.0, 1.01 * unexpected, 0.0),
+            (0.0, 0.1, -1.01 * unexpected, 0.1),
+        ] {
+            let found = carried_after(rate, reported, off);
+            assert!((found - carried).abs() < 1e-9, "{rate} {reported} {off}: {found}");
+        }
+    }
+
+    /// The velocity that is predicted follows the commands; what it differs by from the answer is what fades.
+    #[test]
+    fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
+        let mut joint = moving(0.4);
+        joint.step(&Tick { commanded: 0.1, ..tick(None, 0.0) }, &Config::avena());
+        let predicted = joint.used();
+        let back = Reading { position: predicted.position + 0.1 * DT, velocity: 0.1 };
+        joint.step(&Tick { answer: Some(back), commanded: 0.1, ..tick(None, 0.0) }, &Config::avena());
+        assert!((joint.used().velocity - 0.1).abs() < 1e-9, "{:?}", joint.used());
+    }
+
+    /// An answer that is missing, or unusable, leaves a difference that fades; one that nobody asked for is not missing.
+    #[test]
+    fn j63_only_what_was_expected_or_came_can_be_missing() {
+        for (lost, jumps) in [
+            (Tick { expected: true, ..tick(None, 0.0) }, false),
+            (Tick { expected: false, ..tick(Some(0.5), 0.0) }, false),
+            (Tick { expected: false, ..tick(None, 0.0) }, true),
+        ] {
+            let mut joint = moving(0.0);
+            assert!(!joint.step(&lost, &Config::avena()));
+            assert!(joint.step(&tick(Some(0.003), 0.0), &Config::avena()));
+            assert_eq!(joint.used().position > 0.002, jumps, "{lost:?}: {:?}", joint.used());
+        }
     }
 
     #[test]

@@ -76,6 +76,18 @@ impl Nodes {
         }
     }
 
+    /// Every joint enabled, at these positions (rad) and velocities (rad/s).
+    #[cfg(test)]
+    pub fn enabled_at(position: [f64; JOINTS], velocity: [f64; JOINTS]) -> Self {
+        let mut nodes = Self::new(&Config::avena());
+        for node in &mut nodes.nodes {
+            *node = Node { seen: true, configured: true, valid: true, ..Node::default() };
+            node.report.fsm = fsm::ENABLED;
+        }
+        (nodes.position, nodes.velocity) = (position, velocity);
+        nodes
+    }
+
     /// Nodes that are there: the gripper can be configured as absent.
     fn present(&self) -> usize {
         if self.gripper { NODES } else { JOINTS }

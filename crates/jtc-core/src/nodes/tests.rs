@@ -1,5 +1,5 @@
 //! What one tick makes of a node, state by state (J-14, J-16, J-20, J-21, J-23).
-use jtc_bus::{Frame, GripperReport, Target};
+use jtc_bus::{Frame, GripperReport, Request, Target};
 use jtc_wire::UrgentCommands;
 
 use super::*;
@@ -11,8 +11,9 @@ const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
 const START_TO_INIT: u8 = 10;
 const INIT_TO_READY: u8 = 11;
 
-fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {
-    let inputs = Inputs {
+/// What a tick finds on the bus, and nothing else.
+fn inputs(bus: &[Frame], bus_state: BusState) -> Inputs<'_> {
+    Inputs {
         bus,
         bus_state,
         safety_input: true,
@@ -20,8 +21,11 @@ fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {
         urgent: [UrgentCommands::NONE; HOST_LINES],
         host: &[],
         status_free: true,
-    };
-    nodes.take(&inputs, &Config::avena(), Goal::Ready, &[0.0; JOINTS]);
+    }
+}
+
+fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {
+    nodes.take(&inputs(bus, bus_state), &Config::avena(), Goal::Ready, &[0.0; JOINTS]);
 }
 
 /// Every node configured and ready, and a Move just sent.
@@ -109,20 +113,27 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
 #[test]
 fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known() {
     let lost = BusState { acknowledged: false, bus_off: false };
-    for (unacknowledged, sent_move, valid, missed) in [
-        (0, true, true, 1),
-        (3, true, true, 1),
+    for (unacknowledged, sent_move, valid, before, missed) in [
+        (0, true, true, 0, 1),
+        (3, true, true, 0, 1),
         // Given up in this tick: the transmit timeout stands for all of them.
-        (4, true, true, 0),
-        (2, false, true, 0),
-        (2, true, false, 0),
+        (4, true, true, 0, 0),
+        (4, true, true, 3, 0),
+        (2, false, true, 3, 3),
+        (2, true, false, 0, 0),
     ] {
         let mut nodes = ready();
         (nodes.unacknowledged, nodes.sent_move, nodes.nodes[1].valid) = (unacknowledged, sent_move, valid);
+        nodes.nodes[1].missed = before;
         tick(&mut nodes, &[], lost);
         let node = nodes.node(1);
-        assert_eq!((node.missed, node.silent), (missed, 0), "{unacknowledged} {sent_move} {valid}");
+        assert_eq!((node.missed, node.silent), (missed, 0), "{unacknowledged} {sent_move} {valid} {before}");
     }
+    // A gripper has no position that could be wrong: what it misses is shown by its silence.
+    let mut nodes = ready();
+    (nodes.unacknowledged, nodes.nodes[GRIPPER].missed) = (1, 4);
+    tick(&mut nodes, &[], lost);
+    assert!(!nodes.node(GRIPPER).misbehaved);
 }
 
 #[test]
@@ -137,6 +148,14 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
         assert_eq!(nodes.node(2).misbehaved, ms == 5, "after {ms}");
         assert!(!nodes.node(2).fresh() && nodes.node(1).fresh() && nodes.node(2).silent == 0);
     }
+    // An answer without a Move before it is looked at as well.
+    let mut nodes_without = ready();
+    tick(&mut nodes_without, &all(fsm::READY), GOOD);
+    nodes_without.sent_move = false;
+    let mut bus = all(fsm::READY);
+    bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
+    tick(&mut nodes_without, &bus, GOOD);
+    assert_eq!((nodes_without.node(2).missed, nodes_without.node(1).missed), (1, 0));
     // Then it is taken as it is.
     let mut bus = all(fsm::READY);
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
@@ -203,27 +222,37 @@ fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
     let config = Config::avena();
     let mut nodes = ready();
     nodes.nodes[GRIPPER].report.fsm = fsm::ENABLED;
-    let inputs = |bus_state| Inputs {
-        bus: &[],
-        bus_state,
-        safety_input: true,
-        missed_ticks: 0,
-        urgent: [UrgentCommands::NONE; HOST_LINES],
-        host: &[],
-        status_free: true,
-    };
     for ms in 1..=6u8 {
         let answers = [0, 1, 3, 4, 5].map(|n| joint(n, fsm::READY));
         tick(&mut nodes, &answers, GOOD);
         let (flags, shown) = if ms < 5 { (0, 0) } else { (1 << (8 + 2), GRIPPER_FLAG) };
-        assert_eq!(nodes.can_flags(&inputs(GOOD), &config), flags, "after {ms}");
+        assert_eq!(nodes.can_flags(&inputs(&[], GOOD), &config), flags, "after {ms}");
         assert_eq!(nodes.gripper_flags(&config), shown, "after {ms}");
         assert_eq!(nodes.nodes[2].configured, ms < 5, "it may have lost its supply");
         assert!(nodes.nodes[GRIPPER].configured, "it is enabled: its state will tell");
     }
-    assert_eq!(nodes.can_flags(&inputs(BusState { bus_off: true, ..GOOD }), &config) & 1, 1);
+    assert_eq!(nodes.can_flags(&inputs(&[], BusState { bus_off: true, ..GOOD }), &config) & 1, 1);
     let absent = Nodes::new(&Config { gripper: false, ..Config::avena() });
     assert_eq!(absent.gripper_flags(&config), 0, "none is expected");
+}
+
+/// Any node may have lost its supply while it was silent, but the state of an enabled gripper will tell.
+#[test]
+fn j14_a_node_that_was_silent_has_lost_its_configuration_unless_it_is_an_enabled_gripper() {
+    for (n, state, kept) in [
+        (GRIPPER, fsm::ENABLED, true),
+        (GRIPPER, fsm::READY, false),
+        (2, fsm::ENABLED, false),
+        (2, fsm::READY, false),
+    ] {
+        let mut nodes = ready();
+        nodes.nodes[n].report.fsm = state;
+        nodes.nodes[n].silent = 4;
+        let answers = all(fsm::READY);
+        let others: [Frame; NODES - 1] = core::array::from_fn(|i| answers[i + usize::from(i >= n)]);
+        tick(&mut nodes, &others, GOOD);
+        assert_eq!(nodes.nodes[n].configured, kept, "node {n} in {state}");
+    }
 }
 
 #[test]
@@ -412,5 +441,99 @@ fn j20_a_node_is_configured_in_init_and_ready_once() {
         assert!(!Node { configured: true, ..node }.wants_configuration());
         assert!(!Node { clear: true, ..node }.wants_configuration());
         assert!(!Node { seen: false, ..node }.wants_configuration());
+    }
+}
+
+/// What the frame of a tick is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sent {
+    Move,
+    Mode,
+    State,
+    Reset,
+    ResetAll,
+}
+
+/// One frame to nodes that `change` made of ready ones, so many Moves after the last other frame.
+fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
+    let (config, mut nodes) = (Config::avena(), ready());
+    nodes.moves = moves;
+    change(&mut nodes);
+    let frame = nodes.frame(&config, goal, [0.0; JOINTS], false, false);
+    match Request::parse(&frame).unwrap() {
+        Request::Move { .. } => Sent::Move,
+        Request::ChangeMode { .. } => Sent::Mode,
+        Request::ChangeFsm { .. } => Sent::State,
+        Request::Reset(_) => Sent::Reset,
+        Request::ResetAll => Sent::ResetAll,
+    }
+}
+
+/// Node `n` waits for its configuration, in Init.
+fn waits(nodes: &mut Nodes, n: usize) {
+    (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.fsm) = (false, false, fsm::INIT);
+}
+
+#[test]
+fn j12_at_most_one_tick_of_four_sends_another_frame_than_move() {
+    for moves in 0..6 {
+        let frame = if moves < 3 { Sent::Move } else { Sent::Mode };
+        assert_eq!(sent(Goal::Ready, moves, |nodes| waits(nodes, 2)), frame, "{moves}");
+    }
+    assert_eq!(sent(Goal::Ready, 3, |_| ()), Sent::Move, "nobody is in want of anything");
+    assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x04)), Sent::Reset);
+    assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x7F)), Sent::ResetAll);
+}
+
+/// Under torque what the gripper alone is in want of comes in one tick of twenty.
+#[test]
+fn j23_a_gripper_is_brought_up_on_the_side() {
+    let (wait, many) = (|nodes: &mut Nodes| waits(nodes, GRIPPER), 19);
+    assert_eq!(sent(Goal::Ready, 3, wait), Sent::Mode);
+    assert_eq!(
+        sent(Goal::Enabled, 3, |nodes| {
+            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
+            wait(nodes);
+        }),
+        Sent::Move
+    );
+    assert_eq!(
+        sent(Goal::Enabled, many, |nodes| {
+            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
+            wait(nodes);
+        }),
+        Sent::Mode
+    );
+    assert_eq!(sent(Goal::Down, many, wait), Sent::Move, "nothing is configured in Error");
+    let silent = |nodes: &mut Nodes| {
+        waits(nodes, GRIPPER);
+        nodes.nodes[GRIPPER].silent = 5;
+    };
+    assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
+    // A joint that is to be enabled does not wait for that.
+    let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
+    assert_eq!(sent(Goal::Enabled, 3, still), Sent::State);
+    assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
+}
+
+/// Configurations and changes of state take turns, but a node that is enabled refuses the former.
+#[test]
+fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
+    for (state, seen, configured_last, frame) in [
+        (fsm::ENABLED, true, false, Sent::State),
+        (fsm::ENABLED, true, true, Sent::State),
+        // To be brought from Init to Ready, which can wait.
+        (fsm::INIT, true, false, Sent::Mode),
+        (fsm::INIT, true, true, Sent::State),
+        // Restarted: what it reported before means nothing.
+        (fsm::ENABLED, false, false, Sent::Mode),
+        (fsm::ENABLED, false, true, Sent::Mode),
+    ] {
+        let found = sent(Goal::Ready, 3, |nodes| {
+            waits(nodes, 2);
+            nodes.configured_last = configured_last;
+            (nodes.nodes[3].report.fsm, nodes.nodes[3].seen) = (state, seen);
+        });
+        assert_eq!(found, frame, "{state} {seen} {configured_last}");
     }
 }

@@ -1,6 +1,7 @@
 //! What a board does when its power comes on: supply, clocks, statuses, the version record, the second core.
 mod rig;
 
+use jtc_core::ControllerState;
 use openjtc_emulator::BoardConfig;
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND};
 use openjtc_emulator::observe::ResetCause;
@@ -145,8 +146,8 @@ fn j04_a_status_on_both_ports_every_40_ms() {
             }
             let status = rig.status(port);
             assert_eq!(
-                (status.fsm, status.errors, status.occurred),
-                (1, 0, 0),
+                (status.state, status.errors, status.occurred),
+                (ControllerState::Init.into(), 0, 0),
                 "{board}: Init without errors"
             );
             assert_eq!((status.jtc_init, status.node_init), (7, 0), "{board}: parameters are awaited");

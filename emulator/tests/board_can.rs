@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use can_link::{CanFrame, Id};
 use jtc_bus::Request;
-use jtc_core::{State, error};
+use jtc_core::{ControllerState, error};
 use jtc_sim::{FaultKind, SimConfig};
 use openjtc_emulator::clock::{MILLISECOND, Time, to_us};
 use openjtc_emulator::fdcan::{CanPeers, Outcome};
@@ -142,7 +142,7 @@ fn j14_after_bus_off_no_stale_frame() {
     rig.wait("bus-off", 20, |rig| rig.board.machine.chip().fdcan.state().bus_off);
     let off = rig.board.machine.now();
     rig.run(2);
-    assert_eq!(rig.state(), State::Error, "at once");
+    assert_eq!(rig.state(), ControllerState::Error, "at once");
     assert!(rig.telemetry().errors & error::INTERNAL_CAN != 0);
     rig.run(30);
     rig.board.heal(FaultKind::BusOff);
@@ -165,7 +165,7 @@ fn j14_after_bus_off_no_stale_frame() {
     );
     assert!(first > off + 129 * 11 * MILLISECOND / 1000, "129 times 11 recessive bits are waited for");
     // The error stays until the host clears it (J-21), then everything goes on.
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
     rig.wait_for_hold(15_000);
 }
@@ -174,7 +174,7 @@ fn j14_after_bus_off_no_stale_frame() {
 fn ticks_to_error(rig: &mut Rig, kind: FaultKind) -> (u64, u32) {
     let before = rig.ticks;
     rig.inject(kind);
-    rig.wait("Error", 50, |rig| rig.state() == State::Error);
+    rig.wait("Error", 50, |rig| rig.state() == ControllerState::Error);
     let ticks = rig.ticks - before;
     assert_eq!(rig.flight.torque, [0.0; 6], "J-12: zero in the tick of the error");
     let sent = rig.flight.sent.as_ref().map(Request::parse);
@@ -221,7 +221,7 @@ fn j14_j23_a_silent_gripper_is_shown_and_takes_nothing_away() {
     rig.bring_up(Port::Usart2);
     rig.inject(FaultKind::NodeSilent { node: 6 });
     rig.run(50);
-    assert_eq!((rig.state(), rig.telemetry().errors), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.telemetry().errors), (ControllerState::HoldPos, 0));
     let status = rig.status(Port::Usart2);
     assert_eq!((status.can_error, status.can_current), (0, 1 << 14));
 }
@@ -246,6 +246,6 @@ fn j15_short_answers_are_no_answers() {
         heard += rig.flight.heard.len();
     }
     assert!(heard > 2_500, "they were heard: {heard}");
-    assert_eq!(rig.state(), State::Error, "nobody has answered a Move");
+    assert_eq!(rig.state(), ControllerState::Error, "nobody has answered a Move");
     assert_eq!(rig.status(Port::Usart2).can_current, 0x7F00, "and the bus is well");
 }

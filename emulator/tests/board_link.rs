@@ -2,7 +2,9 @@
 mod rig;
 
 use jtc_sim::host;
-use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response, fixed, pid_param, trajectory};
+use jtc_wire::{
+    DataStatus, FrameStatus, FrameType, RawPoint, Response, TrajectoryState, fixed, pid_param, trajectory,
+};
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, to_us};
 use openjtc_emulator::{BoardConfig, Port};
 use rig::{BOARDS, PORTS, Rig, elf, fast_elf, index};
@@ -94,7 +96,7 @@ fn longest_frames(mut rig: Rig) {
             assert_eq!(host.records, [Response::good(FrameType::Trajectory, code, frame.len() as u16)]);
         }
     }
-    assert_eq!(rig.status(A).tes, 1, "the trajectory is there, at its start");
+    assert_eq!(rig.status(A).trajectory, TrajectoryState::Stop, "the trajectory is there, at its start");
     no_losses(&mut rig);
 }
 
@@ -290,9 +292,9 @@ fn j04_a_stop_waits_for_nothing() {
                 assert!(ticks <= 2, "{} bytes at {baud} Bd on {port:?}", before.len());
                 rig.step();
             }
-            rig.wait("standstill", 500, |rig| rig.telemetry().tes == jtc_core::Tes::Stop);
+            rig.wait("standstill", 500, |rig| rig.telemetry().trajectory == jtc_core::TrajectoryState::Stop);
             rig.run(1);
-            assert_eq!((rig.state(), rig.telemetry().errors), (jtc_core::State::HoldPos, 0));
+            assert_eq!((rig.state(), rig.telemetry().errors), (jtc_core::ControllerState::HoldPos, 0));
         }
     }
 }

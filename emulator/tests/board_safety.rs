@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_bus::Request;
-use jtc_core::{State, Tes, error};
+use jtc_core::{ControllerState, TrajectoryState, error};
 use jtc_sim::{SimConfig, host as frames};
 use jtc_wire::ExecCommand;
 use openjtc_emulator::clock::{MICROSECOND, Time, to_us};
@@ -33,7 +33,7 @@ fn moving() -> Rig {
     }
     rig.ask(HOST, &frames::exec(ExecCommand::Execute));
     rig.run(500);
-    assert_eq!(rig.state(), State::Operate);
+    assert_eq!(rig.state(), ControllerState::Operate);
     rig
 }
 
@@ -53,21 +53,25 @@ fn j22_the_safety_input_acts_in_one_tick() {
         for mut rig in [holding(), moving()] {
             rig.board.set_safety_input(level);
             rig.step();
-            assert_eq!(rig.state(), State::Error, "{level:?}: in the first tick");
+            assert_eq!(rig.state(), ControllerState::Error, "{level:?}: in the first tick");
             assert!(!rig.flight.safety_input && rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
             let sent: Vec<_> = rig.bus.iter().filter(|e| e.from_controller).map(|e| &e.frame).collect();
             assert_eq!(sent.into_iter().map(torque_of).collect::<Vec<_>>(), [Some([0.0; 6])], "on the bus");
             // Clearing helps only when the cause is gone.
             rig.ask(HOST, &frames::clear_all());
             rig.run(50);
-            assert_eq!(rig.state(), State::Error);
+            assert_eq!(rig.state(), ControllerState::Error);
             rig.board.set_safety_input(Some(true));
             rig.run(300);
-            assert_eq!(rig.state(), State::Error, "J-21: the host has not cleared it");
+            assert_eq!(rig.state(), ControllerState::Error, "J-21: the host has not cleared it");
             rig.ask(HOST, &frames::clear_all());
             rig.wait_for_hold(15_000);
             rig.run(500);
-            assert_eq!((rig.state(), rig.telemetry().tes), (State::HoldPos, Tes::Null), "J-24");
+            assert_eq!(
+                (rig.state(), rig.telemetry().trajectory),
+                (ControllerState::HoldPos, TrajectoryState::Null),
+                "J-24"
+            );
         }
     }
 }
@@ -91,7 +95,7 @@ fn pulse(rig: &mut Rig, phase: u64, us: u64) -> bool {
 fn j22_pulses_shorter_than_a_tick_are_seen() {
     let mut rig = holding();
     assert!(pulse(&mut rig, 700, 50));
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert!(rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
     for us in [50, 100, 200, 300] {
         for phase in (5..995 - us).step_by(23) {
@@ -171,19 +175,27 @@ fn latched_until_cleared(mut rig: Rig, cause: u32) {
     let status = rig.status(HOST);
     let bits = error::INTERNAL | error::EMERGENCY_OUTPUT;
     assert_eq!((status.errors & bits, status.occurred & bits), (bits, bits), "J-12: in the first status");
-    assert_eq!((status.jtc_init, status.tes), (7, 0), "nothing is left of what the host gave");
+    assert_eq!(
+        (status.jtc_init, status.trajectory),
+        (7, TrajectoryState::Null.into()),
+        "nothing is left of what the host gave"
+    );
     for _ in 0..500 {
         rig.step();
-        assert_eq!(rig.state(), State::Error);
+        assert_eq!(rig.state(), ControllerState::Error);
         assert_eq!(rig.board.safety_output(), Some(false), "J-22");
         let mut own = rig.bus.iter().filter(|e| e.from_controller);
         assert!(own.all(|e| torque_of(&e.frame).is_none_or(|torque| torque == [0.0; 6])));
     }
     let rest = rig.board.plant().truth().q;
     rig.ask(HOST, &frames::clear_all());
-    rig.wait("Init", 1_000, |rig| rig.state() == State::Init);
+    rig.wait("Init", 1_000, |rig| rig.state() == ControllerState::Init);
     rig.run(500);
-    assert_eq!((rig.state(), rig.telemetry().tes), (State::Init, Tes::Null), "J-24");
+    assert_eq!(
+        (rig.state(), rig.telemetry().trajectory),
+        (ControllerState::Init, TrajectoryState::Null),
+        "J-24"
+    );
     for (now, then) in rig.board.plant().truth().q.into_iter().zip(rest) {
         assert!((now - then).abs() < 1e-3, "the arm moved by itself");
     }
@@ -340,8 +352,8 @@ fn j24_reset_and_power_on_begin_in_init() {
         rig.board.machine.reset(cause);
         rig.run(200);
         assert_eq!(rig.flight.cause, number);
-        assert_eq!((rig.state(), rig.telemetry().errors), (State::Init, 0));
-        assert_eq!((rig.status(HOST).jtc_init, rig.telemetry().tes), (7, Tes::Null));
+        assert_eq!((rig.state(), rig.telemetry().errors), (ControllerState::Init, 0));
+        assert_eq!((rig.status(HOST).jtc_init, rig.telemetry().trajectory), (7, TrajectoryState::Null));
         assert_eq!(rig.flight.phase, Flight::PHASE_COMPLETE);
     }
 }

@@ -2,7 +2,7 @@
 //! computes the same, to the bit (`rig`).
 mod rig;
 
-use jtc_core::{Config, Parameters, State, Tes};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_dynamics::Dynamics;
 use jtc_sim::{SimConfig, host as frames};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, RawPoint, Response, fixed, pid_param};
@@ -24,7 +24,7 @@ impl Rig {
         for segment in frames::trajectory(points, step_ms, 113) {
             self.ask(HOST, &segment);
         }
-        assert_eq!(self.telemetry().tes, Tes::Stop);
+        assert_eq!(self.telemetry().trajectory, TrajectoryState::Stop);
     }
 
     fn exec(&mut self, command: ExecCommand) -> Response {
@@ -46,11 +46,11 @@ impl Rig {
 
 /// Lets a run go on until that execution state; the largest following error.
 #[track_caller]
-fn follow(rig: &mut Rig, until: Tes, ms: u64) -> f64 {
+fn follow(rig: &mut Rig, until: TrajectoryState, ms: u64) -> f64 {
     let mut worst: f64 = 0.0;
     rig.wait("the end of the motion", ms, |rig| {
         worst = worst.max(rig.following_error());
-        rig.telemetry().tes == until
+        rig.telemetry().trajectory == until
     });
     worst
 }
@@ -70,22 +70,22 @@ fn a_whole_session() {
     // J-33: pause on the way, at rest after its ramp; resume; stop.
     assert!(accepted(rig.exec(ExecCommand::Execute)));
     rig.run(1_000);
-    assert_eq!(rig.state(), State::Operate);
+    assert_eq!(rig.state(), ControllerState::Operate);
     let moving = rig.speed();
     assert!(moving > 0.1, "the arm moves at {moving} rad/s");
     assert!(accepted(rig.exec(ExecCommand::Pause)));
-    let paused = follow(&mut rig, Tes::Pause, 1_000);
+    let paused = follow(&mut rig, TrajectoryState::Pause, 1_000);
     rig.run(300);
     assert!(rig.speed() < 0.02, "at rest: {} rad/s", rig.speed());
     let held = rig.telemetry().point;
     assert!((500..3_000).contains(&held), "point {held}");
     rig.run(200);
-    assert_eq!((rig.telemetry().point, rig.state()), (held, State::HoldPos));
+    assert_eq!((rig.telemetry().point, rig.state()), (held, ControllerState::HoldPos));
     assert!(accepted(rig.exec(ExecCommand::Execute)));
     rig.run(500);
     assert!(rig.telemetry().point > held, "it goes on where it was");
     assert!(accepted(rig.exec(ExecCommand::Stop)));
-    let stopped = follow(&mut rig, Tes::Stop, 1_000);
+    let stopped = follow(&mut rig, TrajectoryState::Stop, 1_000);
     // J-34: from somewhere on the path it cannot be started.
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::StartPositionMismatch);
     assert_eq!(rig.exec(ExecCommand::Pause).data, DataStatus::NotAllowed);
@@ -94,10 +94,10 @@ fn a_whole_session() {
     let here = rig.telemetry().joints.map(|j| j.set_position);
     rig.upload(&frames::there_and_back(&here, &[0.0; 6], 2.0, 1, 10)[..201], 10);
     assert!(accepted(rig.exec(ExecCommand::Execute)));
-    follow(&mut rig, Tes::Finish, 4_000);
+    follow(&mut rig, TrajectoryState::Finish, 4_000);
     rig.upload(&motion(), 4);
     assert!(accepted(rig.exec(ExecCommand::Execute)));
-    let followed = follow(&mut rig, Tes::Finish, 6_000);
+    let followed = follow(&mut rig, TrajectoryState::Finish, 6_000);
     assert_eq!(rig.telemetry().point, 4_000, "the last 1 ms point");
     for (name, error) in [("paused", paused), ("stopped", stopped), ("followed", followed)] {
         println!("{name}: {error:.5} rad");
@@ -107,11 +107,11 @@ fn a_whole_session() {
     // J-25.
     rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
     rig.run(500);
-    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.state(), ControllerState::Teaching);
     assert!(rig.speed() < 1.2);
     rig.ask(HOST, &fixed::TEACHING_MODE_DISABLE);
     rig.run(300);
-    assert_eq!((rig.state(), rig.telemetry().tes), (State::HoldPos, Tes::Null));
+    assert_eq!((rig.state(), rig.telemetry().trajectory), (ControllerState::HoldPos, TrajectoryState::Null));
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
 }
 
@@ -146,7 +146,7 @@ fn j33_a_loaded_arm_stands_within_half_a_second() {
     for ms in 1..=700 {
         rig.step();
         fastest = fastest.max(rig.speed());
-        if rig.telemetry().tes == Tes::Execute {
+        if rig.telemetry().trajectory == TrajectoryState::Execute {
             stopped = ms;
         }
         if rig.speed() > 0.01 {
@@ -156,7 +156,7 @@ fn j33_a_loaded_arm_stands_within_half_a_second() {
     println!("stop at {place:.3} rad: commanded {stopped} ms, stands after {stands} ms, {fastest:.3} rad/s");
     assert!(fastest > 0.1, "it moved at {fastest} rad/s");
     assert!(stopped <= 500 && stands <= 520 && fastest < 0.25, "{stopped} ms, {stands} ms, {fastest} rad/s");
-    assert_eq!((rig.state(), rig.telemetry().tes), (State::HoldPos, Tes::Stop));
+    assert_eq!((rig.state(), rig.telemetry().trajectory), (ControllerState::HoldPos, TrajectoryState::Stop));
     assert_eq!(rig.status(HOST).occurred, 0);
 }
 
@@ -183,7 +183,7 @@ fn j40_torques_have_the_same_bits_as_on_a_pc() {
     assert!(moved.len() > 1_000, "{} different torques", moved.len());
     // A joint that is stuck: the position error grows over its limit.
     rig.inject(jtc_sim::FaultKind::Friction { joint: 1, factor: 30.0 });
-    rig.wait("an error", 2_000, |rig| rig.state() == State::Error);
+    rig.wait("an error", 2_000, |rig| rig.state() == ControllerState::Error);
     rig.run(200);
     assert_ne!(rig.status(HOST).joints[1].internal_occurred, 0, "of that joint");
 }
@@ -197,7 +197,7 @@ fn a_short_session_on_every_board() {
         rig.bring_up(Port::Usart3);
         rig.upload(&points, 5);
         assert!(accepted(rig.exec(ExecCommand::Execute)));
-        follow(&mut rig, Tes::Finish, 2_500);
+        follow(&mut rig, TrajectoryState::Finish, 2_500);
         assert_eq!((rig.telemetry().point, rig.status(HOST).occurred), (1000, 0), "{board}");
     }
 }
@@ -210,7 +210,7 @@ fn a_short_session_at_15_mbd() {
     rig.bring_up(HOST);
     rig.upload(&points, 5);
     assert!(accepted(rig.exec(ExecCommand::Execute)));
-    follow(&mut rig, Tes::Finish, 2_500);
+    follow(&mut rig, TrajectoryState::Finish, 2_500);
 }
 
 /// The drives with the older habits: their velocity scale, one message per interrupt, answers during transitions.
@@ -223,7 +223,7 @@ fn j12_older_drives_are_not_left_behind() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
     rig.bring_up(HOST);
     rig.run(500);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(rig.status(HOST).occurred, 0);
 }
 

@@ -132,7 +132,7 @@ pub struct Flight {
     /// State of the controller.
     pub state: u8,
     /// Trajectory execution state.
-    pub tes: u8,
+    pub trajectory: u8,
     /// Level of the safety output.
     pub safety_output: u8,
     /// A status was sent.
@@ -188,7 +188,7 @@ impl Flight {
             events: [FlightEvent { kind: 0, line: 0, frame_type: 0, status: 0, len: 0, crc: 0 }; EVENTS_MAX],
             heard: [FlightFrame::NONE; RX],
             state: 0,
-            tes: 0,
+            trajectory: 0,
             safety_output: 0,
             status: 0,
             sent: FlightFrame::NONE,
@@ -233,7 +233,7 @@ impl Flight {
     /// Records what came out of it.
     pub fn complete(&mut self, outputs: &jtc_core::Outputs, telemetry: &Telemetry) {
         self.state = telemetry.state as u8;
-        self.tes = telemetry.tes as u8;
+        self.trajectory = telemetry.trajectory as u8;
         self.safety_output = outputs.safety_output.into();
         self.status = outputs.status.into();
         self.host_done = outputs.host_done as u8;

@@ -21,13 +21,18 @@ pub fn without_record(status: &[u8; STATUS_LEN]) -> [u8; STATUS_LEN] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use jtc_wire::{DataStatus, FrameType, Response, Status};
+    use jtc_wire::{ControllerState, DataStatus, FrameType, Response, Status};
 
     #[test]
     fn j04_the_other_line_gets_the_same_status_without_a_record() {
         let response = Response::good(FrameType::PidParam, DataStatus::NotAllowed, 126);
-        let mut status =
-            Status { response, fsm: 3, point: 77, gripper: Some(Default::default()), ..Default::default() };
+        let mut status = Status {
+            response,
+            state: ControllerState::Operate.into(),
+            point: 77,
+            gripper: Some(Default::default()),
+            ..Default::default()
+        };
         let sent = status.emit();
         status.response = Response::default();
         let idle = without_record(&sent);

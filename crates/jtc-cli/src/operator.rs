@@ -7,16 +7,12 @@ use std::time::Duration;
 use cli_kit::view::LEAST;
 use cli_kit::{Keys, Output, Stop, draws_bars};
 use jtc_host::session::Flow;
-use jtc_wire::Status;
+use jtc_wire::{Code, Status, TrajectoryState};
 
 use crate::failure::{FAULT, Failure};
 use crate::keys::{HELP, NO_SPEED, Wish, wish};
 use crate::progress::Progress;
 use cli_kit::output_file;
-
-/// Trajectory execution states, as on the wire.
-const PAUSE: u8 = 2;
-const EXECUTE: u8 = 3;
 
 /// How long the last words may take: a reader that takes nothing holds no command.
 const LAST_WORDS: Duration = Duration::from_millis(300);
@@ -45,8 +41,8 @@ pub struct Operator<'a> {
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,
-    /// Trajectory state that was said last.
-    said: u8,
+    /// Trajectory state that was announced last.
+    announced: Option<Code<TrajectoryState>>,
 }
 
 impl<'a> Operator<'a> {
@@ -66,7 +62,15 @@ impl<'a> Operator<'a> {
             };
             ended_at_once(its_out, message, hint)
         })?;
-        Ok(Self { out, progress: progress.clone(), stop, keys: None, moving, stopping: false, said: 0 })
+        Ok(Self {
+            out,
+            progress: progress.clone(),
+            stop,
+            keys: None,
+            moving,
+            stopping: false,
+            announced: None,
+        })
     }
 
     /// The command shall end.
@@ -77,7 +81,7 @@ impl<'a> Operator<'a> {
     /// From now on keys count.
     pub fn motion_begins(&mut self) {
         self.moving.store(true, Ordering::Relaxed);
-        self.said = 0;
+        self.announced = None;
         self.keys = Keys::listen();
         if self.keys.is_none() {
             return;
@@ -106,9 +110,16 @@ impl<'a> Operator<'a> {
 
     /// What the person wants of the motion.
     pub fn wish(&mut self, status: &Status) -> Flow {
-        if self.keys.is_some() && matches!(status.tes, PAUSE | EXECUTE) && self.said != status.tes {
-            self.said = status.tes;
-            self.out.note(if status.tes == PAUSE { "paused; space goes on" } else { "moving" });
+        if self.keys.is_some()
+            && status.trajectory.is_in(&[TrajectoryState::Pause, TrajectoryState::Execute])
+            && self.announced != Some(status.trajectory)
+        {
+            self.announced = Some(status.trajectory);
+            self.out.note(if status.trajectory == TrajectoryState::Pause {
+                "paused; space goes on"
+            } else {
+                "moving"
+            });
         }
         let wish = self.keys.as_mut().and_then(wish);
         if self.stop.asked() || wish == Some(Wish::Stop) {
@@ -117,9 +128,9 @@ impl<'a> Operator<'a> {
             }
             return Flow::Stop;
         }
-        match (wish, status.tes) {
-            (Some(Wish::PauseOrResume), EXECUTE) => Flow::Pause,
-            (Some(Wish::PauseOrResume), PAUSE) => Flow::Resume,
+        match (wish, status.trajectory.known()) {
+            (Some(Wish::PauseOrResume), Some(TrajectoryState::Execute)) => Flow::Pause,
+            (Some(Wish::PauseOrResume), Some(TrajectoryState::Pause)) => Flow::Resume,
             (Some(Wish::Speed), _) => {
                 self.out.note(NO_SPEED.replace('`', ""));
                 Flow::Continue

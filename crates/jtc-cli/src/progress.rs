@@ -8,7 +8,7 @@ use cli_kit::Output;
 use jtc_host::port::Port;
 use jtc_host::sample::is_measured;
 use jtc_host::{Session, session, words};
-use jtc_wire::Status;
+use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
@@ -19,14 +19,17 @@ pub const EVENTS_HELP: &str = include_str!("progress.md");
 /// Samples and steps of an upload come no faster than this.
 const MODEST: Duration = Duration::from_millis(200);
 
+/// States of controller and trajectory, and errors.
+type Reported = (Code<ControllerState>, Code<TrajectoryState>, u16);
+
 /// The events of a command.
 #[derive(Clone)]
 pub struct Progress(Rc<Inner>);
 
 struct Inner {
     out: Output,
-    /// States that were told last: controller, trajectory, errors.
-    told: Cell<Option<(u8, u8, u16)>>,
+    /// What was reported last.
+    reported: Cell<Option<Reported>>,
     sampled: Cell<Option<Instant>>,
     uploaded: Cell<Option<Instant>>,
     link: RefCell<Value>,
@@ -38,7 +41,7 @@ impl Progress {
         out.stream()?;
         Ok(Self(Rc::new(Inner {
             out: *out,
-            told: Cell::default(),
+            reported: Cell::default(),
             sampled: Cell::default(),
             uploaded: Cell::default(),
             link: RefCell::default(),
@@ -60,9 +63,9 @@ impl Progress {
     /// A status that came: the first one is the connection, changes of the state are told at once, and measured values at a modest
     /// rate while the arm moves or may be moved.
     pub fn see(&self, s: &Status) {
-        let now = (s.fsm, s.tes, s.errors);
-        let state = || json!({ "state": words::state(s.fsm), "trajectory": words::tes(s.tes), "errors": words::causes(s) });
-        match self.0.told.replace(Some(now)) {
+        let now = (s.state, s.trajectory, s.errors);
+        let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": words::causes(s) });
+        match self.0.reported.replace(Some(now)) {
             None => {
                 let mut value = self.0.link.borrow().clone();
                 if let (Value::Object(all), Value::Object(more)) = (&mut value, state()) {
@@ -73,7 +76,7 @@ impl Progress {
             Some(before) if before != now => self.event("state", state()),
             Some(_) => {}
         }
-        if matches!(s.fsm, 3 | 4) && due(&self.0.sampled) {
+        if s.state.is_in(&[ControllerState::Operate, ControllerState::Teaching]) && due(&self.0.sampled) {
             self.event("sample", sample(s));
         }
     }

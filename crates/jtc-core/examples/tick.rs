@@ -3,7 +3,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
-use jtc_core::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, POINTS_MAX, State};
+use jtc_core::{BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, POINTS_MAX};
 use jtc_wire::{FrameRef, FrameType, LinkEvent, RawPoint, UrgentCommands, crc16};
 
 const SCALE: Scale = Scale { velocity: 2.0 };
@@ -90,7 +90,7 @@ fn main() {
     let bus_state = BusState { acknowledged: true, bus_off: false };
     while recorded.len() < 4_000 {
         // Later commands need HoldPos.
-        let ready = queue.len() > 2 || controller.telemetry().state == State::HoldPos;
+        let ready = queue.len() > 2 || controller.telemetry().state == ControllerState::HoldPos;
         let host = queue
             .front()
             .filter(|_| ready)
@@ -137,7 +137,7 @@ fn main() {
             black_box(controller.tick(black_box(&inputs)));
         }
         times.push(begin.elapsed().as_nanos() as f64 / recorded.len() as f64);
-        assert_eq!(controller.telemetry().state, State::Operate);
+        assert_eq!(controller.telemetry().state, ControllerState::Operate);
     }
     times.sort_by(f64::total_cmp);
     println!("control_tick_ns {:.1}", times[times.len() / 2]);

@@ -16,7 +16,7 @@ use crate::path::PathClock;
 use crate::records::{HOST_LINES, ResponseQueues};
 use crate::store::Store;
 use crate::telemetry::Telemetry;
-use crate::{JOINTS, State, Tes};
+use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// Which parameters the host has given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Given {
 #[derive(Clone, Debug)]
 pub struct Controller<M> {
     pub(crate) config: Config,
-    pub(crate) state: State,
+    pub(crate) state: ControllerState,
     pub(crate) errors: Errors,
     pub(crate) nodes: Nodes,
     // What the host gave.
@@ -69,7 +69,7 @@ pub struct Controller<M> {
     pub(crate) violation: Option<Violation>,
     /// Friction was given since the trajectory was checked.
     pub(crate) friction_is_new: bool,
-    pub(crate) tes: Tes,
+    pub(crate) trajectory: TrajectoryState,
     pub(crate) clock: PathClock,
     pub(crate) path: Path,
     /// Ticks since a pause or stop was asked for on the path, until the arm stands (J-33).
@@ -89,7 +89,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// A controller in Start. The first tick takes it to Init.
     pub fn new(config: Config, points: M) -> Self {
         Self {
-            state: State::Start,
+            state: ControllerState::Start,
             errors: Errors::default(),
             nodes: Nodes::new(&config),
             given: Given::default(),
@@ -105,7 +105,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             check: TrajectoryCheck::new(&config, 1, None),
             violation: None,
             friction_is_new: false,
-            tes: Tes::Null,
+            trajectory: TrajectoryState::Null,
             clock: PathClock::default(),
             path: Path::BEGIN,
             braking_ms: None,
@@ -139,10 +139,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // A fault is known before a command that may clear it: a clear in this very tick does not hide it.
         self.check_errors(inputs);
         if self.errors.any() {
-            self.enter(State::Error);
+            self.enter(ControllerState::Error);
         }
         // In Start nothing is executed yet; the events are offered again.
-        let host_done = if before == State::Start { 0 } else { self.serve_host(inputs) };
+        let host_done = if before == ControllerState::Start { 0 } else { self.serve_host(inputs) };
 
         // What state that makes. What persists is raised again, where a host may have cleared it.
         if !inputs.host.is_empty() {
@@ -152,29 +152,29 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
         // What to do in it.
         let mut torque = match self.state {
-            State::Start | State::Init | State::Error => {
+            ControllerState::Start | ControllerState::Init | ControllerState::Error => {
                 self.motion.release(&self.nodes);
                 [0.0; JOINTS]
             }
-            State::Teaching => self.teach(),
-            State::HoldPos => self.hold(),
-            State::Operate => self.operate(),
+            ControllerState::Teaching => self.teach(),
+            ControllerState::HoldPos => self.hold(),
+            ControllerState::Operate => self.operate(),
         };
 
         // An error found now zeroes the torque of this same tick.
         if self.errors.any() {
-            self.enter(State::Error);
+            self.enter(ControllerState::Error);
             torque = [0.0; JOINTS];
         }
 
         // What goes out.
         // Drives keep their last torque: taking it away comes before everything else.
-        let new_error = self.state == State::Error && before != State::Error;
-        let must_move = new_error || (powered(before) && !self.powered());
+        let new_error = self.state == ControllerState::Error && before != ControllerState::Error;
+        let must_move = new_error || (before.has_torque() && !self.powered());
         let bus = self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move);
         self.observe(&torque);
         // J-22: 0 in Start and while an internal error is latched.
-        let safety_output = self.state != State::Start && !self.errors.internal();
+        let safety_output = self.state != ControllerState::Start && !self.errors.internal();
         let status = self.status_due(inputs.status_free);
         let mut record_line = None;
         if status {
@@ -212,15 +212,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// In a state that commands torque.
     pub(crate) fn powered(&self) -> bool {
-        powered(self.state)
+        self.state.has_torque()
     }
 
     /// Where the nodes are wanted in the present state.
     fn goal(&self) -> Goal {
         match self.state {
-            State::Start | State::Init => Goal::Ready,
-            State::HoldPos | State::Operate | State::Teaching => Goal::Enabled,
-            State::Error => Goal::Down,
+            ControllerState::Start | ControllerState::Init => Goal::Ready,
+            ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => Goal::Enabled,
+            ControllerState::Error => Goal::Down,
         }
     }
 
@@ -245,56 +245,63 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if initialised && !self.powered() && !self.holdable(&self.dynamics) {
             // Sent before the positions were known: it is asked for again.
             self.given.take_back(Given::MODEL);
-            return self.enter(if self.errors.any() { State::Error } else { State::Init });
+            return self.enter(if self.errors.any() {
+                ControllerState::Error
+            } else {
+                ControllerState::Init
+            });
         }
-        let next = if self.errors.any() || (self.state == State::Error && self.nodes.clearing()) {
-            State::Error
+        let next = if self.errors.any() || (self.state == ControllerState::Error && self.nodes.clearing()) {
+            ControllerState::Error
         } else if !initialised {
-            State::Init
-        } else if self.teaching && (self.state == State::Teaching || self.motion.may_be_taught(&self.config))
+            ControllerState::Init
+        } else if self.teaching
+            && (self.state == ControllerState::Teaching || self.motion.may_be_taught(&self.config))
         {
             // Accepted, it waits until every joint is held at rest: what the arm carries is found only then (J-25).
-            State::Teaching
-        } else if self.tes == Tes::Execute {
-            State::Operate
+            ControllerState::Teaching
+        } else if self.trajectory == TrajectoryState::Execute {
+            ControllerState::Operate
         } else {
-            State::HoldPos
+            ControllerState::HoldPos
         };
         self.enter(next);
     }
 
-    pub(crate) fn enter(&mut self, next: State) {
+    pub(crate) fn enter(&mut self, next: ControllerState) {
         let last = core::mem::replace(&mut self.state, next);
         if last == next {
             return;
         }
-        if matches!(next, State::Error | State::Init | State::Teaching) {
+        if matches!(next, ControllerState::Error | ControllerState::Init | ControllerState::Teaching) {
             // J-24: a trajectory is never resumed after these; it has to be sent again.
             self.store.clear();
-            self.set_tes(Tes::Null);
+            self.set_trajectory(TrajectoryState::Null);
         }
-        if !matches!(next, State::HoldPos | State::Operate) {
+        if !matches!(next, ControllerState::HoldPos | ControllerState::Operate) {
             self.braking_ms = None;
         }
         match next {
-            State::Error | State::Init | State::Start => {
+            ControllerState::Error | ControllerState::Init | ControllerState::Start => {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
                 // A pump that does not run on is off until it is commanded again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
-            State::HoldPos if last == State::Teaching => {
+            ControllerState::HoldPos if last == ControllerState::Teaching => {
                 self.motion.end_teaching(&self.nodes, &self.config, &self.pid);
             }
-            State::Teaching => self.motion.begin_teaching(&self.nodes, &self.config, &self.dynamics),
-            State::HoldPos | State::Operate => {}
+            ControllerState::Teaching => {
+                self.motion.begin_teaching(&self.nodes, &self.config, &self.dynamics)
+            }
+            ControllerState::HoldPos | ControllerState::Operate => {}
         }
         self.motion.change_law();
     }
 
-    pub(crate) fn set_tes(&mut self, tes: Tes) {
-        self.tes = tes;
-        if matches!(tes, Tes::Null | Tes::Stop) {
+    pub(crate) fn set_trajectory(&mut self, trajectory: TrajectoryState) {
+        self.trajectory = trajectory;
+        if matches!(trajectory, TrajectoryState::Null | TrajectoryState::Stop) {
             self.clock = PathClock::default();
         }
     }
@@ -350,11 +357,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
         self.motion.control(law, braking, &self.nodes, &self.config, &parameters)
     }
-}
-
-/// The state commands torque.
-fn powered(state: State) -> bool {
-    matches!(state, State::HoldPos | State::Operate | State::Teaching)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 use crate::controller::Controller;
 use crate::motion::Law;
 use crate::path::PathClock;
-use crate::{JOINTS, Tes, joint_error};
+use crate::{JOINTS, TrajectoryState, joint_error};
 
 /// Where in Operate the controller is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,11 +12,11 @@ pub(crate) enum Path {
     /// Waits until every joint is enabled, and for how long it has, ms.
     Waiting { elapsed_ms: u32 },
     /// On the way from where the arm is held to the first point, or to the one where the path was paused.
-    Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<Tes> },
+    Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<TrajectoryState> },
     /// At point 0, which the next tick commands.
     AtStart,
     /// On the path; `leave` says where to when it stands.
-    Running { leave: Option<Tes> },
+    Running { leave: Option<TrajectoryState> },
 }
 
 impl Path {
@@ -33,7 +33,7 @@ impl Path {
     }
 
     /// The state that an accepted Pause or Stop leads to.
-    pub fn leave(&self) -> Option<Tes> {
+    pub fn leave(&self) -> Option<TrajectoryState> {
         match self {
             Self::Gliding { leave, .. } | Self::Running { leave } => *leave,
             Self::Waiting { .. } | Self::AtStart => None,
@@ -52,7 +52,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.path = Path::BEGIN;
         self.braking_ms = None;
         self.motion.stand_firm();
-        self.set_tes(Tes::Execute);
+        self.set_trajectory(TrajectoryState::Execute);
         Ok(())
     }
 
@@ -86,7 +86,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         } else {
             Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None }
         };
-        self.set_tes(Tes::Execute);
+        self.set_trajectory(TrajectoryState::Execute);
         Ok(())
     }
 
@@ -98,7 +98,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
     pub(crate) fn leave_path(&mut self, command: ExecCommand) {
-        let to = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
+        let to = if command == ExecCommand::Pause { TrajectoryState::Pause } else { TrajectoryState::Stop };
         match &mut self.path {
             Path::Running { leave } => {
                 if leave.replace(to).is_none() {
@@ -109,7 +109,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             // It comes to rest at point 0 by itself.
             Path::Gliding { leave, .. } => *leave = Some(to),
-            Path::Waiting { .. } | Path::AtStart => self.set_tes(to),
+            Path::Waiting { .. } | Path::AtStart => self.set_trajectory(to),
         }
     }
 
@@ -123,13 +123,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     // It does not wait for ever: nobody expects a motion then (J-16).
                     self.path = Path::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {
-                        self.set_tes(Tes::Stop);
+                        self.set_trajectory(TrajectoryState::Stop);
                     }
                 } else if self.near(&self.path_point()) {
                     self.path =
                         Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
                 } else {
-                    self.set_tes(Tes::Stop);
+                    self.set_trajectory(TrajectoryState::Stop);
                 }
             }
             Path::Gliding { from, elapsed_ms, leave } => {
@@ -142,8 +142,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.glide(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
                 if elapsed_ms < length {
                     self.path = Path::Gliding { from, elapsed_ms, leave };
-                } else if let Some(tes) = leave {
-                    self.set_tes(tes);
+                } else if let Some(trajectory) = leave {
+                    self.set_trajectory(trajectory);
                 } else if self.clock.time == 0.0 {
                     self.path = Path::AtStart;
                 } else {
@@ -162,9 +162,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.follow();
                 match leave {
                     // The last point is at rest: there the arm stands whatever the ramp says.
-                    Some(tes) if self.clock.standing() || self.at_end() => {
+                    Some(trajectory) if self.clock.standing() || self.at_end() => {
                         self.clock.rest();
-                        self.set_tes(tes);
+                        self.set_trajectory(trajectory);
                     }
                     Some(_) => {}
                     None => self.finish_at_end(),
@@ -202,7 +202,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn finish_at_end(&mut self) {
         if self.at_end() {
-            self.set_tes(Tes::Finish);
+            self.set_trajectory(TrajectoryState::Finish);
         }
     }
 
@@ -214,16 +214,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let Some(ms) = self.braking_ms else { return false };
         let moving = self.motion.moving(&self.nodes);
         let stands = moving == [false; JOINTS];
-        if let (Tes::Execute, Path::Running { leave: Some(tes) }) = (self.tes, self.path)
+        if let (TrajectoryState::Execute, Path::Running { leave: Some(trajectory) }) =
+            (self.trajectory, self.path)
             && stands
             && ms >= self.config.stop_ms
         {
             self.clock.rest();
-            self.set_tes(tes);
+            self.set_trajectory(trajectory);
         }
-        let still = self.tes != Tes::Execute && stands;
+        let still = self.trajectory != TrajectoryState::Execute && stands;
         let over = ms >= self.config.braking_ms_max;
-        if over && self.tes == Tes::Execute {
+        if over && self.trajectory == TrajectoryState::Execute {
             self.errors.raise_joints(&moving.map(|moves| if moves { joint_error::TORQUE } else { 0 }));
         }
         self.braking_ms = if over || still { None } else { Some(ms + 1) };
@@ -234,32 +235,36 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Config, State};
+    use crate::{Config, ControllerState};
 
-    fn braking(state: State, tes: Tes) -> Controller<[RawPoint; 4]> {
+    fn braking(state: ControllerState, trajectory: TrajectoryState) -> Controller<[RawPoint; 4]> {
         let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
-        (controller.state, controller.tes, controller.braking_ms) = (state, tes, Some(5));
+        (controller.state, controller.trajectory, controller.braking_ms) = (state, trajectory, Some(5));
         controller
     }
 
     /// What braking excuses (J-43) it does not excuse for longer than the arm moves.
     #[test]
     fn j33_braking_ends_where_the_arm_stands() {
-        let mut stands = braking(State::HoldPos, Tes::Pause);
+        let mut stands = braking(ControllerState::HoldPos, TrajectoryState::Pause);
         assert!(!stands.brake());
         assert_eq!(stands.braking_ms, None);
-        let mut moves = braking(State::HoldPos, Tes::Pause);
+        let mut moves = braking(ControllerState::HoldPos, TrajectoryState::Pause);
         moves.motion.set.velocity[2] = -0.03;
         assert!(moves.brake());
         assert_eq!(moves.braking_ms, Some(6));
-        let mut on_the_path = braking(State::Operate, Tes::Execute);
+        let mut on_the_path = braking(ControllerState::Operate, TrajectoryState::Execute);
         assert!(on_the_path.brake(), "path time still runs");
     }
 
     #[test]
     fn j33_braking_ends_with_the_states_that_hold_or_follow() {
-        for (next, goes_on) in [(State::HoldPos, true), (State::Error, false), (State::Init, false)] {
-            let mut controller = braking(State::Operate, Tes::Execute);
+        for (next, goes_on) in [
+            (ControllerState::HoldPos, true),
+            (ControllerState::Error, false),
+            (ControllerState::Init, false),
+        ] {
+            let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
             controller.enter(next);
             assert_eq!(controller.braking_ms.is_some(), goes_on, "{next:?}");
         }
@@ -267,18 +272,26 @@ mod tests {
 
     #[test]
     fn j34_after_a_stop_the_path_begins_anew() {
-        for (tes, time) in [(Tes::Stop, 0.0), (Tes::Null, 0.0), (Tes::Pause, 250.0), (Tes::Finish, 250.0)] {
-            let mut controller = braking(State::Operate, Tes::Execute);
+        for (trajectory, time) in [
+            (TrajectoryState::Stop, 0.0),
+            (TrajectoryState::Null, 0.0),
+            (TrajectoryState::Pause, 250.0),
+            (TrajectoryState::Finish, 250.0),
+        ] {
+            let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
             controller.clock.time = 250.0;
-            controller.set_tes(tes);
-            assert_eq!(controller.clock.time, time, "{tes:?}: this is the index that the status shows");
+            controller.set_trajectory(trajectory);
+            assert_eq!(
+                controller.clock.time, time,
+                "{trajectory:?}: this is the index that the status shows"
+            );
         }
     }
 
     /// On the path, with a Pause accepted `ms` ago.
     fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
-        let mut controller = braking(State::Operate, Tes::Execute);
-        controller.path = Path::Running { leave: Some(Tes::Pause) };
+        let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
+        controller.path = Path::Running { leave: Some(TrajectoryState::Pause) };
         controller.braking_ms = Some(ms);
         (controller.clock, controller.clock.time) = (PathClock::start(), 250.0);
         controller
@@ -287,18 +300,18 @@ mod tests {
     #[test]
     fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
         let most = Config::avena().braking_ms_max;
-        for (tes, ms, goes_on, error) in [
-            (Tes::Execute, most - 1, true, 0),
-            (Tes::Execute, most, false, joint_error::TORQUE),
+        for (trajectory, ms, goes_on, error) in [
+            (TrajectoryState::Execute, most - 1, true, 0),
+            (TrajectoryState::Execute, most, false, joint_error::TORQUE),
             // An arm that is held, and moved by something else.
-            (Tes::Pause, most - 1, true, 0),
-            (Tes::Pause, most, false, 0),
+            (TrajectoryState::Pause, most - 1, true, 0),
+            (TrajectoryState::Pause, most, false, 0),
         ] {
             let mut controller = pausing(ms);
-            (controller.tes, controller.motion.set.velocity[2]) = (tes, -0.03);
-            assert_eq!(controller.brake(), goes_on, "{tes:?} after {ms} ms");
+            (controller.trajectory, controller.motion.set.velocity[2]) = (trajectory, -0.03);
+            assert_eq!(controller.brake(), goes_on, "{trajectory:?} after {ms} ms");
             let found: [u16; JOINTS] = core::array::from_fn(|j| controller.errors.joint(j).0);
-            assert_eq!(found, [0, 0, error, 0, 0, 0], "{tes:?} after {ms} ms");
+            assert_eq!(found, [0, 0, error, 0, 0, 0], "{trajectory:?} after {ms} ms");
         }
         let mut controller = pausing(most);
         controller.brake();
@@ -309,15 +322,17 @@ mod tests {
     #[test]
     fn j33_an_arm_that_stands_when_its_time_is_over_has_stopped() {
         let most = Config::avena().stop_ms;
-        for (ms, velocity, tes) in
-            [(most - 1, 0.01, Tes::Execute), (most, 0.01, Tes::Pause), (most, -0.03, Tes::Execute)]
-        {
+        for (ms, velocity, trajectory) in [
+            (most - 1, 0.01, TrajectoryState::Execute),
+            (most, 0.01, TrajectoryState::Pause),
+            (most, -0.03, TrajectoryState::Execute),
+        ] {
             let mut controller = pausing(ms);
             controller.motion.set.velocity[4] = velocity;
             controller.brake();
             assert_eq!(
-                (controller.tes, controller.clock.standing()),
-                (tes, tes == Tes::Pause),
+                (controller.trajectory, controller.clock.standing()),
+                (trajectory, trajectory == TrajectoryState::Pause),
                 "{ms} {velocity}"
             );
             assert_eq!(controller.clock.time, 250.0);
@@ -329,12 +344,16 @@ mod tests {
         let mut controller = pausing(700);
         controller.leave_path(ExecCommand::Stop);
         assert_eq!(controller.braking_ms, Some(700));
-        assert_eq!(controller.path, Path::Running { leave: Some(Tes::Stop) }, "the later command holds");
+        assert_eq!(
+            controller.path,
+            Path::Running { leave: Some(TrajectoryState::Stop) },
+            "the later command holds"
+        );
     }
 
     #[test]
     fn j34_an_arm_exactly_at_the_tolerance_is_at_the_point() {
-        let mut controller = braking(State::HoldPos, Tes::Stop);
+        let mut controller = braking(ControllerState::HoldPos, TrajectoryState::Stop);
         controller.config.start_tolerance_rad = 0.25;
         assert!(controller.near(&[0.0, 0.25, -0.25, 0.0, 0.1, 0.0]));
         assert!(!controller.near(&[0.0, 0.25, -0.2501, 0.0, 0.1, 0.0]));
@@ -344,7 +363,7 @@ mod tests {
 
     #[test]
     fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
-        let leave = Some(Tes::Stop);
+        let leave = Some(TrajectoryState::Stop);
         assert_eq!(Path::Running { leave }.leave(), leave);
         assert_eq!(Path::Gliding { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
         assert_eq!((Path::BEGIN.leave(), Path::AtStart.leave()), (None, None));

@@ -9,7 +9,7 @@ use crate::defaults;
 use crate::friction::celsius;
 use crate::io::{HostEvent, Inputs};
 use crate::nodes::GRIPPER;
-use crate::{JOINTS, State, Tes};
+use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// Ticks that the check of a segment takes at most (J-36), and ticks for copying it: with the record, less than 40 ms.
 const CHECK_TICKS: usize = 28;
@@ -147,10 +147,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Err(DataStatus::NotAllowed);
         };
         let rests = match command {
-            UrgentCommand::Stop => Tes::Stop,
-            UrgentCommand::Pause => Tes::Pause,
+            UrgentCommand::Stop => TrajectoryState::Stop,
+            UrgentCommand::Pause => TrajectoryState::Pause,
         };
-        let cancelled = core::mem::take(&mut overtaking.cancelled) && self.tes == rests;
+        let cancelled = core::mem::take(&mut overtaking.cancelled) && self.trajectory == rests;
         let accepted = overtaking.accepted(command);
         let acted = *accepted > 0;
         *accepted = accepted.saturating_sub(1);
@@ -160,7 +160,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// The command takes a few instructions and leaves the state of the controller as it is, on which the next one depends.
     fn is_quick(&self, command: &Command<'_>) -> bool {
         match command {
-            Command::ClearCurrentErrors { .. } | Command::ClearOccurredErrors => self.state != State::Error,
+            Command::ClearCurrentErrors { .. } | Command::ClearOccurredErrors => {
+                self.state != ControllerState::Error
+            }
             Command::TeachingModeDisable => !self.teaching,
             Command::GripperControl { .. } => true,
             _ => false,
@@ -169,7 +171,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     fn obey(&mut self, command: Command<'_>) -> Progress {
         // Parameters would change the torque under a moving arm.
-        let settable = matches!(self.state, State::Init | State::HoldPos | State::Error);
+        let settable =
+            matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);
         match command {
             Command::ClearCurrentErrors { jtc, nodes } => {
                 if jtc {
@@ -184,7 +187,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::Trajectory(segment) => self.take_segment(&segment),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
-            Command::TeachingModeEnable if self.state == State::HoldPos => {
+            Command::TeachingModeEnable if self.state == ControllerState::HoldPos => {
                 self.teaching = true;
                 Progress::Done
             }
@@ -195,7 +198,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             // J-23: torque would be taken from a moving arm.
             Command::ResetCanDevices { nodes }
-                if nodes & JOINTS_MASK != 0 && matches!(self.state, State::Operate | State::Teaching) =>
+                if nodes & JOINTS_MASK != 0
+                    && matches!(self.state, ControllerState::Operate | ControllerState::Teaching) =>
             {
                 Progress::Refused(DataStatus::NotAllowed)
             }
@@ -206,7 +210,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Progress::Done
             }
             Command::GripperControl { pump }
-                if self.config.gripper && (self.state != State::Error || !pump) =>
+                if self.config.gripper && (self.state != ControllerState::Error || !pump) =>
             {
                 self.pump = pump;
                 Progress::Done
@@ -234,7 +238,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// J-30, J-36: all points are checked before the first is copied, so that a refused segment changes nothing.
     fn take_segment(&mut self, segment: &Segment<'_>) -> Progress {
-        if self.state != State::HoldPos {
+        if self.state != ControllerState::HoldPos {
             // Also in the middle of a segment: the change of state has cleared the trajectory.
             return Progress::Refused(DataStatus::NotAllowed);
         }
@@ -279,7 +283,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         self.store.begin(segment);
         if segment.segment == 0 {
-            self.set_tes(Tes::Null);
+            self.set_trajectory(TrajectoryState::Null);
             self.friction_is_new = false;
         }
         Progress::Working(Work::PointCopy(0))
@@ -294,7 +298,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         self.store.commit(segment, self.check.speeds());
         if self.store.complete() {
-            self.set_tes(Tes::Stop);
+            self.set_trajectory(TrajectoryState::Stop);
         }
         Progress::Done
     }
@@ -306,23 +310,23 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// J-34.
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
-        match (self.tes, command) {
+        match (self.trajectory, command) {
             // Teaching was accepted, and begins as soon as the arm is held.
             (_, ExecCommand::Execute) if self.teaching => Err(DataStatus::NotAllowed),
-            (Tes::Stop | Tes::Finish, ExecCommand::Execute) => {
+            (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute) => {
                 self.check_friction()?;
                 self.start_path()
             }
-            (Tes::Pause, ExecCommand::Execute) => {
+            (TrajectoryState::Pause, ExecCommand::Execute) => {
                 self.check_friction()?;
                 self.resume_path()
             }
-            (Tes::Execute, ExecCommand::Pause | ExecCommand::Stop) => {
+            (TrajectoryState::Execute, ExecCommand::Pause | ExecCommand::Stop) => {
                 self.leave_path(command);
                 Ok(())
             }
-            (Tes::Pause | Tes::Finish, ExecCommand::Stop) => {
-                self.set_tes(Tes::Stop);
+            (TrajectoryState::Pause | TrajectoryState::Finish, ExecCommand::Stop) => {
+                self.set_trajectory(TrajectoryState::Stop);
                 Ok(())
             }
             _ => Err(DataStatus::NotAllowed),

@@ -34,6 +34,7 @@ pub use config::{Config, ConfigError, Friction, JointConfig, Parameters, PidGain
 pub use controller::Controller;
 pub use interpolation::{SetPoint, interpolate, position_speed};
 pub use io::{BusState, HostEvent, Inputs, Outputs};
+pub use jtc_wire::{ControllerState, TrajectoryState};
 pub use parameters::{OutOfBounds, ParameterBounds};
 pub use records::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};
@@ -48,42 +49,6 @@ pub const POINTS_MAX: usize = 12_000;
 pub const SEGMENTS_MAX: usize = 100;
 /// Points of a segment (J-30).
 pub const SEGMENT_POINTS_MAX: usize = 1_500;
-
-/// States of the controller (section 4), with their number on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-#[repr(u8)]
-pub enum State {
-    /// Set-up is not complete.
-    #[default]
-    Start = 0,
-    /// Nodes are brought up, parameters are awaited; zero torque.
-    Init = 1,
-    /// Holds a position.
-    HoldPos = 2,
-    /// Follows the trajectory.
-    Operate = 3,
-    /// Gravity compensation only.
-    Teaching = 4,
-    /// Zero torque until the cause is gone and the host has cleared.
-    Error = 5,
-}
-
-/// Trajectory execution state (TES).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-#[repr(u8)]
-pub enum Tes {
-    /// No trajectory.
-    #[default]
-    Null = 0,
-    /// Complete, at its start.
-    Stop = 1,
-    /// Paused on the path.
-    Pause = 2,
-    /// Being executed (until standstill).
-    Execute = 3,
-    /// Executed to its last point.
-    Finish = 4,
-}
 
 /// Bits of the controller's error words.
 pub mod error {

@@ -8,7 +8,7 @@ use jtc_wire::{ExecCommand, RawPoint};
 use crate::controller::Controller;
 use crate::execution::Path;
 use crate::motion::Law;
-use crate::{JOINTS, Tes, joint_error};
+use crate::{JOINTS, TrajectoryState, joint_error};
 
 /// Errors that stop the arm on its path.
 const STOP: u16 = joint_error::VELOCITY | joint_error::ACCELERATION | joint_error::FRICTION_TABLE;
@@ -28,9 +28,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.hold(&self.config);
         self.clock.rest();
         self.braking_ms = None;
-        if self.tes == Tes::Execute {
+        if self.trajectory == TrajectoryState::Execute {
             // Where a Pause or Stop was on its way, that is what it ends in (J-33).
-            self.set_tes(self.path.leave().unwrap_or(Tes::Pause));
+            self.set_trajectory(self.path.leave().unwrap_or(TrajectoryState::Pause));
         }
         true
     }
@@ -68,7 +68,7 @@ mod tests {
     fn running() -> Bench {
         let mut controller = Bench::new(Config::avena(), [RawPoint::default(); 4]);
         controller.path = Path::Running { leave: None };
-        controller.tes = Tes::Execute;
+        controller.trajectory = TrajectoryState::Execute;
         controller
     }
 
@@ -78,7 +78,7 @@ mod tests {
         for bit in [joint_error::VELOCITY, joint_error::ACCELERATION, joint_error::FRICTION_TABLE] {
             let (mut controller, errors) = (running(), [0, bit, 0, 0, 0, 0]);
             assert!(controller.stops_on_path(Law::Follow, &errors));
-            assert_eq!(controller.path, Path::Running { leave: Some(Tes::Pause) });
+            assert_eq!(controller.path, Path::Running { leave: Some(TrajectoryState::Pause) });
             assert_eq!((controller.errors.word(), controller.errors.joint(1)), (0, (0, bit)));
             // Still outside while it brakes; when the time for that is over, it is an error.
             controller.braking_ms = Some(700);
@@ -97,14 +97,14 @@ mod tests {
             controller.motion.set.velocity[1] = velocity;
             controller.motion.set.position[1] = controller.nodes.positions()[1] + offset;
             controller.control(Law::Follow);
-            (controller.path, controller.tes, controller.errors.word(), controller.errors.joint(1))
+            (controller.path, controller.trajectory, controller.errors.word(), controller.errors.joint(1))
         };
         let limits = Config::avena().joints[1];
         let (too_fast, too_far) = (1.01 * limits.velocity_max, 1.01 * limits.position_error_max);
-        let stops = Path::Running { leave: Some(Tes::Pause) };
-        assert_eq!(found(too_fast, 0.0), (stops, Tes::Execute, 0, (0, joint_error::VELOCITY)));
-        let (_, tes, word, joint) = found(0.0, too_far);
-        assert_eq!((tes, word, joint), (Tes::Pause, 0, (0, joint_error::POSITION_ERROR)));
+        let stops = Path::Running { leave: Some(TrajectoryState::Pause) };
+        assert_eq!(found(too_fast, 0.0), (stops, TrajectoryState::Execute, 0, (0, joint_error::VELOCITY)));
+        let (_, trajectory, word, joint) = found(0.0, too_far);
+        assert_eq!((trajectory, word, joint), (TrajectoryState::Pause, 0, (0, joint_error::POSITION_ERROR)));
     }
 
     #[test]
@@ -124,7 +124,7 @@ mod tests {
         }
         let mut controller = running();
         assert!(controller.gives_way(&[0, 0, joint_error::POSITION | joint_error::VELOCITY, 0, 0, 0]));
-        assert_eq!((controller.tes, controller.errors.word()), (Tes::Pause, 0));
+        assert_eq!((controller.trajectory, controller.errors.word()), (TrajectoryState::Pause, 0));
         assert!(!controller.gives_way(&[joint_error::POSITION_ERROR; JOINTS]), "it does already");
     }
 }

@@ -11,7 +11,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let (q, v) = (self.nodes.positions(), self.nodes.velocities());
         let t = &mut self.telemetry;
         t.tick += 1;
-        (t.state, t.tes, t.errors) = (self.state, self.tes, self.errors.word());
+        (t.state, t.trajectory, t.errors) = (self.state, self.trajectory, self.errors.word());
         // Index of the current 1 ms point.
         t.point = self.clock.time as u32;
         t.braking = self.braking_ms.is_some();
@@ -72,12 +72,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let gripper = &self.nodes.node(GRIPPER).report;
         Status {
             response,
-            fsm: self.state as u8,
+            state: self.state.into(),
             errors: self.errors.word(),
             occurred: self.errors.occurred(),
             jtc_init: self.given.missing(),
             node_init: self.nodes.init_word(&self.config),
-            tes: self.tes as u8,
+            trajectory: self.trajectory.into(),
             point: self.telemetry.point,
             friction_type: u8::from(self.friction_is_table),
             can_error: u8::from(self.errors.can_error()),

@@ -1,5 +1,5 @@
 //! What a tick computed, for recordings and tests.
-use crate::{JOINTS, State, Tes};
+use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// One joint in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,9 +51,9 @@ pub struct Telemetry {
     /// Ticks since boot.
     pub tick: u64,
     /// State in this tick.
-    pub state: State,
+    pub state: ControllerState,
     /// Trajectory execution state.
-    pub tes: Tes,
+    pub trajectory: TrajectoryState,
     /// Index of the current 1 ms point.
     pub point: u32,
     /// A pause or stop brakes with all the torque there is (J-33).

@@ -1,7 +1,7 @@
 //! On the way to the path, and on the way from it: what is remembered of a motion must not outlive its place.
 mod rig;
 
-use jtc_core::{Config, Parameters, State, Tes, joint_error};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use rig::{Rig, floats, segment_body};
 
@@ -26,16 +26,16 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     rig.urgent(0, UrgentCommand::Pause);
     // The arm still moves a little when the path stands.
     rig.nodes[1].report.velocity = 0.05;
-    rig.until(600, |r| r.tes() == Tes::Pause);
+    rig.until(600, |r| r.trajectory() == TrajectoryState::Pause);
     rig.run(2);
     rig.send(FrameType::TeachingModeEnable, &[]);
-    rig.until(450, |r| r.state() == State::Teaching);
+    rig.until(450, |r| r.state() == ControllerState::Teaching);
     rig.follow = false;
     rig.nodes[1].report.velocity = 0.4;
     for ms in 0..2_000 {
         rig.nodes[1].report.position += 0.0004;
         rig.tick();
-        assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0), "{ms} ms");
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0), "{ms} ms");
     }
 }
 
@@ -47,7 +47,10 @@ fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     rig.exec(ExecCommand::Pause);
     rig.nodes[1].report.velocity = 0.05;
     rig.run(2_000);
-    assert_eq!((rig.state(), rig.tes(), rig.errors()), (State::HoldPos, Tes::Pause, 0));
+    assert_eq!(
+        (rig.state(), rig.trajectory(), rig.errors()),
+        (ControllerState::HoldPos, TrajectoryState::Pause, 0)
+    );
 }
 
 /// The way to the first point is faster than the path, and than its friction table.
@@ -68,7 +71,7 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table)), DataStatus::NoError);
     rig.upload(&points(), 10);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    rig.until(5_000, |r| r.tes() == Tes::Finish);
+    rig.until(5_000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }
 
@@ -91,7 +94,7 @@ fn j43_an_arm_beyond_a_limit_can_go_to_a_path_inside() {
     let points: Vec<_> = points().into_iter().map(down).collect();
     rig.upload(&points, 10);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    rig.until(5_000, |r| r.tes() == Tes::Finish);
+    rig.until(5_000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.status().joints[1].internal_occurred & joint_error::POSITION, 0);
 }
 
@@ -121,15 +124,15 @@ fn j16_an_execute_does_not_wait_for_ever() {
     let (mut sent, mut waited) = (false, 0);
     for _ in 0..30_000 {
         swing(&mut rig);
-        if !sent && rig.tes() == Tes::Stop && rig.nodes[1].report.position.abs() < 0.005 {
+        if !sent && rig.trajectory() == TrajectoryState::Stop && rig.nodes[1].report.position.abs() < 0.005 {
             rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
             sent = true;
         }
         rig.tick();
-        waited += u32::from(rig.tes() == Tes::Execute);
+        waited += u32::from(rig.trajectory() == TrajectoryState::Execute);
     }
     assert!(sent && (9_900..=10_100).contains(&waited), "{waited} ms");
-    assert_eq!((rig.tes(), rig.errors()), (Tes::Stop, 0));
+    assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Stop, 0));
 }
 
 /// J-06: a model sent before the positions are known is looked at once they are.
@@ -160,9 +163,9 @@ fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     assert_eq!(rig.ask(FrameType::ArmModel, &floats(body)), DataStatus::NoError);
     for _ in 0..1_000 {
         rig.tick();
-        assert_eq!((rig.state(), rig.torque), (State::Init, [0.0; 6]));
+        assert_eq!((rig.state(), rig.torque), (ControllerState::Init, [0.0; 6]));
     }
     assert_eq!(rig.status().jtc_init, 0b100, "the model is missing");
     assert_eq!(rig.ask(FrameType::ArmModelUseDefault, &[]), DataStatus::NoError);
-    rig.until(500, |r| r.state() == State::HoldPos);
+    rig.until(500, |r| r.state() == ControllerState::HoldPos);
 }

@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_bus::{Answer, Frame, JointReport, Request, Target, fsm};
-use jtc_core::{Config, State};
+use jtc_core::{Config, ControllerState};
 use jtc_wire::{DataStatus, FrameType};
 use rig::{Rig, SCALE};
 
@@ -63,13 +63,13 @@ fn j20_late_answers_after_a_reset_do_not_count() {
         }
         rig.inject = answers;
         rig.tick();
-        assert_eq!(rig.state(), State::Init);
+        assert_eq!(rig.state(), ControllerState::Init);
         assert_eq!(rig.controller.telemetry().joints[JOINT].position, 0.0);
     }
     assert!(rig.sent[from..].iter().all(|r| target_of(r) == Target::NoChange), "nothing is asked of it yet");
     rig.inject.clear();
     rig.run(500);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     assert!(rig.nodes[JOINT].configured);
 }
 
@@ -85,7 +85,7 @@ fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     let requests = &rig.sent;
     assert!(requests.iter().any(|r| target_of(r) == Target::Init));
     assert!(rig.nodes[JOINT].configured);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
 /// The way from Error to HoldPos leads through joints in ReadyToOperate; one that is still enabled is not taken over.
@@ -99,12 +99,12 @@ fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     rig.clear(true, 0x7F);
     for _ in 0..200 {
         rig.tick();
-        assert_eq!(rig.state(), State::Init);
+        assert_eq!(rig.state(), ControllerState::Init);
         assert_eq!(rig.torque, [0.0; 6]);
     }
     rig.nodes[JOINT].stays_enabled = false;
     rig.run(800);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
 /// A node that is on its way through 10, from Start to Init, has not followed yet.
@@ -120,12 +120,12 @@ fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     rig.run(3);
     let from = rig.sent.len();
     rig.run(100);
-    assert_eq!(rig.state(), State::Error, "it is still being cleared");
+    assert_eq!(rig.state(), ControllerState::Error, "it is still being cleared");
     assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init), "the command stands");
     rig.nodes[JOINT].report.fsm = fsm::INIT;
     rig.nodes[JOINT].configured = false;
     rig.run(800);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
 /// Neither in Error, nor while a node of it is being cleared, is anything configured.
@@ -138,7 +138,7 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     rig.nodes[JOINT].restart();
     let from = rig.sent.len();
     rig.run(500);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert!(!rig.sent[from..].iter().any(configures));
 
     // In Init: it waits in ReadyToOperate without configuration, and has something to clear.
@@ -153,7 +153,7 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     rig.run(150);
     let from = rig.sent.len();
     rig.run(200);
-    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.state(), ControllerState::Init);
     assert!(!rig.sent[from..].iter().any(configures));
     assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init));
 }
@@ -165,7 +165,7 @@ fn j21_occurred_errors_are_not_reported_as_current() {
     let mut rig = Rig::holding();
     rig.push(JOINT, 0.2);
     rig.run(50);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     rig.follow = true;
     rig.nodes[JOINT + 1].silent = true;
     rig.run(10);
@@ -195,14 +195,14 @@ fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
     rig.run(20);
     rig.nodes[2].report.mc_occurred = 4;
     rig.run(20);
-    assert_eq!((rig.state(), rig.status().node_init), (State::Init, 0));
+    assert_eq!((rig.state(), rig.status().node_init), (ControllerState::Init, 0));
     rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
     rig.send(FrameType::FrictionPolynomialUseDefault, &[]);
     rig.nodes[2].stays_ready = true;
     for _ in 0..50 {
         rig.tick();
-        assert_eq!(rig.state(), State::Init);
+        assert_eq!(rig.state(), ControllerState::Init);
     }
     rig.nodes[2].stays_ready = false;
-    rig.until(500, |rig| rig.state() == State::HoldPos);
+    rig.until(500, |rig| rig.state() == ControllerState::HoldPos);
 }

@@ -3,7 +3,7 @@ mod plant;
 mod rig;
 
 use jtc_bus::fsm;
-use jtc_core::{Config, Parameters, State, Tes, joint_error};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{ExecCommand, RawPoint};
 use plant::{LuGre, Plant, loaded};
@@ -97,7 +97,7 @@ fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
                 let mut it = Let::new(Config::avena(), mass, pose, factor);
                 it.caught(3000);
                 let about = format!("{mass} kg at {pose:?}, friction times {factor}");
-                assert_eq!((it.rig.state(), it.rig.errors()), (State::HoldPos, 0), "{about}");
+                assert_eq!((it.rig.state(), it.rig.errors()), (ControllerState::HoldPos, 0), "{about}");
                 // The joints sag until P and the integral carry it; at the limit a little further.
                 let sag = if it.saturated > 10 { 0.02 } else { 0.01 };
                 assert!(it.sag < sag, "{about}: {} rad", it.sag);
@@ -124,7 +124,7 @@ fn j43_an_unknown_payload_is_caught_in_motion() {
             it.run(1);
         }
         it.run(3000);
-        assert_eq!((it.rig.state(), it.rig.errors()), (State::HoldPos, 0), "{velocity} rad/s");
+        assert_eq!((it.rig.state(), it.rig.errors()), (ControllerState::HoldPos, 0), "{velocity} rad/s");
         assert!(it.sag < 0.08, "{velocity} rad/s: {} rad", it.sag);
         assert!(it.saturated > 10 || velocity < 0.0, "{velocity} rad/s: {} ms at the limit", it.saturated);
     }
@@ -143,7 +143,7 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
                 it.caught(1000);
                 it.run(20);
                 let about = format!("{mass} kg at {pose:?}, friction times {factor}");
-                assert_eq!(it.rig.state(), State::Error, "{about}");
+                assert_eq!(it.rig.state(), ControllerState::Error, "{about}");
                 let bits = it.rig.controller.telemetry().joints.map(|j| j.internal);
                 assert_eq!(bits.iter().fold(0, |all, bits| all | bits), joint_error::TORQUE, "{about}");
                 assert!(it.sag < 0.25, "{about}: {} rad", it.sag);
@@ -164,7 +164,7 @@ fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
         it.caught(after);
         it.arm.push[1] = 70.0;
         it.run(400);
-        assert_eq!(it.rig.state(), State::Error, "{catch_ms_max} ms");
+        assert_eq!(it.rig.state(), ControllerState::Error, "{catch_ms_max} ms");
         assert_eq!(it.rig.controller.telemetry().joints[1].internal, joint_error::TORQUE);
         assert!(it.saturated <= 11, "{} ms at the limit", it.saturated);
     }
@@ -175,7 +175,7 @@ fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
 fn j34_an_execute_waits_until_the_load_is_caught() {
     let mut it = Let::new(Config::avena(), 2.6, POSES[1], 0.1);
     it.rig.nodes[1].slow_enable = true;
-    while it.rig.state() != State::HoldPos {
+    while it.rig.state() != ControllerState::HoldPos {
         it.run(1);
     }
     it.run(200);
@@ -184,10 +184,10 @@ fn j34_an_execute_waits_until_the_load_is_caught() {
     it.rig.send(jtc_wire::FrameType::Trajectory, &rig::segment_body(7, 0, 1, 10, &points));
     it.rig.send(jtc_wire::FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
     it.run(100);
-    assert_eq!((it.rig.state(), it.rig.tes()), (State::Operate, Tes::Execute));
+    assert_eq!((it.rig.state(), it.rig.trajectory()), (ControllerState::Operate, TrajectoryState::Execute));
     it.rig.nodes[1].report.fsm = fsm::ENABLED;
     let mut left = 0;
-    while it.rig.tes() == Tes::Execute {
+    while it.rig.trajectory() == TrajectoryState::Execute {
         let before = it.saturated;
         it.run(1);
         let point = it.rig.controller.telemetry().point;
@@ -196,6 +196,9 @@ fn j34_an_execute_waits_until_the_load_is_caught() {
         assert!(left < 2000);
     }
     it.run(2);
-    assert_eq!((it.rig.state(), it.rig.tes(), it.rig.errors()), (State::HoldPos, Tes::Finish, 0));
+    assert_eq!(
+        (it.rig.state(), it.rig.trajectory(), it.rig.errors()),
+        (ControllerState::HoldPos, TrajectoryState::Finish, 0)
+    );
     assert!(it.saturated > 10, "{} ms at the limit", it.saturated);
 }

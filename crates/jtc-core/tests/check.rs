@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_core::check::Quantity;
-use jtc_core::{Config, State, Tes, Violation};
+use jtc_core::{Config, ControllerState, TrajectoryState, Violation};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, rad, rest, segment_body};
 
@@ -50,9 +50,12 @@ fn j36_what_no_path_may_do_is_refused_when_it_is_loaded() {
         let mut rig = rig();
         assert_eq!(load(&mut rig, 0, 1, &points), DataStatus::IncorrectValue, "{expected:?}");
         assert_eq!(why(&rig), Some((expected.0, 1, expected.1)));
-        assert_eq!((rig.tes(), rig.exec(ExecCommand::Execute)), (Tes::Null, DataStatus::NotAllowed));
+        assert_eq!(
+            (rig.trajectory(), rig.exec(ExecCommand::Execute)),
+            (TrajectoryState::Null, DataStatus::NotAllowed)
+        );
         assert_eq!(load(&mut rig, 0, 1, &[still, still]), DataStatus::NoError);
-        assert_eq!((rig.tes(), why(&rig)), (Tes::Stop, None));
+        assert_eq!((rig.trajectory(), why(&rig)), (TrajectoryState::Stop, None));
     }
     let mut rig = rig();
     assert_eq!(load(&mut rig, 0, 1, &[still, point(1, 0.0, 0.0, 0.0), still]), DataStatus::NoError);
@@ -67,7 +70,7 @@ fn j30_a_refused_segment_0_leaves_the_old_trajectory_as_it_was() {
     let mut bad = vec![point(2, 0.015, 0.0, 0.0); 39];
     bad.push(point(2, 3.0, 0.0, 0.0));
     assert_eq!(load(&mut rig, 0, 1, &bad), DataStatus::IncorrectValue);
-    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
     for (i, p) in good.iter().enumerate().skip(1) {
         rig.until(1000, |r| r.controller.telemetry().point == 100 * i as u32);
@@ -86,9 +89,9 @@ fn j30_the_right_segment_can_follow_one_that_was_refused() {
     assert_eq!(load(&mut rig, 1, 2, &[at(0.04), point(3, 0.05, 0.2, 0.0)]), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((3, 3, Quantity::Rest)), "only the last segment has the last point");
     assert_eq!(load(&mut rig, 1, 2, &[at(0.04), at(0.05)]), DataStatus::NoError);
-    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    rig.until(1000, |r| r.tes() == Tes::Finish);
+    rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.controller.telemetry().joints[3].set_position, rad(at(0.05).position[3]));
 }
 
@@ -102,8 +105,11 @@ fn j30_points_of_a_segment_that_loses_holdpos_do_not_count() {
     assert_eq!(rig.statuses.last().unwrap().response.data, DataStatus::NotAllowed);
     rig.safety_input = true;
     rig.clear(true, 0);
-    rig.until(500, |r| r.state() == State::HoldPos);
-    assert_eq!((rig.tes(), rig.exec(ExecCommand::Execute)), (Tes::Null, DataStatus::NotAllowed));
+    rig.until(500, |r| r.state() == ControllerState::HoldPos);
+    assert_eq!(
+        (rig.trajectory(), rig.exec(ExecCommand::Execute)),
+        (TrajectoryState::Null, DataStatus::NotAllowed)
+    );
     // Nothing of it is there to go on behind.
     let second = segment_body(7, 1, 2, 100, &[rest(0)]);
     assert_eq!(rig.ask(FrameType::Trajectory, &second), DataStatus::IncorrectSegmentOrder);
@@ -148,11 +154,15 @@ fn j36_velocities_outside_the_friction_table_are_refused_at_loading_and_at_execu
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((2, 4, Quantity::FrictionVelocity)));
     rig.run(300);
-    assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Stop), "nothing moves");
+    assert_eq!(
+        (rig.state(), rig.trajectory()),
+        (ControllerState::HoldPos, TrajectoryState::Stop),
+        "nothing moves"
+    );
     // The polynomial has no ends.
     assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::NoError);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    rig.until(2000, |r| r.tes() == Tes::Finish);
+    rig.until(2000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }
 
@@ -164,14 +174,14 @@ fn j36_a_new_table_in_pause_is_asked_before_the_path_goes_on() {
     rig.exec(ExecCommand::Execute);
     rig.until(1000, |r| r.controller.telemetry().point == 50);
     rig.exec(ExecCommand::Pause);
-    rig.until(1000, |r| r.tes() == Tes::Pause);
+    rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
     rig.run(2);
     assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.2, 0.2, 0.0, 60.0)), DataStatus::NoError);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
-    assert_eq!((rig.tes(), rig.state()), (Tes::Pause, State::HoldPos));
+    assert_eq!((rig.trajectory(), rig.state()), (TrajectoryState::Pause, ControllerState::HoldPos));
     assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.4, 0.4, 0.0, 60.0)), DataStatus::NoError);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    rig.until(3000, |r| r.tes() == Tes::Finish);
+    rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }
 
@@ -198,9 +208,9 @@ fn j36_temperature_is_asked_at_execute_and_j42_in_motion_the_nearest_column_is_u
         // It gets colder or warmer than the table while it moves.
         rig.nodes[4].report.temperature = if temperature == 20 { 251 } else { 70 };
         rig.run(20);
-        assert_eq!((rig.state(), rig.errors()), (State::Operate, 0));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::Operate, 0));
         assert!((rig.controller.telemetry().joints[4].torque_friction - column).abs() < 1e-6);
-        rig.until(2000, |r| r.tes() == Tes::Finish);
+        rig.until(2000, |r| r.trajectory() == TrajectoryState::Finish);
         assert_eq!(rig.errors(), 0);
         assert_eq!(
             rig.exec(ExecCommand::Execute),
@@ -234,27 +244,35 @@ fn j42_friction_acts_at_the_commanded_velocity_not_at_the_measured_one() {
 
 #[test]
 fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
-    for (away, tes) in [(0.015, Tes::Finish), (-0.015, Tes::Finish), (0.025, Tes::Stop), (-0.025, Tes::Stop)]
-    {
+    for (away, trajectory) in [
+        (0.015, TrajectoryState::Finish),
+        (-0.015, TrajectoryState::Finish),
+        (0.025, TrajectoryState::Stop),
+        (-0.025, TrajectoryState::Stop),
+    ] {
         let mut rig = Rig::new(Config::avena());
         // A drive that takes its time, and an arm that sags meanwhile.
         rig.nodes[5].slow_enable = true;
         rig.defaults();
-        rig.until(300, |r| r.state() == State::HoldPos);
+        rig.until(300, |r| r.state() == ControllerState::HoldPos);
         assert_eq!(load(&mut rig, 0, 1, &[rest(0), rest(0)]), DataStatus::NoError);
         rig.follow = false;
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
         rig.run(50);
-        assert_eq!((rig.state(), rig.tes()), (State::Operate, Tes::Execute), "it waits");
+        assert_eq!(
+            (rig.state(), rig.trajectory()),
+            (ControllerState::Operate, TrajectoryState::Execute),
+            "it waits"
+        );
         for mm in 1..=100 {
             rig.nodes[5].report.position = away * f64::from(mm) / 100.0;
             rig.tick();
         }
         rig.follow = true;
         rig.nodes[5].report.fsm = jtc_bus::fsm::ENABLED;
-        rig.until(1000, |r| r.tes() != Tes::Execute);
-        assert_eq!((rig.tes(), rig.errors()), (tes, 0), "{away} rad away");
-        if tes == Tes::Stop {
+        rig.until(1000, |r| r.trajectory() != TrajectoryState::Execute);
+        assert_eq!((rig.trajectory(), rig.errors()), (trajectory, 0), "{away} rad away");
+        if trajectory == TrajectoryState::Stop {
             let held = rig.controller.telemetry().joints[5].set_position;
             assert!((held - away).abs() < 1e-3, "nothing moves: {held}");
         }
@@ -290,7 +308,11 @@ fn j36_the_existing_trajectories_keep_their_verdicts() {
             })
             .take_while(|&answer| answer == DataStatus::NoError)
             .collect();
-        assert_eq!((answers.len() == chunks.len(), rig.tes() == Tes::Stop), (passes, passes), "{name}");
+        assert_eq!(
+            (answers.len() == chunks.len(), rig.trajectory() == TrajectoryState::Stop),
+            (passes, passes),
+            "{name}"
+        );
         if !passes {
             let v = rig.controller.violation().expect("kept");
             assert_eq!((v.point, v.quantity), (1053, Quantity::PositionSpeed), "{v:?}");

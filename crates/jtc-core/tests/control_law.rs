@@ -1,7 +1,7 @@
 //! The control law in the loop of the controller (section 6), and torque without steps.
 mod rig;
 
-use jtc_core::{Config, Parameters, State, Tes, joint_error};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, rest};
@@ -91,7 +91,7 @@ fn j41_no_derivative_kick_when_holding_begins() {
             assert!(j.torque_d.abs() < 1e-6 && j.torque_p.abs() < 1e-2);
         }
     }
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn j43_an_error_zeroes_the_torque_of_the_same_tick() {
     let mut rig = Rig::holding_with(config);
     rig.push(3, 0.09 + 0.095);
     rig.run(2);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.status().joints[3].internal, joint_error::POSITION_ERROR);
     assert!(
         rig.sent
@@ -124,11 +124,11 @@ fn j43_the_torque_saturates_at_its_limit_for_a_while_at_most_and_j41_holds_the_i
     let mut rig = Rig::holding_with(Config { catch_ms_max: 0, ..Config::avena() });
     rig.push(5, -0.012);
     rig.run(1);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(rig.controller.telemetry().joints[5].torque, 40.0);
     let integral = rig.controller.telemetry().joints[5].torque_i;
     rig.run(5);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(rig.controller.telemetry().joints[5].torque_i, integral);
     rig.run(5);
     assert_eq!(rig.status().joints[5].internal, joint_error::TORQUE);
@@ -178,13 +178,13 @@ fn j44_no_torque_step_at_any_switch() {
     rig.send(FrameType::TrajSetExecStatus, &[3]);
     // Slack: integral and the blend of 100 ms.
     run_without_steps(&mut rig, 1200, 1.5);
-    assert_eq!(rig.tes(), Tes::Finish);
+    assert_eq!(rig.trajectory(), TrajectoryState::Finish);
     rig.send(FrameType::TeachingModeEnable, &[]);
     run_without_steps(&mut rig, 300, 1.5);
-    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.state(), ControllerState::Teaching);
     rig.send(FrameType::TeachingModeDisable, &[]);
     run_without_steps(&mut rig, 300, 1.5);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     // New gains while holding.
     rig.send(FrameType::PidParam, &floats((0..6).flat_map(|_| [100.0, 10.0, 1.0, -1.0, 1.0])));
     run_without_steps(&mut rig, 300, 1.5);
@@ -206,7 +206,7 @@ fn j25_teaching_compensates_gravity_and_brakes_above_the_speed_limit() {
     rig.nodes[2].report.velocity = -1.999;
     rig.nodes[5].report.velocity = 1.999;
     rig.run(5);
-    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.state(), ControllerState::Teaching);
 }
 
 #[test]
@@ -220,7 +220,7 @@ fn j25_leaving_teaching_in_motion_comes_to_rest() {
     rig.nodes[0].report.velocity = 0.0;
     rig.run(400);
     let t = rig.controller.telemetry();
-    assert_eq!((t.state, t.errors), (State::HoldPos, 0));
+    assert_eq!((t.state, t.errors), (ControllerState::HoldPos, 0));
     assert_eq!(t.joints[0].set_velocity, 0.0);
     assert!((t.joints[0].set_position - 0.08).abs() < 0.01, "{}", t.joints[0].set_position);
 }
@@ -242,7 +242,7 @@ fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
             rig.nodes[1].report.velocity = side * 0.8;
             rig.run(2);
             rig.send(FrameType::TeachingModeDisable, &[]);
-            rig.until(20, |r| r.state() == State::HoldPos);
+            rig.until(20, |r| r.state() == ControllerState::HoldPos);
             rig.nodes[1].report.velocity = 0.0;
             rig.follow = true;
             let mut last = rig.controller.telemetry().joints[1];

@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_bus::{Request, Target, fsm};
-use jtc_core::{Config, State, error};
+use jtc_core::{Config, ControllerState, error};
 use jtc_wire::FrameType;
 use rig::Rig;
 
@@ -58,7 +58,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
             let from = rig.sent.len();
             // The time limit of enabling counts only while enabling is asked for.
             swing(&mut rig, 3000, speed, report);
-            assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0), "{speed} rad/s");
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{speed} rad/s");
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
             assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY), "which the status shows");
             // It must have been slow for 50 ms.
@@ -69,7 +69,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
             assert!(asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
             rig.run(100);
             assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
-            assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         }
     }
 }
@@ -122,7 +122,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
             );
             last = if t.fsm == fsm::ENABLED { correction } else { 0.0 };
         }
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         let t = rig.controller.telemetry().joints[JOINT];
         let way = t.set_position - start;
         assert_eq!(t.set_velocity, 0.0);

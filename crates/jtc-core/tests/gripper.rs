@@ -2,30 +2,31 @@
 mod rig;
 
 use jtc_bus::{Request, fsm};
-use jtc_core::{Config, State, Tes};
+use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, rest};
 
 const GRIPPER: usize = 6;
 const FLAG: u32 = 1 << 14;
-const POWERED: [State; 3] = [State::HoldPos, State::Operate, State::Teaching];
+const POWERED: [ControllerState; 3] =
+    [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching];
 
 /// In a state with torque, the pump on.
-fn powered(state: State) -> Rig {
+fn powered(state: ControllerState) -> Rig {
     powered_with(Config::avena(), state)
 }
 
-fn powered_with(config: Config, state: State) -> Rig {
+fn powered_with(config: Config, state: ControllerState) -> Rig {
     let mut rig = Rig::holding_with(config);
     pump(&mut rig, true);
     match state {
-        State::Operate => {
+        ControllerState::Operate => {
             let points: Vec<RawPoint> = (0..400).map(|_| rest(0)).collect();
             rig.upload(&points, 10);
             rig.exec(ExecCommand::Execute);
             rig.until(500, |r| r.controller.telemetry().point > 5);
         }
-        State::Teaching => {
+        ControllerState::Teaching => {
             rig.ask(FrameType::TeachingModeEnable, &[]);
             rig.run(200);
         }
@@ -42,7 +43,7 @@ fn pump(rig: &mut Rig, on: bool) {
 }
 
 /// Runs, and sees that the arm is left alone: no error, no other state, nothing but Move in 19 of 20 ticks.
-fn undisturbed(rig: &mut Rig, ticks: usize, state: State) {
+fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     let from = rig.sent.len();
     for _ in 0..ticks {
         rig.tick();
@@ -111,7 +112,7 @@ fn j23_a_gripper_that_leaves_operation_enable_is_enabled_again_without_its_pump(
 
 #[test]
 fn j23_joints_are_not_reset_while_the_arm_may_move() {
-    for state in [State::Operate, State::Teaching] {
+    for state in [ControllerState::Operate, ControllerState::Teaching] {
         let mut rig = powered(state);
         for mask in [0x01, 0x20, 0x3F, 0x7F, 0xFF] {
             assert_eq!(rig.ask(FrameType::ResetCanDevices, &[mask, 0, 0, 0]), DataStatus::NotAllowed);
@@ -130,22 +131,22 @@ fn j23_joints_are_not_reset_while_the_arm_may_move() {
 #[test]
 fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
     for mask in [0x40, 0x7F] {
-        let mut rig = powered(State::HoldPos);
+        let mut rig = powered(ControllerState::HoldPos);
         rig.ask(FrameType::ResetCanDevices, &[mask, 0, 0, 0]);
         let from = rig.sent.len();
         rig.run(800);
         assert!(rig.sent[from..].iter().all(|r| !matches!(r, Request::Move { pump: true, .. })));
         assert_eq!(rig.nodes[GRIPPER].resets, 2);
-        assert_eq!((rig.state(), rig.nodes[GRIPPER].report.fsm), (State::HoldPos, fsm::ENABLED));
+        assert_eq!((rig.state(), rig.nodes[GRIPPER].report.fsm), (ControllerState::HoldPos, fsm::ENABLED));
         pump(&mut rig, true);
         assert!(rig.pump);
     }
     // Nor after a joint took the controller back to Init.
-    let mut rig = powered(State::HoldPos);
+    let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
     rig.nodes[2].report.fsm = fsm::INIT;
     rig.run(400);
-    assert_eq!((rig.state(), rig.pump), (State::HoldPos, false));
+    assert_eq!((rig.state(), rig.pump), (ControllerState::HoldPos, false));
 }
 
 #[test]
@@ -154,20 +155,20 @@ fn j14_a_gripper_that_is_not_there_is_no_error_and_keeps_the_controller_in_init(
     rig.nodes[GRIPPER].silent = true;
     rig.defaults();
     rig.run(3000);
-    assert_eq!((rig.state(), rig.errors()), (State::Init, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Init, 0));
     let status = rig.status();
     assert_eq!((status.can_error, status.can_current, status.node_init), (0, FLAG, 1 << GRIPPER));
     // When it comes, it is brought up like the others.
     rig.nodes[GRIPPER].silent = false;
     rig.run(200);
-    assert_eq!((rig.state(), rig.status().can_current), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.status().can_current), (ControllerState::HoldPos, 0));
 }
 
 /// An error and the way back to HoldPos.
 fn error_and_clear(rig: &mut Rig) {
     rig.safety_input = false;
     rig.run(100);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     rig.safety_input = true;
 }
 
@@ -185,7 +186,10 @@ fn the_pump_is_switched_off_by_an_error_where_the_setting_says_so() {
         assert_eq!(rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]), DataStatus::NotAllowed);
         rig.clear(true, 0x7F);
         rig.run(400);
-        assert_eq!((rig.state(), rig.tes(), rig.pump), (State::HoldPos, Tes::Null, false));
+        assert_eq!(
+            (rig.state(), rig.trajectory(), rig.pump),
+            (ControllerState::HoldPos, TrajectoryState::Null, false)
+        );
     }
 }
 
@@ -201,13 +205,13 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY));
         rig.clear(true, 0x7F);
         rig.run(400);
-        assert_eq!(rig.state(), State::HoldPos);
+        assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
         // Through Init as well.
         rig.nodes[2].configured = false;
         rig.nodes[2].report.fsm = fsm::INIT;
         rig.run(400);
-        assert_eq!(rig.state(), State::HoldPos);
+        assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
         assert!(rig.sent[from..].iter().all(|r| !matches!(r, Request::Move { pump: false, .. })));
         // The host can let go of it in Error.
@@ -228,7 +232,10 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     rig.nodes[GRIPPER].slow_enable = false;
     rig.clear(true, 0x7F);
     rig.run(400);
-    assert_eq!((rig.state(), rig.nodes[GRIPPER].report.fsm, rig.pump), (State::HoldPos, fsm::ENABLED, false));
+    assert_eq!(
+        (rig.state(), rig.nodes[GRIPPER].report.fsm, rig.pump),
+        (ControllerState::HoldPos, fsm::ENABLED, false)
+    );
 }
 
 /// A command that was given while the gripper was brought up is carried out once it is; one from before its reset is not.
@@ -239,8 +246,14 @@ fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
     assert!(rig.nodes[GRIPPER].booting > 0 && !rig.nodes[GRIPPER].configured);
     pump(&mut rig, true);
     rig.run(400);
-    assert_eq!((rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm), (State::Init, true, fsm::READY));
+    assert_eq!(
+        (rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm),
+        (ControllerState::Init, true, fsm::READY)
+    );
     rig.nodes[GRIPPER].restart();
     rig.run(400);
-    assert_eq!((rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm), (State::Init, false, fsm::READY));
+    assert_eq!(
+        (rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm),
+        (ControllerState::Init, false, fsm::READY)
+    );
 }

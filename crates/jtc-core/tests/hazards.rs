@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_bus::{Request, fsm, warning};
-use jtc_core::{Config, State, Tes, error};
+use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, pieces, rad, rest, segment_body};
 
@@ -37,7 +37,7 @@ fn j16_drives_that_lost_their_supply_are_configured_again() {
     rig.safety_input = true;
     rig.clear(true, 0x7F);
     rig.run(300);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     assert!(rig.nodes.iter().all(|n| n.configured));
     for joint in &rig.controller.telemetry().joints {
         assert!((joint.set_position - 0.7).abs() < 1e-6, "held where it is: {}", joint.set_position);
@@ -64,7 +64,10 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
         assert!((t.joints[0].set_position - last.joints[0].set_position).abs() < 2e-4, "{last:?} {t:?}");
         last = t;
     }
-    assert_eq!((last.tes, last.state, last.errors), (Tes::Finish, State::HoldPos, 0));
+    assert_eq!(
+        (last.trajectory, last.state, last.errors),
+        (TrajectoryState::Finish, ControllerState::HoldPos, 0)
+    );
     assert_eq!(last.joints[0].set_position, rad(points.last().unwrap().position[0]));
 }
 
@@ -81,13 +84,13 @@ fn j33_pause_and_resume_keep_to_the_acceleration_limit() {
             let mut rig = Rig::holding_with(roomy(Config::avena(), limit));
             rig.move_along(points, pause_at);
             rig.exec(ExecCommand::Pause);
-            rig.until(4000, |r| r.tes() != Tes::Execute);
+            rig.until(4000, |r| r.trajectory() != TrajectoryState::Execute);
             assert_eq!(rig.errors(), 0, "pause at {pause_at}");
-            if rig.tes() == Tes::Pause {
+            if rig.trajectory() == TrajectoryState::Pause {
                 rig.exec(ExecCommand::Execute);
-                rig.until(6000, |r| r.tes() != Tes::Execute);
+                rig.until(6000, |r| r.trajectory() != TrajectoryState::Execute);
             }
-            assert_eq!((rig.errors(), rig.tes()), (0, Tes::Finish), "pause at {pause_at}");
+            assert_eq!((rig.errors(), rig.trajectory()), (0, TrajectoryState::Finish), "pause at {pause_at}");
         }
     }
 }
@@ -99,7 +102,7 @@ fn j33_a_pause_during_a_resume_slows_down() {
         let mut rig = Rig::holding_with(roomy(Config::avena(), 4.0));
         rig.move_along(&points, 500);
         rig.exec(ExecCommand::Pause);
-        rig.until(3000, |r| r.tes() == Tes::Pause);
+        rig.until(3000, |r| r.trajectory() == TrajectoryState::Pause);
         rig.exec(ExecCommand::Execute);
         rig.run(wait);
         let before = rig.controller.telemetry().joints[0].set_velocity;
@@ -107,7 +110,7 @@ fn j33_a_pause_during_a_resume_slows_down() {
         let mut top = before;
         let ticks = rig.until(3000, |r| {
             top = top.max(r.controller.telemetry().joints[0].set_velocity);
-            r.tes() == Tes::Pause
+            r.trajectory() == TrajectoryState::Pause
         });
         assert!(top < before + 0.06, "from {before} up to {top} rad/s");
         assert!(ticks < 600, "{ticks}");
@@ -130,10 +133,10 @@ fn j33_a_pause_on_the_way_to_point_0_has_no_step_of_velocity() {
         assert!((v - last).abs() < 0.01, "{last} to {v} rad/s");
         last = v;
     }
-    assert_eq!((rig.tes(), rig.errors()), (Tes::Pause, 0));
+    assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Pause, 0));
     assert_eq!(rig.controller.telemetry().joints[0].set_position, rad(200));
     rig.exec(ExecCommand::Execute);
-    rig.until(1000, |r| r.tes() == Tes::Finish);
+    rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
 }
 
 #[test]
@@ -162,7 +165,7 @@ fn j21_a_clear_waits_as_long_as_the_node_takes() {
     rig.run(6000);
     rig.nodes[1].report.fsm = fsm::FAULT;
     rig.run(300);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
 #[test]
@@ -173,7 +176,7 @@ fn j21_healthy_joints_are_brought_to_ready_in_error() {
     rig.run(1);
     rig.safety_input = false;
     rig.run(50);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY));
 }
 
@@ -184,10 +187,10 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
     rig.follow = false;
     rig.defaults();
     rig.run(400);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(500);
-    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.state(), ControllerState::Teaching);
     // A trajectory out there is another matter.
     rig.ask(FrameType::TeachingModeDisable, &[]);
     rig.run(300);
@@ -195,7 +198,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
     let out: Vec<_> =
         (0..10).map(|_| RawPoint { position: [0, (1.6 / rad(1)) as i16, 0, 0, 0, 0], ..rest(0) }).collect();
     let answer = rig.ask(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &out));
-    assert_eq!((answer, rig.tes()), (DataStatus::IncorrectValue, Tes::Null));
+    assert_eq!((answer, rig.trajectory()), (DataStatus::IncorrectValue, TrajectoryState::Null));
 }
 
 #[test]
@@ -204,7 +207,7 @@ fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
     let mut rig = Rig::new(roomy(Config::avena(), 100.0));
     rig.nodes[2].slow_enable = true;
     rig.defaults();
-    rig.until(300, |r| r.state() == State::HoldPos);
+    rig.until(300, |r| r.state() == ControllerState::HoldPos);
     rig.run(50);
     rig.ask(FrameType::TeachingModeEnable, &[]);
     rig.run(150);
@@ -245,7 +248,7 @@ fn j25_the_brake_leaves_room_for_what_is_being_blended_out() {
     rig.ask(FrameType::TeachingModeEnable, &[]);
     rig.nodes[5].report.velocity = 1.75;
     rig.run(40);
-    assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
 }
 
 #[test]
@@ -258,7 +261,7 @@ fn j12_torque_is_taken_away_before_anything_else_is_sent() {
     rig.nodes[2].configured = false;
     rig.nodes[2].report.fsm = fsm::INIT;
     rig.run(9);
-    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.state(), ControllerState::Init);
     let mut rest = rig.sent[from..]
         .iter()
         .skip_while(|r| matches!(r, Request::Move { torque, .. } if *torque != [0.0; 6]));
@@ -285,7 +288,7 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
             && matches!(healthy[state], Request::ChangeFsm { .. })));
     for tick in others {
         let mut rig = run(tick);
-        assert_eq!(rig.state(), State::Init);
+        assert_eq!(rig.state(), ControllerState::Init);
         rig.safety_input = false;
         rig.tick();
         assert_eq!(
@@ -310,7 +313,7 @@ fn j16_a_joint_that_loses_its_position_in_motion_is_an_error() {
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     rig.nodes[3].report.warnings = 0;
     rig.run(300);
-    assert_eq!(rig.state(), State::Error, "it does not hold again by itself");
+    assert_eq!(rig.state(), ControllerState::Error, "it does not hold again by itself");
 }
 
 #[test]
@@ -335,7 +338,7 @@ fn j42_drives_send_temperatures_below_zero_modulo_256() {
 fn j14_a_silent_node_is_seen_within_seven_frames() {
     let mut rig = Rig::holding();
     rig.nodes[4].silent = true;
-    let ticks = rig.until(30, |r| r.state() == State::Error);
+    let ticks = rig.until(30, |r| r.state() == ControllerState::Error);
     assert!(ticks <= 7, "{ticks}");
 }
 
@@ -386,7 +389,7 @@ fn swings_until_error(held_ms: usize) -> usize {
         // 4 mrad at Kp 8000: 32 N·m, the sign changes every 8 ms.
         rig.nodes[0].report.position = if (k / 8) % 2 == 0 { 4e-3 } else { -4e-3 };
         rig.tick();
-        if rig.state() == State::Error {
+        if rig.state() == ControllerState::Error {
             break;
         }
         swung += 1;

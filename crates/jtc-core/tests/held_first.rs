@@ -3,7 +3,7 @@ mod plant;
 mod rig;
 
 use jtc_bus::fsm;
-use jtc_core::{Config, Parameters, State, Tes};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use plant::{LuGre, Plant, loaded};
 use rig::{Rig, floats};
@@ -34,13 +34,13 @@ fn j25_teaching_waits_until_the_load_is_held() {
     for factor in [0.3, 1.0] {
         for after in [0, 50, 100, 400] {
             let (mut arm, mut rig) = carrying(2.0, factor);
-            while rig.state() != State::HoldPos {
+            while rig.state() != ControllerState::HoldPos {
                 arm.tick(&mut rig);
             }
             arm.run(&mut rig, after);
             rig.send(FrameType::TeachingModeEnable, &[]);
             arm.run(&mut rig, 3_000);
-            assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0), "after {after} ms");
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0), "after {after} ms");
             assert!(way(&arm) < 0.03, "after {after} ms, friction times {factor}: {} rad", way(&arm));
         }
     }
@@ -56,25 +56,29 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
         rig.run(50);
         rig.safety_input = true;
         rig.clear(true, 0x7F);
-        rig.until(2_000, |rig| rig.state() == State::HoldPos);
+        rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
     };
     waiting(&mut rig);
     rig.upload(&vec![RawPoint::default(); 30], 10);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(500);
-    assert_eq!(rig.state(), State::HoldPos, "joint 3 is not enabled");
+    assert_eq!(rig.state(), ControllerState::HoldPos, "joint 3 is not enabled");
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     rig.nodes[2].report.fsm = fsm::ENABLED;
     rig.run(2_000);
-    assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Stop), "called off");
+    assert_eq!(
+        (rig.state(), rig.trajectory()),
+        (ControllerState::HoldPos, TrajectoryState::Stop),
+        "called off"
+    );
 
     waiting(&mut rig);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(10_100);
     rig.nodes[2].report.fsm = fsm::ENABLED;
     rig.run(2_000);
-    assert_eq!(rig.state(), State::HoldPos, "after ten seconds nobody expects it");
+    assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
 
 /// One drive is seconds later than the others; its load swings, and moves the others' again.
@@ -84,14 +88,14 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
         for factor in [0.0, 0.1, 0.3] {
             let (mut arm, mut rig) = carrying(2.8, factor);
             rig.nodes[late].slow_enable = true;
-            while rig.state() != State::HoldPos {
+            while rig.state() != ControllerState::HoldPos {
                 arm.tick(&mut rig);
             }
             arm.run(&mut rig, 4_000);
             rig.nodes[late].report.fsm = fsm::ENABLED;
             arm.run(&mut rig, 3_000);
             let about = format!("joint {} late, friction times {factor}", late + 1);
-            assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0), "{about}");
+            assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{about}");
         }
     }
 }
@@ -111,7 +115,7 @@ fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
             let mut fastest = 0.0_f64;
             for _ in 0..5_000 {
                 arm.tick(&mut rig);
-                if rig.state() != State::Error {
+                if rig.state() != ControllerState::Error {
                     fastest = arm.v.iter().fold(fastest, |f, v| f.max(v.abs()));
                 }
             }
@@ -132,7 +136,7 @@ fn j25_leaving_teaching_in_motion_is_no_error_where_the_torque_is_at_its_limit()
         arm.run(&mut rig, 3_000);
         rig.send(FrameType::TeachingModeEnable, &[]);
         arm.run(&mut rig, 700);
-        assert_eq!(rig.state(), State::Teaching);
+        assert_eq!(rig.state(), ControllerState::Teaching);
         for k in 0..400 {
             let wanted = speed * (f64::from(k) / 200.0).min(1.0);
             arm.push[1] = (wanted - arm.v[1]) * 400.0;
@@ -143,7 +147,7 @@ fn j25_leaving_teaching_in_motion_is_no_error_where_the_torque_is_at_its_limit()
         arm.push = [0.0; 6];
         let from = arm.q;
         arm.run(&mut rig, 2_000);
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0), "{speed} rad/s");
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{speed} rad/s");
         assert!((arm.q[1] - from[1]).abs() < 0.25, "{speed} rad/s: {} rad", arm.q[1] - from[1]);
     }
 }

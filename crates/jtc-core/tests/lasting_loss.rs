@@ -3,7 +3,7 @@
 mod plant;
 mod rig;
 
-use jtc_core::{Config, Parameters, State, Tes, error};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
 use jtc_wire::{FrameType, RawPoint};
 use plant::{LuGre, Plant, loaded};
 use rig::{Rig, pieces};
@@ -71,10 +71,15 @@ fn on_the_path(lost: &[bool]) -> f64 {
     for (k, &lost) in lost.iter().enumerate() {
         rig.nodes[JOINT].silent = lost;
         arm.tick(&mut rig);
-        assert_ne!(rig.state(), State::Error, "after {k} ms: {:?}", rig.controller.telemetry());
+        assert_ne!(rig.state(), ControllerState::Error, "after {k} ms: {:?}", rig.controller.telemetry());
         worst = worst.max((rig.controller.telemetry().joints[JOINT].set_position - arm.q[JOINT]).abs());
     }
-    assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Finish), "{:?}", rig.controller.telemetry());
+    assert_eq!(
+        (rig.state(), rig.trajectory()),
+        (ControllerState::HoldPos, TrajectoryState::Finish),
+        "{:?}",
+        rig.controller.telemetry()
+    );
     worst
 }
 
@@ -89,7 +94,7 @@ fn pushed(lost: &[bool]) -> f64 {
         arm.push[JOINT] = if (1000..1100).contains(&k) { 20.0 } else { 0.0 };
         rig.nodes[JOINT].silent = lost;
         arm.tick(&mut rig);
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0), "after {k} ms");
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "after {k} ms");
         worst = worst.max((arm.q[JOINT] - from).abs());
     }
     worst
@@ -127,7 +132,7 @@ fn blocked(velocity: f64, lost: &[bool]) -> (usize, f64) {
         rig.nodes[JOINT].report.velocity = if k >= FROM { 0.0 } else { velocity };
         rig.nodes[JOINT].silent = lost;
         rig.tick();
-        if rig.tes() != Tes::Execute {
+        if rig.trajectory() != TrajectoryState::Execute {
             return (k - FROM, off);
         }
         let used = rig.controller.telemetry().joints[JOINT].position;

@@ -1,7 +1,7 @@
 //! Answers that are missing, or that no arm can have given: no torque step when they go, none when they come back (J-35, J-63).
 mod rig;
 
-use jtc_core::{Config, JointTelemetry, State, error};
+use jtc_core::{Config, ControllerState, JointTelemetry, error};
 use jtc_wire::{FrameType, RawPoint};
 use rig::{Rig, pieces};
 
@@ -53,16 +53,16 @@ fn roomy() -> Config {
 fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     let mut rig = Rig::holding_with(roomy());
     let state = match motion {
-        Motion::Held(_) => State::HoldPos,
+        Motion::Held(_) => ControllerState::HoldPos,
         Motion::Operate(velocity) => {
             rig.move_along(&path(velocity), 2);
-            State::Operate
+            ControllerState::Operate
         }
         Motion::Led(_) => {
             rig.follow = false;
             rig.ask(FrameType::TeachingModeEnable, &[]);
             rig.run(150);
-            State::Teaching
+            ControllerState::Teaching
         }
     };
     let mut all = Vec::new();
@@ -89,7 +89,7 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
             Motion::Led(_) => rig.nodes[JOINT].report.position += velocity * 0.001,
         }
         rig.nodes[JOINT].report.velocity =
-            if tick >= 220 && state == State::HoldPos { 0.0 } else { velocity };
+            if tick >= 220 && state == ControllerState::HoldPos { 0.0 } else { velocity };
         let within = |ms: usize| (200..200 + ms).contains(&tick);
         match fault {
             Fault::None => {}
@@ -149,10 +149,10 @@ fn j63_lost_answers_make_no_torque_step() {
 
 #[test]
 fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_taken() {
-    for state in [State::HoldPos, State::Teaching] {
+    for state in [ControllerState::HoldPos, ControllerState::Teaching] {
         let mut rig = Rig::holding();
         rig.follow = false;
-        if state == State::Teaching {
+        if state == ControllerState::Teaching {
             rig.ask(FrameType::TeachingModeEnable, &[]);
         }
         rig.run(3);
@@ -162,14 +162,14 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
         assert_eq!((rig.state(), rig.errors()), (state, 0));
         assert!(rig.controller.telemetry().joints[JOINT].position.abs() < 1e-9);
         rig.tick();
-        assert_eq!((rig.state(), rig.errors()), (State::Error, NODE_ERROR));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::Error, NODE_ERROR));
         assert_eq!(rig.torque, [0.0; 6]);
         let status = rig.status();
         assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, 0, 0), "no CAN timeout");
         assert!((status.joints[JOINT].position - 0.3).abs() < 1e-6, "taken as it is");
         rig.clear(true, 0x7F);
         rig.run(300);
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         assert!((rig.controller.telemetry().joints[JOINT].set_position - 0.3).abs() < 1e-6);
     }
 }
@@ -194,7 +194,7 @@ fn j63_silence_and_implausible_answers_count_together() {
             rig.nodes[JOINT].silent = tick % u32::from(max) != 0;
             rig.tick();
         }
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
 }
 
@@ -210,6 +210,6 @@ fn j35_a_position_that_becomes_accurate_may_jump() {
     rig.nodes[JOINT].report.position = 0.037;
     rig.nodes[JOINT].report.warnings = 0;
     rig.run(300);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     assert!((rig.controller.telemetry().joints[JOINT].position - 0.037).abs() < 1e-6);
 }

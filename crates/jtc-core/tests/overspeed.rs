@@ -1,7 +1,7 @@
 //! A joint that moves faster than it may, whatever was commanded (J-35), and arms that drives cannot do (J-35, J-43).
 mod rig;
 
-use jtc_core::{Config, ConfigError, State, joint_error};
+use jtc_core::{Config, ConfigError, ControllerState, joint_error};
 use jtc_wire::{ExecCommand, FrameType};
 use rig::{Rig, rest};
 
@@ -12,11 +12,11 @@ fn powered() -> [Rig; 3] {
     operating.upload(&[rest(0); 200], 10);
     operating.exec(ExecCommand::Execute);
     operating.run(300);
-    assert_eq!(operating.state(), State::Operate);
+    assert_eq!(operating.state(), ControllerState::Operate);
     let mut teaching = Rig::holding();
     teaching.ask(FrameType::TeachingModeEnable, &[]);
     teaching.run(150);
-    assert_eq!(teaching.state(), State::Teaching);
+    assert_eq!(teaching.state(), ControllerState::Teaching);
     [holding, operating, teaching]
 }
 
@@ -29,7 +29,7 @@ fn j35_a_joint_above_its_speed_for_5_ms_is_an_error_in_every_state_with_torque()
             rig.run(5);
             assert_eq!(rig.errors(), 0, "{:?}", rig.state());
             rig.run(1);
-            assert_eq!((rig.state(), rig.torque), (State::Error, [0.0; 6]));
+            assert_eq!((rig.state(), rig.torque), (ControllerState::Error, [0.0; 6]));
             assert_eq!(rig.status().joints[3].internal, joint_error::VELOCITY);
         }
     }
@@ -73,7 +73,7 @@ fn j35_answers_that_are_missing_neither_count_nor_excuse() {
         rig.run(1);
     }
     rig.run(1);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.status().joints[3].internal, joint_error::VELOCITY);
 }
 
@@ -82,7 +82,7 @@ fn j35_a_joint_that_is_not_enabled_may_move() {
     let mut rig = Rig::new(Config::avena());
     rig.nodes[2].slow_enable = true;
     rig.defaults();
-    rig.until(300, |r| r.state() == State::HoldPos);
+    rig.until(300, |r| r.state() == ControllerState::HoldPos);
     rig.run(30);
     rig.nodes[2].report.velocity = 1.9;
     rig.run(100);

@@ -1,7 +1,7 @@
 //! Which gains and models are taken, when, and that none of them throws an arm that is held (J-06).
 mod rig;
 
-use jtc_core::{Config, Parameters, State, Tes};
+use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_dynamics::ArmModel;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use proptest::prelude::*;
@@ -47,7 +47,7 @@ fn refused_without_a_trace(frame_type: FrameType, body: &[u8], what: &str) {
     }
     let record = *asked.records().last().expect("a record");
     assert_eq!((record.frame_type, record.data), (frame_type as u8, DataStatus::IncorrectValue), "{what}");
-    assert_eq!(asked.state(), State::HoldPos);
+    assert_eq!(asked.state(), ControllerState::HoldPos);
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
         (FrameType::FrictionPolynomialUseDefault, &[]),
         (FrameType::FrictionTableUseDefault, &[]),
     ];
-    let check = |rig: &mut Rig, state: State, expected: DataStatus| {
+    let check = |rig: &mut Rig, state: ControllerState, expected: DataStatus| {
         for (frame_type, body) in frames {
             assert_eq!(rig.state(), state);
             assert_eq!(rig.ask(frame_type, body), expected, "{frame_type} in {state:?}");
@@ -156,21 +156,21 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
     // The last of the three would end Init.
     assert_eq!(rig.ask(frames[0].0, frames[0].1), DataStatus::NoError);
     assert_eq!(rig.ask(frames[4].0, frames[4].1), DataStatus::NoError);
-    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.state(), ControllerState::Init);
     let mut rig = Rig::holding();
-    check(&mut rig, State::HoldPos, DataStatus::NoError);
+    check(&mut rig, ControllerState::HoldPos, DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(2);
-    check(&mut rig, State::Teaching, DataStatus::NotAllowed);
+    check(&mut rig, ControllerState::Teaching, DataStatus::NotAllowed);
     rig.ask(FrameType::TeachingModeDisable, &[]);
     rig.run(300);
     rig.upload(&[rest(0); 200], 10);
     rig.exec(ExecCommand::Execute);
     rig.run(10);
-    check(&mut rig, State::Operate, DataStatus::NotAllowed);
+    check(&mut rig, ControllerState::Operate, DataStatus::NotAllowed);
     rig.safety_input = false;
     rig.run(2);
-    check(&mut rig, State::Error, DataStatus::NoError);
+    check(&mut rig, ControllerState::Error, DataStatus::NoError);
 }
 
 #[test]
@@ -188,8 +188,8 @@ fn j30_a_segment_is_not_copied_on_after_an_error() {
         assert_eq!((record.frame_type, record.data), (4, DataStatus::NotAllowed));
         rig.safety_input = true;
         rig.clear(true, 0);
-        rig.until(1500, |r| r.state() == State::HoldPos);
-        assert_eq!(rig.tes(), Tes::Null);
+        rig.until(1500, |r| r.state() == ControllerState::HoldPos);
+        assert_eq!(rig.trajectory(), TrajectoryState::Null);
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     }
 }
@@ -210,11 +210,11 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
                 rig.nodes[2].configured = false;
                 rig.nodes[2].report.fsm = jtc_bus::fsm::INIT;
                 rig.run(2);
-                assert_eq!(rig.state(), State::Init);
+                assert_eq!(rig.state(), ControllerState::Init);
             }
-            rig.until(1500, |r| r.state() == State::HoldPos);
+            rig.until(1500, |r| r.state() == ControllerState::HoldPos);
             rig.run(600);
-            assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Null));
+            assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Null));
             assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
             let next = segment_body(7, 1, 2, 10, &[rest(0); 50]);
             assert_eq!(rig.ask(FrameType::Trajectory, &next), DataStatus::IncorrectSegmentOrder);
@@ -227,7 +227,7 @@ fn waiting_for_a_drive() -> Rig {
     let mut rig = Rig::new(Config::avena());
     rig.nodes[2].slow_enable = true;
     rig.defaults();
-    rig.until(300, |r| r.state() == State::HoldPos);
+    rig.until(300, |r| r.state() == ControllerState::HoldPos);
     rig.run(50);
     let there_and_back = |n: i16| rest(if n < 25 { n } else { 50 - n });
     rig.upload(&(0..51).map(there_and_back).collect::<Vec<_>>(), 20);
@@ -235,11 +235,11 @@ fn waiting_for_a_drive() -> Rig {
     rig.run(3000);
     let t = rig.controller.telemetry();
     assert_eq!(
-        (t.tes, t.point, t.joints[0].set_position),
-        (Tes::Execute, 0, 0.0),
+        (t.trajectory, t.point, t.joints[0].set_position),
+        (TrajectoryState::Execute, 0, 0.0),
         "shown, and nothing moves"
     );
-    assert_eq!(rig.status().tes, 3);
+    assert!(rig.status().trajectory == TrajectoryState::Execute);
     rig
 }
 
@@ -248,13 +248,15 @@ fn j16_an_execute_waits_for_drives_that_are_being_enabled() {
     let mut rig = waiting_for_a_drive();
     rig.nodes[2].slow_enable = false;
     rig.nodes[2].report.fsm = jtc_bus::fsm::ENABLED;
-    rig.until(3000, |r| r.tes() == Tes::Finish);
+    rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }
 
 #[test]
 fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
-    for (command, to) in [(UrgentCommand::Stop, Tes::Stop), (UrgentCommand::Pause, Tes::Pause)] {
+    for (command, to) in
+        [(UrgentCommand::Stop, TrajectoryState::Stop), (UrgentCommand::Pause, TrajectoryState::Pause)]
+    {
         for urgent in [true, false] {
             let mut rig = waiting_for_a_drive();
             if urgent {
@@ -263,17 +265,21 @@ fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
             } else {
                 assert_eq!(rig.exec(command.into()), DataStatus::NoError);
             }
-            assert_eq!(rig.tes(), to, "at once");
+            assert_eq!(rig.trajectory(), to, "at once");
             rig.nodes[2].slow_enable = false;
             rig.nodes[2].report.fsm = jtc_bus::fsm::ENABLED;
             for _ in 0..3000 {
                 rig.tick();
                 let t = rig.controller.telemetry();
-                assert_eq!((t.tes, t.point, t.joints[0].set_position), (to, 0, 0.0), "nothing moves later");
+                assert_eq!(
+                    (t.trajectory, t.point, t.joints[0].set_position),
+                    (to, 0, 0.0),
+                    "nothing moves later"
+                );
             }
             // A new Execute is another matter.
             assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-            rig.until(3000, |r| r.tes() == Tes::Finish);
+            rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
     }
 }
@@ -291,7 +297,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
     for _ in 0..300 {
         asked.tick();
         let t = *asked.controller.telemetry();
-        prop_assert_eq!((t.state, t.errors), (State::HoldPos, 0), "{}", accepted);
+        prop_assert_eq!((t.state, t.errors), (ControllerState::HoldPos, 0), "{}", accepted);
         for (j, limits) in Config::avena().joints.iter().enumerate() {
             let torque = t.joints[j].torque;
             prop_assert!(torque.abs() <= limits.torque_max);

@@ -4,7 +4,7 @@ mod rig;
 
 use std::path::Path;
 
-use jtc_core::{Config, State, Tes, joint_error};
+use jtc_core::{Config, ControllerState, TrajectoryState, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, rad};
 
@@ -55,7 +55,7 @@ fn j66_a_position_error_lets_the_arm_give_way_and_the_path_can_go_on() {
     push(&mut rig, 0.097);
     rig.run(2);
     let t = *rig.controller.telemetry();
-    assert_eq!((t.state, t.tes, t.errors), (State::HoldPos, Tes::Pause, 0));
+    assert_eq!((t.state, t.trajectory, t.errors), (ControllerState::HoldPos, TrajectoryState::Pause, 0));
     // Held where it is measured, to within what it went on coasting.
     assert!((t.joints[3].set_position - rig.nodes[3].report.position).abs() < 0.04, "{:?}", t.joints[3]);
     assert!(t.joints[3].torque_i.abs() < 2.0, "the integral is cleared: {:?}", t.joints[3]);
@@ -73,13 +73,13 @@ fn j66_a_position_error_lets_the_arm_give_way_and_the_path_can_go_on() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
     let mut last = rig.nodes[3].report.position;
     rig.apart[3] = false;
-    while rig.tes() == Tes::Execute {
+    while rig.trajectory() == TrajectoryState::Execute {
         rig.tick();
         let set = rig.controller.telemetry().joints[3].set_position;
         assert!((set - last).abs() < 3e-4, "a step from {last} to {set}");
         last = set;
     }
-    assert_eq!((rig.tes(), rig.errors()), (Tes::Finish, 0));
+    assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Finish, 0));
     assert_eq!(rig.controller.telemetry().joints[4].set_position, rad(path()[400].position[4]));
 }
 
@@ -94,7 +94,7 @@ fn j66_what_gives_way_adds_only_so_much_to_the_model() {
         let t = rig.controller.telemetry().joints[3];
         assert!((t.torque - t.torque_model).abs() <= most + 1e-9, "{k}: {t:?}");
         used = used.max((t.torque - t.torque_model).abs());
-        assert_eq!(rig.state(), State::HoldPos);
+        assert_eq!(rig.state(), ControllerState::HoldPos);
     }
     assert!(used > 0.4 * most, "it still holds against the push: {used} N·m");
     // It fails when the arm is led away again.
@@ -102,7 +102,7 @@ fn j66_what_gives_way_adds_only_so_much_to_the_model() {
         rig.nodes[3].report.position += 0.004;
         rig.tick();
     }
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.status().joints[3].internal, joint_error::POSITION_ERROR);
     assert_eq!(rig.torque, [0.0; 6]);
 }
@@ -119,7 +119,7 @@ fn j66_a_command_of_the_host_makes_it_stand_firm_again() {
     // Another position error finds it firm: it gives way anew instead of an error.
     let here = rig.nodes[3].report.position;
     push(&mut rig, here + 0.097);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
 /// What braking excuses is for the arm that cannot follow its path, not for one that is pushed away from where the path stands.
@@ -129,11 +129,11 @@ fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_gives_way_while_it_still_
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
     // It moves all the time, so braking goes on.
     rig.nodes[3].report.velocity = 0.5;
-    rig.until(500, |r| r.tes() == Tes::Pause);
+    rig.until(500, |r| r.trajectory() == TrajectoryState::Pause);
     push(&mut rig, 0.097);
     rig.run(2);
     let t = *rig.controller.telemetry();
-    assert_eq!((t.state, t.tes, t.errors), (State::HoldPos, Tes::Pause, 0));
+    assert_eq!((t.state, t.trajectory, t.errors), (ControllerState::HoldPos, TrajectoryState::Pause, 0));
     assert!((t.joints[3].set_position - rig.nodes[3].report.position).abs() < 0.04, "{:?}", t.joints[3]);
     assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);
 }
@@ -185,10 +185,10 @@ fn reaction(rig: &Rig) -> String {
     let t = rig.controller.telemetry();
     let torque = if t.joints.iter().all(|j| j.torque == 0.0) { "torque zero" } else { "torque stays" };
     let output = if rig.last.safety_output { "safety output 1" } else { "safety output 0" };
-    let what = match (t.state, t.tes) {
-        (State::Error, _) => "Error".into(),
-        (State::HoldPos, Tes::Pause) => "HoldPos, Pause".into(),
-        (State::HoldPos, _) => "HoldPos".into(),
+    let what = match (t.state, t.trajectory) {
+        (ControllerState::Error, _) => "Error".into(),
+        (ControllerState::HoldPos, TrajectoryState::Pause) => "HoldPos, Pause".into(),
+        (ControllerState::HoldPos, _) => "HoldPos".into(),
         (state, _) => format!("{state:?}, it goes on"),
     };
     format!("{what}; {torque}, {output}")

@@ -1,7 +1,7 @@
 //! Which frame gets which record, in which order, and what waits for what (J-04).
 mod rig;
 
-use jtc_core::{RECORDS_MAX, State, Tes};
+use jtc_core::{ControllerState, RECORDS_MAX, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, FrameType, RawPoint, Response, UrgentCommand};
 use proptest::prelude::*;
 use rig::{Rig, rest, segment_body};
@@ -29,9 +29,9 @@ fn run_slowly(rig: &mut Rig, ticks: usize) {
 }
 
 /// The time scale falls: TES leaves Execute within this time.
-fn stopped_within(rig: &mut Rig, ticks: usize) -> Tes {
-    rig.until(ticks, |r| r.tes() != Tes::Execute);
-    rig.tes()
+fn stopped_within(rig: &mut Rig, ticks: usize) -> TrajectoryState {
+    rig.until(ticks, |r| r.trajectory() != TrajectoryState::Execute);
+    rig.trajectory()
 }
 
 fn exec_record(data: DataStatus) -> Response {
@@ -40,7 +40,9 @@ fn exec_record(data: DataStatus) -> Response {
 
 #[test]
 fn j04_stop_and_pause_wait_for_no_record() {
-    for (command, to) in [(UrgentCommand::Stop, Tes::Stop), (UrgentCommand::Pause, Tes::Pause)] {
+    for (command, to) in
+        [(UrgentCommand::Stop, TrajectoryState::Stop), (UrgentCommand::Pause, TrajectoryState::Pause)]
+    {
         let mut rig = moving();
         // The line takes no status: every record waits.
         rig.status_free = false;
@@ -65,7 +67,7 @@ fn j04_stop_and_pause_wait_for_no_record() {
 fn j04_a_stop_acts_while_a_long_frame_is_executed() {
     let mut rig = moving();
     rig.exec(ExecCommand::Pause);
-    rig.until(400, |r| r.tes() == Tes::Pause);
+    rig.until(400, |r| r.trajectory() == TrajectoryState::Pause);
     // A segment of many slices; in it the path is given up.
     let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
     rig.statuses.clear();
@@ -73,7 +75,7 @@ fn j04_a_stop_acts_while_a_long_frame_is_executed() {
     rig.send(FrameType::Trajectory, &segment_body(9, 1, 2, 10, &points));
     rig.urgent(0, UrgentCommand::Stop);
     rig.tick();
-    assert_eq!(rig.tes(), Tes::Stop, "in the first tick");
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop, "in the first tick");
     rig.run(40);
     let types: Vec<u8> = rig.records().iter().map(|r| r.frame_type).collect();
     assert_eq!(types, [0x06, 0x04, 0x0B], "records in the order of the frames");
@@ -93,7 +95,7 @@ fn j04_a_stop_cancels_the_execute_before_it_and_not_the_one_after() {
         rig.send(FrameType::TrajSetExecStatus, &[3]);
         rig.urgent(0, command);
         rig.run(20);
-        assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Stop));
+        assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Stop));
         let refused = exec_record(DataStatus::NotAllowed);
         // The arm stands at the start, where a Stop and no Pause leaves it.
         assert_eq!(rig.records(), [refused, refused, exec_record(data)]);
@@ -102,7 +104,7 @@ fn j04_a_stop_cancels_the_execute_before_it_and_not_the_one_after() {
         rig.urgent(0, command);
         rig.send(FrameType::TrajSetExecStatus, &[3]);
         rig.run(20);
-        assert_eq!(rig.tes(), Tes::Execute);
+        assert_eq!(rig.trajectory(), TrajectoryState::Execute);
         assert_eq!(
             rig.records(),
             [refused, exec_record(DataStatus::NoError)],
@@ -118,7 +120,7 @@ fn j04_each_stop_has_one_record_that_says_what_it_did() {
     rig.urgent(0, UrgentCommand::Stop);
     rig.urgent(1, UrgentCommand::Stop);
     stopped_within(&mut rig, 300);
-    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
     let accepted = exec_record(DataStatus::NoError);
     assert_eq!(rig.records(), [accepted; 3]);
     rig.statuses.clear();

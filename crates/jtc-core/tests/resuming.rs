@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_bus::fsm;
-use jtc_core::{Config, State, Tes};
+use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
 use rig::{Rig, pieces, rest};
 
@@ -11,7 +11,7 @@ fn j16_an_execute_after_a_pause_waits_for_drives_as_well() {
     let mut rig = Rig::new(Config::avena());
     rig.nodes[2].slow_enable = true;
     rig.defaults();
-    rig.until(300, |r| r.state() == State::HoldPos);
+    rig.until(300, |r| r.state() == ControllerState::HoldPos);
     rig.run(50);
     let there_and_back = |n: i16| rest(if n < 25 { n } else { 50 - n });
     rig.upload(&(0..51).map(there_and_back).collect::<Vec<_>>(), 20);
@@ -21,11 +21,15 @@ fn j16_an_execute_after_a_pause_waits_for_drives_as_well() {
     for _ in 0..1_000 {
         rig.tick();
         let t = rig.controller.telemetry();
-        assert_eq!((t.tes, t.point, t.joints[0].set_position), (Tes::Execute, 0, 0.0), "nothing moves");
+        assert_eq!(
+            (t.trajectory, t.point, t.joints[0].set_position),
+            (TrajectoryState::Execute, 0, 0.0),
+            "nothing moves"
+        );
     }
     rig.nodes[2].slow_enable = false;
     rig.nodes[2].report.fsm = fsm::ENABLED;
-    rig.until(3_000, |r| r.tes() == Tes::Finish);
+    rig.until(3_000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }
 
@@ -35,7 +39,7 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     let mut rig = Rig::holding();
     rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 600);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
-    rig.until(1_000, |r| r.tes() == Tes::Pause);
+    rig.until(1_000, |r| r.trajectory() == TrajectoryState::Pause);
     let paused = *rig.controller.telemetry();
     rig.push(2, paused.joints[2].set_position - 0.003);
     rig.run(100);
@@ -59,11 +63,11 @@ fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     rig.run(1_000);
     rig.upload(&[rest(0); 20], 10);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    rig.until(1_000, |r| r.tes() == Tes::Finish);
+    rig.until(1_000, |r| r.trajectory() == TrajectoryState::Finish);
     rig.run(2);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(50);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     rig.run(400);
-    assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
 }

@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_bus::{Frame, Request, Target, fsm, warning};
-use jtc_core::{Config, State, Tes, error};
+use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response};
 use rig::{Rig, rest};
 
@@ -22,7 +22,7 @@ fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
     let mut rig = Rig::new(Config::avena());
     rig.run(500);
     // Without parameters it stays in Init, with no joint enabled.
-    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.state(), ControllerState::Init);
     assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.fsm == fsm::READY && n.configured));
     let status = rig.status();
     assert_eq!((status.jtc_init, status.node_init), (0b111, 0));
@@ -35,7 +35,7 @@ fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
         assert_eq!(rig.ask(t, &[]), DataStatus::NoError);
         assert_eq!(rig.status().jtc_init, left);
     }
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     rig.run(100);
     assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::ENABLED && n.resets == 1));
 }
@@ -63,11 +63,11 @@ fn j20_waits_for_accurate_positions() {
     rig.run(30);
     rig.nodes[3].report.warnings = warning::POSITION_NOT_ACCURATE;
     rig.run(300);
-    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.state(), ControllerState::Init);
     assert_eq!(rig.status().node_init, 1 << 3);
     rig.nodes[3].report.warnings = 0;
     rig.run(5);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
 #[test]
@@ -76,11 +76,11 @@ fn j20_a_node_that_falls_back_to_init_takes_the_controller_back() {
     rig.nodes[2].configured = false;
     rig.nodes[2].report.fsm = fsm::INIT;
     rig.run(2);
-    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.state(), ControllerState::Init);
     assert_eq!(rig.torque, [0.0; 6]);
     assert_eq!(rig.errors(), 0);
     rig.run(200);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert!(rig.nodes.iter().all(|n| n.resets == 1), "later entries reset none");
 }
 
@@ -90,7 +90,7 @@ fn j20_the_gripper_can_be_absent() {
     rig.nodes[6].silent = true;
     rig.defaults();
     rig.run(3000);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
 #[test]
@@ -98,19 +98,19 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     let mut rig = Rig::holding();
     rig.safety_input = false;
     rig.tick();
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.errors(), error::EMERGENCY_INPUT | error::EXTERNAL);
     // Clearing while the cause is there does not help.
     rig.clear(true, 0x7F);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     // The cause gone does not help either.
     rig.safety_input = true;
     rig.run(200);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY), "joints are in ReadyToOperate");
     rig.clear(true, 0);
     rig.run(100);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     // Occurred errors stay until 0x02.
     assert_eq!(rig.status().occurred, error::EMERGENCY_INPUT | error::EXTERNAL);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
@@ -124,20 +124,20 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     rig.run(3);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     rig.clear(true, 0);
-    assert_eq!(rig.state(), State::Error, "the node's fault is still there");
+    assert_eq!(rig.state(), ControllerState::Error, "the node's fault is still there");
     // The node does not listen for a while.
     rig.nodes[1].report.fsm = 254;
     rig.clear(true, 1 << 1);
     let from = rig.sent.len();
     rig.run(400);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     let asked = rig.sent[from..]
         .iter()
         .filter(|r| matches!(r, Request::ChangeFsm { target } if target[1] == Target::Init));
     assert!(asked.count() >= 90, "the command is repeated");
     rig.nodes[1].report.fsm = fsm::FAULT;
     rig.run(300);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     assert_eq!(rig.nodes[1].report.errors, 0);
 }
 
@@ -169,7 +169,7 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
                 for _ in 0..30 {
                     let faulty = rig.nodes[1].report.errors | rig.nodes[1].report.mc_current != 0;
                     rig.tick();
-                    assert_eq!(rig.state(), State::Error, "{name}");
+                    assert_eq!(rig.state(), ControllerState::Error, "{name}");
                     assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6], "{name}");
                     if !faulty {
                         break;
@@ -185,7 +185,10 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     rig.tick();
     rig.safety_input = true;
     rig.run(100);
-    assert_eq!((rig.state(), rig.errors()), (State::Error, error::EMERGENCY_INPUT | error::EXTERNAL));
+    assert_eq!(
+        (rig.state(), rig.errors()),
+        (ControllerState::Error, error::EMERGENCY_INPUT | error::EXTERNAL)
+    );
 }
 
 #[test]
@@ -193,7 +196,7 @@ fn j21_healthy_nodes_are_left_alone_by_a_clear() {
     let mut rig = Rig::holding();
     rig.clear(true, 0x7F);
     rig.run(50);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::ENABLED));
 }
 
@@ -209,7 +212,7 @@ fn j22_safety_input_acts_in_the_first_tick_and_output_follows_internal_errors() 
     // An internal error pulls it and its bit says so.
     let mut rig = Rig::holding();
     rig.nodes[4].silent = true;
-    rig.until(20, |r| r.state() == State::Error);
+    rig.until(20, |r| r.state() == ControllerState::Error);
     assert!(!rig.last.safety_output);
     assert_ne!(rig.errors() & error::EMERGENCY_OUTPUT, 0);
     rig.nodes[4].silent = false;
@@ -228,15 +231,15 @@ fn j23_a_reset_touches_only_the_nodes_in_its_mask() {
     rig.run(600);
     let resets: Vec<_> = rig.nodes.iter().map(|n| n.resets).collect();
     assert_eq!(resets, [1, 2, 1, 1, 1, 2, 1]);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     // An empty mask does nothing at all.
     rig.ask(FrameType::ResetCanDevices, &[0, 0, 0, 0]);
     rig.run(50);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     // Bits that mean nothing are ignored: hosts send 0xFF for all.
     rig.ask(FrameType::ResetCanDevices, &[0xFF, 0, 0, 0]);
     rig.run(600);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(rig.sent.iter().filter(|r| **r == Request::ResetAll).count(), 2);
 }
 
@@ -249,11 +252,11 @@ fn j24_a_trajectory_is_not_resumed_after_an_error() {
     rig.until(400, |r| r.controller.telemetry().point > 50);
     rig.safety_input = false;
     rig.tick();
-    assert_eq!(rig.tes(), Tes::Null);
+    assert_eq!(rig.trajectory(), TrajectoryState::Null);
     rig.safety_input = true;
     rig.clear(true, 0);
     rig.run(500);
-    assert_eq!((rig.state(), rig.tes()), (State::HoldPos, Tes::Null));
+    assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Null));
     assert_eq!(rig.exec(jtc_wire::ExecCommand::Execute), DataStatus::NotAllowed);
     let before = rig.controller.telemetry().joints[0].set_position;
     rig.run(500);
@@ -297,21 +300,21 @@ fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
             rig.missed_ticks = 1;
             rig.tick();
         }
-        assert_eq!((rig.state(), rig.errors()), (State::Error, OWN));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::Error, OWN));
         assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6], "in the tick that finds it");
         assert!(!rig.last.safety_output);
         rig.run(1000);
         assert_eq!(rig.errors(), OWN, "it latches");
         rig.clear(true, 0);
         rig.run(600);
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
     // A few are borne, for ever.
     let mut rig = Rig::holding();
     for _ in 0..100 {
         rig.missed_ticks = 5;
         rig.run(1000);
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
 }
 
@@ -321,7 +324,7 @@ fn j14_five_unanswered_moves_are_a_receive_timeout() {
         let mut rig = Rig::holding();
         rig.nodes[node].silent = true;
         let from = rig.sent.len();
-        rig.until(30, |r| r.state() == State::Error);
+        rig.until(30, |r| r.state() == ControllerState::Error);
         assert_eq!(rig.status().can_current, 1 << (8 + node));
         // The answer to the last Move before the silence still arrives; then five are missed.
         let moves = rig.sent[from..].iter().take_while(|r| is_move(r)).count();
@@ -331,7 +334,7 @@ fn j14_five_unanswered_moves_are_a_receive_timeout() {
         rig.run(4);
         rig.nodes[node].silent = false;
         rig.run(20);
-        assert_eq!(rig.state(), State::HoldPos, "four missed answers are no error yet");
+        assert_eq!(rig.state(), ControllerState::HoldPos, "four missed answers are no error yet");
     }
 }
 
@@ -340,9 +343,9 @@ fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
     let mut rig = Rig::holding();
     rig.acknowledged = false;
     rig.run(4);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     rig.run(2);
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.status().can_current, 1);
 }
 
@@ -352,9 +355,9 @@ fn j14_a_bus_on_which_every_node_boots_is_no_error_until_that_takes_too_long() {
     rig.defaults();
     rig.acknowledged = false;
     rig.run(1500);
-    assert_eq!((rig.state(), rig.errors()), (State::Init, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Init, 0));
     rig.run(600);
-    assert_eq!((rig.state(), rig.status().can_current), (State::Error, 1));
+    assert_eq!((rig.state(), rig.status().can_current), (ControllerState::Error, 1));
 }
 
 #[test]
@@ -362,7 +365,7 @@ fn j14_bus_off_is_an_error_at_once() {
     let mut rig = Rig::holding();
     rig.bus_off = true;
     rig.tick();
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6]);
     assert_ne!(rig.errors() & error::INTERNAL_CAN, 0);
 }
@@ -378,7 +381,7 @@ fn j15_frames_not_understood_are_counted_and_ignored() {
     rig.tick();
     rig.run(5);
     assert_eq!(rig.controller.ignored_frames(), 3);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
 #[test]
@@ -408,11 +411,11 @@ fn j16_the_safety_line_counts_once_a_joint_is_configured() {
         rig.tick();
         assert_eq!(rig.errors(), 0);
     }
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     // In Init too, it is an error of a joint that is configured.
     let mut rig = Rig::new(Config::avena());
     rig.run(300);
-    assert_eq!((rig.state(), rig.nodes[2].configured), (State::Init, true));
+    assert_eq!((rig.state(), rig.nodes[2].configured), (ControllerState::Init, true));
     rig.nodes[2].report.warnings = warning::SAFETY_LINE;
     rig.run(2);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
@@ -432,12 +435,15 @@ fn j16_enabling_has_a_time_limit() {
     let mut rig = Rig::new(Config { enable_timeout_ms: 500, ..Config::avena() });
     rig.nodes[2].slow_enable = true;
     rig.defaults();
-    rig.until(200, |r| r.state() == State::HoldPos);
+    rig.until(200, |r| r.state() == ControllerState::HoldPos);
     rig.run(490);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     // The arm has to have been still for 50 ms before enabling is asked for.
     rig.run(80);
-    assert_eq!((rig.state(), rig.errors()), (State::Error, error::EXTERNAL | error::EXTERNAL_JOINTS));
+    assert_eq!(
+        (rig.state(), rig.errors()),
+        (ControllerState::Error, error::EXTERNAL | error::EXTERNAL_JOINTS)
+    );
     // The default leaves time for the four seconds of motor alignment.
     assert_eq!(Config::avena().enable_timeout_ms, 10_000);
 }
@@ -457,12 +463,12 @@ fn j16_only_known_states_are_requested_and_positions_count_after_configuration()
             let q = t.joints[j].position;
             assert!(q == 0.0 || (q - 0.1 * j as f64).abs() < 1e-6);
             // A hold position is never latched from the zero that is reported before configuration.
-            if t.state == State::HoldPos {
+            if t.state == ControllerState::HoldPos {
                 assert!((t.joints[j].set_position - 0.1 * j as f64).abs() < 1e-6);
             }
         }
     }
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
 #[test]
@@ -497,15 +503,15 @@ fn j25_teaching_is_refused_outside_holdpos() {
     let mut rig = Rig::new(Config::avena());
     rig.run(300);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NotAllowed);
-    assert_eq!(rig.state(), State::Init);
+    assert_eq!(rig.state(), ControllerState::Init);
     let mut rig = Rig::holding();
     rig.run(100);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(2);
-    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.state(), ControllerState::Teaching);
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     rig.run(2);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
 #[test]
@@ -515,20 +521,23 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     rig.controller.raise_internal();
     rig.defaults();
     rig.tick();
-    assert_eq!(rig.state(), State::Error);
+    assert_eq!(rig.state(), ControllerState::Error);
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
     // It latches, and says what it is: an internal error that neither a joint nor the bus explains.
     let status = rig.status();
-    assert_eq!((status.fsm, status.errors, status.occurred), (State::Error as u8, OWN, OWN));
+    assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);
     assert!(rig.sent.iter().all(|request| torque_of(request) == [0.0; 6]));
     assert!(rig.nodes.iter().all(|node| node.report.fsm != fsm::ENABLED));
 
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     rig.run(200);
-    assert_eq!((rig.state(), rig.tes(), rig.errors()), (State::HoldPos, Tes::Null, 0));
+    assert_eq!(
+        (rig.state(), rig.trajectory(), rig.errors()),
+        (ControllerState::HoldPos, TrajectoryState::Null, 0)
+    );
     assert!(rig.last.safety_output);
     assert_eq!(rig.status().occurred, OWN, "what has occurred stays until it is cleared, too");
 }

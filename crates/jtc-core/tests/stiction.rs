@@ -2,7 +2,7 @@
 mod plant;
 mod rig;
 
-use jtc_core::{Config, Parameters, Tes};
+use jtc_core::{Config, Parameters, TrajectoryState};
 use jtc_wire::{FrameType, RawPoint};
 use plant::{ENCODER_STEP, LuGre, Plant, heavier};
 use rig::{Rig, segment_body};
@@ -111,7 +111,7 @@ fn j41_a_motion_ends_without_hunting() {
                 worst = worst.max(t.position_error().abs());
             }
         }
-        assert_eq!((rig.tes(), rig.errors()), (Tes::Finish, 0));
+        assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Finish, 0));
         assert!(worst < 0.003, "{:.2} mrad while moving", 1e3 * worst);
         arm.run(&mut rig, 12_000);
         assert_quiet(&mut arm, &mut rig, &format!("stiction {ratio}, bristles {stiffness}"));

@@ -2,7 +2,7 @@
 mod plant;
 mod rig;
 
-use jtc_core::{Config, Parameters, State};
+use jtc_core::{Config, ControllerState, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics};
 use jtc_wire::FrameType;
 use plant::{LuGre, Plant, heavier, loaded};
@@ -34,10 +34,10 @@ fn friction(factor: f64) -> [LuGre; 6] {
 fn taught(arm: &mut Plant, config: Config) -> Rig {
     let mut rig = arm.holding(config);
     arm.run(&mut rig, 4000);
-    assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     rig.send(FrameType::TeachingModeEnable, &[]);
     without_steps(arm, &mut rig, 200);
-    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.state(), ControllerState::Teaching);
     rig
 }
 
@@ -59,7 +59,7 @@ fn without_steps(arm: &mut Plant, rig: &mut Rig, ticks: usize) {
 fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     let from = arm.q;
     arm.run(rig, ms);
-    assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
     (0..6).map(|j| (arm.q[j] - from[j]).abs()).fold(0.0, f64::max)
 }
 
@@ -75,7 +75,7 @@ fn lead(arm: &mut Plant, rig: &mut Rig, way: [f64; 6]) {
         arm.tick(rig);
     }
     arm.push = [0.0; 6];
-    assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
         let from = arm.q;
         rig.send(FrameType::TeachingModeDisable, &[]);
         without_steps(&mut arm, &mut rig, 200);
-        assert_eq!((rig.state(), rig.errors()), (State::HoldPos, 0));
+        assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         arm.run(&mut rig, 2000);
         for (j, q) in from.iter().enumerate() {
             let sag = (arm.q[j] - q).abs();
@@ -159,7 +159,7 @@ fn fastest_after_contact(config: Config, pose: [f64; 6], factor: f64, mass: f64)
         arm.tick(&mut rig);
         fastest = arm.v.iter().fold(fastest, |fastest, v| fastest.max(v.abs()));
     }
-    assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0));
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
     fastest
 }
 

@@ -3,7 +3,7 @@ mod plant;
 mod rig;
 
 use jtc_bus::fsm;
-use jtc_core::{Config, Parameters, State};
+use jtc_core::{Config, ControllerState, Parameters};
 use jtc_dynamics::ArmModel;
 use jtc_wire::{DataStatus, FrameType};
 use plant::{LuGre, Plant};
@@ -68,7 +68,7 @@ fn braked_with(model: &ArmModel, given: f64, rotor: f64, joint: usize, push: f64
         arm.tick(&mut rig);
     }
     rig.send(FrameType::TeachingModeEnable, &[]);
-    while rig.state() != State::Teaching {
+    while rig.state() != ControllerState::Teaching {
         arm.tick(&mut rig);
         assert_eq!(rig.errors(), 0);
     }
@@ -78,7 +78,12 @@ fn braked_with(model: &ArmModel, given: f64, rotor: f64, joint: usize, push: f64
         arm.push = arm.v.map(|v| -v);
         arm.push[joint] = push;
         arm.tick(&mut rig);
-        assert_eq!((rig.state(), rig.errors()), (State::Teaching, 0), "joint {} after {ms} ms", joint + 1);
+        assert_eq!(
+            (rig.state(), rig.errors()),
+            (ControllerState::Teaching, 0),
+            "joint {} after {ms} ms",
+            joint + 1
+        );
         let brake = rig.controller.telemetry().joints[joint].torque_other;
         let now = brake - last;
         it.turns += u32::from(ms > 200 && now * change < 0.0 && now.abs() > 0.2);

@@ -1,7 +1,7 @@
 //! An arm in a pose in which its torque limits do not hold it (J-06, J-20, J-43).
 mod rig;
 
-use jtc_core::{Config, Parameters, State, joint_error};
+use jtc_core::{Config, ControllerState, Parameters, joint_error};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, FrameType};
 use rig::Rig;
@@ -21,23 +21,26 @@ fn j43_an_arm_that_is_led_to_where_it_cannot_be_held_is_an_error_of_that_joint()
     let mut rig = Rig::holding_with(weak());
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(20);
-    assert_eq!(rig.state(), State::Teaching);
+    assert_eq!(rig.state(), ControllerState::Teaching);
     rig.follow = false;
-    let mut last = State::Teaching;
+    let mut last = ControllerState::Teaching;
     for _ in 0..600 {
         rig.nodes[1].report.position = (rig.nodes[1].report.position + 0.001).min(POSE[1]);
         rig.tick();
         let state = rig.state();
-        assert!(state == last || (last, state) == (State::Teaching, State::Error), "{last:?} to {state:?}");
+        assert!(
+            state == last || (last, state) == (ControllerState::Teaching, ControllerState::Error),
+            "{last:?} to {state:?}"
+        );
         last = state;
     }
-    assert_eq!(last, State::Error);
+    assert_eq!(last, ControllerState::Error);
     assert_eq!(rig.status().joints[1].internal, joint_error::TORQUE);
     // It is limp now: its model is asked for again, and does not go while the error is latched.
     assert_eq!(rig.status().jtc_init, 0b100);
     rig.clear(true, 0x7F);
     rig.run(50);
-    assert_eq!((rig.state(), rig.torque), (State::Init, [0.0; 6]));
+    assert_eq!((rig.state(), rig.torque), (ControllerState::Init, [0.0; 6]));
 }
 
 /// Whether an arm can be held matters when it is to be held, not while it is moved by hand before.
@@ -51,8 +54,8 @@ fn j06_the_model_is_judged_where_init_ends() {
     for to in [POSE[1], 0.0] {
         rig.push(1, to);
         rig.run(200);
-        assert_eq!((rig.state(), rig.status().jtc_init), (State::Init, 0), "joint 2 at {to}");
+        assert_eq!((rig.state(), rig.status().jtc_init), (ControllerState::Init, 0), "joint 2 at {to}");
     }
     rig.nodes[6].silent = false;
-    rig.until(1_000, |r| r.state() == State::HoldPos);
+    rig.until(1_000, |r| r.state() == ControllerState::HoldPos);
 }

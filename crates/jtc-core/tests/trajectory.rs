@@ -1,7 +1,7 @@
 //! The trajectory: segments, execution, pause and stop (section 5).
 mod rig;
 
-use jtc_core::{Config, POINTS_MAX, State, Tes};
+use jtc_core::{Config, ControllerState, POINTS_MAX, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, rad, rest, segment_body};
 
@@ -52,12 +52,12 @@ fn j30_segments_come_in_order_and_the_right_one_can_follow_a_refused_one() {
     assert_eq!(traj(&mut rig, 1, 1, 3, 10, &[]), IncorrectValue, "empty");
     assert_eq!(traj(&mut rig, 1, 1, 3, 10, &p), NoError);
     assert_eq!(traj(&mut rig, 1, 1, 3, 10, &p), IncorrectSegmentOrder, "repeated");
-    assert_eq!(rig.tes(), Tes::Null);
+    assert_eq!(rig.trajectory(), TrajectoryState::Null);
     assert_eq!(traj(&mut rig, 1, 2, 3, 10, &p), NoError);
-    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
     assert_eq!(traj(&mut rig, 1, 3, 3, 10, &p), IncorrectSegmentOrder, "after the last");
     assert_eq!(rig.exec(ExecCommand::Execute), NoError);
-    rig.until(1000, |r| r.tes() == Tes::Finish);
+    rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.controller.telemetry().point, 50, "six points, five steps of 10 ms");
 }
 
@@ -73,7 +73,7 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     assert_eq!(traj(&mut rig, 1, 0, 0, 10, &p), IncorrectSegmentOrder);
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &vec![rest(0); 1501]), TooManyPoints);
     assert_eq!(traj(&mut rig, 1, 0, 1, 0, &p), IncorrectStepTime);
-    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
     // Fill the store to its last point; one more is refused, and segment 0 of another counts only its own.
     for s in 0..8 {
         assert_eq!(traj(&mut rig, 9, s, 9, 1, &vec![rest(0); 1500]), NoError);
@@ -81,11 +81,15 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     assert_eq!(POINTS_MAX, 8 * 1500);
     assert_eq!(traj(&mut rig, 9, 8, 9, 1, &p), TooManyPoints);
     assert_eq!(traj(&mut rig, 9, 0, 1, 1, &vec![rest(0); 1500]), NoError);
-    assert_eq!(rig.tes(), Tes::Stop);
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop);
     for s in 0..100 {
-        assert_eq!((rig.tes() == Tes::Stop, traj(&mut rig, 9, s, 100, 10, &p)), (s == 0, NoError), "{s}");
+        assert_eq!(
+            (rig.trajectory() == TrajectoryState::Stop, traj(&mut rig, 9, s, 100, 10, &p)),
+            (s == 0, NoError),
+            "{s}"
+        );
     }
-    assert_eq!(rig.tes(), Tes::Stop, "as many segments as there may be");
+    assert_eq!(rig.trajectory(), TrajectoryState::Stop, "as many segments as there may be");
 }
 
 #[test]
@@ -97,12 +101,12 @@ fn j30_segments_are_accepted_in_holdpos_only() {
     rig.upload(&motion(100, 10), 10);
     rig.exec(ExecCommand::Execute);
     rig.run(300);
-    assert_eq!(rig.state(), State::Operate);
+    assert_eq!(rig.state(), ControllerState::Operate);
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &[rest(0)]), DataStatus::NotAllowed);
-    rig.until(3000, |r| r.tes() == Tes::Finish);
+    rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
     rig.run(2);
     assert_eq!(traj(&mut rig, 1, 0, 2, 10, &[rest(0)]), DataStatus::NoError);
-    assert_eq!(rig.tes(), Tes::Null);
+    assert_eq!(rig.trajectory(), TrajectoryState::Null);
 }
 
 #[test]
@@ -116,7 +120,7 @@ fn j06_parameters_are_not_changed_under_a_moving_arm() {
     {
         assert_eq!(rig.ask(t, &[]), DataStatus::NotAllowed);
     }
-    assert_eq!(rig.state(), State::Operate);
+    assert_eq!(rig.state(), ControllerState::Operate);
 }
 
 #[test]
@@ -136,11 +140,11 @@ fn j31_first_and_last_point_are_commanded_exactly_and_the_index_counts_milliseco
         rig.tick();
     }
     let t = rig.controller.telemetry();
-    assert_eq!((t.tes, t.point), (Tes::Finish, 1000));
+    assert_eq!((t.trajectory, t.point), (TrajectoryState::Finish, 1000));
     assert_eq!(t.joints[2].set_position, rad(points[40].position[2]));
     rig.run(500);
     // J-33: after Finish the last point is held.
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(rig.controller.telemetry().joints[2].set_position, rad(points[40].position[2]));
     assert_eq!(rig.controller.telemetry().point, 1000);
 }
@@ -155,7 +159,7 @@ fn j31_point_0_is_commanded() {
     for _ in 0..400 {
         rig.tick();
         let t = rig.controller.telemetry();
-        seen |= t.state == State::Operate && t.point == 0 && t.joints[3].set_position == rad(100);
+        seen |= t.state == ControllerState::Operate && t.point == 0 && t.joints[3].set_position == rad(100);
     }
     assert!(seen);
 }
@@ -169,7 +173,7 @@ fn j33_pause_and_resume_follow_the_path() {
     // Undisturbed run: position of joint 5 as a function of that of joint 2.
     rig.exec(ExecCommand::Execute);
     let mut path = Vec::new();
-    while rig.tes() != Tes::Finish {
+    while rig.trajectory() != TrajectoryState::Finish {
         rig.tick();
         let t = rig.controller.telemetry();
         if t.point > 0 {
@@ -194,21 +198,21 @@ fn j33_pause_and_resume_follow_the_path() {
         let dv = (t.joints[2].set_velocity - last.joints[2].set_velocity).abs();
         assert!(dv < 0.0126 + 0.0004, "step of {dv} rad/s");
     };
-    while rig.tes() == Tes::Execute {
+    while rig.trajectory() == TrajectoryState::Execute {
         rig.tick();
         ticks_to_stand += 1;
         let t = *rig.controller.telemetry();
         check(&t, &last);
         last = t;
     }
-    assert_eq!(rig.tes(), Tes::Pause);
+    assert_eq!(rig.trajectory(), TrajectoryState::Pause);
     assert!((150..=260).contains(&ticks_to_stand), "{ticks_to_stand}");
     let held = rig.controller.telemetry().joints[2].set_position;
     rig.run(500);
-    assert_eq!(rig.state(), State::HoldPos);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(rig.controller.telemetry().joints[2].set_position, held, "the commanded position is held");
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    while rig.tes() != Tes::Finish {
+    while rig.trajectory() != TrajectoryState::Finish {
         rig.tick();
         let t = *rig.controller.telemetry();
         check(&t, &last);
@@ -221,7 +225,9 @@ fn j33_pause_and_resume_follow_the_path() {
 #[test]
 fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
     let points = motion(101, 10);
-    for (command, to) in [(ExecCommand::Pause, Tes::Pause), (ExecCommand::Stop, Tes::Stop)] {
+    for (command, to) in
+        [(ExecCommand::Pause, TrajectoryState::Pause), (ExecCommand::Stop, TrajectoryState::Stop)]
+    {
         for before_the_end in [1, 2, 5, 20, 50, 99, 150, 199, 250] {
             let mut rig = Rig::holding();
             rig.upload(&points, 10);
@@ -229,13 +235,17 @@ fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
             rig.until(3000, |r| r.controller.telemetry().point == 1000 - before_the_end);
             rig.send(FrameType::TrajSetExecStatus, &[command as u8]);
             rig.tick();
-            let ticks = rig.until(500, |r| r.tes() != Tes::Execute);
-            assert_eq!(rig.tes(), to, "{command:?} {before_the_end} ms before the end, after {ticks} ms");
+            let ticks = rig.until(500, |r| r.trajectory() != TrajectoryState::Execute);
+            assert_eq!(
+                rig.trajectory(),
+                to,
+                "{command:?} {before_the_end} ms before the end, after {ticks} ms"
+            );
             rig.run(100);
-            assert_eq!((rig.tes(), rig.state(), rig.errors()), (to, State::HoldPos, 0));
-            if to == Tes::Pause {
+            assert_eq!((rig.trajectory(), rig.state(), rig.errors()), (to, ControllerState::HoldPos, 0));
+            if to == TrajectoryState::Pause {
                 assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-                rig.until(1000, |r| r.tes() == Tes::Finish);
+                rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
                 assert_eq!(rig.controller.telemetry().joints[2].set_position, rad(points[100].position[2]));
             }
         }
@@ -268,56 +278,65 @@ fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
     rig.exec(ExecCommand::Execute);
     rig.until(1000, |r| r.controller.telemetry().point == 300);
     rig.exec(ExecCommand::Stop);
-    let ticks = rig.until(1000, |r| r.tes() != Tes::Execute);
+    let ticks = rig.until(1000, |r| r.trajectory() != TrajectoryState::Execute);
     assert!((256..330).contains(&ticks), "{ticks}");
-    assert_eq!((rig.tes(), rig.errors()), (Tes::Stop, 0));
+    assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Stop, 0));
 }
 
 #[test]
 fn j34_commands_follow_the_table() {
     use ExecCommand::*;
-    let fresh = |tes: Tes| {
+    let fresh = |trajectory: TrajectoryState| {
         let mut rig = Rig::holding();
-        if tes == Tes::Null {
+        if trajectory == TrajectoryState::Null {
             return rig;
         }
         rig.upload(&motion(100, 10), 10);
-        if tes == Tes::Stop {
+        if trajectory == TrajectoryState::Stop {
             return rig;
         }
         rig.exec(Execute);
         rig.until(1000, |r| r.controller.telemetry().point > 300);
-        if tes == Tes::Pause {
+        if trajectory == TrajectoryState::Pause {
             rig.exec(Pause);
-            rig.until(1000, |r| r.tes() == Tes::Pause);
+            rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
         }
-        if tes == Tes::Finish {
+        if trajectory == TrajectoryState::Finish {
             // A closed path would be needed to run again: put the joints back to the start instead.
-            rig.until(3000, |r| r.tes() == Tes::Finish);
+            rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
         rig
     };
     let allowed = [
-        (Tes::Stop, Execute),
-        (Tes::Execute, Pause),
-        (Tes::Execute, Stop),
-        (Tes::Pause, Execute),
-        (Tes::Pause, Stop),
-        (Tes::Finish, Stop),
+        (TrajectoryState::Stop, Execute),
+        (TrajectoryState::Execute, Pause),
+        (TrajectoryState::Execute, Stop),
+        (TrajectoryState::Pause, Execute),
+        (TrajectoryState::Pause, Stop),
+        (TrajectoryState::Finish, Stop),
     ];
-    for tes in [Tes::Null, Tes::Stop, Tes::Pause, Tes::Execute, Tes::Finish] {
+    for trajectory in [
+        TrajectoryState::Null,
+        TrajectoryState::Stop,
+        TrajectoryState::Pause,
+        TrajectoryState::Execute,
+        TrajectoryState::Finish,
+    ] {
         for command in [Stop, Pause, Execute] {
-            if (tes, command) == (Tes::Finish, Execute) {
+            if (trajectory, command) == (TrajectoryState::Finish, Execute) {
                 continue; // below
             }
-            let mut rig = fresh(tes);
-            let expected =
-                if allowed.contains(&(tes, command)) { DataStatus::NoError } else { DataStatus::NotAllowed };
-            assert_eq!(rig.exec(command), expected, "{tes:?} {command:?}");
+            let mut rig = fresh(trajectory);
+            let expected = if allowed.contains(&(trajectory, command)) {
+                DataStatus::NoError
+            } else {
+                DataStatus::NotAllowed
+            };
+            assert_eq!(rig.exec(command), expected, "{trajectory:?} {command:?}");
             if expected == DataStatus::NotAllowed {
                 let point = rig.controller.telemetry().point;
                 rig.run(5);
-                let moving = tes == Tes::Execute;
+                let moving = trajectory == TrajectoryState::Execute;
                 assert_eq!(
                     rig.controller.telemetry().point > point,
                     moving,
@@ -338,7 +357,7 @@ fn j34_a_finished_closed_path_runs_again() {
     rig.upload(&there, 10);
     for _ in 0..2 {
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-        rig.until(3000, |r| r.tes() == Tes::Finish);
+        rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         rig.run(3);
     }
 }
@@ -352,7 +371,7 @@ fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
     rig.exec(ExecCommand::Execute);
     rig.until(1000, |r| r.controller.telemetry().point > 300);
     rig.exec(ExecCommand::Pause);
-    rig.until(1000, |r| r.tes() == Tes::Pause);
+    rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
     // Somebody leans on it: a little, then too much.
     rig.follow = false;
     for (push, answer) in [(0.022, DataStatus::StartPositionMismatch), (-0.004, DataStatus::NoError)] {
@@ -361,7 +380,7 @@ fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
             rig.tick();
         }
         assert_eq!(rig.exec(ExecCommand::Execute), answer);
-        assert_eq!(rig.tes() == Tes::Execute, answer == DataStatus::NoError);
+        assert_eq!(rig.trajectory() == TrajectoryState::Execute, answer == DataStatus::NoError);
     }
 }
 
@@ -372,11 +391,11 @@ fn j34_execute_needs_the_arm_at_the_first_point() {
     rig.upload(&points, 10);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     rig.run(300);
-    assert_eq!((rig.tes(), rig.state()), (Tes::Stop, State::HoldPos));
+    assert_eq!((rig.trajectory(), rig.state()), (TrajectoryState::Stop, ControllerState::HoldPos));
     assert_eq!(rig.controller.telemetry().joints[0].set_position, 0.0, "nothing moves");
     let points: Vec<_> = (0..10).map(|_| rest(190)).collect(); // 0.018 rad
     rig.upload(&points, 10);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
-    rig.until(1000, |r| r.tes() == Tes::Finish);
+    rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jtc_wire::Status;
+use jtc_wire::{ControllerState, Status};
 
 use crate::port::Port;
 use crate::{Error, Session, words};
@@ -222,7 +222,7 @@ fn errors(s: &Status, all: &mut Vec<Finding>) {
             all.push(finding(Problem, format!("{who}: drive in its fault state"), "", "`jtc recover`"));
         }
     }
-    if s.fsm == 5 && all.iter().all(|f| f.severity != Problem) {
+    if s.state == ControllerState::Error && all.iter().all(|f| f.severity != Problem) {
         all.push(finding(
             Problem,
             "an error is latched whose cause is gone",
@@ -260,14 +260,14 @@ fn set_up(s: &Status, all: &mut Vec<Finding>) {
         };
         let what = format!("{} is not ready ({})", words::node(n), words::node_state(fsm));
         all.push(finding(
-            if s.fsm <= 1 { Problem } else { Warning },
+            if s.is_coming_up() { Problem } else { Warning },
             what,
             why,
             "wait 10 s; then `jtc recover`",
         ));
     }
     if s.errors == 0 && s.jtc_init == 0 && s.node_init == 0 {
-        let line = format!("controller: {}, trajectory {}", words::state(s.fsm), words::tes(s.tes));
+        let line = format!("controller: {}, trajectory {}", s.state.name(), s.trajectory.name());
         all.push(finding(Good, line, "", ""));
     }
 }
@@ -292,6 +292,8 @@ fn temperatures(s: &Status, all: &mut Vec<Finding>) {
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::TrajectoryState;
+
     use super::*;
 
     fn seen(status: Status) -> Observation {
@@ -323,7 +325,12 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_named() {
-        let mut status = Status { fsm: 1, jtc_init: 0b101, node_init: 0b10, ..Default::default() };
+        let mut status = Status {
+            state: ControllerState::Init.into(),
+            jtc_init: 0b101,
+            node_init: 0b10,
+            ..Default::default()
+        };
         status.joints[1].fsm = 12;
         let t = text(&seen(status));
         assert!(
@@ -334,9 +341,18 @@ mod tests {
 
     #[test]
     fn problems_come_first_and_a_good_controller_has_none() {
-        let good = seen(Status { fsm: 2, tes: 1, ..Default::default() });
+        let good = seen(Status {
+            state: ControllerState::HoldPos.into(),
+            trajectory: TrajectoryState::Stop.into(),
+            ..Default::default()
+        });
         assert!(findings(&good).iter().all(|f| f.severity == Severity::Good), "{}", text(&good));
-        let mut status = Status { fsm: 5, errors: 0x29, can_current: 1 << 12, ..Default::default() };
+        let mut status = Status {
+            state: ControllerState::Error.into(),
+            errors: 0x29,
+            can_current: 1 << 12,
+            ..Default::default()
+        };
         status.joints[3].temperature = 80;
         let all = findings(&seen(status));
         assert!(all.is_sorted_by_key(|f| f.severity));

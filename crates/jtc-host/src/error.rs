@@ -1,6 +1,8 @@
 //! What can go wrong, with the facts in it, the command that helps and the exit code of the commands.
 
-use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status};
+use jtc_wire::{
+    Code, ControllerState, DataStatus, FrameStatus, FrameType, Response, Status, TrajectoryState,
+};
 
 use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
@@ -30,7 +32,7 @@ pub enum Error {
         bytes: u64,
     },
     /// A request was not confirmed, although statuses come.
-    #[error("{request:?}: not confirmed in {tries} tries")]
+    #[error("{}: not confirmed in {tries} tries", words::request(*request))]
     NotConfirmed {
         /// The request.
         request: FrameType,
@@ -40,19 +42,19 @@ pub enum Error {
         last: Option<Response>,
     },
     /// The controller refused a request.
-    #[error("{request:?}: {} (state {}, trajectory {})", words::data_status(*code), words::state(*state), words::tes(*tes))]
+    #[error("{}: {} (state {}, trajectory {})", words::request(*request), words::data_status(*code), state, trajectory)]
     Refused {
         /// The request.
         request: FrameType,
         /// Why.
         code: DataStatus,
         /// State of the controller then.
-        state: u8,
+        state: Code<ControllerState>,
         /// Trajectory execution state then.
-        tes: u8,
+        trajectory: Code<TrajectoryState>,
     },
     /// The controller refused a parameter, and this is beyond the bounds of known controllers.
-    #[error("{request:?}: {}: {beyond}", words::data_status(DataStatus::IncorrectValue))]
+    #[error("{}: {}: {beyond}", words::request(*request), words::data_status(DataStatus::IncorrectValue))]
     BeyondBounds {
         /// The request.
         request: FrameType,
@@ -70,7 +72,10 @@ pub enum Error {
         code: DataStatus,
     },
     /// The upload did not end with a complete trajectory.
-    #[error("upload given up after {restarts} restarts; segments confirmed: {confirmed} of {segments}, trajectory {}", words::tes(*tes))]
+    #[error(
+        "upload given up after {restarts} restarts; segments confirmed: {confirmed} of {segments}, trajectory {}",
+        trajectory
+    )]
     UploadFailed {
         /// Segments known to have arrived.
         confirmed: usize,
@@ -79,7 +84,7 @@ pub enum Error {
         /// Times the whole was begun again.
         restarts: u32,
         /// Trajectory execution state at the end.
-        tes: u8,
+        trajectory: Code<TrajectoryState>,
     },
     /// The controller reports errors.
     #[error("the controller reports an error: {}", words::errors_line(status))]
@@ -139,12 +144,12 @@ pub enum Error {
         status: Box<Status>,
     },
     /// Resume was asked for, and nothing is paused.
-    #[error("{} (state {}, trajectory {})", not_paused(*tes), words::state(*state), words::tes(*tes))]
+    #[error("{} (state {}, trajectory {})", not_paused(*trajectory), state, trajectory)]
     NotPaused {
         /// State of the controller.
-        state: u8,
+        state: Code<ControllerState>,
         /// Trajectory execution state.
-        tes: u8,
+        trajectory: Code<TrajectoryState>,
     },
     /// The controller needs parameters, and nobody said whose.
     #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
@@ -178,11 +183,11 @@ pub enum Error {
 /// What is known about the motion when the link is gone.
 fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     match last {
-        Some(s) if s.tes == 2 => format!(
+        Some(s) if s.trajectory == TrajectoryState::Pause => format!(
             "The trajectory was paused at point {}: the arm should stand there, but nothing confirms it any more",
             s.point
         ),
-        Some(s) if s.tes == 3 => format!(
+        Some(s) if s.trajectory == TrajectoryState::Execute => format!(
             "THE ARM MAY BE MOVING: at the last status it was at point {} ({:.3} s) of its trajectory, and {}",
             s.point,
             f64::from(s.point) * 1e-3,
@@ -198,8 +203,8 @@ fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
 }
 
 /// Right after a pause the trajectory state is still Execute, until the arm stands.
-fn not_paused(tes: u8) -> &'static str {
-    if tes == 3 {
+fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
+    if trajectory == TrajectoryState::Execute {
         "nothing is paused yet: the motion is still slowing down after a pause, or nobody paused it"
     } else {
         "nothing is paused: resume would start a motion, not go on with one"
@@ -285,21 +290,25 @@ impl Error {
                 baud.map_or("none".into(), |b| b.to_string())
             ),
             Error::NotConfirmed { .. } => "the line towards the controller loses bytes: `jtc doctor`".into(),
-            Error::Refused { request: FrameType::TrajSetExecStatus, code, tes: 2, .. } if is_place(*code) => {
+            Error::Refused { request: FrameType::TrajSetExecStatus, code, trajectory, .. }
+                if *trajectory == TrajectoryState::Pause && is_place(*code) => {
                 "the arm was moved since it was paused: resume needs each joint where it paused, to 0.02 rad. `jtc traj stop`, then \
                  `jtc traj run FILE --approach`"
                     .into()
             }
             // Execution from there is refused for another reason, and resume is not sent.
-            Error::Refused {
-                request: FrameType::TrajSetExecStatus, code: DataStatus::NotAllowed, state: 2, tes: 0 | 1 | 4
-            } => "nothing is being executed, so there is nothing to pause or stop; `jtc status` shows the state".into(),
+            Error::Refused { request: FrameType::TrajSetExecStatus, code: DataStatus::NotAllowed, state, trajectory }
+                if *state == ControllerState::HoldPos
+                    && trajectory.is_in(&[TrajectoryState::Null, TrajectoryState::Stop, TrajectoryState::Finish]) =>
+            {
+                "nothing is being executed, so there is nothing to pause or stop; `jtc status` shows the state".into()
+            }
             Error::Refused { code, state, .. } => refused(*code, *state).into(),
             Error::BeyondBounds { .. } => {
                 "such a number would throw or drop the arm: correct the file (`jtc params show FILE`); what the controller had before \
                  is unchanged".into()
             }
-            Error::SegmentRefused { code, .. } => refused(*code, 2).into(),
+            Error::SegmentRefused { code, .. } => refused(*code, ControllerState::HoldPos.into()).into(),
             Error::UploadFailed { .. } => "`jtc doctor` looks at the line; then run it again".into(),
             Error::Device { .. } => "`jtc recover` leads back to HoldPos, `jtc explain CODE` tells about each error".into(),
             Error::StateTimeout { status, .. } => words::next_step(status).into(),
@@ -317,7 +326,7 @@ impl Error {
                  once each joint is back within 0.02 rad of the path, `jtc traj stop` gives it up"
                     .into()
             }
-            Error::NotPaused { tes: 3, .. } => {
+            Error::NotPaused { trajectory, .. } if *trajectory == TrajectoryState::Execute => {
                 "a pause takes up to half a second: `jtc traj resume` again once `jtc status` shows Pause".into()
             }
             Error::NotPaused { .. } => "`jtc traj run FILE` checks a trajectory and starts it".into(),
@@ -344,13 +353,13 @@ fn is_place(code: DataStatus) -> bool {
     matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
 }
 
-fn refused(code: DataStatus, state: u8) -> &'static str {
-    match (code, state) {
-        (DataStatus::NotAllowed, 0 | 1) => {
+fn refused(code: DataStatus, state: Code<ControllerState>) -> &'static str {
+    match (code, state.known()) {
+        (DataStatus::NotAllowed, Some(ControllerState::Start | ControllerState::Init)) => {
             "the controller is not ready yet: `jtc doctor` names what is missing"
         }
-        (DataStatus::NotAllowed, 5) => "the controller is in Error: `jtc recover`",
-        (DataStatus::NotAllowed, 4) => "`jtc teach off` first",
+        (DataStatus::NotAllowed, Some(ControllerState::Error)) => "the controller is in Error: `jtc recover`",
+        (DataStatus::NotAllowed, Some(ControllerState::Teaching)) => "`jtc teach off` first",
         (DataStatus::NotAllowed, _) => "`jtc status` shows the state; `jtc traj stop` ends a trajectory",
         (DataStatus::StartPositionMismatch, _) => {
             "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first"
@@ -371,10 +380,16 @@ mod tests {
     /// J-34: resume right after pause finds Execute until the arm stands.
     #[test]
     fn a_resume_too_early_is_told_from_one_without_a_pause() {
-        let early = Error::NotPaused { state: 3, tes: 3 };
+        let early = Error::NotPaused {
+            state: ControllerState::Operate.into(),
+            trajectory: TrajectoryState::Execute.into(),
+        };
         assert!(early.to_string().contains("still slowing down"), "{early}");
         assert!(early.hint().contains("resume` again"), "{}", early.hint());
-        let never = Error::NotPaused { state: 2, tes: 4 };
+        let never = Error::NotPaused {
+            state: ControllerState::HoldPos.into(),
+            trajectory: TrajectoryState::Finish.into(),
+        };
         assert!(never.to_string().contains("would start a motion"), "{never}");
         assert_eq!((early.exit_code(), never.exit_code()), (4, 4));
     }

@@ -24,7 +24,7 @@
 //!
 //! let mut session = Session::new(SimPort::new(World::new(SimConfig::new(arm.config(), &arm.parameters()))));
 //! session.push(&arm.parameter_set(), |_| {})?;
-//! let here = session.wait_ready(Duration::from_secs(15))?.joints.map(|j| f64::from(j.position));
+//! let here = session.wait_ready(Duration::from_secs(15))?.positions();
 //!
 //! let checked = CheckedTrajectory::check(&motion, &arm, &here, &CheckOptions::default())?;
 //! session.upload(&checked, |_| Flow::Continue)?;

@@ -1,7 +1,7 @@
 //! One moment of a run, as recordings and reports hold it, from the controller itself or from a status.
 
 use jtc_core::{JOINTS, JointTelemetry, Telemetry};
-use jtc_wire::Status;
+use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 
 use crate::trajectory::Trajectory;
 
@@ -101,10 +101,10 @@ impl From<&JointTelemetry> for JointSample {
 pub struct Sample {
     /// Time since the first sample's clock began, s.
     pub time_s: f64,
-    /// State of the controller as on the wire.
-    pub state: u8,
-    /// Trajectory execution state as on the wire.
-    pub tes: u8,
+    /// State of the controller.
+    pub state: Code<ControllerState>,
+    /// What becomes of the trajectory.
+    pub trajectory: Code<TrajectoryState>,
     /// Index of the current 1 ms point.
     pub point: u32,
     /// Current error word of the controller.
@@ -120,15 +120,19 @@ impl From<&Telemetry> for Sample {
     fn from(t: &Telemetry) -> Self {
         Self {
             time_s: t.tick as f64 * 1e-3,
-            state: t.state as u8,
-            tes: t.tes as u8,
+            state: t.state.into(),
+            trajectory: t.trajectory.into(),
             point: t.point,
             errors: t.errors,
             can_current: 0,
             joints: std::array::from_fn(|j| {
                 let own = &t.joints[j];
                 // Without torque a joint that is not measured reads as exactly zero.
-                let lost = matches!(t.state as u8, 0 | 1 | 5) && own.position == 0.0 && own.velocity == 0.0;
+                let torque_off = matches!(
+                    t.state,
+                    ControllerState::Start | ControllerState::Init | ControllerState::Error
+                );
+                let lost = torque_off && own.position == 0.0 && own.velocity == 0.0;
                 if lost { JointSample::from(own).not_measured() } else { JointSample::from(own) }
             }),
         }
@@ -147,8 +151,8 @@ impl Sample {
     pub fn from_status(time_s: f64, status: &Status) -> Self {
         Self {
             time_s,
-            state: status.fsm,
-            tes: status.tes,
+            state: status.state,
+            trajectory: status.trajectory,
             point: status.point,
             errors: status.errors,
             can_current: status.can_current,
@@ -168,11 +172,18 @@ impl Sample {
         }
     }
 
+    /// The trajectory is being executed.
+    pub fn is_executing(&self) -> bool {
+        self.state == ControllerState::Operate && self.trajectory == TrajectoryState::Execute
+    }
+
     /// What a status says while `trajectory` is executed: the commanded values are those of the reported point, as the
     /// controller computes them.
     pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory) -> Self {
         let mut sample = Self::from_status(time_s, status);
-        if let (3, Some(set)) = (status.fsm, trajectory.at_ms(status.point)) {
+        if status.state == ControllerState::Operate
+            && let Some(set) = trajectory.at_ms(status.point)
+        {
             for (j, joint) in sample.joints.iter_mut().enumerate() {
                 joint.set_position = set.position[j];
                 joint.set_velocity = set.velocity[j];
@@ -189,7 +200,8 @@ mod tests {
 
     #[test]
     fn a_joint_that_does_not_answer_has_no_position() {
-        let mut status = Status { fsm: 5, can_current: 1 << 10, ..Status::default() };
+        let mut status =
+            Status { state: ControllerState::Error.into(), can_current: 1 << 10, ..Status::default() };
         status.joints[1].position = 0.5;
         let sample = Sample::from_status(0.0, &status);
         assert!(sample.joints[2].position.is_nan() && sample.joints[2].torque.is_nan());

@@ -1,16 +1,6 @@
 //! The controller's numbers in words.
 
-use jtc_wire::{DataStatus, FrameStatus, Status};
-
-/// State of the controller.
-pub fn state(fsm: u8) -> &'static str {
-    jtc_wire::words::jtc_fsm(fsm)
-}
-
-/// Trajectory execution state.
-pub fn tes(tes: u8) -> &'static str {
-    jtc_wire::words::tes(tes)
-}
+use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Status, TrajectoryState};
 
 /// State of a node; numbers from 10 to 16 are transitions.
 pub fn node_state(fsm: u8) -> &'static str {
@@ -20,6 +10,29 @@ pub fn node_state(fsm: u8) -> &'static str {
 /// Name of a node on the joint bus: joints count from 1, as people do.
 pub fn node(n: usize) -> String {
     if n == 6 { "gripper".into() } else { format!("joint {}", n + 1) }
+}
+
+/// A request, as people name it.
+pub fn request(request: FrameType) -> &'static str {
+    match request {
+        FrameType::ClearCurrentErrors => "clearing the current errors",
+        FrameType::ClearOccurredErrors => "clearing the occurred errors",
+        FrameType::JtcStatus => "the status",
+        FrameType::Trajectory => "a segment of the trajectory",
+        FrameType::FrictionTable => "the friction tables",
+        FrameType::FrictionTableUseDefault => "the default friction tables",
+        FrameType::PidParam => "the gains",
+        FrameType::PidParamUseDefault => "the default gains",
+        FrameType::ArmModel => "the arm model",
+        FrameType::ArmModelUseDefault => "the default arm model",
+        FrameType::TrajSetExecStatus => "executing, pausing or stopping the trajectory",
+        FrameType::TeachingModeEnable => "switching teaching on",
+        FrameType::TeachingModeDisable => "switching teaching off",
+        FrameType::FrictionPolynomial => "the friction polynomial",
+        FrameType::FrictionPolynomialUseDefault => "the default friction polynomial",
+        FrameType::ResetCanDevices => "resetting nodes",
+        FrameType::GripperControl => "switching the pump",
+    }
 }
 
 /// What became of a frame's data.
@@ -144,7 +157,7 @@ pub fn warnings(s: &Status) -> Vec<String> {
 pub fn errors_line(s: &Status) -> String {
     let all = causes(s);
     if all.is_empty() {
-        format!("no error bit is set (state {}, trajectory {})", state(s.fsm), tes(s.tes))
+        format!("no error bit is set (state {}, trajectory {})", s.state, s.trajectory)
     } else {
         all.join(", ")
     }
@@ -162,10 +175,10 @@ pub fn occurred_since(before: &[u16; 6], s: &Status) -> String {
 
 /// Why the controller is not further than it is.
 pub fn waiting_for(s: &Status) -> String {
-    let head = format!("state {}, trajectory {}", state(s.fsm), tes(s.tes));
+    let head = format!("state {}, trajectory {}", s.state, s.trajectory);
     let mut missing: Vec<String> =
         missing_parameters(s.jtc_init).into_iter().map(|m| format!("{m} not given")).collect();
-    if s.fsm <= 1 {
+    if s.is_coming_up() {
         missing.extend(missing_nodes(s.node_init).into_iter().map(|n| format!("{n} not ready")));
     }
     if s.errors != 0 {
@@ -176,17 +189,17 @@ pub fn waiting_for(s: &Status) -> String {
 
 /// The command that leads on from here.
 pub fn next_step(s: &Status) -> &'static str {
-    if (s.errors != 0 || s.fsm == 5) && s.jtc_init != 0 {
+    if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
         "`jtc recover --arm FILE`, or `--defaults` for the arm that is built into the controller"
-    } else if s.errors != 0 || s.fsm == 5 {
+    } else if s.errors != 0 || s.state == ControllerState::Error {
         "`jtc recover`"
     } else if s.jtc_init != 0 {
         "`jtc params push FILE` or `jtc params use-defaults`"
-    } else if s.fsm <= 1 && s.node_init != 0 {
+    } else if s.is_coming_up() && s.node_init != 0 {
         "`jtc doctor` looks at the nodes that are not ready"
-    } else if s.fsm == 4 {
+    } else if s.state == ControllerState::Teaching {
         "`jtc teach off`"
-    } else if s.tes == 3 {
+    } else if s.trajectory == TrajectoryState::Execute {
         "`jtc traj stop` ends the motion"
     } else {
         "`jtc status`"
@@ -200,7 +213,12 @@ mod tests {
     /// What broke stands before what follows from it, and a drive that is not configured yet has no safety line to be active.
     #[test]
     fn the_most_particular_cause_stands_first() {
-        let mut s = Status { fsm: 5, errors: 0x89, can_current: 1 << 10, ..Status::default() };
+        let mut s = Status {
+            state: ControllerState::Error.into(),
+            errors: 0x89,
+            can_current: 1 << 10,
+            ..Status::default()
+        };
         s.joints[3].mc_current = 0x40;
         s.joints[4].warnings = 8;
         let first = [

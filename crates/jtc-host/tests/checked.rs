@@ -1,5 +1,6 @@
 //! Only what passed the check runs, and only what was uploaded.
 
+use jtc_wire::ControllerState;
 use std::time::Duration;
 
 use jtc_core::Config;
@@ -125,7 +126,7 @@ fn only_what_was_uploaded_is_executed() {
         trigger: Trigger::At(0),
         duration_ms: Some(200),
     });
-    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
     refused(&mut s, &first);
 }
 

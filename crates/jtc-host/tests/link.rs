@@ -1,5 +1,6 @@
 //! The client against the whole simulated controller: parameters, uploads on good and bad lines, execution, recovery.
 
+use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
 
 use jtc_core::{Config, Friction};
@@ -52,7 +53,7 @@ fn upload(s: &mut Sim, t: &Trajectory) -> Result<(CheckedTrajectory, UploadRepor
 fn parameters_go_over_and_the_controller_becomes_ready() {
     let mut s = session(Some(921_600));
     let status = s.next_status().unwrap();
-    assert_eq!((status.fsm, status.jtc_init), (1, 7));
+    assert_eq!((status.state, status.jtc_init), (ControllerState::Init.into(), 7));
     let arm = Arm::avena();
     let file = ParameterFile { polynomial: arm.polynomial, table: arm.table, ..ParameterFile::default() };
     let table = s.push(&file.parameter_set(FrictionChoice::Table), |_| {}).unwrap();
@@ -74,7 +75,10 @@ fn uploads_fill_the_line() {
         let share = report.line_share.unwrap();
         println!("{baud} Bd: {points} points in {:.3} s, {:.2} % of the line", report.time_s, share * 100.0);
         assert!(share >= 0.98, "{baud} Bd: {share}");
-        assert_eq!((report.retries, report.restarts, s.last().unwrap().tes), (0, 0, 1));
+        assert_eq!(
+            (report.retries, report.restarts, s.last().unwrap().trajectory),
+            (0, 0, TrajectoryState::Stop.into())
+        );
         assert_eq!(s.statistics().bad_frames, 0);
     }
 }
@@ -144,7 +148,7 @@ fn uploads_survive_a_bad_line() {
             "{kind:?}: {:.2} s, {} retries, {} restarts",
             report.time_s, report.retries, report.restarts
         );
-        assert_eq!(s.last().unwrap().tes, 1);
+        assert_eq!(s.last().unwrap().trajectory, TrajectoryState::Stop);
     }
 }
 
@@ -179,16 +183,16 @@ fn pause_resume_and_stop() {
     s.execute(&t).unwrap();
     let (mut paused, mut resumed, mut stopped) = (false, false, false);
     let outcome = s
-        .follow(|status| match (status.tes, status.point) {
-            (3, 300..) if !paused => {
+        .follow(|status| match (status.trajectory.known(), status.point) {
+            (Some(TrajectoryState::Execute), 300..) if !paused => {
                 paused = true;
                 Flow::Pause
             }
-            (2, _) if !resumed => {
+            (Some(TrajectoryState::Pause), _) if !resumed => {
                 resumed = true;
                 Flow::Resume
             }
-            (3, 900..) if resumed && !stopped => {
+            (Some(TrajectoryState::Execute), 900..) if resumed && !stopped => {
                 stopped = true;
                 Flow::Stop
             }
@@ -219,26 +223,26 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     let status = s
         .recover(ParameterSource::None, |step| steps.push(step.clone()))
         .unwrap_or_else(|e| panic!("{e}: {steps:?}"));
-    assert_eq!((status.fsm, status.errors), (2, 0), "{steps:?}");
+    assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0), "{steps:?}");
     assert!(steps.iter().any(|s| matches!(s, RecoverStep::Clear(_))));
     // J-24: nothing moves on its own.
-    assert_ne!(status.tes, 3);
+    assert_ne!(status.trajectory, TrajectoryState::Execute);
 }
 
 #[test]
 fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
     let mut s = session(Some(921_600));
     let status = s.recover(ParameterSource::ControllerDefaults, |_| {}).unwrap();
-    assert_eq!(status.fsm, 2);
+    assert_eq!(status.state, ControllerState::HoldPos);
     s.port_mut().world_mut().inject(Fault {
         kind: FaultKind::SafetyInput,
         trigger: Trigger::At(0),
         duration_ms: Some(5_000),
     });
-    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
     let mut steps = Vec::new();
     let status = s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
-    assert_eq!((status.fsm, status.errors), (2, 0));
+    assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0));
     assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
 }
 
@@ -307,17 +311,30 @@ mod scripted {
 /// J-34: resume goes on with what is paused and starts nothing else.
 #[test]
 fn j34_resume_only_after_a_pause() {
-    for tes in [0, 1, 3, 4] {
-        let (mut s, written) =
-            scripted::session(jtc_wire::Status { fsm: 2, tes, ..Default::default() }, Duration::MAX);
+    use TrajectoryState::{Execute, Finish, Null, Stop};
+    for trajectory in [Null, Stop, Execute, Finish] {
+        let (mut s, written) = scripted::session(
+            jtc_wire::Status {
+                state: ControllerState::HoldPos.into(),
+                trajectory: trajectory.into(),
+                ..Default::default()
+            },
+            Duration::MAX,
+        );
         let error = s.resume().unwrap_err();
-        assert!(matches!(error, Error::NotPaused { tes: t, .. } if t == tes), "{error}");
+        assert!(matches!(error, Error::NotPaused { trajectory: t, .. } if t == trajectory), "{error}");
         assert_eq!((error.exit_code(), written.borrow().len()), (4, 0), "{error}");
         // Only a motion that may be slowing down can be resumed by the same command a little later.
-        assert_eq!(error.hint().contains("traj resume"), tes == 3, "{}", error.hint());
+        assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
-    let (mut s, written) =
-        scripted::session(jtc_wire::Status { fsm: 2, tes: 2, ..Default::default() }, Duration::MAX);
+    let (mut s, written) = scripted::session(
+        jtc_wire::Status {
+            state: ControllerState::HoldPos.into(),
+            trajectory: TrajectoryState::Pause.into(),
+            ..Default::default()
+        },
+        Duration::MAX,
+    );
     s.resume().unwrap();
     assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Execute));
 }
@@ -325,7 +342,12 @@ fn j34_resume_only_after_a_pause() {
 /// A link that is lost in motion: the error says that the arm may be moving, and a stop goes out that may still arrive.
 #[test]
 fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
-    let moving = jtc_wire::Status { fsm: 3, tes: 3, point: 1234, ..Default::default() };
+    let moving = jtc_wire::Status {
+        state: ControllerState::Operate.into(),
+        trajectory: TrajectoryState::Execute.into(),
+        point: 1234,
+        ..Default::default()
+    };
     let (mut s, written) = scripted::session(moving, Duration::from_millis(500));
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     assert_eq!((error.exit_code(), error.code()), (3, "link-lost"));
@@ -339,7 +361,12 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     let text = s.stop().unwrap_err().to_string();
     assert!(text.contains("THE ARM MAY BE MOVING"), "{text}");
 
-    let paused = jtc_wire::Status { fsm: 2, tes: 2, point: 700, ..Default::default() };
+    let paused = jtc_wire::Status {
+        state: ControllerState::HoldPos.into(),
+        trajectory: TrajectoryState::Pause.into(),
+        point: 700,
+        ..Default::default()
+    };
     let (mut s, written) = scripted::session(paused, Duration::from_millis(500));
     let text = s.follow(|_| Flow::Continue).unwrap_err().to_string();
     assert!(text.contains("paused at point 700") && !text.contains("MAY BE MOVING"), "{text}");
@@ -371,7 +398,11 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     let status = s
         .recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
-    assert_eq!((status.fsm, s.statistics().frames_sent - before), (2, 3), "{steps:?}");
+    assert_eq!(
+        (status.state, s.statistics().frames_sent - before),
+        (ControllerState::HoldPos.into(), 3),
+        "{steps:?}"
+    );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
     // Held: nothing is sent under the arm's weight, and that is said.
     let mut steps = Vec::new();
@@ -390,7 +421,7 @@ fn j55_after_an_error_the_named_arm_is_powered() {
         trigger: Trigger::At(0),
         duration_ms: Some(500),
     });
-    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
     let set = Arm::avena().parameter_set();
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.clone()))
@@ -404,7 +435,7 @@ fn j55_after_an_error_the_named_arm_is_powered() {
         trigger: Trigger::At(0),
         duration_ms: Some(500),
     });
-    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
     let mut steps = Vec::new();
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
@@ -431,7 +462,7 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     let text = error.to_string();
     assert!(text.contains("joint 5: position error"), "{text}");
     assert!(error.hint().contains("jtc traj resume"));
-    assert_eq!(s.fresh_status().unwrap().fsm, 2, "it is held");
+    assert_eq!(s.fresh_status().unwrap().state, ControllerState::HoldPos, "it is held");
 }
 
 /// The controller says "incorrect value" only: joint, value and bounds are found on this side.

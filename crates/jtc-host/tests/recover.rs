@@ -1,5 +1,6 @@
 //! The way back to HoldPos: what is said on it from each state, and how a person ends it.
 
+use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
 
 use jtc_core::Config;
@@ -20,7 +21,8 @@ fn move_arm(s: &mut Sim) {
     let t = CheckedTrajectory::check(&t, &Arm::avena(), &[0.0; 6], &CheckOptions::default()).unwrap();
     s.upload(&t, |_| Flow::Continue).unwrap();
     s.execute(&t).unwrap();
-    s.wait_for("motion", Duration::from_secs(10), |s| s.fsm == 3 && s.point > 100).unwrap();
+    s.wait_for("motion", Duration::from_secs(10), |s| s.state == ControllerState::Operate && s.point > 100)
+        .unwrap();
 }
 
 /// What a person reads on the way back, from each state.
@@ -29,7 +31,11 @@ fn recover_says_each_step_of_each_state() {
     fn words(s: &mut Sim, source: ParameterSource<'_>) -> Vec<String> {
         let mut steps = Vec::new();
         let done = s.recover(source, |step| steps.push(step.to_string()));
-        assert_eq!(done.map(|s| (s.fsm, s.errors)).ok(), Some((2, 0)), "{steps:?}");
+        assert_eq!(
+            done.map(|s| (s.state, s.errors)).ok(),
+            Some((ControllerState::HoldPos.into(), 0)),
+            "{steps:?}"
+        );
         steps
     }
     let kept = "friction, gains and arm model: those that the controller was given before";
@@ -47,7 +53,7 @@ fn recover_says_each_step_of_each_state() {
     assert_eq!(fresh.last().unwrap(), done);
     assert_eq!(words(&mut s, ParameterSource::None), ["found: state HoldPos, trajectory Null", kept, done]);
     s.teach(true).unwrap();
-    s.wait_for("teaching", Duration::from_secs(1), |s| s.fsm == 4).unwrap();
+    s.wait_for("teaching", Duration::from_secs(1), |s| s.state == ControllerState::Teaching).unwrap();
     assert_eq!(
         words(&mut s, ParameterSource::None),
         ["found: state Teaching, trajectory Null", kept, "switching teaching off", done]
@@ -62,7 +68,7 @@ fn recover_says_each_step_of_each_state() {
         trigger: Trigger::At(0),
         duration_ms: Some(3_000),
     });
-    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
     let stopped = words(&mut s, ParameterSource::None);
     assert!(
         stopped[0].starts_with("found: state Error, trajectory Null; ")
@@ -78,7 +84,7 @@ fn recover_says_each_step_of_each_state() {
         trigger: Trigger::At(0),
         duration_ms: Some(300),
     });
-    s.wait_for("error", Duration::from_secs(1), |s| s.fsm == 5).unwrap();
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
     let faulty = words(&mut s, ParameterSource::None);
     assert!(faulty.iter().any(|s| s == "clearing the errors of the controller and of joint 3"), "{faulty:?}");
 }
@@ -92,12 +98,18 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
     let error = s.recover_until(ParameterSource::None, || true, |_| {}).unwrap_err();
     assert!(matches!(error, Error::Cancelled) && error.exit_code() == 5, "{error}");
     let status = s.fresh_status().unwrap();
-    assert_eq!((status.fsm, status.tes), (2, 1));
+    assert_eq!(
+        (status.state, status.trajectory),
+        (ControllerState::HoldPos.into(), TrajectoryState::Stop.into())
+    );
     // In teaching the arm is somebody's: it is left as it is.
     s.teach(true).unwrap();
-    s.wait_for("teaching", Duration::from_secs(1), |s| s.fsm == 4).unwrap();
+    s.wait_for("teaching", Duration::from_secs(1), |s| s.state == ControllerState::Teaching).unwrap();
     let sent = s.statistics().frames_sent;
     let error = s.recover_until(ParameterSource::None, || true, |_| {}).unwrap_err();
     assert!(matches!(error, Error::Cancelled), "{error}");
-    assert_eq!((s.statistics().frames_sent, s.fresh_status().unwrap().fsm), (sent, 4));
+    assert_eq!(
+        (s.statistics().frames_sent, s.fresh_status().unwrap().state),
+        (sent, ControllerState::Teaching.into())
+    );
 }

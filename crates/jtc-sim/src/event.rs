@@ -3,7 +3,7 @@ use core::fmt;
 use std::collections::VecDeque;
 
 use jtc_bus::GRIPPER;
-use jtc_core::{State, Tes};
+use jtc_core::{ControllerState, TrajectoryState};
 use jtc_wire::FrameStatus;
 
 use crate::faults::FaultKind;
@@ -12,18 +12,18 @@ use crate::faults::FaultKind;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// The controller changed its state.
-    State {
+    ControllerState {
         /// Before.
-        from: State,
+        from: ControllerState,
         /// Now.
-        to: State,
+        to: ControllerState,
     },
     /// The trajectory execution state changed.
     Execution {
         /// Before.
-        from: Tes,
+        from: TrajectoryState,
         /// Now.
-        to: Tes,
+        to: TrajectoryState,
     },
     /// The controller's error word changed.
     Errors {
@@ -64,7 +64,7 @@ pub enum Event {
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::State { from, to } => write!(f, "controller: {from:?} → {to:?}"),
+            Self::ControllerState { from, to } => write!(f, "controller: {from:?} → {to:?}"),
             Self::Execution { from, to } => write!(f, "trajectory: {from:?} → {to:?}"),
             Self::Errors { from, to } => write!(f, "errors: 0x{from:04X} → 0x{to:04X}"),
             Self::Node { node, from, to } => match usize::from(*node) {

@@ -1,6 +1,6 @@
 #![doc = include_str!("fault_file.md")]
 use jtc_bus::GRIPPER;
-use jtc_core::{JOINTS, State};
+use jtc_core::{ControllerState, JOINTS};
 use serde::Deserialize;
 
 use crate::faults::{Fault, FaultKind, FaultPlan, Trigger};
@@ -37,13 +37,13 @@ const KINDS: [&str; 23] = [
     "hand",
 ];
 
-const STATES: [(&str, State); 6] = [
-    ("start", State::Start),
-    ("init", State::Init),
-    ("hold", State::HoldPos),
-    ("operate", State::Operate),
-    ("teaching", State::Teaching),
-    ("error", State::Error),
+const STATES: [(&str, ControllerState); 6] = [
+    ("start", ControllerState::Start),
+    ("init", ControllerState::Init),
+    ("hold", ControllerState::HoldPos),
+    ("operate", ControllerState::Operate),
+    ("teaching", ControllerState::Teaching),
+    ("error", ControllerState::Error),
 ];
 
 /// What every format says of itself.

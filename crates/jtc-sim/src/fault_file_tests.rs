@@ -12,7 +12,7 @@ fn the_documented_example_is_read() {
         Fault { kind: FaultKind::NodeSilent { node: 2 }, trigger: Trigger::At(3500), duration_ms: Some(50) },
         Fault {
             kind: FaultKind::EncoderJump { joint: 1, rad: 0.3 },
-            trigger: Trigger::InState(State::Operate, 1000),
+            trigger: Trigger::InState(ControllerState::Operate, 1000),
             duration_ms: None,
         },
         Fault {
@@ -22,7 +22,7 @@ fn the_documented_example_is_read() {
         },
         Fault {
             kind: FaultKind::Push { joint: 2, torque: 12.0 },
-            trigger: Trigger::InState(State::HoldPos, 2000),
+            trigger: Trigger::InState(ControllerState::HoldPos, 2000),
             duration_ms: Some(500),
         },
     ];

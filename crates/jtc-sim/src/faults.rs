@@ -2,7 +2,7 @@
 use core::fmt;
 
 use jtc_bus::GRIPPER;
-use jtc_core::State;
+use jtc_core::ControllerState;
 
 use crate::hand::HandPath;
 
@@ -194,7 +194,7 @@ pub enum Trigger {
     /// At this time, ms after the start.
     At(u64),
     /// This long (ms) after the controller has first entered a state.
-    InState(State, u64),
+    InState(ControllerState, u64),
     /// When the trajectory's point index first reaches this value in Operate.
     AtPoint(u32),
 }
@@ -265,7 +265,7 @@ impl Running {
     }
 
     /// Let faults begin and end at `now` (ms), given the controller's state and point index.
-    pub fn step(&mut self, now: u64, state: State, point: u32, mut change: impl FnMut(Change)) {
+    pub fn step(&mut self, now: u64, state: ControllerState, point: u32, mut change: impl FnMut(Change)) {
         if self.open == 0 {
             return;
         }
@@ -274,7 +274,7 @@ impl Running {
                 let start = match fault.trigger {
                     Trigger::At(ms) => Some(ms),
                     Trigger::InState(wanted, after) => (state == wanted).then_some(now + after),
-                    Trigger::AtPoint(k) => (state == State::Operate && point >= k).then_some(now),
+                    Trigger::AtPoint(k) => (state == ControllerState::Operate && point >= k).then_some(now),
                 };
                 if let Some(start) = start {
                     *phase = Phase::Armed(start);

@@ -2,7 +2,7 @@
 use core::fmt;
 
 use jtc_bus::{Frame, Request, Target};
-use jtc_core::{Config, JOINTS, State, Telemetry, Tes};
+use jtc_core::{Config, ControllerState, JOINTS, Telemetry, TrajectoryState};
 use jtc_wire::{ExecCommand, FrameType};
 
 mod motion;
@@ -42,7 +42,7 @@ pub enum Broken {
     /// A torque went out in a state without torque.
     Torque {
         /// State.
-        state: State,
+        state: ControllerState,
         /// Joint.
         joint: usize,
         /// N·m.
@@ -67,7 +67,7 @@ pub enum Broken {
     /// The error state was left, though the host had not cleared anything.
     LeftErrorAlone {
         /// State that was entered.
-        to: State,
+        to: ControllerState,
     },
     /// Operate was entered without Execute from the host.
     MovedAlone,
@@ -76,7 +76,7 @@ pub enum Broken {
     /// An execution state that only the host can bring about.
     ExecutionAlone {
         /// State that was entered.
-        to: Tes,
+        to: TrajectoryState,
     },
     /// The point index went back within a run.
     IndexFell {
@@ -88,7 +88,7 @@ pub enum Broken {
     /// No frame went out though the controller ticked and is not in Start.
     Silent {
         /// State.
-        state: State,
+        state: ControllerState,
     },
     /// Frames that take the place of Move are too close together.
     NoMove {
@@ -100,7 +100,7 @@ pub enum Broken {
     /// A node is asked to be enabled in a state that does not want it.
     Enabled {
         /// State.
-        state: State,
+        state: ControllerState,
         /// Node.
         node: usize,
     },
@@ -159,8 +159,8 @@ impl std::error::Error for Violation {}
 /// Remembers what it needs from one millisecond to the next.
 #[derive(Clone, Debug)]
 pub struct Invariants {
-    state: State,
-    tes: Tes,
+    state: ControllerState,
+    trajectory: TrajectoryState,
     point: u32,
     controller_ticks: u64,
     since_other: u32,
@@ -173,8 +173,8 @@ pub struct Invariants {
 impl Default for Invariants {
     fn default() -> Self {
         Self {
-            state: State::Start,
-            tes: Tes::Null,
+            state: ControllerState::Start,
+            trajectory: TrajectoryState::Null,
             point: 0,
             controller_ticks: 0,
             since_other: MOVES_BETWEEN,
@@ -190,7 +190,13 @@ impl Invariants {
     /// A checker that joins a world which has been running for a while; what was permitted before counts.
     pub fn joining(world: &World) -> Self {
         let t = world.telemetry();
-        Self { state: t.state, tes: t.tes, point: t.point, controller_ticks: t.tick, ..Self::default() }
+        Self {
+            state: t.state,
+            trajectory: t.trajectory,
+            point: t.point,
+            controller_ticks: t.tick,
+            ..Self::default()
+        }
     }
 
     /// Look at the millisecond that has just passed.
@@ -217,13 +223,13 @@ impl Invariants {
         self.finite(moment)?;
         self.states(moment)?;
         self.frame(moment)?;
-        self.motion.check(moment, self.tes)?;
+        self.motion.check(moment, self.trajectory)?;
         let internal = telemetry.errors & jtc_core::error::INTERNAL != 0;
-        if moment.safety_output != (telemetry.state != State::Start && !internal) {
+        if moment.safety_output != (telemetry.state != ControllerState::Start && !internal) {
             return Err(Broken::SafetyOutput { level: moment.safety_output, errors: telemetry.errors });
         }
         self.state = telemetry.state;
-        self.tes = telemetry.tes;
+        self.trajectory = telemetry.trajectory;
         self.point = telemetry.point;
         Ok(())
     }
@@ -273,28 +279,35 @@ impl Invariants {
     fn states(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let telemetry = moment.telemetry;
         let (from, to) = (self.state, telemetry.state);
-        if from == State::Error && to != State::Error && !self.cleared {
+        if from == ControllerState::Error && to != ControllerState::Error && !self.cleared {
             return Err(Broken::LeftErrorAlone { to });
         }
-        if to == State::Error {
+        if to == ControllerState::Error {
             // What was commanded before the error permits nothing after it.
             self.execute = false;
             self.teach = false;
         } else {
             self.cleared = false;
         }
-        if telemetry.tes == Tes::Execute && self.tes != Tes::Execute && !core::mem::take(&mut self.execute) {
-            return Err(Broken::ExecutionAlone { to: telemetry.tes });
+        if telemetry.trajectory == TrajectoryState::Execute
+            && self.trajectory != TrajectoryState::Execute
+            && !core::mem::take(&mut self.execute)
+        {
+            return Err(Broken::ExecutionAlone { to: telemetry.trajectory });
         }
-        if to == State::Operate && telemetry.tes == Tes::Null {
+        if to == ControllerState::Operate && telemetry.trajectory == TrajectoryState::Null {
             return Err(Broken::MovedAlone);
         }
-        if to == State::Teaching && from != State::Teaching && !core::mem::take(&mut self.teach) {
+        if to == ControllerState::Teaching
+            && from != ControllerState::Teaching
+            && !core::mem::take(&mut self.teach)
+        {
             return Err(Broken::TaughtAlone);
         }
         // Stop ends the run and goes back to the first point.
-        let executing = (self.tes, telemetry.tes) == (Tes::Execute, Tes::Execute);
-        let running = (from, to) == (State::Operate, State::Operate) && executing;
+        let executing =
+            (self.trajectory, telemetry.trajectory) == (TrajectoryState::Execute, TrajectoryState::Execute);
+        let running = (from, to) == (ControllerState::Operate, ControllerState::Operate) && executing;
         if running && telemetry.point < self.point {
             return Err(Broken::IndexFell { from: self.point, to: telemetry.point });
         }
@@ -305,11 +318,11 @@ impl Invariants {
     fn frame(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let state = moment.telemetry.state;
         let Some(frame) = moment.sent else {
-            return if state == State::Start { Ok(()) } else { Err(Broken::Silent { state }) };
+            return if state == ControllerState::Start { Ok(()) } else { Err(Broken::Silent { state }) };
         };
         let Ok(request) = Request::parse(frame) else { return Err(Broken::UnknownFrame { id: frame.id }) };
         let Request::Move { torque, .. } = request else {
-            if state == State::Error && self.state != State::Error {
+            if state == ControllerState::Error && self.state != ControllerState::Error {
                 return Err(Broken::ErrorWithoutZero);
             }
             if self.since_other < MOVES_BETWEEN {
@@ -333,7 +346,7 @@ impl Invariants {
         Ok(())
     }
 
-    fn targets(&self, state: State, request: &Request) -> Result<(), Broken> {
+    fn targets(&self, state: ControllerState, request: &Request) -> Result<(), Broken> {
         let Request::ChangeFsm { target } = request else { return Ok(()) };
         let powered = powered(state);
         match target.iter().position(|&t| t == Target::Enable) {

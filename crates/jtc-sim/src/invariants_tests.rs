@@ -23,9 +23,9 @@ impl Script {
         }
     }
 
-    fn tick(&mut self, state: State, tes: Tes) -> Option<Broken> {
+    fn tick(&mut self, state: ControllerState, trajectory: TrajectoryState) -> Option<Broken> {
         self.telemetry.tick += 1;
-        (self.telemetry.state, self.telemetry.tes) = (state, tes);
+        (self.telemetry.state, self.telemetry.trajectory) = (state, trajectory);
         let config = Config::avena();
         let frame = self.request.emit();
         let worked = std::mem::take(&mut self.worked);
@@ -36,7 +36,7 @@ impl Script {
             truth: &self.truth,
             sent: Some(&frame),
             worked: &worked,
-            safety_output: self.safety_output && state != State::Start,
+            safety_output: self.safety_output && state != ControllerState::Start,
             config: &config,
         };
         self.checker.check_moment(&moment).err().map(|violation| violation.broken)
@@ -58,20 +58,21 @@ fn torque(first: f64) -> Request {
 #[test]
 fn j21_torque_outside_the_powered_states_is_found() {
     for (state, powered) in [
-        (State::Init, false),
-        (State::HoldPos, true),
-        (State::Operate, true),
-        (State::Teaching, true),
-        (State::Error, false),
+        (ControllerState::Init, false),
+        (ControllerState::HoldPos, true),
+        (ControllerState::Operate, true),
+        (ControllerState::Teaching, true),
+        (ControllerState::Error, false),
     ] {
         let mut script = Script::new();
         script.exec(ExecCommand::Execute);
-        let tes = if state == State::Operate { Tes::Execute } else { Tes::Null };
-        if state == State::Teaching {
+        let trajectory =
+            if state == ControllerState::Operate { TrajectoryState::Execute } else { TrajectoryState::Null };
+        if state == ControllerState::Teaching {
             script.command(FrameType::TeachingModeEnable);
         }
         script.request = torque(1.0);
-        let found = script.tick(state, tes);
+        let found = script.tick(state, trajectory);
         assert_eq!(matches!(found, Some(Broken::Torque { joint: 0, .. })), !powered, "{state:?}: {found:?}");
     }
 }
@@ -80,31 +81,43 @@ fn j21_torque_outside_the_powered_states_is_found() {
 fn j43_torque_over_the_limit_is_found() {
     let mut script = Script::new();
     script.request = torque(-80.5);
-    assert!(matches!(script.tick(State::HoldPos, Tes::Null), Some(Broken::TorqueLimit { joint: 0, .. })));
+    assert!(matches!(
+        script.tick(ControllerState::HoldPos, TrajectoryState::Null),
+        Some(Broken::TorqueLimit { joint: 0, .. })
+    ));
 }
 
 #[test]
 fn j24_leaving_error_or_moving_without_a_command_is_found() {
     let mut script = Script::new();
-    assert_eq!(script.tick(State::Error, Tes::Null), None);
-    assert_eq!(script.tick(State::Init, Tes::Null), Some(Broken::LeftErrorAlone { to: State::Init }));
+    assert_eq!(script.tick(ControllerState::Error, TrajectoryState::Null), None);
+    assert_eq!(
+        script.tick(ControllerState::Init, TrajectoryState::Null),
+        Some(Broken::LeftErrorAlone { to: ControllerState::Init })
+    );
 
     let mut script = Script::new();
-    assert_eq!(script.tick(State::Error, Tes::Null), None);
+    assert_eq!(script.tick(ControllerState::Error, TrajectoryState::Null), None);
     script.command(FrameType::ClearCurrentErrors);
-    assert_eq!(script.tick(State::HoldPos, Tes::Null), None);
-    assert_eq!(script.tick(State::HoldPos, Tes::Stop), None);
-    assert_eq!(script.tick(State::Operate, Tes::Execute), Some(Broken::ExecutionAlone { to: Tes::Execute }));
+    assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Null), None);
+    assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Stop), None);
+    assert_eq!(
+        script.tick(ControllerState::Operate, TrajectoryState::Execute),
+        Some(Broken::ExecutionAlone { to: TrajectoryState::Execute })
+    );
 
     // A command from before the error permits nothing after it.
     let mut script = Script::new();
     script.exec(ExecCommand::Execute);
-    assert_eq!(script.tick(State::HoldPos, Tes::Stop), None);
-    assert_eq!(script.tick(State::Error, Tes::Null), None);
+    assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Stop), None);
+    assert_eq!(script.tick(ControllerState::Error, TrajectoryState::Null), None);
     script.command(FrameType::ClearCurrentErrors);
-    assert_eq!(script.tick(State::HoldPos, Tes::Stop), None);
-    assert!(script.tick(State::Operate, Tes::Execute).is_some());
-    assert_eq!(Script::new().tick(State::Teaching, Tes::Null), Some(Broken::TaughtAlone));
+    assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Stop), None);
+    assert!(script.tick(ControllerState::Operate, TrajectoryState::Execute).is_some());
+    assert_eq!(
+        Script::new().tick(ControllerState::Teaching, TrajectoryState::Null),
+        Some(Broken::TaughtAlone)
+    );
 }
 
 #[test]
@@ -113,10 +126,13 @@ fn j31_an_index_that_goes_back_is_found() {
     script.exec(ExecCommand::Execute);
     for point in [1, 2, 3] {
         script.telemetry.point = point;
-        assert_eq!(script.tick(State::Operate, Tes::Execute), None);
+        assert_eq!(script.tick(ControllerState::Operate, TrajectoryState::Execute), None);
     }
     script.telemetry.point = 2;
-    assert_eq!(script.tick(State::Operate, Tes::Execute), Some(Broken::IndexFell { from: 3, to: 2 }));
+    assert_eq!(
+        script.tick(ControllerState::Operate, TrajectoryState::Execute),
+        Some(Broken::IndexFell { from: 3, to: 2 })
+    );
 }
 
 #[test]
@@ -124,22 +140,25 @@ fn j12_too_few_moves_and_a_late_zero_are_found() {
     let other = Request::ChangeFsm { target: [Target::Ready; 7] };
     let mut script = Script::new();
     script.request = other;
-    assert_eq!(script.tick(State::Init, Tes::Null), None);
+    assert_eq!(script.tick(ControllerState::Init, TrajectoryState::Null), None);
     script.request = torque(0.0);
     for _ in 0..2 {
-        assert_eq!(script.tick(State::Init, Tes::Null), None);
+        assert_eq!(script.tick(ControllerState::Init, TrajectoryState::Null), None);
     }
     script.request = other;
-    assert_eq!(script.tick(State::Init, Tes::Null), Some(Broken::NoMove { ticks: 2 }));
+    assert_eq!(script.tick(ControllerState::Init, TrajectoryState::Null), Some(Broken::NoMove { ticks: 2 }));
 
     let mut script = Script::new();
-    script.tick(State::HoldPos, Tes::Null);
+    script.tick(ControllerState::HoldPos, TrajectoryState::Null);
     script.request = other;
-    assert_eq!(script.tick(State::Error, Tes::Null), Some(Broken::ErrorWithoutZero));
+    assert_eq!(script.tick(ControllerState::Error, TrajectoryState::Null), Some(Broken::ErrorWithoutZero));
 
     let mut script = Script::new();
     script.request = Request::ChangeFsm { target: [Target::Enable; 7] };
-    assert!(matches!(script.tick(State::Init, Tes::Null), Some(Broken::Enabled { node: 0, .. })));
+    assert!(matches!(
+        script.tick(ControllerState::Init, TrajectoryState::Null),
+        Some(Broken::Enabled { node: 0, .. })
+    ));
 }
 
 #[test]
@@ -147,22 +166,31 @@ fn nothing_nan_goes_unseen() {
     let mut script = Script::new();
     script.telemetry.joints[4].torque_d = f64::NAN;
     assert_eq!(
-        script.tick(State::Init, Tes::Null),
+        script.tick(ControllerState::Init, TrajectoryState::Null),
         Some(Broken::NotFinite { what: "part of the torque", joint: 4 })
     );
     let mut script = Script::new();
     script.truth.q[1] = f64::INFINITY;
-    assert!(matches!(script.tick(State::Init, Tes::Null), Some(Broken::NotFinite { joint: 1, .. })));
+    assert!(matches!(
+        script.tick(ControllerState::Init, TrajectoryState::Null),
+        Some(Broken::NotFinite { joint: 1, .. })
+    ));
 }
 
 #[test]
 fn j22_a_wrong_safety_output_is_found() {
     let mut script = Script::new();
     script.telemetry.errors = jtc_core::error::INTERNAL;
-    assert!(matches!(script.tick(State::Error, Tes::Null), Some(Broken::SafetyOutput { level: true, .. })));
+    assert!(matches!(
+        script.tick(ControllerState::Error, TrajectoryState::Null),
+        Some(Broken::SafetyOutput { level: true, .. })
+    ));
     let mut script = Script::new();
     script.safety_output = false;
-    assert!(matches!(script.tick(State::HoldPos, Tes::Null), Some(Broken::SafetyOutput { .. })));
+    assert!(matches!(
+        script.tick(ControllerState::HoldPos, TrajectoryState::Null),
+        Some(Broken::SafetyOutput { .. })
+    ));
 }
 
 /// A joint on the path, at this speed; Stop is executed in the next tick.
@@ -170,7 +198,7 @@ fn stopped_at(speed: f64) -> Script {
     let mut script = Script::new();
     script.exec(ExecCommand::Execute);
     script.truth.qd[2] = speed;
-    assert_eq!(script.tick(State::Operate, Tes::Execute), None);
+    assert_eq!(script.tick(ControllerState::Operate, TrajectoryState::Execute), None);
     script.exec(ExecCommand::Stop);
     script
 }
@@ -178,29 +206,35 @@ fn stopped_at(speed: f64) -> Script {
 #[test]
 fn j33_a_stop_that_takes_too_long_is_found() {
     // Set values that do not come to their end, and an arm that does not follow them.
-    for (state, tes) in [(State::Operate, Tes::Execute), (State::HoldPos, Tes::Stop)] {
+    for (state, trajectory) in [
+        (ControllerState::Operate, TrajectoryState::Execute),
+        (ControllerState::HoldPos, TrajectoryState::Stop),
+    ] {
         let mut script = stopped_at(0.3);
-        let found = (0..600).find_map(|ms| script.tick(state, tes).map(|broken| (ms, broken)));
-        assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{tes:?}");
+        let found = (0..600).find_map(|ms| script.tick(state, trajectory).map(|broken| (ms, broken)));
+        assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{trajectory:?}");
     }
     // One that was given before it could be executed begins when the arm brakes.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     script.telemetry.braking = true;
-    assert!((0..600).any(|_| script.tick(State::Operate, Tes::Execute).is_some()));
+    assert!((0..600).any(|_| script.tick(ControllerState::Operate, TrajectoryState::Execute).is_some()));
 }
 
 #[test]
 fn j33_a_stop_against_a_push_has_the_time_that_braking_may_take() {
-    let found = |push: f64, torque: f64, (state, tes): (State, Tes)| {
+    let found = |push: f64, torque: f64, (state, trajectory): (ControllerState, TrajectoryState)| {
         let mut script = stopped_at(0.3);
         script.truth.outside[2] = push;
         script.telemetry.joints[2].torque = torque;
         script.telemetry.braking = true;
-        (0..1_100).find(|_| script.tick(state, tes).is_some())
+        (0..1_100).find(|_| script.tick(state, trajectory).is_some())
     };
     let limit = Config::avena().joints[2].torque_max;
-    let (path, held) = ((State::Operate, Tes::Execute), (State::HoldPos, Tes::Stop));
+    let (path, held) = (
+        (ControllerState::Operate, TrajectoryState::Execute),
+        (ControllerState::HoldPos, TrajectoryState::Stop),
+    );
     for place in [path, held] {
         assert_eq!(found(0.0, limit, place), Some(521), "no push");
         assert_eq!(found(50.0, limit - 1.0, place), Some(521), "a push that leaves torque to brake with");
@@ -212,18 +246,21 @@ fn j33_a_stop_against_a_push_has_the_time_that_braking_may_take() {
 #[test]
 fn j33_a_stop_that_ends_is_none_and_an_error_ends_it() {
     let mut script = stopped_at(0.3);
-    assert!((0..500).all(|_| script.tick(State::Operate, Tes::Execute).is_none()));
+    assert!((0..500).all(|_| script.tick(ControllerState::Operate, TrajectoryState::Execute).is_none()));
     script.truth.qd[2] = 0.0;
-    assert_eq!(script.tick(State::HoldPos, Tes::Stop), None);
+    assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Stop), None);
     script.truth.qd[2] = 0.3;
-    assert!((0..600).all(|_| script.tick(State::HoldPos, Tes::Stop).is_none()), "pushed, later");
+    assert!(
+        (0..600).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Stop).is_none()),
+        "pushed, later"
+    );
 
     let mut script = stopped_at(0.3);
-    assert!((0..600).all(|_| script.tick(State::Error, Tes::Null).is_none()));
+    assert!((0..600).all(|_| script.tick(ControllerState::Error, TrajectoryState::Null).is_none()));
     // Without a command it may move for as long as it likes.
     let mut script = stopped_at(0.3);
     script.worked.clear();
-    assert!((0..600).all(|_| script.tick(State::Operate, Tes::Execute).is_none()));
+    assert!((0..600).all(|_| script.tick(ControllerState::Operate, TrajectoryState::Execute).is_none()));
 }
 
 #[test]
@@ -236,21 +273,23 @@ fn j35_a_joint_that_races_is_found() {
         script
     };
     let mut script = fast();
-    let found = (1..=10).find_map(|ms| script.tick(State::HoldPos, Tes::Null).map(|broken| (ms, broken)));
+    let found = (1..=10).find_map(|ms| {
+        script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
+    });
     assert_eq!(found, Some((6, Broken::Speed { joint: 3, velocity: -1.01 * limit, ticks: 6 })));
     // Predicted ones do not count, and do not end it.
     let mut script = fast();
-    assert!((0..5).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()));
+    assert!((0..5).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
     script.telemetry.joints[3].fresh = false;
-    assert!((0..4).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()));
+    assert!((0..4).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
     script.telemetry.joints[3].fresh = true;
-    assert!(script.tick(State::HoldPos, Tes::Null).is_some());
+    assert!(script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_some());
     // Without torque, or slower, it is none.
     let mut script = fast();
-    assert!((0..10).all(|_| script.tick(State::Error, Tes::Null).is_none()));
+    assert!((0..10).all(|_| script.tick(ControllerState::Error, TrajectoryState::Null).is_none()));
     let mut script = fast();
     script.telemetry.joints[3].velocity = 0.99 * limit;
-    assert!((0..10).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()));
+    assert!((0..10).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
 }
 
 #[test]
@@ -262,24 +301,29 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
         let mut good = true;
         for ms in 0..400 {
             script.telemetry.joints[0].torque = if ms % period == 0 { -limit } else { 0.0 };
-            good &= script.tick(State::HoldPos, Tes::Null).is_none();
+            good &= script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none();
         }
         assert_eq!(good, allowed, "one tick of {period}");
     }
     let mut script = Script::new();
     script.telemetry.joints[0].torque = limit;
     script.telemetry.braking = true;
-    assert!((0..400).all(|_| script.tick(State::HoldPos, Tes::Null).is_none()), "braking");
+    assert!(
+        (0..400).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()),
+        "braking"
+    );
     script.telemetry.braking = false;
-    let found = (1..=20).find_map(|ms| script.tick(State::HoldPos, Tes::Null).map(|broken| (ms, broken)));
+    let found = (1..=20).find_map(|ms| {
+        script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
+    });
     assert_eq!(found, Some((11, Broken::Saturated { joint: 0, ticks: 11 })));
     // A joint that was just enabled has a second to catch its load, and none while it is taught.
-    for (state, last) in [(State::HoldPos, 1_000), (State::Teaching, 0)] {
+    for (state, last) in [(ControllerState::HoldPos, 1_000), (ControllerState::Teaching, 0)] {
         let mut script = Script::new();
         script.telemetry.joints[0].torque = limit;
         script.telemetry.joints[0].fsm = jtc_bus::fsm::ENABLED;
         script.command(FrameType::TeachingModeEnable);
-        let found = (1..=2_000).find(|_| script.tick(state, Tes::Null).is_some());
+        let found = (1..=2_000).find(|_| script.tick(state, TrajectoryState::Null).is_some());
         assert_eq!(found, Some(last + 11), "{state:?}");
     }
 }

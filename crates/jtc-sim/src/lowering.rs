@@ -1,6 +1,6 @@
 //! An arm that is lowered through a place where its shoulder carries much of what it can, and is stopped there (J-33): for tests
 //! and for the tables of docs/safety.md.
-use jtc_core::{Config, JOINTS, Parameters, State, Tes};
+use jtc_core::{Config, ControllerState, JOINTS, Parameters, TrajectoryState};
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::ExecCommand;
 
@@ -76,9 +76,9 @@ pub struct Outcome {
     /// Until no joint moves, ms.
     pub standing_ms: u64,
     /// State at the end.
-    pub state: State,
+    pub state: ControllerState,
     /// Trajectory state at the end.
-    pub tes: Tes,
+    pub trajectory: TrajectoryState,
     /// Error word at the end.
     pub errors: u16,
     /// Internal errors of all joints at the end.
@@ -158,7 +158,7 @@ impl Lowering {
         for ms in 1..=LONGEST_MS {
             operator.step();
             let (truth, t) = (operator.world.truth(), operator.world.telemetry());
-            if t.tes == Tes::Execute {
+            if t.trajectory == TrajectoryState::Execute {
                 commanded_ms = ms;
                 error = t.joints.iter().fold(error, |e, j| e.max(j.position_error().abs()));
             }
@@ -174,8 +174,8 @@ impl Lowering {
             }
         }
         let t = operator.world.telemetry();
-        let (state, tes, errors) = (t.state, t.tes, t.errors);
+        let (state, trajectory, errors) = (t.state, t.trajectory, t.errors);
         let joints = t.joints.iter().fold(0, |word, joint| word | joint.internal);
-        Outcome { sag, commanded_ms, standing_ms, state, tes, errors, joints, way, peak, error }
+        Outcome { sag, commanded_ms, standing_ms, state, trajectory, errors, joints, way, peak, error }
     }
 }

@@ -6,7 +6,7 @@ mod rows;
 mod standstill;
 mod stopping;
 
-use jtc_core::{JOINTS, State, error, joint_error};
+use jtc_core::{ControllerState, JOINTS, error, joint_error};
 use jtc_wire::{ExecCommand, FrameType};
 
 use crate::config::{SimConfig, Support};
@@ -25,7 +25,13 @@ const WATCH_MS: u64 = 600;
 const START: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 
 /// States in which faults are thrown. Start lasts a single tick.
-const STATES: [State; 5] = [State::Init, State::HoldPos, State::Operate, State::Teaching, State::Error];
+const STATES: [ControllerState; 5] = [
+    ControllerState::Init,
+    ControllerState::HoldPos,
+    ControllerState::Operate,
+    ControllerState::Teaching,
+    ControllerState::Error,
+];
 
 /// What became of a fault in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +41,7 @@ pub enum Reaction {
     /// Another state, or more errors in the same.
     Change {
         /// State then.
-        state: State,
+        state: ControllerState,
         /// Error word then.
         errors: u16,
         /// Internal errors of all joints then.
@@ -61,7 +67,7 @@ impl fmt::Display for Reaction {
                 write!(f, "{state:?}, {tick}")?;
                 let words = words(errors, joints).join(", ");
                 match (words.is_empty(), same) {
-                    (true, _) if state == State::Error => f.write_str(" (clearing)"),
+                    (true, _) if state == ControllerState::Error => f.write_str(" (clearing)"),
                     (true, _) => Ok(()),
                     (false, false) => write!(f, " ({words})"),
                     (false, true) => write!(f, " (also {words})"),
@@ -111,7 +117,7 @@ pub enum MatrixError {
         /// Row of the table.
         row: &'static str,
         /// State.
-        state: State,
+        state: ControllerState,
     },
 }
 
@@ -209,31 +215,31 @@ fn worse(back: Back) -> u8 {
 }
 
 /// A world in which the controller is in `state`.
-fn world_in(state: State, support: Support) -> Result<Operator, OperatorError> {
+fn world_in(state: ControllerState, support: Support) -> Result<Operator, OperatorError> {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     for drive in &mut config.drives {
         // Alignment takes seconds in which nothing else happens.
         drive.first_enable_ms = 60;
     }
     let mut operator = Operator::new(config);
-    if state == State::Init {
+    if state == ControllerState::Init {
         operator.run(400);
         return Ok(operator);
     }
     operator.bring_up()?;
     operator.run(200);
     match state {
-        State::Operate => {
+        ControllerState::Operate => {
             let to = START.map(|q| q + 0.8);
             operator.upload(&host::there_and_back(&START, &to, 2.0, 1, 10), 10)?;
             operator.ask(&host::exec(ExecCommand::Execute))?;
             operator.run(800);
         }
-        State::Teaching => {
+        ControllerState::Teaching => {
             operator.teach()?;
             operator.run(200);
         }
-        State::Error => {
+        ControllerState::Error => {
             operator.world.set_safety_input(false);
             operator.run(20);
             operator.world.set_safety_input(true);
@@ -245,7 +251,7 @@ fn world_in(state: State, support: Support) -> Result<Operator, OperatorError> {
     Ok(operator)
 }
 
-fn cell(row: &Row, state: State) -> Result<Cell, MatrixError> {
+fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     let mut operator = world_in(state, Support::Brakes)?;
     let mut watch = Watch::new(&mut operator)?;
     let mut reaction = Reaction::None;
@@ -264,12 +270,14 @@ fn cell(row: &Row, state: State) -> Result<Cell, MatrixError> {
 }
 
 /// Do what an operator would to get the arm held.
-fn recover(operator: &mut Operator, watch: &mut Watch, state: State) -> Result<Back, MatrixError> {
+fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -> Result<Back, MatrixError> {
     // Init and Error wait for the host anyway.
-    let host_first = matches!(state, State::Init | State::Error);
+    let host_first = matches!(state, ControllerState::Init | ControllerState::Error);
     let held = |operator: &Operator| {
-        matches!(operator.state(), State::HoldPos | State::Operate | State::Teaching)
-            && operator.world.node_states()[..JOINTS] == [jtc_bus::fsm::ENABLED; JOINTS]
+        matches!(
+            operator.state(),
+            ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching
+        ) && operator.world.node_states()[..JOINTS] == [jtc_bus::fsm::ENABLED; JOINTS]
     };
     for (back, send) in [
         (Back::ByItself, Vec::new()),
@@ -292,7 +300,7 @@ fn recover(operator: &mut Operator, watch: &mut Watch, state: State) -> Result<B
 /// What is compared from tick to tick.
 struct Watch {
     invariants: Invariants,
-    state: State,
+    state: ControllerState,
     errors: u16,
     resets: u32,
 }
@@ -300,7 +308,7 @@ struct Watch {
 /// Something changed.
 #[derive(Clone, Copy)]
 struct Seen {
-    state: State,
+    state: ControllerState,
     errors: u16,
     joints: u16,
     same: bool,

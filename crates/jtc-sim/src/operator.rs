@@ -2,7 +2,7 @@
 use core::fmt;
 
 use jtc_bus::{JOINTS, fsm};
-use jtc_core::{State, Tes};
+use jtc_core::{ControllerState, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, FrameType, RawPoint, Response};
 
 use crate::config::SimConfig;
@@ -19,7 +19,7 @@ pub enum OperatorError {
         /// For how long, ms.
         ms: u64,
         /// State then.
-        state: State,
+        state: ControllerState,
         /// Error word then.
         errors: u16,
     },
@@ -58,7 +58,7 @@ impl Operator {
     }
 
     /// State of the controller.
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> ControllerState {
         self.world.telemetry().state
     }
 
@@ -129,7 +129,7 @@ impl Operator {
     /// Wait until every joint is enabled and held.
     pub fn wait_for_hold(&mut self, ms: u64) -> Result<(), OperatorError> {
         self.wait("HoldPos with all joints enabled", ms, |world| {
-            world.telemetry().state == State::HoldPos
+            world.telemetry().state == ControllerState::HoldPos
                 && world.node_states()[..JOINTS] == [fsm::ENABLED; JOINTS]
         })
     }
@@ -139,13 +139,15 @@ impl Operator {
         for segment in host::trajectory(points, step_ms, 113) {
             self.ask(&segment)?;
         }
-        self.wait("trajectory complete", 100, |world| world.telemetry().tes == Tes::Stop)
+        self.wait("trajectory complete", 100, |world| world.telemetry().trajectory == TrajectoryState::Stop)
     }
 
     /// Execute the trajectory that is there, until it is finished.
     pub fn execute(&mut self, ms: u64) -> Result<(), OperatorError> {
         self.ask(&host::exec(ExecCommand::Execute))?;
-        self.wait("end of the trajectory", ms, |world| world.telemetry().tes == Tes::Finish)
+        self.wait("end of the trajectory", ms, |world| {
+            world.telemetry().trajectory == TrajectoryState::Finish
+        })
     }
 
     /// Clear every error, and wait until the arm is held again.
@@ -157,6 +159,6 @@ impl Operator {
     /// Teaching on.
     pub fn teach(&mut self) -> Result<(), OperatorError> {
         self.ask(&host::frame(FrameType::TeachingModeEnable, &[]))?;
-        self.wait("Teaching", 600, |world| world.telemetry().state == State::Teaching)
+        self.wait("Teaching", 600, |world| world.telemetry().state == ControllerState::Teaching)
     }
 }

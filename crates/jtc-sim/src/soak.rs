@@ -1,5 +1,5 @@
 //! Hours of virtual time with random commands and faults, every millisecond checked: the soak run.
-use jtc_core::{JOINTS, JointConfig, JointTelemetry, State, Tes};
+use jtc_core::{ControllerState, JOINTS, JointConfig, JointTelemetry, TrajectoryState};
 use jtc_dynamics::JointVec;
 use jtc_wire::{ExecCommand, FrameType, RawPoint};
 
@@ -86,8 +86,8 @@ pub struct Soak {
     invariants: Invariants,
     rng: fastrand::Rng,
     report: SoakReport,
-    state: State,
-    tes: Tes,
+    state: ControllerState,
+    trajectory: TrajectoryState,
     /// When the next command, the next fault comes, ms.
     next_command: u64,
     next_fault: u64,
@@ -115,8 +115,8 @@ impl Soak {
             invariants: Invariants::default(),
             rng,
             report: SoakReport::default(),
-            state: State::Start,
-            tes: Tes::Null,
+            state: ControllerState::Start,
+            trajectory: TrajectoryState::Null,
             next_command: 0,
             next_fault: 20_000,
             now: 0,
@@ -168,9 +168,9 @@ impl Soak {
         let limits = &self.world.config().controller.joints;
         let limited = |(t, limit): (&JointTelemetry, &JointConfig)| t.torque.abs() >= limit.torque_max;
         self.report.limited_ms += u64::from(telemetry.joints.iter().zip(limits).any(limited));
-        if telemetry.tes != self.tes {
-            self.tes = telemetry.tes;
-            self.report.finished += u64::from(self.tes == Tes::Finish);
+        if telemetry.trajectory != self.trajectory {
+            self.trajectory = telemetry.trajectory;
+            self.report.finished += u64::from(self.trajectory == TrajectoryState::Finish);
         }
         if let Err(violation) = self.invariants.check(&self.world) {
             self.report.violation = Some(violation);
@@ -191,19 +191,21 @@ impl Soak {
 
     fn sensible(&mut self) -> Vec<u8> {
         use ExecCommand::{Execute, Pause, Stop};
-        match (self.state, self.tes) {
-            (State::Error, _) => host::clear_all(),
-            (State::Init | State::Start, _) => host::use_defaults(),
-            (State::Teaching, _) => host::frame(FrameType::TeachingModeDisable, &[]),
-            (_, Tes::Null) if self.rng.u8(0..6) == 0 => host::frame(FrameType::TeachingModeEnable, &[]),
-            (_, Tes::Null) => self.motion(),
-            (_, Tes::Execute) => match self.rng.u8(0..16) {
+        match (self.state, self.trajectory) {
+            (ControllerState::Error, _) => host::clear_all(),
+            (ControllerState::Init | ControllerState::Start, _) => host::use_defaults(),
+            (ControllerState::Teaching, _) => host::frame(FrameType::TeachingModeDisable, &[]),
+            (_, TrajectoryState::Null) if self.rng.u8(0..6) == 0 => {
+                host::frame(FrameType::TeachingModeEnable, &[])
+            }
+            (_, TrajectoryState::Null) => self.motion(),
+            (_, TrajectoryState::Execute) => match self.rng.u8(0..16) {
                 0 => host::exec(Pause),
                 1 => host::exec(Stop),
                 _ => Vec::new(),
             },
-            (_, Tes::Finish) if self.rng.bool() => self.motion(),
-            (_, Tes::Stop) if self.rng.u8(0..6) == 0 => self.motion(),
+            (_, TrajectoryState::Finish) if self.rng.bool() => self.motion(),
+            (_, TrajectoryState::Stop) if self.rng.u8(0..6) == 0 => self.motion(),
             _ => host::exec(Execute),
         }
     }

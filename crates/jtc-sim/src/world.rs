@@ -1,6 +1,6 @@
 //! The whole world, one millisecond at a time: host line, controller, joint bus, drives, arm.
 use jtc_bus::{Frame, JOINTS, NODES, Scale, fsm};
-use jtc_core::{BusState, State};
+use jtc_core::{BusState, ControllerState};
 use jtc_wire::FrameType;
 
 use crate::board::{Board, Pins, Worked};
@@ -52,8 +52,8 @@ pub struct World {
 /// What of the controller was logged last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
-    state: State,
-    tes: jtc_core::Tes,
+    state: ControllerState,
+    trajectory: jtc_core::TrajectoryState,
     errors: u16,
 }
 
@@ -144,7 +144,7 @@ impl World {
         let Some(hand) = &mut self.hand else { return };
         // Closed brakes do not yield to a hand: it waits until every drive is enabled.
         let free = self.plant.node_states()[..JOINTS] == [fsm::ENABLED; JOINTS];
-        let teaching = free && self.board.telemetry().state == State::Teaching;
+        let teaching = free && self.board.telemetry().state == ControllerState::Teaching;
         let truth = self.plant.truth();
         let pull = hand.torque(teaching, &truth.q, &truth.qd);
         self.plant.hand = pull.unwrap_or_default();
@@ -245,14 +245,14 @@ impl World {
     fn note(&mut self) {
         let time = self.now_us();
         let telemetry = self.board.telemetry();
-        let now = Seen { state: telemetry.state, tes: telemetry.tes, errors: telemetry.errors };
+        let now = Seen { state: telemetry.state, trajectory: telemetry.trajectory, errors: telemetry.errors };
         if now != self.seen {
             let before = core::mem::replace(&mut self.seen, now);
             if now.state != before.state {
-                self.log.push(time, Event::State { from: before.state, to: now.state });
+                self.log.push(time, Event::ControllerState { from: before.state, to: now.state });
             }
-            if now.tes != before.tes {
-                self.log.push(time, Event::Execution { from: before.tes, to: now.tes });
+            if now.trajectory != before.trajectory {
+                self.log.push(time, Event::Execution { from: before.trajectory, to: now.trajectory });
             }
             if now.errors != before.errors {
                 self.log.push(time, Event::Errors { from: before.errors, to: now.errors });

@@ -1,5 +1,5 @@
 //! From power-up to holding a position, over the real protocol.
-use jtc_core::State;
+use jtc_core::ControllerState;
 use jtc_sim::host::{Listener, use_defaults};
 use jtc_sim::{SimConfig, World};
 
@@ -13,7 +13,7 @@ fn j20_power_up_to_hold_position() {
     for _ in 0..6_000 {
         world.step();
         host.listen(&mut world);
-        if world.telemetry().state == State::HoldPos && world.node_states()[..6] == [3; 6] {
+        if world.telemetry().state == ControllerState::HoldPos && world.node_states()[..6] == [3; 6] {
             held_at.get_or_insert(world.now_us());
         }
     }
@@ -28,7 +28,7 @@ fn j20_power_up_to_hold_position() {
         assert!(error.abs() < 2e-3, "joint {j} is {error} rad away from where it started");
     }
     assert_eq!(host.responses.len(), 3);
-    assert_eq!(host.last.map(|s| s.fsm), Some(State::HoldPos as u8));
+    assert_eq!(host.last.map(|s| s.state), Some(ControllerState::HoldPos.into()));
 }
 
 #[test]
@@ -36,6 +36,6 @@ fn j20_boot_of_all_nodes_is_no_transmit_timeout() {
     let mut world = World::new(SimConfig::default());
     for _ in 0..300 {
         world.step();
-        assert_eq!(world.telemetry().state, State::Init, "at {} µs", world.now_us());
+        assert_eq!(world.telemetry().state, ControllerState::Init, "at {} µs", world.now_us());
     }
 }

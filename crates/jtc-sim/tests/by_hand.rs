@@ -1,5 +1,5 @@
 //! Someone pushes the arm and leads it by the hand.
-use jtc_core::State;
+use jtc_core::ControllerState;
 use jtc_sim::{FaultPlan, HandPath, Operator, SimConfig, host};
 use jtc_wire::FrameType;
 
@@ -38,7 +38,7 @@ fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     operator.run(1500);
     let q = operator.world.truth().q;
     assert!(q.iter().zip(&FROM).all(|(a, b)| (a - b).abs() < 1e-3), "{q:?}");
-    assert_eq!((operator.state(), operator.world.telemetry().errors), (State::HoldPos, 0));
+    assert_eq!((operator.state(), operator.world.telemetry().errors), (ControllerState::HoldPos, 0));
 }
 
 #[test]
@@ -68,10 +68,10 @@ fn j25_a_hand_leads_the_taught_arm_along_its_path_and_lets_go() {
         (0..6).for_each(|j| led[j] = led[j].max(truth.q[j] - FROM[j]));
         fastest = truth.qd.iter().fold(fastest, |v, qd| v.max(qd.abs()));
     }
-    assert_eq!((operator.state(), operator.world.telemetry().errors), (State::Teaching, 0));
+    assert_eq!((operator.state(), operator.world.telemetry().errors), (ControllerState::Teaching, 0));
     assert!(led.iter().all(|far| (0.35..0.45).contains(far)), "{led:?}");
     assert!(fastest < 1.0, "{fastest} rad/s");
     operator.ask(&host::frame(FrameType::TeachingModeDisable, &[])).unwrap();
     operator.run(500);
-    assert_eq!(operator.state(), State::HoldPos);
+    assert_eq!(operator.state(), ControllerState::HoldPos);
 }

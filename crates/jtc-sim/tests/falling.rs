@@ -1,6 +1,6 @@
 //! An arm without brakes that falls, and what becomes of it when the errors are cleared meanwhile (J-16).
 use jtc_bus::{Request, Target, fsm};
-use jtc_core::{State, error};
+use jtc_core::{ControllerState, error};
 use jtc_sim::{Operator, SimConfig, Support, host};
 
 /// Held, the upper arm bent forward by this much: gravity pulls it on.
@@ -33,7 +33,7 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
     operator.run(after_ms - 20);
     let (mut asked, mut last) = (None, [0.0; 6]);
     for ms in 0..15_000 {
-        if ms % 500 == 0 && operator.state() == State::Error {
+        if ms % 500 == 0 && operator.state() == ControllerState::Error {
             // Again and again: drives that fall beyond 1.8 rad/s report over-speed.
             operator.world.host_write(&host::clear_all());
         }

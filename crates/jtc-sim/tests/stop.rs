@@ -2,7 +2,7 @@
 //!
 //! Each test lets two worlds run that differ in the line only: in one it is quiet but for the Stop, in the other it is not. From
 //! the tick after the last byte of the Stop on, both must command the same, bit for bit.
-use jtc_core::{State, Tes};
+use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::{Operator, SimConfig, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, Response, fixed};
 
@@ -41,7 +41,7 @@ fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
 /// The command ends at byte `end` of the script; the arm must slow down as on a quiet line.
 fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
     let (mut busy, ms) = play(baud, script, end);
-    assert_eq!(busy.world.telemetry().tes, Tes::Execute, "still on the way");
+    assert_eq!(busy.world.telemetry().trajectory, TrajectoryState::Execute, "still on the way");
     // Written so early that its last byte arrives in the same millisecond.
     let frame = host::exec(command);
     let lead = baud.map_or(0, |rate| (70_000 / u64::from(rate)) + 1);
@@ -52,7 +52,7 @@ fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecComma
     for n in 1..2000 {
         let set = |operator: &Operator| operator.world.telemetry().joints.map(|j| j.set_position.to_bits());
         assert_eq!(set(&busy), set(&quiet), "{n} ms after the last byte");
-        if quiet.world.telemetry().tes != Tes::Execute {
+        if quiet.world.telemetry().trajectory != TrajectoryState::Execute {
             stood.get_or_insert(n);
         }
         for (_, bytes) in rest.iter().filter(|(at, _)| *at == ms + n) {
@@ -62,9 +62,9 @@ fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecComma
         quiet.step();
     }
     assert!(stood.is_some_and(|ms| ms <= 500), "it stands after {stood:?} ms");
-    let wanted = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
-    assert_eq!(busy.world.telemetry().tes, wanted);
-    assert_eq!((busy.state(), busy.world.telemetry().errors), (State::HoldPos, 0));
+    let wanted = if command == ExecCommand::Pause { TrajectoryState::Pause } else { TrajectoryState::Stop };
+    assert_eq!(busy.world.telemetry().trajectory, wanted);
+    assert_eq!((busy.state(), busy.world.telemetry().errors), (ControllerState::HoldPos, 0));
     busy
 }
 
@@ -160,14 +160,16 @@ fn j04_a_stop_behind_a_false_header_and_a_long_frame() {
 fn j04_a_stop_cancels_an_execute_that_waits() {
     let mut operator = moving(Some(115_200));
     operator.ask(&host::exec(ExecCommand::Stop)).expect("it stops");
-    operator.wait("Stop", 600, |world| world.telemetry().tes == Tes::Stop).expect("it stops");
+    operator
+        .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
+        .expect("it stops");
     operator.listener.responses.clear();
     // An Execute behind gains that are executed one a tick, and a Stop behind it.
     let frames = [&fixed::PID_PARAM_USE_DEFAULT.repeat(30)[..], &fixed::EXECUTE, &fixed::STOP].concat();
     operator.world.host_write(&frames);
     for _ in 0..1500 {
         operator.step();
-        assert_eq!(operator.world.telemetry().tes, Tes::Stop, "nothing moves");
+        assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Stop, "nothing moves");
     }
     assert_eq!(exec_records(&operator), [DataStatus::NotAllowed, DataStatus::NoError]);
     assert_eq!(operator.listener.responses.len(), 32, "one record a frame");

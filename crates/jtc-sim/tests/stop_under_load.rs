@@ -1,5 +1,5 @@
 //! Pause and Stop while a joint carries nearly all that it can (J-33): time, distance and speed until the arm stands.
-use jtc_core::{Config, State, Tes};
+use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_sim::lowering::{LOADED, Lowering, angle_of, holding_torque, with_payload};
 use jtc_sim::{ModelError, Support};
 use jtc_wire::ExecCommand;
@@ -16,8 +16,15 @@ fn j33_a_loaded_arm_stands_within_its_time() {
                     .run()
                     .expect("it is lowered");
                 println!("{share} {speed} {command:?}: {outcome:?}");
-                let to = if command == ExecCommand::Pause { Tes::Pause } else { Tes::Stop };
-                assert_eq!((outcome.state, outcome.tes, outcome.errors), (State::HoldPos, to, 0));
+                let to = if command == ExecCommand::Pause {
+                    TrajectoryState::Pause
+                } else {
+                    TrajectoryState::Stop
+                };
+                assert_eq!(
+                    (outcome.state, outcome.trajectory, outcome.errors),
+                    (ControllerState::HoldPos, to, 0)
+                );
                 assert!(outcome.commanded_ms <= 500 && outcome.standing_ms <= 520, "{outcome:?}");
                 assert!(outcome.peak <= 1.03 * speed && outcome.error < 5e-3, "{outcome:?}");
                 assert!(outcome.way <= 0.35 * speed, "{outcome:?}");
@@ -36,7 +43,10 @@ fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     for speed in [0.1, 0.2] {
         let outcome = Lowering::new(model, shoulder, speed).run().expect("it is lowered");
         println!("{speed}: {outcome:?}");
-        assert_eq!((outcome.state, outcome.tes, outcome.errors), (State::HoldPos, Tes::Stop, 0));
+        assert_eq!(
+            (outcome.state, outcome.trajectory, outcome.errors),
+            (ControllerState::HoldPos, TrajectoryState::Stop, 0)
+        );
         assert!(outcome.commanded_ms <= 500 && outcome.standing_ms <= 520, "{outcome:?}");
         assert!(outcome.peak <= 1.03 * speed && outcome.error < 5e-3, "{outcome:?}");
     }

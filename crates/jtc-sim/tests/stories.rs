@@ -1,5 +1,5 @@
 //! Short stories of an operator and an arm.
-use jtc_core::{State, Tes};
+use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::invariants::Invariants;
 use jtc_sim::{BusTap, DriveConfig, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
@@ -25,7 +25,7 @@ fn j33_pause_and_resume_stay_on_the_path() {
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     operator.run(1500);
     operator.ask(&host::exec(ExecCommand::Pause)).unwrap();
-    operator.wait("standstill", 1000, |w| w.telemetry().tes == Tes::Pause).unwrap();
+    operator.wait("standstill", 1000, |w| w.telemetry().trajectory == TrajectoryState::Pause).unwrap();
     let point = operator.world.telemetry().point;
     assert!(point > 1000, "{point}");
     operator.run(500);
@@ -34,14 +34,14 @@ fn j33_pause_and_resume_stay_on_the_path() {
     assert_eq!(operator.world.telemetry().point, point);
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut last = point;
-    while operator.world.telemetry().tes == Tes::Execute {
+    while operator.world.telemetry().trajectory == TrajectoryState::Execute {
         operator.step();
         let t = operator.world.telemetry();
         assert!(t.point >= last && t.errors == 0, "{t:?}");
         assert!(t.joints.iter().all(|j| j.position_error().abs() < 5e-3), "{t:?}");
         last = t.point;
     }
-    assert_eq!(operator.world.telemetry().tes, Tes::Finish);
+    assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Finish);
 }
 
 #[test]
@@ -62,13 +62,16 @@ fn j24_after_a_node_error_the_trajectory_is_not_resumed() {
     let silent = FaultKind::NodeSilent { node: 3 };
     operator.world.inject(Fault { kind: silent, trigger: Trigger::AtPoint(2000), duration_ms: Some(100) });
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
-    operator.wait("the error", 4000, |w| w.telemetry().state == State::Error).unwrap();
+    operator.wait("the error", 4000, |w| w.telemetry().state == ControllerState::Error).unwrap();
     operator.run(3000);
-    assert_eq!(operator.state(), State::Error, "errors latch");
+    assert_eq!(operator.state(), ControllerState::Error, "errors latch");
     operator.recover().unwrap();
     let held = operator.world.truth().q;
     operator.run(3000);
-    assert_eq!((operator.state(), operator.world.telemetry().tes), (State::HoldPos, Tes::Null));
+    assert_eq!(
+        (operator.state(), operator.world.telemetry().trajectory),
+        (ControllerState::HoldPos, TrajectoryState::Null)
+    );
     let moved = operator.world.truth().q.iter().zip(&held).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(moved < 2e-3, "{moved}");
 }
@@ -82,13 +85,17 @@ fn j12_j21_a_stopped_tick_resets_the_controller_and_leaves_an_internal_error_lat
     operator.run(1500);
     assert!(operator.world.statistics().watchdog_resets >= 1);
     let internal = |operator: &Operator| operator.world.telemetry().errors & jtc_core::error::INTERNAL != 0;
-    assert!(operator.state() == State::Error && internal(&operator), "{:?}", operator.world.telemetry());
+    assert!(
+        operator.state() == ControllerState::Error && internal(&operator),
+        "{:?}",
+        operator.world.telemetry()
+    );
     assert!(!operator.world.safety_output(), "J-22: 0 while the internal error is latched");
     assert_eq!(operator.world.truth().torque, [0.0; 6]);
     // It latches: parameters alone bring nothing back.
     operator.world.host_write(&host::use_defaults());
     operator.run(1500);
-    assert!(operator.state() == State::Error && internal(&operator));
+    assert!(operator.state() == ControllerState::Error && internal(&operator));
     operator.recover().unwrap();
     assert!(operator.world.safety_output());
 }
@@ -100,12 +107,12 @@ fn j25_taught_by_hand_the_arm_floats() {
     let before = operator.world.truth().q;
     operator.run(1000);
     let t = operator.world.telemetry();
-    assert_eq!((t.state, t.errors), (State::Teaching, 0));
+    assert_eq!((t.state, t.errors), (ControllerState::Teaching, 0));
     // Wrong masses make it drift slowly; it does not fall.
     let moved = operator.world.truth().q.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(moved < 0.2, "{moved}");
     operator.ask(&host::frame(FrameType::TeachingModeDisable, &[])).unwrap();
-    operator.wait("HoldPos", 100, |w| w.telemetry().state == State::HoldPos).unwrap();
+    operator.wait("HoldPos", 100, |w| w.telemetry().state == ControllerState::HoldPos).unwrap();
 }
 
 #[test]
@@ -129,7 +136,7 @@ fn without_brakes_an_error_lets_the_arm_fall() {
     let at = Trigger::At(operator.world.now_us() / 1000 + 10);
     operator.world.inject(Fault { kind: FaultKind::SafetyInput, trigger: at, duration_ms: Some(5) });
     operator.run(3000);
-    assert_eq!(operator.state(), State::Error);
+    assert_eq!(operator.state(), ControllerState::Error);
     assert!((operator.world.truth().q[1] - FROM[1]).abs() > 0.3, "{:?}", operator.world.truth().q);
 }
 
@@ -155,7 +162,7 @@ fn others_on_the_bus_see_every_frame_and_take_part() {
         tap.exchange(&mut operator.world).unwrap();
         operator.step();
     }
-    assert_eq!((tap.taken, operator.state()), (1, State::Error));
+    assert_eq!((tap.taken, operator.state()), (1, ControllerState::Error));
 }
 
 #[test]
@@ -183,7 +190,7 @@ fn j07_a_friction_table_and_what_follows_it_at_once_are_taken_without_losing_a_t
         let expected =
             [(0x05, DataStatus::NoError), (0x02, DataStatus::NoError), (0x08, DataStatus::NoError)];
         assert_eq!(responses, expected, "at {baud:?} Bd");
-        assert_eq!(operator.state(), State::HoldPos);
+        assert_eq!(operator.state(), ControllerState::HoldPos);
     }
 }
 
@@ -203,7 +210,7 @@ fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
     operator.run(20);
     let answers = operator.world.bus_frames().iter().filter(|f| f.frame.id & 0x200 != 0).count();
     assert_eq!(answers, 7, "they answer what was asked a millisecond ago");
-    assert_eq!(operator.state(), State::HoldPos);
+    assert_eq!(operator.state(), ControllerState::HoldPos);
 }
 
 #[test]
@@ -234,10 +241,13 @@ fn j12_ticks_that_go_on_missing_are_an_internal_error() {
         operator.run(40);
         let t = *operator.world.telemetry();
         if missing < 10 {
-            assert_eq!((t.state, t.errors), (State::HoldPos, 0));
+            assert_eq!((t.state, t.errors), (ControllerState::HoldPos, 0));
         } else {
             use jtc_core::error;
-            assert_eq!((t.state, t.errors), (State::Error, error::INTERNAL | error::EMERGENCY_OUTPUT));
+            assert_eq!(
+                (t.state, t.errors),
+                (ControllerState::Error, error::INTERNAL | error::EMERGENCY_OUTPUT)
+            );
         }
     }
 }

@@ -1,5 +1,5 @@
 //! How well the arm follows when it is not quite the arm that the controller believes in.
-use jtc_core::{State, Tes};
+use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::{ExecCommand, RawPoint};
 
@@ -26,8 +26,11 @@ fn run(operator: &mut Operator) -> [f64; 6] {
     loop {
         operator.step();
         let telemetry = operator.world.telemetry();
-        assert!(matches!(telemetry.state, State::Operate | State::HoldPos), "{telemetry:?}");
-        if telemetry.tes != Tes::Execute {
+        assert!(
+            matches!(telemetry.state, ControllerState::Operate | ControllerState::HoldPos),
+            "{telemetry:?}"
+        );
+        if telemetry.trajectory != TrajectoryState::Execute {
             break;
         }
         count += 1.0;
@@ -45,7 +48,7 @@ fn j40_tracking_within_two_milliradians_rms_with_wrong_masses_and_friction() {
         operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
         let rms = run(&mut operator);
         println!("seed {seed}: {:?} mrad RMS", rms.map(|x| (x * 1e6).round() / 1e3));
-        assert_eq!(operator.world.telemetry().tes, Tes::Finish);
+        assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Finish);
         assert!(rms.iter().all(|&x| x <= 2e-3), "seed {seed}: {rms:?}");
     }
 }
@@ -77,7 +80,7 @@ fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
         let rms = run(&mut operator);
         let telemetry = operator.world.telemetry();
         println!("seed {seed}: {:?} mrad RMS", rms.map(|x| (x * 1e6).round() / 1e3));
-        assert_eq!((telemetry.tes, telemetry.errors), (Tes::Finish, 0));
+        assert_eq!((telemetry.trajectory, telemetry.errors), (TrajectoryState::Finish, 0));
         assert!(rms.iter().all(|&x| x <= 2e-3), "seed {seed}: {rms:?}");
     }
 }

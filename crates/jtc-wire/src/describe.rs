@@ -169,8 +169,7 @@ fn polynomial(values: Floats<'_>, f: &mut Formatter<'_>) -> Result {
 
 impl Display for Status {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let (state, tes) = (words::jtc_fsm(self.fsm), words::tes(self.tes));
-        write!(f, "JtcStatus: {state}, trajectory {tes}, point {}", self.point)?;
+        write!(f, "JtcStatus: {}, trajectory {}, point {}", self.state, self.trajectory, self.point)?;
         if let Some(response) = self.response() {
             write!(f, "; record: {response}")?;
         }

@@ -42,6 +42,7 @@ extern crate std;
 pub mod fuzzing;
 
 mod batch;
+mod code;
 mod command;
 mod crc;
 mod describe;
@@ -51,12 +52,14 @@ mod frame;
 mod receive;
 mod response;
 mod segment;
+mod state;
 mod status;
 mod stream;
 mod urgent;
 pub mod words;
 
 pub use batch::{EVENTS_MAX, EventBatch, ReceivedEvent};
+pub use code::{Code, Known};
 pub use command::{ALL_NODES, Command, ExecCommand, Floats};
 pub use crc::{crc16, crc16_update};
 pub use describe::{Described, Piece, Pieces, pieces};
@@ -71,6 +74,7 @@ pub use frame::{
 pub use receive::{StatusCounters, StatusReceiver};
 pub use response::{DataStatus, FrameStatus, Response};
 pub use segment::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, Segment, VELOCITY_SCALE};
+pub use state::{ControllerState, TrajectoryState};
 pub use status::{
     GripperStatus, JointStatus, STATUS_LEN, STATUS_LEN_NO_GRIPPER, STATUS_LEN_SHORT_INDEX, Status,
 };

@@ -1,7 +1,9 @@
 //! JtcStatus: what the controller says about itself 25 times a second.
+use crate::code::Code;
 use crate::crc16;
 use crate::frame::{FrameType, HEADER, JOINTS, field as frame_field};
 use crate::response::{DataStatus, FrameStatus, Response};
+use crate::state::{ControllerState, TrajectoryState};
 
 /// Length of JtcStatus.
 pub const STATUS_LEN: usize = 175;
@@ -90,8 +92,8 @@ pub mod field {
 pub struct Status {
     /// Record of a received frame, or none.
     pub response: Response,
-    /// State: see [`crate::words::jtc_fsm`].
-    pub fsm: u8,
+    /// State of the controller.
+    pub state: Code<ControllerState>,
     /// Current errors: bits of [`crate::words::JTC_ERRORS`].
     pub errors: u16,
     /// Occurred errors, same bits.
@@ -100,8 +102,8 @@ pub struct Status {
     pub jtc_init: u8,
     /// Nodes that are missing: bits of [`crate::words::NODES`].
     pub node_init: u8,
-    /// Trajectory execution state: see [`crate::words::tes`].
-    pub tes: u8,
+    /// What becomes of the trajectory.
+    pub trajectory: Code<TrajectoryState>,
     /// Index of the current 1 ms point.
     pub point: u32,
     /// 0 polynomial, 1 table.
@@ -215,12 +217,12 @@ impl Status {
         b[RESPONSE_STATUS] = self.response.status as u8;
         b[RESPONSE_DATA] = self.response.data as u8;
         b[RESPONSE_LENGTH].copy_from_slice(&self.response.length.to_be_bytes());
-        b[FSM] = self.fsm;
+        b[FSM] = self.state.byte();
         b[ERRORS].copy_from_slice(&self.errors.to_be_bytes());
         b[OCCURRED].copy_from_slice(&self.occurred.to_be_bytes());
         b[JTC_INIT] = self.jtc_init;
         b[NODE_INIT] = self.node_init;
-        b[TES] = self.tes;
+        b[TES] = self.trajectory.byte();
         b[POINT].copy_from_slice(&self.point.to_be_bytes());
         b[FRICTION_TYPE] = self.friction_type;
         b[CAN_ERROR] = self.can_error;
@@ -267,12 +269,12 @@ impl Status {
         });
         Some(Status {
             response,
-            fsm: byte(field::FSM),
+            state: Code::new(byte(field::FSM)),
             errors: u16::from_be_bytes(get(bytes, field::ERRORS.start)),
             occurred: u16::from_be_bytes(get(bytes, field::OCCURRED.start)),
             jtc_init: byte(field::JTC_INIT),
             node_init: byte(field::NODE_INIT),
-            tes: byte(field::TES),
+            trajectory: Code::new(byte(field::TES)),
             point: if short_index {
                 u16::from_be_bytes(get(bytes, point)).into()
             } else {
@@ -287,6 +289,21 @@ impl Status {
             }),
             gripper,
         })
+    }
+
+    /// Start or Init: the controller does not hold the arm yet.
+    pub fn is_coming_up(&self) -> bool {
+        self.state.is_in(&[ControllerState::Start, ControllerState::Init])
+    }
+
+    /// The arm follows its trajectory, or slows down on it.
+    pub fn is_executing(&self) -> bool {
+        self.trajectory == TrajectoryState::Execute
+    }
+
+    /// Measured positions of the joints as the frame has them, rad; 0 where one is not known.
+    pub fn positions(&self) -> [f64; JOINTS] {
+        self.joints.map(|joint| f64::from(joint.position))
     }
 
     /// The record it carries; `None` when it carries none.

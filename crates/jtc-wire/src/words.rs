@@ -1,10 +1,6 @@
 //! States, error bits and codes in words: the same everywhere they are printed.
 use core::fmt;
 
-/// States of the controller.
-pub const JTC_FSM: [&str; 6] = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
-/// Trajectory execution states.
-pub const TES: [&str; 6] = ["Null", "Stop", "Pause", "Execute", "Finish", "TransNullToStop"];
 /// Bits of the controller's error words.
 pub const JTC_ERRORS: [&str; 8] = [
     "emergency input",
@@ -76,16 +72,6 @@ pub const CAN_FLAGS: [&str; 15] = [
     "no answer from node 5 (joint 6)",
     "no answer from the gripper",
 ];
-
-/// State of the controller.
-pub fn jtc_fsm(code: u8) -> &'static str {
-    JTC_FSM.get(usize::from(code)).copied().unwrap_or("unknown state")
-}
-
-/// Trajectory execution state.
-pub fn tes(code: u8) -> &'static str {
-    TES.get(usize::from(code)).copied().unwrap_or("unknown")
-}
 
 /// Friction type.
 pub fn friction_type(code: u8) -> &'static str {

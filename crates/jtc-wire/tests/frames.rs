@@ -1,9 +1,9 @@
 //! Frames byte by byte, scaling, and the numbers that the protocol's pages print.
 use jtc_wire::{
-    ACCELERATION_SCALE, Channel, Command, DataStatus, Described, EncodeError, ExecCommand, FRAME_MAX,
-    FrameRef, FrameStatus, FrameType, FrictionTable, GripperStatus, JointStatus, OutOfScale, POSITION_SCALE,
-    RawPoint, Response, STATUS_LEN, Status, StatusReceiver, VELOCITY_SCALE, arm_model, crc16, fixed, floats,
-    friction_polynomial, friction_table, pid_param, trajectory,
+    ACCELERATION_SCALE, Channel, Command, ControllerState, DataStatus, Described, EncodeError, ExecCommand,
+    FRAME_MAX, FrameRef, FrameStatus, FrameType, FrictionTable, GripperStatus, JointStatus, OutOfScale,
+    POSITION_SCALE, RawPoint, Response, STATUS_LEN, Status, StatusReceiver, TrajectoryState, VELOCITY_SCALE,
+    arm_model, crc16, fixed, floats, friction_polynomial, friction_table, pid_param, trajectory,
 };
 use proptest::prelude::*;
 
@@ -211,12 +211,12 @@ proptest! {
 fn status() -> Status {
     Status {
         response: Response::good(FrameType::Trajectory, DataStatus::IncorrectSegmentOrder, 18_014),
-        fsm: 5,
+        state: ControllerState::Error.into(),
         errors: 0x0109,
         occurred: 0x0208,
         jtc_init: 0x07,
         node_init: 0x41,
-        tes: 3,
+        trajectory: TrajectoryState::Execute.into(),
         point: 0x0001_D4C0,
         friction_type: 1,
         can_error: 1,

@@ -1,15 +1,15 @@
 //! Frames, states and codes in words.
 use jtc_wire::words::{self, Bits};
 use jtc_wire::{
-    Command, Described, FRAME_MAX, Floats, FrameRef, FrameStatus, FrameType, FrictionTable, GripperStatus,
-    JointStatus, Piece, RawPoint, Response, Status, arm_model, fixed, friction_polynomial, friction_table,
-    pieces, trajectory,
+    Code, Command, ControllerState, Described, FRAME_MAX, Floats, FrameRef, FrameStatus, FrameType,
+    FrictionTable, GripperStatus, JointStatus, Known, Piece, RawPoint, Response, Status, TrajectoryState,
+    arm_model, fixed, friction_polynomial, friction_table, pieces, trajectory,
 };
 
 #[test]
 fn states_have_their_names_and_other_codes_have_none() {
-    let jtc = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
-    let tes = ["Null", "Stop", "Pause", "Execute", "Finish", "TransNullToStop"];
+    let controller = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
+    let trajectory = ["Null", "Stop", "Pause", "Execute", "Finish", "TransNullToStop"];
     let node = |code| match code {
         0 => "Start",
         1 => "Init",
@@ -20,13 +20,25 @@ fn states_have_their_names_and_other_codes_have_none() {
         255 => "Fault",
         _ => "unknown state",
     };
-    for code in 0..=255u8 {
-        let at = usize::from(code);
-        assert_eq!(words::jtc_fsm(code), jtc.get(at).copied().unwrap_or("unknown state"));
-        assert_eq!(words::tes(code), tes.get(at).copied().unwrap_or("unknown"));
-        assert_eq!(words::friction_type(code), ["polynomial", "table"].get(at).copied().unwrap_or("unknown"));
-        assert_eq!(words::node_fsm(code), node(code), "{code}");
+    for byte in 0..=255u8 {
+        let at = usize::from(byte);
+        let (state, execution) = (Code::<ControllerState>::new(byte), Code::<TrajectoryState>::new(byte));
+        assert_eq!(state.to_string(), controller.get(at).copied().unwrap_or("unknown state"));
+        assert_eq!(execution.to_string(), trajectory.get(at).copied().unwrap_or("unknown"));
+        assert_eq!((state.byte(), execution.byte()), (byte, byte), "what is not known is kept");
+        assert_eq!(state.known().map(Known::code), (at < controller.len()).then_some(byte));
+        assert_eq!(words::friction_type(byte), ["polynomial", "table"].get(at).copied().unwrap_or("unknown"));
+        assert_eq!(words::node_fsm(byte), node(byte), "{byte}");
     }
+    let held = Code::from(ControllerState::HoldPos);
+    assert!(held == ControllerState::HoldPos && held != ControllerState::Init);
+    assert!(
+        held.is_in(&[ControllerState::Error, ControllerState::HoldPos])
+            && !held.is_in(&[ControllerState::Error])
+    );
+    assert_eq!(Code::default(), Code::from(TrajectoryState::Null));
+    let [known, unknown] = [2, 9].map(Code::<TrajectoryState>::new);
+    assert_eq!(format!("{known:?} {unknown:?}"), "Pause 9");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use jtc_core::State;
+use jtc_core::ControllerState;
 use openjtc_emulator::{BoardConfig, Elf, Machine, RegisterARM};
 
 use crate::rig::{Rig, Version};
@@ -21,7 +21,7 @@ pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {
     session.hold();
     session.execute();
     session.run_ms(700);
-    assert_eq!(session.rig.state(), State::Operate);
+    assert_eq!(session.rig.state(), ControllerState::Operate);
     let trace = trace(&mut session.rig)?;
     let lines = straight(&trace, &disassembly(path)?)?;
     let cycles = simulate(&lines.join("\n"))?;

@@ -2,9 +2,9 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use jtc_core::{State, Tes};
+use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::host as frames;
-use jtc_wire::{ExecCommand, FrameType, RawPoint, fixed, trajectory};
+use jtc_wire::{Code, ExecCommand, FrameType, RawPoint, fixed, trajectory};
 use openjtc_emulator::clock::MILLISECOND;
 use openjtc_emulator::{FIRST_LINE, Machine, Port, RegisterARM};
 
@@ -35,9 +35,6 @@ impl Steps {
 
 /// Longer than any ramp of the path time, ms.
 const RAMP: u32 = 250;
-
-/// Names of the states, by number.
-const STATES: [&str; 6] = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
 
 /// A rig whose control steps are counted.
 pub struct Session {
@@ -90,19 +87,19 @@ impl Session {
         self.execute();
         self.run_ms(600);
         self.write(&frames::exec(ExecCommand::Pause));
-        self.until("pause", 3_000, |rig| rig.telemetry().tes == Tes::Pause);
+        self.until("pause", 3_000, |rig| rig.telemetry().trajectory == TrajectoryState::Pause);
         self.write(&frames::exec(ExecCommand::Execute));
-        self.until("the end", 6_000, |rig| rig.telemetry().tes == Tes::Finish);
+        self.until("the end", 6_000, |rig| rig.telemetry().trajectory == TrajectoryState::Finish);
         self.write(&fixed::TEACHING_MODE_ENABLE);
-        self.until("teaching", 2_000, |rig| rig.state() == State::Teaching);
+        self.until("teaching", 2_000, |rig| rig.state() == ControllerState::Teaching);
         self.run_ms(1_000);
         self.write(&fixed::TEACHING_MODE_DISABLE);
-        self.until("no teaching", 2_000, |rig| rig.state() == State::HoldPos);
+        self.until("no teaching", 2_000, |rig| rig.state() == ControllerState::HoldPos);
         self.rig.board.set_safety_input(Some(false));
         self.run_ms(500);
         self.rig.board.set_safety_input(Some(true));
         self.write(&frames::clear_all());
-        self.until("the arm is held again", 20_000, |rig| rig.state() == State::HoldPos);
+        self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
     }
 
     /// From power-on to every joint enabled and held.
@@ -112,7 +109,7 @@ impl Session {
         self.write(&frames::use_defaults());
         self.until("the arm is held", 20_000, |rig| {
             let nodes = rig.board.plant().node_states();
-            rig.state() == State::HoldPos && nodes[..6] == [jtc_bus::fsm::ENABLED; 6]
+            rig.state() == ControllerState::HoldPos && nodes[..6] == [jtc_bus::fsm::ENABLED; 6]
         });
     }
 
@@ -122,7 +119,7 @@ impl Session {
         for segment in frames::trajectory(&frames::there_and_back(&[0.0; 6], &goal, 1.5, 1, 5), 5, 113) {
             self.write(&segment);
         }
-        self.until("the upload", 10_000, |rig| rig.telemetry().tes == Tes::Stop);
+        self.until("the upload", 10_000, |rig| rig.telemetry().trajectory == TrajectoryState::Stop);
         self.write(&frames::exec(ExecCommand::Execute));
         self.until("the beginning", 3_000, |rig| rig.telemetry().point > 0);
     }
@@ -177,7 +174,9 @@ impl Session {
 
     /// Steps without anything from a host: the name of the state, whether a status went out.
     pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
-        self.steps.iter().map(|((state, status), steps)| (STATES[usize::from(*state)], *status, *steps))
+        self.steps
+            .iter()
+            .map(|((state, status), steps)| (Code::<ControllerState>::new(*state).name(), *status, *steps))
     }
 
     /// Steps on the path at full speed, without a status and without anything from a host.
@@ -189,7 +188,7 @@ impl Session {
     pub fn serving(&self) -> impl Iterator<Item = (String, &'static str, Steps)> {
         self.serving.iter().map(|((frame_type, state), steps)| {
             let name = FrameType::from_byte(*frame_type).map_or("no frame".to_owned(), |t| t.to_string());
-            (name, STATES[usize::from(*state)], *steps)
+            (name, Code::<ControllerState>::new(*state).name(), *steps)
         })
     }
 

@@ -22,7 +22,7 @@ pub struct Flight {
     pub events: Vec<Event>,
     pub heard: Vec<Frame>,
     pub state: u8,
-    pub tes: u8,
+    pub trajectory: u8,
     pub safety_output: bool,
     /// So many of the events are done.
     pub host_done: usize,
@@ -113,7 +113,7 @@ impl Flight {
         events.truncate(event_count.into());
         let mut heard: Vec<_> = (0..21).map(|_| b.frame()).collect();
         heard.truncate(heard_count.into());
-        let [state, tes, safety_output, status] = b.take();
+        let [state, trajectory, safety_output, status] = b.take();
         let sent = b.frame();
         let (point, errors) = (b.u32(), b.u16());
         let [host_done, record_line] = b.take();
@@ -132,7 +132,7 @@ impl Flight {
             events,
             heard: heard.into_iter().map(|f| f.expect("what was heard is a frame")).collect(),
             state,
-            tes,
+            trajectory,
             safety_output: safety_output != 0,
             host_done: host_done.into(),
             record_line: (record_line != 0xFF).then_some(record_line.into()),

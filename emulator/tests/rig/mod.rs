@@ -14,7 +14,7 @@ use openjtc_emulator::clock::MICROSECOND;
 use openjtc_emulator::fdcan::{BusEntry, Outcome};
 use openjtc_emulator::{Board, BoardConfig, Port};
 
-use jtc_core::{State, Telemetry};
+use jtc_core::{ControllerState, Telemetry};
 use jtc_sim::invariants::{Invariants, Moment};
 use jtc_sim::{FaultKind, host as frames};
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
@@ -206,7 +206,7 @@ impl Rig {
     }
 
     /// State of the controller.
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> ControllerState {
         self.telemetry().state
     }
 
@@ -254,7 +254,7 @@ impl Rig {
     #[track_caller]
     pub fn wait_for_hold(&mut self, ms: u64) {
         self.wait("HoldPos with all joints enabled", ms, |rig| {
-            rig.state() == State::HoldPos
+            rig.state() == ControllerState::HoldPos
                 && rig.board.plant().node_states()[..6] == [jtc_bus::fsm::ENABLED; 6]
         });
     }

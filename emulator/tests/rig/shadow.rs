@@ -75,8 +75,8 @@ impl Shadow {
         let torque = t.joints.map(|joint| joint.torque.to_bits());
         assert_eq!(torque, flight.torque.map(f64::to_bits), "tick {tick}: bits of the torques");
         assert_eq!(outputs.bus, flight.sent, "tick {tick}: frame on the joint bus");
-        let ours = (t.state as u8, t.tes as u8, t.point, t.errors, outputs.safety_output);
-        let board = (flight.state, flight.tes, flight.point, flight.errors, flight.safety_output);
+        let ours = (t.state as u8, t.trajectory as u8, t.point, t.errors, outputs.safety_output);
+        let board = (flight.state, flight.trajectory, flight.point, flight.errors, flight.safety_output);
         assert_eq!(ours, board, "tick {tick}: state, execution, point, errors, safety output");
         let done = (outputs.host_done, outputs.status, outputs.record_line);
         assert_eq!(done, (flight.host_done, flight.status, flight.record_line), "tick {tick}: host");

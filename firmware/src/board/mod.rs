@@ -2,7 +2,7 @@
 use embassy_stm32::gpio::{AfType, Flex, Output, OutputType, Pin, Pull, Speed};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::{Peri, pac};
-use jtc_core::State;
+use jtc_core::ControllerState;
 
 use crate::uart::Line;
 
@@ -53,13 +53,13 @@ impl Pins {
     }
 
     /// Shows the state on the LEDs as the manual has it.
-    pub fn show(&mut self, state: State) {
+    pub fn show(&mut self, state: ControllerState) {
         let lit = match state {
-            State::Start => [false, false, false],
-            State::Init => [true, false, false],
-            State::Teaching => [true, true, false],
-            State::HoldPos | State::Operate => [false, true, false],
-            State::Error => [false, false, true],
+            ControllerState::Start => [false, false, false],
+            ControllerState::Init => [true, false, false],
+            ControllerState::Teaching => [true, true, false],
+            ControllerState::HoldPos | ControllerState::Operate => [false, true, false],
+            ControllerState::Error => [false, false, true],
         };
         for (led, lit) in self.leds.iter_mut().zip(lit) {
             led.set_level(lit.into());

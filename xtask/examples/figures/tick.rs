@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use jtc_bus::Frame;
-use jtc_core::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, POINTS_MAX, State};
+use jtc_core::{BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, POINTS_MAX};
 use jtc_host::frame;
 use jtc_sim::{SimConfig, World};
 use jtc_wire::{Command, ExecCommand, FRAME_MAX, FrameRef, LinkEvent, RawPoint, UrgentCommands};
@@ -33,18 +33,18 @@ fn bytes(command: &Command<'_>) -> Result<Vec<u8>> {
 }
 
 /// Frames that a host sends, and the state in which each is offered.
-fn script() -> Result<Vec<(State, Vec<u8>)>> {
+fn script() -> Result<Vec<(ControllerState, Vec<u8>)>> {
     use Command::{ArmModelUseDefault, FrictionTableUseDefault, PidParamUseDefault, TrajSetExecStatus};
     let mut frames = Vec::new();
     for command in [FrictionTableUseDefault, PidParamUseDefault, ArmModelUseDefault] {
-        frames.push((State::Init, bytes(&command)?));
+        frames.push((ControllerState::Init, bytes(&command)?));
     }
     if let Some(friction) = jtc_host::Arm::avena().friction() {
-        frames.push((State::HoldPos, frame::friction(&friction)?));
+        frames.push((ControllerState::HoldPos, frame::friction(&friction)?));
     }
     let points = path::raw(&path::smooth(MOVING / usize::from(path::STEP_MS) + 200))?;
-    frames.push((State::HoldPos, frame::segment(1, 0, 1, path::STEP_MS, &points)?));
-    frames.push((State::HoldPos, bytes(&TrajSetExecStatus(ExecCommand::Execute))?));
+    frames.push((ControllerState::HoldPos, frame::segment(1, 0, 1, path::STEP_MS, &points)?));
+    frames.push((ControllerState::HoldPos, bytes(&TrajSetExecStatus(ExecCommand::Execute))?));
     Ok(frames)
 }
 
@@ -70,7 +70,7 @@ fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
 }
 
 /// A whole run: bring-up, parameters, upload, motion. The world answers a controller of its own, which sees the same.
-fn record(frames: &[(State, Vec<u8>)]) -> Vec<Seen> {
+fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
     let mut world = World::new(SimConfig { baud: None, ..SimConfig::default() });
     let mut shadow = controller();
     let (mut seen, mut next, mut moving) = (Vec::new(), 0, 0);
@@ -90,7 +90,7 @@ fn record(frames: &[(State, Vec<u8>)]) -> Vec<Seen> {
         next += shadow.tick(&inputs(&bus, &host)).host_done;
         seen.push(Seen { bus, host: offered });
         world.step();
-        moving += usize::from(state == State::Operate);
+        moving += usize::from(state == ControllerState::Operate);
         assert!(seen.len() < 60_000, "the run does not get to its motion: {:?}", shadow.telemetry());
     }
     seen
@@ -109,7 +109,11 @@ pub fn figures() -> Result<()> {
             black_box(controller.tick(&inputs(&tick.bus, &host)));
             *least = least.min(start.elapsed().as_secs_f64() * 1e9);
         }
-        assert_eq!(controller.telemetry().state, State::Operate, "the run given again ends as the first did");
+        assert_eq!(
+            controller.telemetry().state,
+            ControllerState::Operate,
+            "the run given again ends as the first did"
+        );
     }
     let (quiet, moving) = least.split_at(seen.len() - MOVING);
     print("tick_longest_moving_ns", moving.iter().copied().fold(0.0, f64::max));

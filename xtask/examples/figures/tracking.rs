@@ -3,7 +3,7 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use jtc_core::State;
+use jtc_core::ControllerState;
 use jtc_host::Point;
 use jtc_host::session::{Flow, Outcome};
 use jtc_sim::{SimConfig, World};
@@ -23,7 +23,7 @@ struct Errors {
 impl Errors {
     fn add(&mut self, world: &World) {
         let telemetry = world.telemetry();
-        if telemetry.state != State::Operate {
+        if telemetry.state != ControllerState::Operate {
             return;
         }
         self.samples += 1;

@@ -149,7 +149,7 @@ fn execute(
         out.note(format!("  {} confirmed, {} bytes", p.parameter.name(), p.bytes));
     })?;
     out.note("drives: waiting until all six hold the arm");
-    let here = session.wait_ready(BRING_UP)?.joints.map(|j| f64::from(j.position));
+    let here = session.wait_ready(BRING_UP)?.positions();
     out.note(format!("  HoldPos, drives enabled after {:.1} s", session.now().as_secs_f64()));
 
     let checked = CheckedTrajectory::check(&trajectory, &arm, &here, &CheckOptions::default())?;

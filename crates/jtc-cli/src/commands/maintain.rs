@@ -34,7 +34,7 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     }
     out.result(&json!({ "cleared": s.errors == 0, "status": status::as_json(&s) }), || {
         if s.errors == 0 {
-            format!("cleared; state {}", words::state(s.fsm))
+            format!("cleared; state {}", s.state.name())
         } else {
             format!("still there: {}\nnext: jtc recover", words::errors_line(&s))
         }
@@ -98,7 +98,7 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         _ => not_itself(e),
     })?;
     let value = json!({ "steps": steps, "differences": differences, "status": status::as_json(&s) });
-    out.result(&value, || format!("state {}: ready", words::state(s.fsm)));
+    out.result(&value, || format!("state {}: ready", s.state.name()));
     Ok(())
 }
 

@@ -52,8 +52,8 @@ fn lines(
             let errors = if s.errors == 0 { String::new() } else { format!("   {}", words::errors_line(&s)) };
             format!(
                 "{time_s:8.3} s   {:8} {:7} {:6}{errors}   {}",
-                words::state(s.fsm),
-                words::tes(s.tes),
+                s.state.name(),
+                s.trajectory.name(),
                 s.point,
                 q.join(" ")
             )

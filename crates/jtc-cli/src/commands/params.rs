@@ -61,7 +61,7 @@ fn push(
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
         "pushed": pushed, "kept": kept, "differences": differences, "not_given": not_given,
-        "state": words::state(status.fsm), "missing_parameters": missing,
+        "state": status.state.name(), "missing_parameters": missing,
     });
     out.result(&value, || {
         let sent: Vec<&str> = pushed.iter().map(|p| p.parameter.name()).collect();
@@ -92,7 +92,7 @@ fn use_defaults(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     session.use_defaults()?;
     let status = session.fresh_status()?;
     let missing = words::missing_parameters(status.jtc_init);
-    out.result(&json!({ "state": words::state(status.fsm), "missing_parameters": missing }), || {
+    out.result(&json!({ "state": status.state.name(), "missing_parameters": missing }), || {
         format!("the controller uses its defaults; {}", words::waiting_for(&status))
     });
     Ok(())
@@ -124,7 +124,7 @@ fn show(files: &[PathBuf], link: Option<&LinkArgs>, out: &Output) -> Result<(), 
         "pid": pid,
         "link_mass_kg": masses,
         "controller": status.as_ref().map(|s| json!({
-            "state": words::state(s.fsm), "missing_parameters": words::missing_parameters(s.jtc_init),
+            "state": s.state.name(), "missing_parameters": words::missing_parameters(s.jtc_init),
             "friction": if s.friction_type == 0 { "polynomial" } else { "table" },
         })),
     });

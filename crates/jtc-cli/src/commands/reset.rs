@@ -2,6 +2,7 @@
 
 use cli_kit::Output;
 use jtc_host::words;
+use jtc_wire::ControllerState;
 use serde_json::json;
 
 use crate::args::ResetArgs;
@@ -12,26 +13,22 @@ use crate::failure::{Failure, REFUSED};
 const ALL: u8 = 0x7F;
 /// The gripper's bit.
 const GRIPPER: u8 = 1 << 6;
-/// States of the controller in which the joints have torque.
-const HOLD_POS: u8 = 2;
-const OPERATE: u8 = 3;
-const TEACHING: u8 = 4;
-
 /// Resets the nodes that are named. Where the arm is held, only after a person has agreed; where it moves, no joint.
 pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let nodes = nodes(args)?;
     let names = words::missing_nodes(nodes).join(", ");
     let mut session = args.link.session()?;
-    let state = session.fresh_status()?.fsm;
-    if matches!(state, OPERATE | TEACHING) && nodes & !GRIPPER != 0 {
-        let message = format!("{names} cannot be reset in {}: the arm would fall", words::state(state));
-        let next = if state == OPERATE { "`jtc traj stop` first" } else { "`jtc teach off` first" };
+    let state = session.fresh_status()?.state;
+    if state.is_in(&[ControllerState::Operate, ControllerState::Teaching]) && nodes & !GRIPPER != 0 {
+        let message = format!("{names} cannot be reset in {}: the arm would fall", state);
+        let next =
+            if state == ControllerState::Operate { "`jtc traj stop` first" } else { "`jtc teach off` first" };
         return Err(Failure { exit: REFUSED, code: "powered".into(), ..Failure::usage(message) }.hint(next));
     }
-    if matches!(state, HOLD_POS | OPERATE | TEACHING) && !args.yes {
+    if state.known().is_some_and(ControllerState::has_torque) && !args.yes {
         let question = format!(
             "the arm has torque ({}), and a reset of {names} can take it away: the arm may fall",
-            words::state(state)
+            state
         );
         confirm(&question, "--yes")?;
     }

@@ -13,7 +13,7 @@ use jtc_host::report::{self, ReportInput, RunFailure, Summary};
 use jtc_host::session::{Flow, Outcome, Run, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
 use jtc_host::{CheckOptions, CheckedTrajectory, Error, Sample, Session, words};
-use jtc_wire::Status;
+use jtc_wire::{ControllerState, Status};
 use serde_json::json;
 
 use super::run_report;
@@ -220,18 +220,19 @@ fn not_started(failure: Failure) -> Failure {
 /// Waits until the controller holds the arm with all drives enabled.
 fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Status, Failure> {
     let mut status = session.fresh_status()?;
-    if status.fsm <= 1 && status.jtc_init == 0 && status.errors == 0 {
+    if status.is_coming_up() && status.jtc_init == 0 && status.errors == 0 {
         operator.out.note("waiting until the drives hold the arm");
-        status =
-            session.wait_for("HoldPos", BRING_UP, |s| matches!(s.fsm, 2 | 5) || operator.wants_the_end())?;
-        if status.fsm == 5 {
+        status = session.wait_for("HoldPos", BRING_UP, |s| {
+            s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error]) || operator.wants_the_end()
+        })?;
+        if status.state == ControllerState::Error {
             return Err(Error::Device { status: Box::new(status) }.into());
         }
     }
     if operator.wants_the_end() {
         return Err(cancelled("wait for the drives"));
     }
-    if status.fsm != 2 {
+    if status.state != ControllerState::HoldPos {
         let failure =
             Failure { exit: 1, code: "not-ready".into(), ..Failure::usage(words::waiting_for(&status)) };
         return Err(failure.hint(words::next_step(&status)));
@@ -248,11 +249,6 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
     Ok(status)
 }
 
-/// Where the arm is, rad.
-fn pose(status: &Status) -> [f64; 6] {
-    status.joints.map(|j| f64::from(j.position))
-}
-
 impl Job {
     /// A trajectory of this job, checked for a run from where the arm is.
     fn checked(
@@ -263,7 +259,7 @@ impl Job {
         upload: UploadOptions,
     ) -> Result<CheckedTrajectory, Error> {
         let options = CheckOptions { upload, accept_device_limits: args.accept.accept_device_limits };
-        CheckedTrajectory::check(trajectory, &self.arm, &pose(status), &options)
+        CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &options)
     }
 
     /// Prints what forbids to run it.

@@ -5,7 +5,7 @@ use jtc_host::arm::Arm;
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Facts, RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
-use jtc_wire::Status;
+use jtc_wire::{Status, TrajectoryState};
 
 /// What a recording of this arm says about itself.
 pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
@@ -109,16 +109,16 @@ fn line_share(upload: &UploadReport) -> Option<f64> {
 
 /// A motion in one line, for below its bar: what it does, and the joint that is nearest to what it can.
 pub fn motion_line(s: &Status) -> String {
-    let what = match s.tes {
-        1 => "stopped",
-        2 => "paused; space goes on",
-        3 => "moving",
-        4 => "finished",
-        _ => "not moving",
+    let what = match s.trajectory.known() {
+        Some(TrajectoryState::Stop) => "stopped",
+        Some(TrajectoryState::Pause) => "paused; space goes on",
+        Some(TrajectoryState::Execute) => "moving",
+        Some(TrajectoryState::Finish) => "finished",
+        Some(TrajectoryState::Null | TrajectoryState::TransNullToStop) | None => "not moving",
     };
     let most = s.joints.iter().enumerate().max_by(|a, b| a.1.torque.abs().total_cmp(&b.1.torque.abs()));
     let torque = most.map_or(String::new(), |(j, joint)| {
         format!(", most torque: joint {} {} N·m", j + 1, cli_kit::figure(joint.torque.into(), 0))
     });
-    format!("{what}{}", if s.tes == 3 { &torque } else { "" })
+    format!("{what}{}", if s.is_executing() { &torque } else { "" })
 }

@@ -53,10 +53,10 @@ pub fn as_json(s: &Status) -> Value {
         })
     });
     json!({
-        "state": words::state(s.fsm),
-        "fsm": s.fsm,
-        "trajectory": words::tes(s.tes),
-        "tes": s.tes,
+        "state": s.state.name(),
+        "fsm": s.state.byte(),
+        "trajectory": s.trajectory.name(),
+        "tes": s.trajectory.byte(),
         "point": s.point,
         "time_s": f64::from(s.point) * 1e-3,
         "errors": words::errors(s.errors),
@@ -99,8 +99,8 @@ pub fn gripper_state(s: &Status) -> &'static str {
 pub fn as_text(s: &Status) -> String {
     let mut text = format!(
         "state {}   trajectory {}   point {} ({:.3} s)   friction {}\n",
-        words::state(s.fsm),
-        words::tes(s.tes),
+        s.state.name(),
+        s.trajectory.name(),
         s.point,
         f64::from(s.point) * 1e-3,
         if s.friction_type == 0 { "polynomial" } else { "table" },
@@ -141,7 +141,7 @@ pub fn as_text(s: &Status) -> String {
     if s.errors != 0 {
         text += &format!("errors: {}\n", words::errors_line(s));
     }
-    if s.fsm <= 1 {
+    if s.is_coming_up() {
         text += &format!("{}\n", words::waiting_for(s));
     }
     text += &format!("next: {}\n", words::next_step(s).replace('`', ""));
@@ -150,11 +150,18 @@ pub fn as_text(s: &Status) -> String {
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::ControllerState;
+
     use super::*;
 
     #[test]
     fn a_joint_that_does_not_answer_is_at_no_position() {
-        let mut s = Status { fsm: 5, errors: 0x20, can_current: 1 << 10, ..Status::default() };
+        let mut s = Status {
+            state: ControllerState::Error.into(),
+            errors: 0x20,
+            can_current: 1 << 10,
+            ..Status::default()
+        };
         for joint in &mut s.joints {
             joint.fsm = 3;
         }

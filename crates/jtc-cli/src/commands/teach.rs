@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use cli_kit::{Output, OutputFile, Stop};
 use jtc_host::trajectory::Loaded;
 use jtc_host::words;
-use jtc_wire::Status;
+use jtc_wire::ControllerState;
 use serde_json::json;
 
 use super::traj::typed;
@@ -79,7 +79,7 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
         let message = "cancelled before teaching was switched on".into();
         return Err(Failure { message, ..Failure::of(&jtc_host::Error::Cancelled) });
     }
-    let was_on = status.fsm == 4;
+    let was_on = status.state == ControllerState::Teaching;
     // Before it is asked for: a confirmation that does not come may be that of a request that was taken.
     teaching.store(true, Ordering::Relaxed);
     if !was_on {
@@ -92,7 +92,7 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
     let (mut lost, mut failed): (Option<Failure>, Option<Failure>) = (None, None);
     while !stop.asked() && duration.is_none_or(|s| (session.now() - start).as_secs_f64() < s) {
         match session.next_status() {
-            Ok(s) if s.fsm == 5 || s.errors != 0 => {
+            Ok(s) if s.state == ControllerState::Error || s.errors != 0 => {
                 failed = Some(
                     Failure {
                         exit: FAULT,
@@ -103,14 +103,16 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
                 );
                 break;
             }
-            Ok(s) if s.fsm == 4 => match taught.take((session.now() - start).as_secs_f64(), pose(&s)) {
-                Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
-                // Nobody leads an arm for a file that is lost: it is held, as at Ctrl-C.
-                Err(e) => {
-                    lost = Some(e);
-                    break;
+            Ok(s) if s.state == ControllerState::Teaching => {
+                match taught.take((session.now() - start).as_secs_f64(), s.positions()) {
+                    Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
+                    // Nobody leads an arm for a file that is lost: it is held, as at Ctrl-C.
+                    Err(e) => {
+                        lost = Some(e);
+                        break;
+                    }
                 }
-            },
+            }
             Ok(_) => {}
             Err(e) => {
                 let failure = Failure::from(e);
@@ -147,8 +149,4 @@ fn finish(taught: TaughtFile, out: &Output) -> Result<(), Failure> {
         format!("{name}: {} points, {:.2} s\nnext: jtc traj check {typed}", t.points.len(), t.duration_s())
     });
     Ok(())
-}
-
-fn pose(s: &Status) -> [f64; 6] {
-    s.joints.map(|j| f64::from(j.position))
 }

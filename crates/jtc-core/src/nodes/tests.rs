@@ -449,7 +449,7 @@ fn j20_a_node_is_configured_in_init_and_ready_once() {
 enum Sent {
     Move,
     Mode,
-    State,
+    ControllerState,
     Reset,
     ResetAll,
 }
@@ -463,7 +463,7 @@ fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     match Request::parse(&frame).unwrap() {
         Request::Move { .. } => Sent::Move,
         Request::ChangeMode { .. } => Sent::Mode,
-        Request::ChangeFsm { .. } => Sent::State,
+        Request::ChangeFsm { .. } => Sent::ControllerState,
         Request::Reset(_) => Sent::Reset,
         Request::ResetAll => Sent::ResetAll,
     }
@@ -512,7 +512,7 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
     assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
     // A joint that is to be enabled does not wait for that.
     let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
-    assert_eq!(sent(Goal::Enabled, 3, still), Sent::State);
+    assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
 }
 
@@ -520,11 +520,11 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
 #[test]
 fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     for (state, seen, configured_last, frame) in [
-        (fsm::ENABLED, true, false, Sent::State),
-        (fsm::ENABLED, true, true, Sent::State),
+        (fsm::ENABLED, true, false, Sent::ControllerState),
+        (fsm::ENABLED, true, true, Sent::ControllerState),
         // To be brought from Init to Ready, which can wait.
         (fsm::INIT, true, false, Sent::Mode),
-        (fsm::INIT, true, true, Sent::State),
+        (fsm::INIT, true, true, Sent::ControllerState),
         // Restarted: what it reported before means nothing.
         (fsm::ENABLED, false, false, Sent::Mode),
         (fsm::ENABLED, false, true, Sent::Mode),

@@ -142,7 +142,7 @@ impl Plant {
         self.report(&mut rig);
         rig.defaults();
         self.run(&mut rig, 300);
-        assert_eq!(rig.state(), jtc_core::State::HoldPos, "{:?}", rig.controller.telemetry());
+        assert_eq!(rig.state(), jtc_core::ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
         rig
     }
 

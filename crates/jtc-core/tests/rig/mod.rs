@@ -3,7 +3,8 @@
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
 use jtc_core::{
-    BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX, State, Tes,
+    BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX,
+    TrajectoryState,
 };
 use jtc_wire::{
     DataStatus, EVENTS_MAX, ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Response, Status,
@@ -151,7 +152,7 @@ impl Rig {
         rig.defaults();
         // Until what the arm carries is known: teaching waits for that.
         rig.run(700);
-        assert_eq!(rig.state(), State::HoldPos, "{:?}", rig.controller.telemetry());
+        assert_eq!(rig.state(), ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
         assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
         rig
     }
@@ -163,12 +164,12 @@ impl Rig {
         }
     }
 
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> ControllerState {
         self.controller.telemetry().state
     }
 
-    pub fn tes(&self) -> Tes {
-        self.controller.telemetry().tes
+    pub fn trajectory(&self) -> TrajectoryState {
+        self.controller.telemetry().trajectory
     }
 
     pub fn errors(&self) -> u16 {

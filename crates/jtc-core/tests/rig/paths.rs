@@ -1,5 +1,5 @@
 //! Trajectories, and the way to a place on them.
-use jtc_core::Tes;
+use jtc_core::TrajectoryState;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 
 use super::Rig;
@@ -52,7 +52,7 @@ impl Rig {
             let body = segment_body(7, i as u16, chunks.len() as u16, step, chunk);
             assert_eq!(self.ask(FrameType::Trajectory, &body), DataStatus::NoError, "segment {i}");
         }
-        assert_eq!(self.tes(), Tes::Stop);
+        assert_eq!(self.trajectory(), TrajectoryState::Stop);
     }
 
     /// Uploads points 10 ms apart, executes them and runs on until `point` ms of the path are done.

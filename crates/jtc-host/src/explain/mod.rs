@@ -5,7 +5,7 @@ mod controller;
 mod link;
 mod nodes;
 
-use jtc_wire::{DataStatus, FrameStatus};
+use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, Known, TrajectoryState};
 
 use crate::check::ProblemKind;
 use crate::words;
@@ -181,8 +181,8 @@ fn own_words(page: &Page) -> Option<String> {
         Family::Motor => at(&w::MC_FAULTS),
         Family::Node => at(&w::NODE_ERRORS),
         Family::Warning => at(&w::NODE_WARNINGS),
-        Family::State => at(&w::JTC_FSM),
-        Family::Tes => at(&w::TES),
+        Family::State => Code::<ControllerState>::new(code).known().map(|state| state.name().to_owned()),
+        Family::Tes => Code::<TrajectoryState>::new(code).known().map(|state| state.name().to_owned()),
         Family::NodeState => Some(w::node_fsm(code).to_owned()),
         Family::Can => words::can_flags(page.number()).pop(),
         Family::Data => DataStatus::from_byte(code).map(|code| words::data_status(code).to_owned()),
@@ -288,9 +288,11 @@ mod tests {
     #[test]
     fn every_word_on_a_screen_finds_its_page() {
         use jtc_wire::words as w;
+        let states = ControllerState::ALL.iter().map(|state| state.name()).collect::<Vec<_>>();
+        let trajectory = TrajectoryState::ALL.iter().map(|state| state.name()).collect::<Vec<_>>();
         let lists: [(Family, &[&str]); 7] = [
-            (Family::State, &w::JTC_FSM),
-            (Family::Tes, &w::TES),
+            (Family::State, &states),
+            (Family::Tes, &trajectory),
             (Family::Jtc, &w::JTC_ERRORS),
             (Family::Joint, &w::JOINT_INTERNAL),
             (Family::Motor, &w::MC_FAULTS),
@@ -343,7 +345,8 @@ mod tests {
         assert_eq!(count(Family::Node), w::NODE_ERRORS.len());
         assert_eq!(count(Family::Warning), w::NODE_WARNINGS.len());
         assert_eq!(count(Family::Can), w::CAN_FLAGS.iter().filter(|n| !n.is_empty()).count());
-        assert_eq!(count(Family::State), w::JTC_FSM.len());
+        assert_eq!(count(Family::State), ControllerState::ALL.len());
+        assert_eq!(count(Family::Tes), TrajectoryState::ALL.len());
         assert_eq!(count(Family::Missing), w::JTC_INIT.len());
         assert_eq!(count(Family::Check), ProblemKind::ALL.len());
         assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));

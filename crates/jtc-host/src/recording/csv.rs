@@ -4,6 +4,8 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use jtc_wire::Code;
+
 use super::{Ending, Recording, RecordingError};
 use crate::sample::{JointSample, Sample};
 
@@ -26,10 +28,6 @@ const COLUMNS: [Column; 12] = [
 ];
 
 const SAMPLE_COLUMNS: [&str; 6] = ["time_s", "state", "tes", "point", "errors", "can_current"];
-
-/// State and execution state of an arm that moves along a trajectory, as on the wire.
-const OPERATE: u8 = 3;
-const EXECUTE: u8 = 3;
 
 /// How the comments at the end begin.
 const OUTCOME: &str = "# outcome: ";
@@ -58,7 +56,15 @@ impl<W: Write> CsvWriter<W> {
         let row = &mut self.row;
         row.clear();
         number(row, s.time_s);
-        let _ = write!(row, ",{},{},{},{},{}", s.state, s.tes, s.point, s.errors, s.can_current);
+        let _ = write!(
+            row,
+            ",{},{},{},{},{}",
+            s.state.byte(),
+            s.trajectory.byte(),
+            s.point,
+            s.errors,
+            s.can_current
+        );
         for mut joint in s.joints {
             for (_, field) in COLUMNS {
                 row.push(',');
@@ -140,7 +146,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
         }
         samples.push(sample);
     }
-    let in_motion = samples.last().is_some_and(|s| s.state == OPERATE && s.tes == EXECUTE);
+    let in_motion = samples.last().is_some_and(Sample::is_executing);
     let cut = if !rest.trim().is_empty() {
         Some("the file breaks off within a line")
     } else if in_motion && ending.outcome.is_empty() {
@@ -154,8 +160,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
 fn put(sample: &mut Sample, name: &str, field: &str) -> Option<()> {
     match name {
         "time_s" => sample.time_s = field.parse().ok()?,
-        "state" => sample.state = field.parse().ok()?,
-        "tes" => sample.tes = field.parse().ok()?,
+        "state" => sample.state = Code::new(field.parse().ok()?),
+        "tes" => sample.trajectory = Code::new(field.parse().ok()?),
         "point" => sample.point = field.parse().ok()?,
         "errors" => sample.errors = field.parse().ok()?,
         "can_current" => sample.can_current = field.parse().ok()?,

@@ -105,11 +105,19 @@ fn write(mut recorder: Recorder, messages: &Receiver<Message>) -> Result<u64, Re
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::{ControllerState, TrajectoryState};
+
     use super::super::Recording;
     use super::*;
 
     fn sample(i: u32) -> Sample {
-        Sample { time_s: f64::from(i) * 1e-3, state: 3, tes: 3, point: i, ..Sample::default() }
+        Sample {
+            time_s: f64::from(i) * 1e-3,
+            state: ControllerState::Operate.into(),
+            trajectory: TrajectoryState::Execute.into(),
+            point: i,
+            ..Sample::default()
+        }
     }
 
     /// Nobody ends the recording: as after `kill -9`, what the operating system has is all there is.

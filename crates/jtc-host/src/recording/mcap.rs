@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Seek, Write};
 use std::path::PathBuf;
 
+use jtc_wire::Code;
 use mcap::records::{self, MessageHeader, Metadata, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Compression, McapError, WriteOptions};
@@ -112,8 +113,8 @@ impl<W: Write + Seek> McapWriter<W> {
         self.cdr
             .start()
             .header(stamp, "")
-            .u8(s.state)
-            .u8(s.tes)
+            .u8(s.state.byte())
+            .u8(s.trajectory.byte())
             .u32(s.point)
             .u16(s.errors)
             .u32(s.can_current);
@@ -282,7 +283,7 @@ fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {
         }
         STATE_TOPIC => {
             cdr.skip_header()?;
-            (sample.state, sample.tes) = (cdr.u8()?, cdr.u8()?);
+            (sample.state, sample.trajectory) = (Code::new(cdr.u8()?), Code::new(cdr.u8()?));
             (sample.point, sample.errors, sample.can_current) = (cdr.u32()?, cdr.u16()?, cdr.u32()?);
             for joint in joints.iter_mut() {
                 joint.fsm = cdr.u8()?;

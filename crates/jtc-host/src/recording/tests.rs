@@ -1,5 +1,7 @@
 //! Round trips through both formats, and files that are no recordings.
 
+use jtc_wire::{ControllerState, TrajectoryState};
+
 use super::*;
 use crate::sample::Sample;
 
@@ -8,8 +10,8 @@ fn samples(n: usize) -> Vec<Sample> {
         .map(|i| {
             let t = i as f64 * 1e-3;
             let mut s = Sample::default();
-            (s.time_s, s.state, s.tes, s.point, s.errors, s.can_current) =
-                (t, 3, 3, i as u32, 0x8001, 1 << 8);
+            (s.state, s.trajectory) = (ControllerState::Operate.into(), TrajectoryState::Execute.into());
+            (s.time_s, s.point, s.errors, s.can_current) = (t, i as u32, 0x8001, 1 << 8);
             for (j, joint) in s.joints.iter_mut().enumerate() {
                 joint.set_position = (t + j as f64).sin();
                 joint.position = joint.set_position - 1e-3;
@@ -48,8 +50,8 @@ fn check(name: &str) -> Recording {
     for (a, b) in read.samples.iter().zip(&written) {
         assert!(same(a.time_s, b.time_s));
         assert_eq!(
-            (a.state, a.tes, a.point, a.errors, a.can_current),
-            (3, 3, b.point, b.errors, b.can_current)
+            (a.state, a.trajectory, a.point, a.errors, a.can_current),
+            (b.state, b.trajectory, b.point, b.errors, b.can_current)
         );
         for (a, b) in a.joints.iter().zip(&b.joints) {
             for (x, y) in [

@@ -2,18 +2,13 @@
 
 use std::fmt::Write;
 
-use jtc_wire::Status;
+use jtc_wire::{ControllerState, Status};
 use serde::Serialize;
 
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 use crate::words;
 
-/// States on the wire: a trajectory is followed; an error is latched.
-const OPERATE: u8 = 3;
-const ERROR: u8 = 5;
-/// Trajectory execution state while it is executed.
-const EXECUTE: u8 = 3;
 /// Samples shown before and after the one that shows the failure.
 const BEFORE: usize = 3;
 const AFTER: usize = 2;
@@ -66,7 +61,7 @@ impl RunFailure {
     /// The first error in the samples since a trajectory was executed; none in a run without errors.
     pub fn find(info: &RecordingInfo, samples: &[Sample]) -> Option<Self> {
         let begin = begin(samples);
-        let bad = |s: &Sample| s.errors != 0 || s.state == ERROR;
+        let bad = |s: &Sample| s.errors != 0 || s.state == ControllerState::Error;
         let at = begin + samples.get(begin..)?.iter().position(bad)?;
         let (mut causes, mut joint) = causes(&Words::of_sample(&samples[at]));
         if joint.is_none()
@@ -84,7 +79,7 @@ impl RunFailure {
         if let Some(found) = Self::find(info, samples) {
             return Some(found);
         }
-        let unseen = samples.last().is_some_and(|s| s.state == OPERATE && s.tes == EXECUTE);
+        let unseen = samples.last().is_some_and(Sample::is_executing);
         let reason = match (ending.is_fault(), ending.reason.as_str()) {
             (true, "") => "the run ended in a fault that the recording does not name".to_owned(),
             (true, reason) => reason.to_owned(),
@@ -128,7 +123,7 @@ impl RunFailure {
             Moment {
                 time_ms: into_ms(i),
                 joint: j + 1,
-                state: words::state(sample.state),
+                state: sample.state.name(),
                 set_position_rad: own.set_position,
                 position_rad: own.position,
                 velocity_rad_s: own.velocity,
@@ -246,13 +241,13 @@ fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(usize
 
 /// The first sample of the execution, or the first of all.
 fn begin(samples: &[Sample]) -> usize {
-    samples.iter().position(|s| s.state == OPERATE && s.tes == EXECUTE).unwrap_or(0)
+    samples.iter().position(Sample::is_executing).unwrap_or(0)
 }
 
 /// When the run began, s: the controller's own count of milliseconds at the last sample of the motion says it best.
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];
-    match known.iter().rfind(|s| s.state == OPERATE) {
+    match known.iter().rfind(|s| s.state == ControllerState::Operate) {
         Some(s) => s.time_s - f64::from(s.point) * 1e-3,
         None => samples.get(begin(samples)).map_or(0.0, |s| s.time_s),
     }

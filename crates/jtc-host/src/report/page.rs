@@ -100,8 +100,8 @@ fn data(input: &ReportInput<'_>) -> Value {
         "torque_friction_nm": per_joint(coarse, |j| j.torque_friction),
         "torque_nm": per_joint(coarse, |j| j.torque),
         "temperature_c": per_joint(coarse, |j| j.temperature),
-        "states": runs(input.samples, |s| u64::from(s.state)),
-        "tes": runs(input.samples, |s| u64::from(s.tes)),
+        "states": runs(input.samples, |s| u64::from(s.state.byte())),
+        "tes": runs(input.samples, |s| u64::from(s.trajectory.byte())),
         "errors": runs(input.samples, |s| u64::from(s.errors)),
     })
 }

@@ -5,10 +5,6 @@ use serde::Serialize;
 use crate::recording::RecordingInfo;
 use crate::sample::Sample;
 
-/// State and trajectory state while a trajectory is followed.
-const OPERATE: u8 = 3;
-const EXECUTE: u8 = 3;
-
 /// Figures of one joint; `None` where the source does not know them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointSummary {
@@ -46,7 +42,7 @@ pub struct Summary {
 impl Summary {
     /// The figures over the samples in which a trajectory was executed, or over all when there is none.
     pub fn of(info: &RecordingInfo, samples: &[Sample]) -> Self {
-        let executing = |s: &&Sample| s.state == OPERATE && s.tes == EXECUTE;
+        let executing = |s: &&Sample| s.is_executing();
         let any = samples.iter().any(|s| executing(&s));
         let counted: Vec<&Sample> = samples.iter().filter(|s| !any || executing(s)).collect();
         let span = |first: Option<f64>, last: Option<f64>| last.zip(first).map_or(0.0, |(l, f)| l - f);

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::sample::JointSample;
+use jtc_wire::{ControllerState, TrajectoryState};
 
 fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
     let mut info =
@@ -28,11 +29,15 @@ fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
             fsm: 3,
             internal: 0,
         };
-        let state = if i < samples / 10 { 2 } else { 3 };
+        let (state, trajectory) = if i < samples / 10 {
+            (ControllerState::HoldPos, TrajectoryState::Stop)
+        } else {
+            (ControllerState::Operate, TrajectoryState::Execute)
+        };
         Sample {
             time_s: t,
-            state,
-            tes: if state == 3 { 3 } else { 1 },
+            state: state.into(),
+            trajectory: trajectory.into(),
             point: i as u32,
             errors: 0,
             can_current: 0,
@@ -114,7 +119,8 @@ fn the_picture_is_small() {
 fn silent_joint() -> (RecordingInfo, Vec<Sample>) {
     let (info, mut samples) = run(1000);
     for s in &mut samples[600..] {
-        (s.state, s.tes, s.errors, s.can_current) = (5, 0, 0x20, 1 << 10);
+        (s.state, s.trajectory, s.errors, s.can_current) =
+            (ControllerState::Error.into(), TrajectoryState::Null.into(), 0x20, 1 << 10);
         s.joints[2] = JointSample { set_position: f64::NAN, ..JointSample::UNKNOWN };
     }
     (info, samples)
@@ -158,7 +164,8 @@ fn a_run_without_its_own_error_says_why_it_ended() {
 #[test]
 fn drives_name_their_own_faults() {
     let (info, samples) = silent_joint();
-    let mut status = jtc_wire::Status { fsm: 5, errors: 0x80, ..Default::default() };
+    let mut status =
+        jtc_wire::Status { state: ControllerState::Error.into(), errors: 0x80, ..Default::default() };
     status.joints[4].mc_current = 4;
     let failure = RunFailure::find(&info, &samples).unwrap().with_status(&status);
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
@@ -172,7 +179,8 @@ fn an_encoder_that_jumps_is_named_by_its_step() {
         joint.velocity_max_rad_s = 3.0;
     }
     for s in &mut samples[600..] {
-        (s.state, s.tes, s.errors) = (5, 0, 0x20);
+        (s.state, s.trajectory, s.errors) =
+            (ControllerState::Error.into(), TrajectoryState::Null.into(), 0x20);
         s.joints[3].position += 0.4;
     }
     let failure = RunFailure::find(&info, &samples).unwrap();
@@ -200,7 +208,7 @@ fn a_recording_without_its_end_is_no_success() {
     assert!(unseen.headline().starts_with("FAILED 999 ms") && unseen.causes[0].contains("was not seen"));
     assert_eq!(of(&samples, "finished", ""), None);
     let last = samples.len() - 1;
-    samples[last].tes = 1;
+    samples[last].trajectory = TrajectoryState::Stop.into();
     assert_eq!(of(&samples, "", ""), None);
     assert_eq!(of(&samples, "stopped", ""), None);
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jtc_wire::{ExecCommand, FrameType, Status, fixed};
+use jtc_wire::{ControllerState, ExecCommand, FrameType, Status, TrajectoryState, fixed};
 
 use super::{Session, not_allowed};
 use crate::check::CheckedTrajectory;
@@ -93,7 +93,9 @@ impl<P: Port> Session<P> {
             return self.command(&fixed::empty(FrameType::TeachingModeDisable));
         }
         self.command(&fixed::empty(FrameType::TeachingModeEnable))?;
-        let taught = self.wait_for("teaching", TEACHING, |s| s.fsm == 4 || s.fsm == 5);
+        let taught = self.wait_for("teaching", TEACHING, |s| {
+            s.state == ControllerState::Teaching || s.state == ControllerState::Error
+        });
         taught.map(drop)
     }
 
@@ -145,7 +147,7 @@ impl<P: Port> Session<P> {
 
     /// Execute, whatever the controller holds.
     pub(super) fn go(&mut self) -> Result<(), Error> {
-        self.exec(ExecCommand::Execute, |s| s.tes == 3)
+        self.exec(ExecCommand::Execute, |s| s.trajectory == TrajectoryState::Execute)
     }
 
     /// Goes on after a pause.
@@ -156,9 +158,10 @@ impl<P: Port> Session<P> {
     /// [`Error::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
         let status = self.fresh_status()?;
-        match status.tes {
-            2 => self.go(),
-            tes => Err(Error::NotPaused { state: status.fsm, tes }),
+        if status.trajectory == TrajectoryState::Pause {
+            self.go()
+        } else {
+            Err(Error::NotPaused { state: status.state, trajectory: status.trajectory })
         }
     }
 
@@ -168,7 +171,7 @@ impl<P: Port> Session<P> {
     ///
     /// [`Error::Refused`] when nothing moves; [`Error::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn pause(&mut self) -> Result<(), Error> {
-        self.exec(ExecCommand::Pause, |s| s.tes == 2)
+        self.exec(ExecCommand::Pause, |s| s.trajectory == TrajectoryState::Pause)
     }
 
     /// Ends the trajectory; the next execution begins at its start.
@@ -177,7 +180,7 @@ impl<P: Port> Session<P> {
     ///
     /// [`Error::Refused`] when there is nothing to stop; [`Error::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn stop(&mut self) -> Result<(), Error> {
-        self.exec(ExecCommand::Stop, |s| s.tes == 1)
+        self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
 
     /// Without a confirmation nobody knows whether the arm moves: such errors say so.
@@ -214,8 +217,14 @@ impl<P: Port> Session<P> {
     /// [`Error::Device`] when the controller reports errors, [`Error::StateTimeout`] when it is not in HoldPos in this time,
     /// [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
-        let status = self.wait_for("HoldPos", timeout, |s| s.fsm == 2 || s.fsm == 5)?;
-        if status.fsm == 5 { Err(Error::Device { status: Box::new(status) }) } else { Ok(status) }
+        let status = self.wait_for("HoldPos", timeout, |s| {
+            s.state == ControllerState::HoldPos || s.state == ControllerState::Error
+        })?;
+        if status.state == ControllerState::Error {
+            Err(Error::Device { status: Box::new(status) })
+        } else {
+            Ok(status)
+        }
     }
 
     /// Waits until the controller holds the arm in HoldPos with every drive enabled; an error at once when it reports errors. The
@@ -226,9 +235,16 @@ impl<P: Port> Session<P> {
     /// [`Error::Device`] when the controller reports errors, [`Error::StateTimeout`] when it does not hold the arm in this time (it
     /// may still lack parameters), [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
-        let ready = |s: &Status| s.fsm == 2 && s.joints.iter().all(|j| j.fsm == ENABLED);
-        let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| s.fsm == 5 || ready(s))?;
-        if status.fsm == 5 { Err(Error::Device { status: Box::new(status) }) } else { Ok(status) }
+        let ready =
+            |s: &Status| s.state == ControllerState::HoldPos && s.joints.iter().all(|j| j.fsm == ENABLED);
+        let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {
+            s.state == ControllerState::Error || ready(s)
+        })?;
+        if status.state == ControllerState::Error {
+            Err(Error::Device { status: Box::new(status) })
+        } else {
+            Ok(status)
+        }
     }
 
     /// One line about where the controller is.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jtc_wire::{ExecCommand, Status, fixed};
+use jtc_wire::{ControllerState, ExecCommand, Status, TrajectoryState, fixed};
 
 use super::Session;
 use crate::Error;
@@ -57,31 +57,34 @@ impl<P: Port> Session<P> {
                 Ok(status) => status,
                 Err(e) => return Err(self.lost_in_motion(e)),
             };
-            begun |= status.tes == 3 || self.port.now() - start > SETTLE;
-            if status.fsm == 3 {
+            begun |= status.trajectory == TrajectoryState::Execute || self.port.now() - start > SETTLE;
+            if status.state == ControllerState::Operate {
                 point = status.point;
             }
             let flow = each(&status);
-            if status.fsm == 5 || status.errors != 0 {
+            if status.state == ControllerState::Error || status.errors != 0 {
                 return Err(Error::RunFault { point, status: Box::new(status) });
             }
             let before = *occurred.get_or_insert(errors_occurred(&status));
-            if status.tes == 2 && errors_occurred(&status) != before {
+            if status.trajectory == TrajectoryState::Pause && errors_occurred(&status) != before {
                 return Err(Error::PausedByController { point, before, status: Box::new(status) });
             }
-            match (status.tes, status.fsm) {
-                (4, _) if begun => return Ok(Outcome::Finished(status)),
-                (1, _) if begun => return Ok(Outcome::Stopped(status)),
+            match (status.trajectory.known(), status.state.known()) {
+                (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
+                (Some(TrajectoryState::Stop), _) if begun => return Ok(Outcome::Stopped(status)),
                 // The trajectory is gone, or nodes fell out of operation.
-                (0, _) | (_, 0 | 1) if begun => {
+                (Some(TrajectoryState::Null), _)
+                | (_, Some(ControllerState::Start | ControllerState::Init))
+                    if begun =>
+                {
                     return Err(Error::RunFault { point, status: Box::new(status) });
                 }
                 _ => {}
             }
             match flow {
                 Flow::Continue => {}
-                Flow::Pause if status.tes == 3 => unless_ended(self.pause())?,
-                Flow::Resume if status.tes == 2 => self.go()?,
+                Flow::Pause if status.trajectory == TrajectoryState::Execute => unless_ended(self.pause())?,
+                Flow::Resume if status.trajectory == TrajectoryState::Pause => self.go()?,
                 // Once accepted it needs no repetition: the controller slows down to standstill by itself.
                 Flow::Stop if !stopping => {
                     unless_ended(self.stop())?;
@@ -95,8 +98,8 @@ impl<P: Port> Session<P> {
 
     /// Nothing comes back any more; what goes out may still arrive, and an arm that nobody follows had better stand.
     fn lost_in_motion(&mut self, error: Error) -> Error {
-        let sent =
-            self.last.is_none_or(|s| s.tes == 3) && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
+        let sent = self.last.is_none_or(|s| s.trajectory == TrajectoryState::Execute)
+            && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
         self.link_lost(error, sent)
     }
 }
@@ -109,7 +112,15 @@ fn errors_occurred(status: &Status) -> [u16; 6] {
 /// A pause or stop may cross with the end of the motion: it is refused then, and that is no failure.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
-        Err(Error::Refused { tes: 1 | 2 | 4, .. }) => Ok(()),
+        Err(Error::Refused { trajectory, .. })
+            if trajectory.is_in(&[
+                TrajectoryState::Stop,
+                TrajectoryState::Pause,
+                TrajectoryState::Finish,
+            ]) =>
+        {
+            Ok(())
+        }
         other => other,
     }
 }

@@ -14,7 +14,7 @@ mod upload;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status, StatusReceiver};
+use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status, StatusReceiver, TrajectoryState};
 
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
@@ -27,9 +27,6 @@ pub use upload::{Progress, UploadOptions, UploadReport};
 use crate::Error;
 use crate::error::accepted;
 use crate::port::{Port, line_time};
-
-/// Trajectory execution state of a controller that holds no complete trajectory.
-const NO_TRAJECTORY: u8 = 0;
 
 /// Called with each status and the port's time.
 type Observer = Box<dyn FnMut(Duration, &Status)>;
@@ -208,7 +205,7 @@ impl<P: Port> Session<P> {
             if let Some(observer) = &mut self.observer {
                 observer(now, status);
             }
-            if status.tes == NO_TRAJECTORY {
+            if status.trajectory == TrajectoryState::Null {
                 self.uploaded = None;
             }
             self.last = Some(*status);
@@ -284,8 +281,8 @@ impl<P: Port> Session<P> {
         Error::Refused {
             request: frame_type(record.frame_type),
             code: record.data,
-            state: last.fsm,
-            tes: last.tes,
+            state: last.state,
+            trajectory: last.trajectory,
         }
     }
 

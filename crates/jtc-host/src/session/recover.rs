@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jtc_wire::Status;
+use jtc_wire::{ControllerState, Status};
 
 use super::Session;
 use crate::arm::ParameterSet;
@@ -91,6 +91,15 @@ impl std::fmt::Display for RecoverStep {
 const NODE_TIME: Duration = Duration::from_secs(15);
 /// From reset to Init.
 const START_TIME: Duration = Duration::from_secs(3);
+/// From a stop to standstill, with time to spare.
+const STOP_TIME: Duration = Duration::from_secs(5);
+/// From the reset of a node until it answers.
+const BOOT: Duration = Duration::from_secs(1);
+/// From a parameter's confirmation to the status that shows it.
+const TAKEN_IN: Duration = Duration::from_millis(60);
+/// Acts after which a controller that is still not in HoldPos is given up, and how often errors are cleared.
+const ACTS_MAX: u8 = 24;
+const CLEARS_MAX: u8 = 6;
 /// Effect of a command.
 const EFFECT: Duration = Duration::from_millis(500);
 /// How often it is looked whether a person wants it to end.
@@ -127,105 +136,13 @@ impl<P: Port> Session<P> {
         mut say: impl FnMut(&RecoverStep),
     ) -> Result<Status, Error> {
         parameters.check()?;
-        let mut status = self.fresh_status()?;
+        let status = self.fresh_status()?;
         parameters.enough_for(&status)?;
         say(&RecoverStep::Found(words::waiting_for(&status)));
         if let Some(step) = parameters.kept(&status) {
             say(&step);
         }
-        let mut given = false;
-        let (mut resets, mut clears, mut waited) = (0u8, 0, false);
-        let mut asked: Option<Duration> = None;
-        let mut rounds = 0;
-        while rounds < 24 {
-            rounds += 1;
-            if ended() && status.fsm != 3 {
-                return Err(Error::Cancelled);
-            }
-            parameters.enough_for(&status)?;
-            match status.fsm {
-                1 | 5 if parameters.due(&status, given) => {
-                    say(&RecoverStep::Give(parameters.arm_name()));
-                    self.give(parameters)?;
-                    given = true;
-                    self.pause_for(Duration::from_millis(60), &ended)?;
-                }
-                // Errors latch: only clearing tells whether the safety input is high again.
-                5 if status.errors & 1 != 0
-                    && clears > 0
-                    && faulty(&status) == 0
-                    && status.can_current == 0 =>
-                {
-                    let since = *asked.get_or_insert_with(|| {
-                        say(&RecoverStep::SafetyInput);
-                        self.port.now()
-                    });
-                    if self.port.now() - since > PERSON_TIME {
-                        return Err(Error::Device { status: Box::new(status) });
-                    }
-                    rounds -= 1;
-                    self.clear(true, 0)?;
-                    self.pause_for(EFFECT, &ended)?;
-                }
-                5 => {
-                    let silent = (status.can_current >> 8 & 0x7F) as u8 & !resets;
-                    if silent != 0 && clears > 0 {
-                        resets |= silent;
-                        say(&RecoverStep::Reset(names(silent)));
-                        self.reset(silent)?;
-                        self.pause_for(Duration::from_secs(1), &ended)?;
-                    }
-                    let nodes = faulty(&status);
-                    say(&RecoverStep::Clear(names(nodes)));
-                    self.clear(true, nodes)?;
-                    clears += 1;
-                    self.pause_for(EFFECT, &ended)?;
-                    if clears > 6 {
-                        return Err(Error::Device { status: Box::new(self.fresh_status()?) });
-                    }
-                }
-                0 => {
-                    self.wait_for("the end of the start-up", START_TIME, |s| s.fsm != 0 || ended())?;
-                }
-                1 => {
-                    say(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
-                    let reached = self.wait_for("nodes ready", NODE_TIME, |s| s.fsm > 1 || ended());
-                    match reached {
-                        Ok(_) => {}
-                        Err(Error::StateTimeout { status: s, .. }) if !waited => {
-                            waited = true;
-                            say(&RecoverStep::Reset(names(s.node_init)));
-                            self.reset(s.node_init)?;
-                            self.pause_for(Duration::from_secs(1), &ended)?;
-                        }
-                        Err(e) => return Err(e),
-                    }
-                }
-                4 => {
-                    say(&RecoverStep::TeachOff);
-                    self.teach(false)?;
-                    self.wait_for("teaching off", Duration::from_secs(3), |s| s.fsm != 4 || ended())?;
-                }
-                3 => {
-                    say(&RecoverStep::Stop);
-                    match self.stop() {
-                        Ok(()) | Err(Error::Refused { .. }) => {}
-                        Err(e) => return Err(e),
-                    }
-                    self.wait_for("standstill", Duration::from_secs(5), |s| s.fsm != 3)?;
-                }
-                _ if status.errors == 0 => {
-                    say(&RecoverStep::HoldPos);
-                    return Ok(status);
-                }
-                _ => {
-                    self.clear(true, 0)?;
-                    self.pause_for(EFFECT, &ended)?;
-                }
-            }
-            status = self.fresh_status()?;
-        }
-        Err(Error::Device { status: Box::new(status) })
+        Recovery::new(self, parameters, ended, say).from(status)
     }
 
     fn give(&mut self, parameters: ParameterSource<'_>) -> Result<(), Error> {
@@ -246,6 +163,162 @@ impl<P: Port> Session<P> {
             }
             self.poll((end - now).min(LOOK))?;
         }
+    }
+}
+
+/// A recovery on its way, with what it has done so far.
+struct Recovery<'a, P, Ended, Say> {
+    session: &'a mut Session<P>,
+    parameters: ParameterSource<'a>,
+    ended: Ended,
+    say: Say,
+    /// Parameters were given.
+    given: bool,
+    /// Nodes that were reset because they were silent.
+    reset: u8,
+    /// How often errors were cleared.
+    clears: u8,
+    /// Nodes were reset because they did not come up.
+    reset_slow: bool,
+    /// Since when a person is asked to release the emergency stop.
+    asked: Option<Duration>,
+    /// Acts that are left before it is given up.
+    acts_left: u8,
+}
+
+impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P, Ended, Say> {
+    fn new(session: &'a mut Session<P>, parameters: ParameterSource<'a>, ended: Ended, say: Say) -> Self {
+        let (given, reset_slow) = (false, false);
+        Self {
+            session,
+            parameters,
+            ended,
+            say,
+            given,
+            reset: 0,
+            clears: 0,
+            reset_slow,
+            asked: None,
+            acts_left: ACTS_MAX,
+        }
+    }
+
+    /// From what `status` reports to HoldPos without errors: one act for each state on the way.
+    fn from(&mut self, mut status: Status) -> Result<Status, Error> {
+        while self.acts_left > 0 {
+            self.acts_left -= 1;
+            if (self.ended)() && status.state != ControllerState::Operate {
+                return Err(Error::Cancelled);
+            }
+            self.parameters.enough_for(&status)?;
+            match status.state.known() {
+                Some(ControllerState::Start) => self.start_up()?,
+                Some(ControllerState::Init | ControllerState::Error)
+                    if self.parameters.due(&status, self.given) =>
+                {
+                    self.give()?;
+                }
+                Some(ControllerState::Init) => self.bring_up(&status)?,
+                Some(ControllerState::HoldPos) if status.errors == 0 => {
+                    (self.say)(&RecoverStep::HoldPos);
+                    return Ok(status);
+                }
+                Some(ControllerState::HoldPos) => self.clear(0)?,
+                Some(ControllerState::Operate) => self.end_motion()?,
+                Some(ControllerState::Teaching) => self.end_teaching()?,
+                Some(ControllerState::Error) => self.leave_error(&status)?,
+                // A state that this version does not know is not to be acted upon.
+                None => break,
+            }
+            status = self.session.fresh_status()?;
+        }
+        Err(Error::Device { status: Box::new(status) })
+    }
+
+    fn start_up(&mut self) -> Result<(), Error> {
+        let begun = |s: &Status| s.state != ControllerState::Start || (self.ended)();
+        self.session.wait_for("the end of the start-up", START_TIME, begun).map(drop)
+    }
+
+    fn give(&mut self) -> Result<(), Error> {
+        (self.say)(&RecoverStep::Give(self.parameters.arm_name()));
+        self.session.give(self.parameters)?;
+        self.given = true;
+        self.session.pause_for(TAKEN_IN, &self.ended)
+    }
+
+    fn bring_up(&mut self, status: &Status) -> Result<(), Error> {
+        (self.say)(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
+        let up = |s: &Status| !s.is_coming_up() || (self.ended)();
+        match self.session.wait_for("nodes ready", NODE_TIME, up) {
+            Err(Error::StateTimeout { status, .. }) if !self.reset_slow => {
+                self.reset_slow = true;
+                self.reset_nodes(status.node_init)
+            }
+            other => other.map(drop),
+        }
+    }
+
+    fn end_motion(&mut self) -> Result<(), Error> {
+        (self.say)(&RecoverStep::Stop);
+        match self.session.stop() {
+            Ok(()) | Err(Error::Refused { .. }) => {}
+            Err(e) => return Err(e),
+        }
+        let stands = |s: &Status| s.state != ControllerState::Operate;
+        self.session.wait_for("standstill", STOP_TIME, stands).map(drop)
+    }
+
+    fn end_teaching(&mut self) -> Result<(), Error> {
+        (self.say)(&RecoverStep::TeachOff);
+        self.session.teach(false)?;
+        let off = |s: &Status| s.state != ControllerState::Teaching || (self.ended)();
+        self.session.wait_for("teaching off", START_TIME, off).map(drop)
+    }
+
+    fn leave_error(&mut self, status: &Status) -> Result<(), Error> {
+        let nodes = faulty(status);
+        // Errors latch: only clearing tells whether the safety input is high again.
+        let safety_input = status.errors & 1 != 0;
+        if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
+            return self.wait_for_a_person(status);
+        }
+        let silent = (status.can_current >> 8 & 0x7F) as u8 & !self.reset;
+        if silent != 0 && self.clears > 0 {
+            self.reset |= silent;
+            self.reset_nodes(silent)?;
+        }
+        (self.say)(&RecoverStep::Clear(names(nodes)));
+        self.clear(nodes)?;
+        self.clears += 1;
+        if self.clears > CLEARS_MAX {
+            return Err(Error::Device { status: Box::new(self.session.fresh_status()?) });
+        }
+        Ok(())
+    }
+
+    /// Clears until the safety input is high again, for as long as a person may take.
+    fn wait_for_a_person(&mut self, status: &Status) -> Result<(), Error> {
+        let since = *self.asked.get_or_insert_with(|| {
+            (self.say)(&RecoverStep::SafetyInput);
+            self.session.port.now()
+        });
+        if self.session.port.now() - since > PERSON_TIME {
+            return Err(Error::Device { status: Box::new(*status) });
+        }
+        self.acts_left += 1;
+        self.clear(0)
+    }
+
+    fn clear(&mut self, nodes: u8) -> Result<(), Error> {
+        self.session.clear(true, nodes)?;
+        self.session.pause_for(EFFECT, &self.ended)
+    }
+
+    fn reset_nodes(&mut self, nodes: u8) -> Result<(), Error> {
+        (self.say)(&RecoverStep::Reset(names(nodes)));
+        self.session.reset(nodes)?;
+        self.session.pause_for(BOOT, &self.ended)
     }
 }
 
@@ -289,7 +362,8 @@ impl ParameterSource<'_> {
         match self {
             _ if status.jtc_init != 0 => None,
             ParameterSource::Arm { name, .. } => {
-                matches!(status.fsm, 2..=4).then(|| RecoverStep::KeepHolding((*name).to_owned()))
+                let held = [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching];
+                status.state.is_in(&held).then(|| RecoverStep::KeepHolding((*name).to_owned()))
             }
             ParameterSource::None | ParameterSource::ControllerDefaults => Some(RecoverStep::Keep),
         }

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
-use jtc_wire::{DataStatus, EncodeError, FrameStatus, RawPoint, Response, STATUS_LEN};
+use jtc_wire::{DataStatus, EncodeError, FrameStatus, RawPoint, Response, STATUS_LEN, TrajectoryState};
 
 use super::{Flow, Session};
 use crate::check::CheckedTrajectory;
@@ -274,17 +274,17 @@ impl<P: Port> Session<P> {
             confirmed: up.confirmed,
             segments: up.frames.len(),
             restarts: up.restarts,
-            tes: self.last.map_or(0, |s| s.tes),
+            trajectory: self.last.map_or(TrajectoryState::Null.into(), |s| s.trajectory),
         }
     }
 
     /// The controller has the whole trajectory.
     fn complete(&mut self) -> Result<bool, Error> {
-        if self.last.is_some_and(|s| s.tes == 1) {
+        if self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop) {
             return Ok(true);
         }
         for _ in 0..8 {
-            if self.next_status()?.tes == 1 {
+            if self.next_status()?.trajectory == TrajectoryState::Stop {
                 return Ok(true);
             }
         }
@@ -361,7 +361,10 @@ impl<P: Port> Session<P> {
             self.next_status()?;
         }
         // All sent and complete: only confirmations were lost. (TES is Null since segment 0 was confirmed.)
-        if up.next == up.frames.len() && up.confirmed > 0 && self.last.is_some_and(|s| s.tes == 1) {
+        if up.next == up.frames.len()
+            && up.confirmed > 0
+            && self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop)
+        {
             while up.confirmed < up.frames.len() {
                 up.confirm();
             }

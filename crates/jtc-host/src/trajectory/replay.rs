@@ -7,15 +7,13 @@ use std::path::Path;
 
 use jtc_core::JOINTS;
 
+use jtc_wire::TrajectoryState;
+
 use super::fit::Samples;
 use super::{Form, Loaded, Point};
 use crate::file::{FileError, Place};
 use crate::recording::{Recording, RecordingError};
 use crate::sample::Sample;
-
-/// States of execution, as on the wire.
-const EXECUTE: u8 = jtc_core::Tes::Execute as u8;
-const FINISH: u8 = jtc_core::Tes::Finish as u8;
 
 /// Points further apart than this are left as they are, ms.
 const GRID_MS: u32 = 10;
@@ -95,14 +93,16 @@ impl Seen {
 fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
     let mut path = Seen::default();
     for sample in samples {
-        let place = match (sample.tes, path.points.last()) {
-            (EXECUTE, _) => Point {
+        let place = match (sample.trajectory.known(), path.points.last()) {
+            (Some(TrajectoryState::Execute), _) => Point {
                 position: sample.joints.map(|joint| joint.set_position),
                 velocity: sample.joints.map(|joint| joint.set_velocity),
                 acceleration: sample.joints.map(|joint| joint.set_acceleration),
             },
             // The set values are known on the path only. It ends at rest, nearly where it was a moment before.
-            (FINISH, Some(place)) => Point { position: place.position, ..Point::default() },
+            (Some(TrajectoryState::Finish), Some(place)) => {
+                Point { position: place.position, ..Point::default() }
+            }
             _ => continue,
         };
         if place.position.iter().any(|q| !q.is_finite()) || path.ms.last() == Some(&sample.point) {
@@ -137,27 +137,29 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
 
 #[cfg(test)]
 mod tests {
+    use TrajectoryState::{Execute, Finish, Pause, Stop};
+
     use super::*;
     use crate::sample::JointSample;
 
     /// A sample at `point` with the set positions of a smooth path of 2 s.
-    fn sample(tes: u8, point: u32) -> Sample {
+    fn sample(trajectory: TrajectoryState, point: u32) -> Sample {
         let s = f64::from(point) / 2_000.0;
         let q = 0.3 * s * s * (3.0 - 2.0 * s);
         let joint = JointSample { set_position: q, position: q + 1e-4, ..JointSample::UNKNOWN };
         // The host's times are of no use in virtual time.
-        Sample { tes, point, joints: [joint; JOINTS], ..Sample::default() }
+        Sample { trajectory: trajectory.into(), point, joints: [joint; JOINTS], ..Sample::default() }
     }
 
     #[test]
     fn the_path_is_found_by_the_point_index_over_pauses_and_lost_samples() {
-        let unknown = Sample { joints: [JointSample::UNKNOWN; JOINTS], ..sample(EXECUTE, 500) };
-        let pause = [sample(EXECUTE, 800), sample(2, 800), sample(EXECUTE, 800)];
-        let mut samples = vec![sample(1, 0), sample(EXECUTE, 0), sample(EXECUTE, 0), unknown];
-        samples.extend((0..20).map(|k| sample(EXECUTE, 40 * k)));
+        let unknown = Sample { joints: [JointSample::UNKNOWN; JOINTS], ..sample(Execute, 500) };
+        let pause = [sample(Execute, 800), sample(Pause, 800), sample(Execute, 800)];
+        let mut samples = vec![sample(Stop, 0), sample(Execute, 0), sample(Execute, 0), unknown];
+        samples.extend((0..20).map(|k| sample(Execute, 40 * k)));
         samples.extend(pause);
-        samples.extend((21..50).filter(|k| k % 7 != 0).map(|k| sample(EXECUTE, 40 * k)));
-        samples.extend([sample(FINISH, 2_000), sample(FINISH, 2_000)]);
+        samples.extend((21..50).filter(|k| k % 7 != 0).map(|k| sample(Execute, 40 * k)));
+        samples.extend([sample(Finish, 2_000), sample(Finish, 2_000)]);
         let loaded = executed(&samples).unwrap();
         assert_eq!(loaded.form, Form::Recording);
         assert!((loaded.trajectory.duration_s() - 2.0).abs() < 1e-9);
@@ -171,10 +173,10 @@ mod tests {
 
     #[test]
     fn of_several_executions_the_last_one_counts() {
-        let approach = (0..10).map(|k| sample(EXECUTE, 100 * k));
-        let motion = (0..4).map(|k| sample(EXECUTE, 50 * k));
+        let approach = (0..10).map(|k| sample(Execute, 100 * k));
+        let motion = (0..4).map(|k| sample(Execute, 50 * k));
         let loaded =
-            executed(&approach.chain([sample(FINISH, 1_000)]).chain(motion).collect::<Vec<_>>()).unwrap();
+            executed(&approach.chain([sample(Finish, 1_000)]).chain(motion).collect::<Vec<_>>()).unwrap();
         assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
     }
 
@@ -191,7 +193,7 @@ mod tests {
                 set_acceleration: w * w * x.cos(),
                 ..JointSample::UNKNOWN
             };
-            Sample { tes: EXECUTE, point: ms, joints: [joint; JOINTS], ..Sample::default() }
+            Sample { trajectory: Execute.into(), point: ms, joints: [joint; JOINTS], ..Sample::default() }
         };
         let loaded = executed(&(0..=60_000).map(at).collect::<Vec<_>>()).unwrap();
         assert!(loaded.trajectory.points.len() <= jtc_core::POINTS_MAX);
@@ -205,8 +207,8 @@ mod tests {
 
     #[test]
     fn a_recording_without_an_execution_is_refused() {
-        let held: Vec<Sample> = (0..9).map(|_| sample(1, 0)).collect();
+        let held: Vec<Sample> = (0..9).map(|_| sample(Stop, 0)).collect();
         assert!(executed(&held).unwrap_err().to_string().contains("no execution"));
-        assert!(executed(&[sample(EXECUTE, 0), sample(FINISH, 0)]).is_err());
+        assert!(executed(&[sample(Execute, 0), sample(Finish, 0)]).is_err());
     }
 }

@@ -1,6 +1,6 @@
 //! How the arm moves: a stop comes to its end, no joint races, and no torque stays at its limit.
 use jtc_bus::fsm;
-use jtc_core::{JOINTS, State, Tes};
+use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
 
 use super::{Broken, Moment};
@@ -30,7 +30,7 @@ pub(super) struct MotionWatch {
 
 impl MotionWatch {
     /// Look at a tick before which the execution state was `before`.
-    pub fn check(&mut self, moment: &Moment<'_>, before: Tes) -> Result<(), Broken> {
+    pub fn check(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         self.stop(moment, before)?;
         self.speed(moment)?;
         self.torque(moment)
@@ -38,22 +38,27 @@ impl MotionWatch {
 
     /// J-33: the arm stands in time, unless an error takes the torque away. Where a push leaves the torque limit too little to brake
     /// with, it has the time of an error.
-    fn stop(&mut self, moment: &Moment<'_>, before: Tes) -> Result<(), Broken> {
+    fn stop(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         let t = moment.telemetry;
         let ends = |worked: &Worked| {
             let pause = Worked::Exec(ExecCommand::Pause as u8);
             *worked == pause || *worked == Worked::Exec(ExecCommand::Stop as u8)
         };
-        let commanded = before == Tes::Execute && (t.braking || moment.worked.iter().any(ends));
-        let executes_again = before != Tes::Execute && t.tes == Tes::Execute;
-        let powered = matches!(t.state, State::HoldPos | State::Operate);
-        let stands = t.tes != Tes::Execute && moment.truth.qd.iter().all(|v| v.abs() < STANDS);
+        let commanded = before == TrajectoryState::Execute && (t.braking || moment.worked.iter().any(ends));
+        let executes_again = before != TrajectoryState::Execute && t.trajectory == TrajectoryState::Execute;
+        let powered = matches!(t.state, ControllerState::HoldPos | ControllerState::Operate);
+        let stands =
+            t.trajectory != TrajectoryState::Execute && moment.truth.qd.iter().all(|v| v.abs() < STANDS);
         let braking = u32::from(moment.config.braking_ms_max);
         self.stopping = match self.stopping {
             _ if !powered || stands || executes_again => None,
             None => commanded.then_some(0),
             // Once it has had all its time, an arm that is held and pushed is a matter of the other limits.
-            Some(ticks) if self.overpowered && t.tes != Tes::Execute && ticks >= braking => None,
+            Some(ticks)
+                if self.overpowered && t.trajectory != TrajectoryState::Execute && ticks >= braking =>
+            {
+                None
+            }
             Some(ticks) => Some(ticks + 1),
         };
         self.overpowered = self.stopping.is_some() && (self.overpowered || overpowered(moment));
@@ -91,7 +96,7 @@ impl MotionWatch {
             let enabled = powered(t.state) && t.joints[joint].fsm == fsm::ENABLED;
             self.enabled[joint] = if enabled { self.enabled[joint].saturating_add(1) } else { 0 };
             let caught = (1..=moment.config.catch_ms_max).contains(&self.enabled[joint]);
-            let catching = caught && t.state != State::Teaching;
+            let catching = caught && t.state != ControllerState::Teaching;
             let counted = at_limit(moment, joint) && powered(t.state) && !t.braking && !catching;
             self.saturated[joint] = self.saturated[joint] << 1 | u128::from(counted);
             let ticks = (self.saturated[joint] << (u128::BITS - WINDOW)).count_ones();
@@ -113,6 +118,6 @@ fn at_limit(moment: &Moment<'_>, joint: usize) -> bool {
 }
 
 /// The state commands torque.
-pub(super) fn powered(state: State) -> bool {
-    matches!(state, State::HoldPos | State::Operate | State::Teaching)
+pub(super) fn powered(state: ControllerState) -> bool {
+    matches!(state, ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching)
 }

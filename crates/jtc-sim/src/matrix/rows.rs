@@ -1,6 +1,6 @@
 //! What goes wrong in a row of the tables, and why nothing happens where nothing happens.
 use jtc_bus::GRIPPER;
-use jtc_core::State;
+use jtc_core::ControllerState;
 use jtc_wire::{FrameType, fixed};
 
 use crate::faults::{Fault, FaultKind, Trigger};
@@ -82,9 +82,9 @@ pub(super) struct Row {
 
 impl Row {
     /// What the cell says where there is no reaction; `None`: there should be one.
-    pub fn quiet(&self, state: State) -> Option<String> {
+    pub fn quiet(&self, state: ControllerState) -> Option<String> {
         match state {
-            State::HoldPos | State::Operate | State::Teaching => {
+            ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => {
                 self.held.map(|why| format!("goes on: {why}"))
             }
             _ => self.parked.map(|why| format!("no effect: {why}")),

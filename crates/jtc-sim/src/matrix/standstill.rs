@@ -1,5 +1,5 @@
 //! How far and how fast the arm goes after a fault in motion until it stands, with holding brakes and without.
-use jtc_core::{JOINTS, State, Tes};
+use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 
 use super::rows::{Act, ROWS, STOPS};
 use super::{MatrixError, words, world_in};
@@ -77,7 +77,7 @@ fn line(name: &str, act: Act) -> Result<String, MatrixError> {
 
 /// State and motion after `act`.
 fn motion(support: Support, act: Act) -> Result<(String, Motion), MatrixError> {
-    let mut operator = world_in(State::Operate, support)?;
+    let mut operator = world_in(ControllerState::Operate, support)?;
     let from = operator.world.truth().q;
     let (mut still, mut distance, mut speed) = (0, 0.0f64, 0.0f64);
     let mut motion = Motion::Moves;
@@ -95,7 +95,8 @@ fn motion(support: Support, act: Act) -> Result<(String, Motion), MatrixError> {
             break;
         }
         let telemetry = operator.world.telemetry();
-        let runs = telemetry.state == State::Operate && telemetry.tes == Tes::Execute;
+        let runs =
+            telemetry.state == ControllerState::Operate && telemetry.trajectory == TrajectoryState::Execute;
         if ms == WATCH_MS && runs {
             motion = Motion::GoesOn;
             break;
@@ -103,15 +104,22 @@ fn motion(support: Support, act: Act) -> Result<(String, Motion), MatrixError> {
     }
     let t = operator.world.telemetry();
     let joints = t.joints.iter().fold(0, |word, joint| word | joint.internal);
-    Ok((state_then(t.state, t.tes, t.errors, joints), motion))
+    Ok((state_then(t.state, t.trajectory, t.errors, joints), motion))
 }
 
 /// State, execution state where there is a path, and errors.
-pub(super) fn state_then(state: State, tes: Tes, errors: u16, joints: u16) -> String {
+pub(super) fn state_then(
+    state: ControllerState,
+    trajectory: TrajectoryState,
+    errors: u16,
+    joints: u16,
+) -> String {
     let words = words(errors, joints).join(", ");
-    match (state, tes) {
+    match (state, trajectory) {
         _ if !words.is_empty() => format!("{state:?} ({words})"),
-        (State::HoldPos, Tes::Pause | Tes::Stop) => format!("{state:?}, {tes:?}"),
+        (ControllerState::HoldPos, TrajectoryState::Pause | TrajectoryState::Stop) => {
+            format!("{state:?}, {trajectory:?}")
+        }
         _ => format!("{state:?}"),
     }
 }

@@ -1,5 +1,5 @@
 //! What makes sense in a motion only: commands that stop, on a bad line, near the torque limit, and with a payload.
-use jtc_core::{Parameters, State};
+use jtc_core::{ControllerState, Parameters};
 
 use super::MatrixError;
 use super::standstill::{Motion, state_then, stood_in_time, stop_lines};
@@ -74,10 +74,10 @@ impl Line {
             if suffices {
                 stood_in_time(&motion)?;
             }
-            if suffices != (o.state == State::HoldPos) {
+            if suffices != (o.state == ControllerState::HoldPos) {
                 return Err(MatrixError::NoStop { ms: None });
             }
-            Ok((state_then(o.state, o.tes, o.errors, o.joints), motion))
+            Ok((state_then(o.state, o.trajectory, o.errors, o.joints), motion))
         };
         let (brakes, stand) = (one(Support::Brakes)?, one(Support::Stand)?);
         Ok(Self { then: [brakes.0, stand.0], motion: [brakes.1, stand.1], sag })

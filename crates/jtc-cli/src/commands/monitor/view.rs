@@ -9,7 +9,7 @@ use cli_kit::figure;
 use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small};
 use jtc_host::sample::is_measured;
 use jtc_host::words;
-use jtc_wire::Status;
+use jtc_wire::{Code, ControllerState, Status};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -83,7 +83,7 @@ impl View {
 
     /// The failure of the port, with what is known of the motion.
     pub fn lost(&self, failure: Failure) -> Failure {
-        let moving = self.last.is_some_and(|s| s.tes == 3);
+        let moving = self.last.is_some_and(|s| s.is_executing());
         let message = format!("{}{}", failure.message, if moving { "; THE ARM MAY BE MOVING" } else { "" });
         Failure { message, ..failure }
     }
@@ -147,11 +147,11 @@ impl View {
     fn head(&self, width: u16, link: bool) -> Vec<Line<'static>> {
         let Some(s) = &self.last else { return vec![Line::from(self.port.clone()).dark_gray()] };
         if self.silent.is_some() {
-            let was = format!("last state {}, trajectory {}", words::state(s.fsm), words::tes(s.tes));
+            let was = format!("last state {}, trajectory {}", s.state.name(), s.trajectory.name());
             return vec![Line::from(was).dark_gray()];
         }
-        let state = Span::styled(format!(" {} ", words::state(s.fsm)), state_style(s.fsm));
-        let mut line = vec![state, Span::raw(" trajectory "), words::tes(s.tes).bold()];
+        let state = Span::styled(format!(" {} ", s.state.name()), state_style(s.state));
+        let mut line = vec![state, Span::raw(" trajectory "), s.trajectory.name().bold()];
         line.push(Span::raw(format!(" {:.2} s", f64::from(s.point) * 1e-3)));
         let mut lines = vec![Line::from(line)];
         if link {
@@ -170,14 +170,14 @@ impl View {
             (None, None) => (Vec::new(), vec!["waiting for a status".into()], String::new()),
             (None, Some(time)) => (vec![silence(time)], Vec::new(), "jtc doctor".into()),
             (Some(s), Some(time)) => {
-                let moving = if s.tes == 3 { "; THE ARM MAY BE MOVING" } else { "" };
+                let moving = if s.is_executing() { "; THE ARM MAY BE MOVING" } else { "" };
                 let cause = format!("{}, what was received before is not shown{moving}", silence(time));
                 (vec![cause], Vec::new(), "jtc doctor".into())
             }
             (Some(s), None) => {
                 let causes = words::causes(s);
                 let mut warnings = words::warnings(s);
-                if causes.is_empty() && s.fsm <= 1 {
+                if causes.is_empty() && s.is_coming_up() {
                     warnings.insert(0, words::waiting_for(s));
                 }
                 (causes, warnings, words::next_step(s).to_owned())
@@ -206,13 +206,13 @@ fn part(lines: Vec<Line<'static>>, title: &str, framed: bool) -> Paragraph<'stat
     if framed { paragraph.block(panel(title)) } else { paragraph }
 }
 
-fn state_style(fsm: u8) -> Style {
-    let colour = match fsm {
-        2 => Color::Rgb(47, 131, 124),
-        3 => Color::Rgb(63, 111, 224),
-        4 => Color::Rgb(125, 87, 201),
-        5 => Color::Rgb(201, 70, 59),
-        _ => Color::Rgb(86, 97, 115),
+fn state_style(state: Code<ControllerState>) -> Style {
+    let colour = match state.known() {
+        Some(ControllerState::HoldPos) => Color::Rgb(47, 131, 124),
+        Some(ControllerState::Operate) => Color::Rgb(63, 111, 224),
+        Some(ControllerState::Teaching) => Color::Rgb(125, 87, 201),
+        Some(ControllerState::Error) => Color::Rgb(201, 70, 59),
+        Some(ControllerState::Start | ControllerState::Init) | None => Color::Rgb(86, 97, 115),
     };
     Style::new().bg(colour).fg(Color::White).add_modifier(Modifier::BOLD)
 }

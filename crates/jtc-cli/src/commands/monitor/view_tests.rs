@@ -1,4 +1,5 @@
 use cli_kit::Key;
+use jtc_wire::TrajectoryState;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
@@ -9,7 +10,12 @@ const SIZES: [(u16, u16); 6] = [(40, 12), (60, 20), (80, 24), (90, 28), (120, 40
 
 /// Joint 3 fell silent while the arm was held.
 fn silent() -> Status {
-    let mut s = Status { fsm: 5, errors: 0x2A, can_current: 1 << 10, ..Status::default() };
+    let mut s = Status {
+        state: ControllerState::Error.into(),
+        errors: 0x2A,
+        can_current: 1 << 10,
+        ..Status::default()
+    };
     for (j, joint) in s.joints.iter_mut().enumerate() {
         joint.fsm = 3;
         joint.position = 0.1 + j as f32;
@@ -78,7 +84,13 @@ fn a_joint_without_measurement_has_no_number_and_is_named_first() {
 /// However much is wrong: the first cause and the next command are whole, and all of the rest can be scrolled to.
 #[test]
 fn no_cause_is_cut_and_none_vanishes() {
-    let mut s = Status { fsm: 5, errors: 0xFF, jtc_init: 7, can_current: 0x101, ..Status::default() };
+    let mut s = Status {
+        state: ControllerState::Error.into(),
+        errors: 0xFF,
+        jtc_init: 7,
+        can_current: 0x101,
+        ..Status::default()
+    };
     for joint in &mut s.joints {
         (joint.fsm, joint.internal, joint.mc_current, joint.warnings) = (255, 0x3F, 0x41, 7);
     }
@@ -107,7 +119,7 @@ fn no_cause_is_cut_and_none_vanishes() {
 /// A joint with a fault leads the table; of its words those that have room are shown whole, and the others are counted.
 #[test]
 fn a_joint_with_a_fault_leads_the_table() {
-    let mut s = Status { fsm: 5, errors: 0x98, ..Status::default() };
+    let mut s = Status { state: ControllerState::Error.into(), errors: 0x98, ..Status::default() };
     (s.joints[3].fsm, s.joints[3].errors, s.joints[3].mc_current) = (255, 2, 0x40);
     for size in SIZES {
         let rows = drawn(&mut of(s), size);
@@ -128,7 +140,13 @@ fn a_joint_with_a_fault_leads_the_table() {
 /// `jtc explain` has a page for each cause and each warning, as it is shown.
 #[test]
 fn every_cause_is_explained() {
-    let mut s = Status { fsm: 5, errors: 0xFF, jtc_init: 7, can_current: 0x7F01, ..Status::default() };
+    let mut s = Status {
+        state: ControllerState::Error.into(),
+        errors: 0xFF,
+        jtc_init: 7,
+        can_current: 0x7F01,
+        ..Status::default()
+    };
     s.gripper = Some(jtc_wire::GripperStatus { errors: 0x0F, warnings: 0x0F, ..Default::default() });
     for (n, joint) in s.joints.iter_mut().enumerate() {
         (joint.fsm, joint.internal, joint.errors) = (254 + (n as u8 & 1), 0x3F, 0x0F);
@@ -144,7 +162,8 @@ fn every_cause_is_explained() {
 fn a_silent_controller_shows_no_old_value() {
     for size in SIZES {
         let mut s = silent();
-        (s.fsm, s.tes, s.errors, s.can_current) = (3, 3, 0, 0);
+        (s.state, s.trajectory, s.errors, s.can_current) =
+            (ControllerState::Operate.into(), TrajectoryState::Execute.into(), 0, 0);
         let mut view = of(s);
         view.silent = Some(Duration::from_secs(3));
         let rows = drawn(&mut view, size);
@@ -180,7 +199,8 @@ fn a_terminal_that_is_too_small_says_the_size_that_is_needed() {
 /// A gripper that does not answer has no pump that stands.
 #[test]
 fn a_silent_gripper_looks_so() {
-    let mut s = Status { fsm: 5, errors: 0x20, can_current: 1 << 14, ..silent() };
+    let mut s =
+        Status { state: ControllerState::Error.into(), errors: 0x20, can_current: 1 << 14, ..silent() };
     s.gripper = Some(jtc_wire::GripperStatus { fsm: 3, ..Default::default() });
     for size in SIZES {
         let all = scrolled(&mut of(s), size);

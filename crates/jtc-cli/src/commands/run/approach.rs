@@ -10,7 +10,7 @@ use jtc_wire::Status;
 use serde_json::json;
 
 use super::super::traj::{Job, typed};
-use super::{APPROACH, pose};
+use super::APPROACH;
 use crate::args::RunArgs;
 use crate::failure::{Failure, REFUSED};
 
@@ -21,7 +21,7 @@ pub fn approach(
     args: &RunArgs,
     out: &Output,
 ) -> Result<CheckedTrajectory, Failure> {
-    let here = pose(status);
+    let here = status.positions();
     let first = job.trajectory.points.first().map_or(here, |p| p.position);
     // Half of the limits: nobody has looked at this path for obstacles.
     let speed = args.check.speed.min(50.0);

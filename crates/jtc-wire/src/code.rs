@@ -1,0 +1,95 @@
+//! Bytes that stand for one of a closed list: states, kinds.
+use core::fmt;
+use core::marker::PhantomData;
+
+/// A closed list of codes with their names.
+pub trait Known: Copy + Eq + fmt::Debug + 'static {
+    /// Every one, in the order of the codes.
+    const ALL: &'static [Self];
+    /// What a code is called that is none of them.
+    const UNKNOWN: &'static str;
+
+    /// The byte on the wire.
+    fn code(self) -> u8;
+
+    /// Name, as every program prints it.
+    fn name(self) -> &'static str;
+}
+
+/// A code as it was received: one of `T`, or one that this version does not know.
+///
+/// It is compared with what is known, never with a number.
+///
+/// ```
+/// use jtc_wire::{Code, ControllerState};
+///
+/// let state = Code::new(2);
+/// assert!(state == ControllerState::HoldPos);
+/// assert_eq!(state.to_string(), "HoldPos");
+/// assert_eq!(Code::<ControllerState>::new(9).known(), None);
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Code<T> {
+    byte: u8,
+    list: PhantomData<T>,
+}
+
+impl<T: Known> Code<T> {
+    /// The code of a received byte.
+    pub const fn new(byte: u8) -> Self {
+        Self { byte, list: PhantomData }
+    }
+
+    /// The byte on the wire.
+    pub const fn byte(self) -> u8 {
+        self.byte
+    }
+
+    /// Which one it is; `None` when this version does not know it.
+    pub fn known(self) -> Option<T> {
+        T::ALL.iter().copied().find(|known| known.code() == self.byte)
+    }
+
+    /// It is one of `wanted`.
+    pub fn is_in(self, wanted: &[T]) -> bool {
+        wanted.iter().any(|&wanted| self == wanted)
+    }
+
+    /// Name, as every program prints it.
+    pub fn name(self) -> &'static str {
+        self.known().map_or(T::UNKNOWN, T::name)
+    }
+}
+
+impl<T: Known> PartialEq<T> for Code<T> {
+    fn eq(&self, other: &T) -> bool {
+        self.byte == other.code()
+    }
+}
+
+impl<T: Known> From<T> for Code<T> {
+    fn from(known: T) -> Self {
+        Self::new(known.code())
+    }
+}
+
+impl<T: Known + Default> Default for Code<T> {
+    fn default() -> Self {
+        T::default().into()
+    }
+}
+
+impl<T: Known> fmt::Display for Code<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl<T: Known> fmt::Debug for Code<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.known() {
+            Some(known) => known.fmt(f),
+            None => write!(f, "{}", self.byte),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! States of the controller and of its trajectory: code, name and meaning of each, in one table.
+use crate::code::Known;
+
+/// Declares an enum of codes and what is known of each.
+macro_rules! states {
+    ($(#[$doc:meta])* $list:ident, $unknown:literal: $($(#[$meaning:meta])* $name:ident = $code:literal,)*) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+        #[repr(u8)]
+        pub enum $list {
+            $($(#[$meaning])* $name = $code,)*
+        }
+
+        impl Known for $list {
+            const ALL: &'static [Self] = &[$(Self::$name,)*];
+            const UNKNOWN: &'static str = $unknown;
+
+            fn code(self) -> u8 {
+                self as u8
+            }
+
+            fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => stringify!($name),)*
+                }
+            }
+        }
+    };
+}
+
+states! {
+    /// State of the controller.
+    ControllerState, "unknown state":
+    /// Set-up is not complete.
+    #[default]
+    Start = 0,
+    /// Nodes are brought up, parameters are awaited; zero torque.
+    Init = 1,
+    /// Holds a position.
+    HoldPos = 2,
+    /// Follows the trajectory.
+    Operate = 3,
+    /// Gravity compensation only.
+    Teaching = 4,
+    /// Zero torque until the cause is gone and the host has cleared.
+    Error = 5,
+}
+
+impl ControllerState {
+    /// Torque is commanded: without it the arm falls.
+    pub fn has_torque(self) -> bool {
+        matches!(self, Self::HoldPos | Self::Operate | Self::Teaching)
+    }
+}
+
+states! {
+    /// What becomes of the trajectory, "trajectory execution state" (TES) in manuals.
+    TrajectoryState, "unknown":
+    /// No trajectory.
+    #[default]
+    Null = 0,
+    /// Complete, at its start.
+    Stop = 1,
+    /// Paused on the path.
+    Pause = 2,
+    /// Being executed (until standstill).
+    Execute = 3,
+    /// Executed to its last point.
+    Finish = 4,
+    /// Being received. Only older controllers report it.
+    TransNullToStop = 5,
+}

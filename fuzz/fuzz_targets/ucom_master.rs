@@ -1,2 +1,2 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ucom::master::fuzzing::frames(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ucom_host::master::fuzzing::frames(data));

@@ -1,2 +1,2 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ucom::fuzzing::node(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ucom_sim::fuzzing::node(data));

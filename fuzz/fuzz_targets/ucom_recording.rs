@@ -1,2 +1,2 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| ucom::files::fuzzing::recording(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| ucom_host::files::fuzzing::recording(data));

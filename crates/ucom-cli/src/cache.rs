@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use ucom::files::{BoardEdges, EdgeTable};
-use ucom::master::io::{DescriptionKey, IoDescription};
-use ucom::master::{Outcome, Request};
 use ucom::{BoardInfo, Profile};
+use ucom_host::files::{BoardEdges, EdgeTable};
+use ucom_host::master::io::{DescriptionKey, IoDescription};
+use ucom_host::master::{Outcome, Request};
 
 use crate::args::{Boards, CacheArgs, LinkArgs};
 use crate::commands::seen;

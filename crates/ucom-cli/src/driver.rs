@@ -6,7 +6,7 @@ use std::time::Duration;
 use cli_kit::{Lines, Stop};
 use serde_json::{Value, json};
 use ucom::Profile;
-use ucom::master::{
+use ucom_host::master::{
     Error, Event, Master, Outcome, ProcedureId, Request, ScanFinding, StopLevel, Supervision,
 };
 

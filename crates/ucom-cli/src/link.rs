@@ -3,8 +3,9 @@
 use std::time::{Duration, Instant};
 
 use can_link::{CanBus, CanFrame, ControllerState, Id};
-use ucom::files::recording::{FrameKind, RecordedFrame};
 use ucom::{Foreign, Format, Frame, Profile};
+use ucom_host::ProfileFile;
+use ucom_host::files::recording::{FrameKind, RecordedFrame};
 
 use crate::args::LinkArgs;
 use crate::bus_off::BusOff;

@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-use ucom::master::Master;
 use ucom::{Foreign, Frame};
+use ucom_host::master::Master;
 
 use crate::failure::Failure;
 
@@ -97,7 +97,7 @@ mod tests {
     use std::collections::VecDeque;
 
     use ucom::Profile;
-    use ucom::master::{Event, Outcome, Request};
+    use ucom_host::master::{Event, Outcome, Request};
 
     use super::*;
 
@@ -138,7 +138,11 @@ mod tests {
         }
 
         /// Runs a request to its end.
-        fn run(&mut self, master: &mut Master, request: Request) -> Result<Outcome, ucom::master::Error> {
+        fn run(
+            &mut self,
+            master: &mut Master,
+            request: Request,
+        ) -> Result<Outcome, ucom_host::master::Error> {
             let mut pump = Pump::default();
             let id = master.start(self.now, request).unwrap();
             while self.now < 100_000_000 {
@@ -224,7 +228,7 @@ mod tests {
         let mut master = Master::new(Profile::default());
         master.begin_session(0);
         let result = bench.run(&mut master, Request::Info { board: 9 });
-        assert!(matches!(result, Err(ucom::master::Error::NoAnswer { board: 9, .. })), "{result:?}");
+        assert!(matches!(result, Err(ucom_host::master::Error::NoAnswer { board: 9, .. })), "{result:?}");
         let alive = bench.times_of("680#");
         assert!(bench.now < 10_000_000, "{} µs", bench.now);
         assert!(alive.len() as u64 >= bench.now / 500_000, "{alive:?} up to {}", bench.now);

@@ -2,8 +2,8 @@
 
 use cli_kit::table;
 use serde_json::{Value, json};
-use ucom::master::BoardSeen;
 use ucom::{BoardInfo, Profile, Status};
+use ucom_host::master::BoardSeen;
 
 /// A flash date as text, `2026-05-04`; the bare number where the profile's form does not fit.
 pub fn date(profile: &Profile, date: u16) -> String {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use cli_kit::Stop;
 use cli_kit::exit::FAULT;
-use ucom::master::{Request, StopLevel};
+use ucom_host::master::{Request, StopLevel};
 
 /// What is left undone if the process ends now: what, and the next command.
 type Left = (String, String);
@@ -188,8 +188,8 @@ fn left_by(request: &Request) -> Option<Left> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ucom::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
-    use ucom::master::{RunBoard, RunOptions};
+    use ucom_host::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
+    use ucom_host::master::{RunBoard, RunOptions};
 
     fn stop(board: u8) -> Request {
         Request::Stop { board, level: StopLevel::Application, force: true }

@@ -3,10 +3,10 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use ucom::files::EdgeTable;
-use ucom::files::edges::ValueError;
-use ucom::master::io::Kind;
-use ucom::master::{Outcome, Request, Setting, StopLevel};
+use ucom_host::files::EdgeTable;
+use ucom_host::files::edges::ValueError;
+use ucom_host::master::io::Kind;
+use ucom_host::master::{Outcome, Request, Setting, StopLevel};
 
 use crate::args::{Assignment, CacheArgs};
 use crate::cache::Known;

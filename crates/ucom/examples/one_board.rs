@@ -2,9 +2,9 @@
 //!
 //! `cargo run -p ucom --example one_board` prints the frames with their times; `<` is the PC, `>` the board.
 
-use ucom::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Admin, Frame, Profile, Sequence, ToBoard};
+use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
 fn main() {
     let profile = Profile::default();

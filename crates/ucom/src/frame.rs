@@ -63,6 +63,12 @@ impl Payload {
     }
 }
 
+impl From<[u8; 8]> for Payload {
+    fn from(data: [u8; 8]) -> Self {
+        Self { len: 8, data }
+    }
+}
+
 /// A classic CAN data frame with an 11-bit identifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {

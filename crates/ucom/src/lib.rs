@@ -1,10 +1,9 @@
-//! UCoM over CAN: codec, compatibility profile, the board's state machine and the PC's procedures, without any
-//! I/O.
+//! UCoM over CAN, for boards and PCs: codec, compatibility profile and the board's state machine, without any I/O.
 //!
 //! A PC talks to up to 31 motor boards (UCoM, a DSP each) on one classic CAN bus. [`ToBoard`] and [`FromBoard`]
 //! are the messages of both directions, made from and into a [`Frame`]; a [`Profile`] says how a board reads
 //! what the published description leaves open. [`node`] is the board side, usable in a board's firmware as it
-//! is; `master` (feature `std`) is the PC side.
+//! is. The PC's side is the crate `ucom-host`, a chain of boards to try things with `ucom-sim`.
 //!
 //! ```
 //! use ucom::{Frame, FromBoard, Profile, Sequence, ToBoard};
@@ -23,7 +22,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-#[cfg(any(feature = "std", test))]
+#[cfg(test)]
 #[macro_use]
 extern crate std;
 
@@ -43,12 +42,6 @@ mod report;
 mod status;
 mod string;
 
-#[cfg(feature = "std")]
-pub mod chain;
-#[cfg(feature = "std")]
-pub mod files;
-#[cfg(feature = "std")]
-pub mod master;
 pub mod node;
 pub mod profile;
 

@@ -4,13 +4,13 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use can_link::{CanFrame, Happening, Id, MemberId, TimedBus};
-use ucom::chain::{ChainConfig, ChainSim};
-use ucom::files::{DbcBoard, dbc};
-use ucom::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
-use ucom::master::{Event, InitOptions, Master, Outcome, Request};
 use ucom::node::Node;
-use ucom::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 use ucom::{Format, Frame, FromBoard, Function, Profile, ToBoard};
+use ucom_host::files::{DbcBoard, dbc};
+use ucom_host::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
+use ucom_host::master::{Event, InitOptions, Master, Outcome, Request};
+use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+use ucom_sim::{ChainConfig, ChainSim};
 
 use crate::print;
 use crate::world::Result;

@@ -19,6 +19,8 @@ const REPORT: &str = "gamma-report.json";
 const COMMIT: &str = "commit";
 /// Crates that run on a board, those with the quickest tests first.
 const PACKAGES: [&str; 5] = ["jtc-bus", "jtc-dynamics", "jtc-wire", "ucom", "jtc-core"];
+/// Crates whose tests judge the mutants of `ucom`: its board is tried from the PC's side as well.
+const JUDGES_OF_UCOM: [&str; 3] = ["ucom", "ucom-sim", "ucom-host"];
 /// At most this share of a crate's mutants may be left alive, with a sentence or without.
 const SURVIVING_MAX: f64 = 0.03;
 
@@ -123,6 +125,9 @@ fn campaign(package: &str, survivors: bool, resume: bool) -> Result<()> {
         gamma.arg("--resume-testing");
     } else {
         gamma.args(["--package", package]);
+        if package == "ucom" {
+            gamma.args(JUDGES_OF_UCOM.iter().flat_map(|judge| ["--test-package", judge]));
+        }
     }
     if survivors {
         gamma.arg("--only-survivors");

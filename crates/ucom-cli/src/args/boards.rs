@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use ucom::files::Given;
+use ucom_host::files::Given;
 
 /// Which boards are meant: numbers, a list, ranges, or all.
 #[derive(Clone, Debug, Eq, PartialEq)]

@@ -2,8 +2,8 @@
 
 use cli_kit::Output;
 use serde_json::json;
-use ucom::master::{BoardSeen, Outcome, RawStatus, Reports, Request, StopLevel, counted};
 use ucom::{BoardInfo, Profile, Status};
+use ucom_host::master::{BoardSeen, Outcome, RawStatus, Reports, Request, StopLevel, counted};
 
 use crate::args::{ActArgs, Boards, BoardsArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
 use crate::driver::{Driver, shared_numbers, unexpected};

@@ -2,8 +2,8 @@
 
 use cli_kit::{Output, OutputFile};
 use serde_json::json;
-use ucom::files::{Inventory, InventoryBoard};
-use ucom::master::{InitOptions, InitReport, Outcome, Request, ScanFinding, counted};
+use ucom_host::files::{Inventory, InventoryBoard};
+use ucom_host::master::{InitOptions, InitReport, Outcome, Request, ScanFinding, counted};
 
 use crate::args::{InitArgs, LinkArgs};
 use crate::driver::{Driver, nothing_shared, unexpected};

@@ -6,11 +6,11 @@ use std::path::Path;
 use cli_kit::Output;
 use serde_json::json;
 use ucom::Profile;
-use ucom::files::{Image, ImageOptions, Inventory};
-use ucom::master::conformance::{
+use ucom_host::files::{Image, ImageOptions, Inventory};
+use ucom_host::master::conformance::{
     ConformanceOptions, ConformanceProgram, ConformanceReport, ConformanceTest, Verdict, test_names,
 };
-use ucom::master::{Outcome, Request};
+use ucom_host::master::{Outcome, Request};
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
 use crate::driver::{Driver, unexpected};

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use cli_kit::{Output, Stop};
 use serde_json::json;
-use ucom::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
+use ucom_host::ProfileFile;
+use ucom_host::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 
 use super::record::tell_broken_off;
 use crate::args::{DecodeArgs, LinkArgs};

@@ -5,10 +5,11 @@ use std::time::{Duration, Instant};
 use can_link::ErrorState;
 use cli_kit::{Output, OutputFile};
 use serde_json::json;
-use ucom::files::{Image, ImageOptions};
-use ucom::master::doctor::{Controller, Finding, Observation, Severity, findings};
-use ucom::master::probe::ProbeOptions;
-use ucom::master::{Event, Outcome, Request};
+use ucom_host::ProfileFile;
+use ucom_host::files::{Image, ImageOptions};
+use ucom_host::master::doctor::{Controller, Finding, Observation, Severity, findings};
+use ucom_host::master::probe::ProbeOptions;
+use ucom_host::master::{Event, Outcome, Request};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};

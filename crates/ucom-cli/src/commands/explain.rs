@@ -229,7 +229,7 @@ pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use ucom::Status;
-    use ucom::master::{Board, Life};
+    use ucom_host::master::{Board, Life};
 
     use super::super::monitor::{doing, life};
     use super::super::monitor_boards::BITS;

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use ucom::Status;
-use ucom::master::io::Snapshot;
-use ucom::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
+use ucom_host::master::io::Snapshot;
+use ucom_host::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
 
 use crate::failure::{FAULT, Failure};
 

@@ -10,11 +10,11 @@ use crate::failure::Failure;
 /// Prints a page, or the program's own help.
 pub fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {
     let text = match topic {
-        Some(Topic::Profile) => ucom::profile::help(),
-        Some(Topic::Sim) => ucom::chain::help(),
-        Some(Topic::Faults) => ucom::chain::FAULT_HELP.to_owned(),
-        Some(Topic::Edges) => ucom::files::edges::EDGE_HELP.to_owned(),
-        Some(Topic::Params) => ucom::files::params::PARAMS_HELP.to_owned(),
+        Some(Topic::Profile) => ucom_host::profile_help(),
+        Some(Topic::Sim) => ucom_sim::help(),
+        Some(Topic::Faults) => ucom_sim::FAULT_HELP.to_owned(),
+        Some(Topic::Edges) => ucom_host::files::edges::EDGE_HELP.to_owned(),
+        Some(Topic::Params) => ucom_host::files::params::PARAMS_HELP.to_owned(),
         None => Cli::command().render_long_help().to_string(),
     };
     out.result(&json!({ "text": text }), || text.clone());

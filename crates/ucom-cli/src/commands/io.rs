@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 
 use cli_kit::{Output, table};
 use serde_json::{Value, json};
-use ucom::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
-use ucom::master::io::{IoDescription, Kind};
-use ucom::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel, counted};
+use ucom_host::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
+use ucom_host::master::io::{IoDescription, Kind};
+use ucom_host::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel, counted};
 
 use super::followed::Followed;
 use super::outputs::{named, units};

@@ -7,7 +7,7 @@ use cli_kit::view::Scroll;
 use cli_kit::{Key, Lines, Output, Screen};
 use serde_json::{Value, json};
 use ucom::Profile;
-use ucom::master::{Board, Event, Life, Request};
+use ucom_host::master::{Board, Event, Life, Request};
 
 use super::doctor::controller;
 use super::monitor_view::{self as view, ForeignMaster};

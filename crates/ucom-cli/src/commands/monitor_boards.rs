@@ -5,7 +5,7 @@ use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::Span;
 use ratatui::widgets::{Cell, Row, Table};
 use ucom::Status;
-use ucom::master::{Board, Life, Statistics};
+use ucom_host::master::{Board, Life, Statistics};
 
 use super::monitor::{age_s, doing, is_known, life};
 use super::monitor_view::Picture;

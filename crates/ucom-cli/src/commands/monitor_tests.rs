@@ -2,7 +2,7 @@ use cli_kit::Key;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ucom::Profile;
-use ucom::master::{Event, Master, Request};
+use ucom_host::master::{Event, Master, Request};
 
 use super::*;
 

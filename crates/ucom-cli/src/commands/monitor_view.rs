@@ -8,8 +8,8 @@ use ratatui::style::{Color, Style, Stylize};
 use ratatui::text::Line;
 use ratatui::widgets::{Paragraph, Sparkline};
 use ucom::Function;
-use ucom::master::doctor::{Controller, Observation, Severity, findings};
-use ucom::master::{Boards, Statistics};
+use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
+use ucom_host::master::{Boards, Statistics};
 
 use super::monitor::Watch;
 use super::monitor_boards::{self as rows, WIDE};

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use cli_kit::{Lines, Output};
 use serde_json::{Map, Value, json};
-use ucom::files::Edge;
-use ucom::master::Event;
-use ucom::master::io::{Kind, Snapshot, short};
+use ucom_host::files::Edge;
+use ucom_host::master::Event;
+use ucom_host::master::io::{Kind, Snapshot, short};
 
 use crate::args::{LinkArgs, SoArgs};
 use crate::cache::Known;

@@ -5,13 +5,13 @@ use std::path::Path;
 use cli_kit::{Output, OutputFile, table};
 use serde_json::{Value, json};
 use ucom::Status;
-use ucom::files::params::{
+use ucom_host::files::params::{
     ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, ParamsWord, SavedBoard,
     SavedEdge, check_board, check_identity, params_text,
 };
-use ucom::files::{EdgeTable, Inventory};
-use ucom::master::io::{Kind, ParValue};
-use ucom::master::{AdminChange, Outcome, Request, counted};
+use ucom_host::files::{EdgeTable, Inventory};
+use ucom_host::master::io::{Kind, ParValue};
+use ucom_host::master::{AdminChange, Outcome, Request, counted};
 
 use super::seen;
 use crate::args::{Boards, LinkArgs, ParArgs};
@@ -215,7 +215,7 @@ pub fn deliver(
         return Ok(());
     };
     // Whole or not at all: what was there is people's own work.
-    ucom::files::write_text(file.path(), text).map_err(Failure::usage)?;
+    ucom_host::files::write_text(file.path(), text).map_err(Failure::usage)?;
     let name = file.name();
     file.is_written();
     result["file"] = json!(name);

@@ -1,7 +1,7 @@
 //! With which inputs and parameters `ucom run` starts each board.
 
-use ucom::master::io::Kind;
-use ucom::master::{RunBoard, Setting};
+use ucom_host::master::io::Kind;
+use ucom_host::master::{RunBoard, Setting};
 
 use super::params::Applied;
 use crate::args::{Assignment, RunArgs};

@@ -5,11 +5,12 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use cli_kit::{Output, OutputFile, Stop};
 use serde_json::json;
-use ucom::files::recording::{
+use ucom_host::ProfileFile;
+use ucom_host::files::recording::{
     CandumpWriter, Record, RecordedFrame, Recording, RecordingError, RecordingFormat, RecordingWriter,
     profile_path,
 };
-use ucom::master::{Master, counted};
+use ucom_host::master::{Master, counted};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
@@ -29,7 +30,7 @@ enum Sink {
 }
 
 impl Sink {
-    fn write(&mut self, record: &Record, name: &str) -> Result<(), ucom::files::RecordingError> {
+    fn write(&mut self, record: &Record, name: &str) -> Result<(), ucom_host::files::RecordingError> {
         match self {
             Self::File(writer) => writer.write(record, Some(name)),
             Self::Stdout(writer) => writer.write(record),

@@ -1,8 +1,8 @@
 //! `ucom repair`: one board gets its number back, the others keep theirs.
 
 use serde_json::json;
-use ucom::files::Inventory;
-use ucom::master::{Outcome, Request};
+use ucom_host::files::Inventory;
+use ucom_host::master::{Outcome, Request};
 
 use cli_kit::Output;
 

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use cli_kit::{Lines, Output};
 use serde_json::json;
-use ucom::files::EdgeTable;
-use ucom::master::io::Kind;
-use ucom::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel, counted};
+use ucom_host::files::EdgeTable;
+use ucom_host::master::io::Kind;
+use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel, counted};
 
 use super::followed::{Followed, Said};
 use super::outputs::{finish, named, units};

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use cli_kit::Output;
 use serde_json::json;
-use ucom::files::recording::RecordedFrame;
+use ucom_host::files::recording::RecordedFrame;
 
 use super::decode::parsed;
 use super::record::is_intrusive;

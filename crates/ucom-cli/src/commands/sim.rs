@@ -11,9 +11,9 @@ use can_link::{
 };
 use cli_kit::{Output, Stop};
 use serde_json::json;
-use ucom::chain::{ChainConfig, ChainSim, Fault};
-use ucom::master::counted;
 use ucom::{Format, Frame, Profile};
+use ucom_host::master::counted;
+use ucom_sim::{ChainConfig, ChainSim, Fault};
 
 use crate::args::{LinkArgs, SimArgs};
 use crate::failure::Failure;

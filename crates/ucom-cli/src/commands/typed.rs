@@ -3,8 +3,8 @@
 use std::io::{BufRead, ErrorKind};
 use std::sync::mpsc::{Receiver, channel};
 
-use ucom::master::io::Kind;
-use ucom::master::{AdminChange, Request, Setting};
+use ucom_host::master::io::Kind;
+use ucom_host::master::{AdminChange, Request, Setting};
 
 use crate::args::{Assignment, RunArgs};
 use crate::driver::Driver;

@@ -2,11 +2,11 @@
 
 use cli_kit::Output;
 use ucom::Profile;
-use ucom::files::Inventory;
-use ucom::master::update::{
+use ucom_host::files::Inventory;
+use ucom_host::master::update::{
     UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult, UpdateTarget,
 };
-use ucom::master::{Outcome, Request};
+use ucom_host::master::{Outcome, Request};
 
 use super::update_bar::Bar;
 use super::update_files::{Files, day};

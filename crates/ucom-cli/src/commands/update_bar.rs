@@ -4,8 +4,8 @@ use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
 
 use cli_kit::{Output, ProgressBar};
-use ucom::master::Event;
-use ucom::master::update::Progress;
+use ucom_host::master::Event;
+use ucom_host::master::update::Progress;
 
 use crate::failure::{FAULT, Failure};
 

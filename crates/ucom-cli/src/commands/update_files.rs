@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use cli_kit::Output;
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
-use ucom::files::image::{AddressUnit, Format};
-use ucom::files::{Image, ImageOptions};
-use ucom::master::update::UpdateImage;
 use ucom::profile::{HeaderForm, Plan};
+use ucom_host::files::image::{AddressUnit, Format};
+use ucom_host::files::{Image, ImageOptions};
+use ucom_host::master::update::UpdateImage;
 
 use crate::args::{Addresses, UpdateArgs};
 use crate::failure::Failure;

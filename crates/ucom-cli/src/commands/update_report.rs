@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use cli_kit::{Output, table};
 use serde_json::{Value, json};
-use ucom::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult};
 use ucom::{BoardInfo, Memory, Profile};
+use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult};
 
 use super::update_files::has_header;
 use crate::shape::date;

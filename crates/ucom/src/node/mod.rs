@@ -4,8 +4,7 @@
 //! The caller hands in what was received ([`Node::receive`]), asks what to send ([`Node::poll`]) and says when
 //! that has left the controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`]
 //! tells until when nothing will happen by itself. Flash, pins, lasting memory and the application are traits
-//! ([`Flash`], [`Pins`], [`Store`], [`Application`]); `memory` (feature `std`) has all four for tests and
-//! simulations.
+//! ([`Flash`], [`Pins`], [`Store`], [`Application`]); the crate `ucom-sim` has all four in memory.
 //!
 //! The node offers one frame at a time: the next comes after `sent`. Strings and dumps are made frame by frame
 //! when the bus takes them, so a node needs no queue for them.
@@ -14,8 +13,6 @@ mod answers;
 mod application;
 mod config;
 mod hardware;
-#[cfg(feature = "std")]
-pub mod memory;
 mod outbox;
 mod programming;
 mod rate;

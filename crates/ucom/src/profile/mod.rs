@@ -1,16 +1,11 @@
 //! The compatibility profile: how a board reads what the published description leaves open.
 //!
 //! Each decision of this project has a key here, so that the same code can talk to a board that was built with
-//! another reading. [`KEYS`] lists them with default, range and meaning; [`Profile`] is the values. Reading and
-//! writing profile files needs feature `std`.
+//! another reading. [`KEYS`] lists them with default, range and meaning; [`Profile`] is the values.
 
-#[cfg(feature = "std")]
-mod file;
 mod keys;
 mod values;
 
-#[cfg(feature = "std")]
-pub use file::{ProfileFileError, help};
 pub use keys::{KEYS, Key, Kind, Profile};
 pub use values::{AliveMode, Broadcast, CiLatch, Endian, HeaderForm, OnLost, Plan, ReportMode};
 pub(crate) use values::{Value, words};

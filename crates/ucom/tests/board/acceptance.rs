@@ -171,7 +171,7 @@ fn d_t11_initial_inputs() {
     for endian in [Endian::Little, Endian::Big] {
         let mut bus = Bus::new(&[0x21], Profile { endian, ..Profile::default() });
         let names = ["a", "b", "c", "d", "e", "f", "g"];
-        bus.boards[0].application = ucom::node::memory::MemoryApplication::new("x", &names, &[], &[]);
+        bus.boards[0].application = ucom_sim::memory::MemoryApplication::new("x", &names, &[], &[]);
         bus.boards[0].application.initial_ci = (1..=7).collect();
         bus.number(1);
         bus.send("301#");

@@ -97,7 +97,7 @@ fn d34_latch_last() {
     let profile = Profile { ci_latch: CiLatch::Last, ..Profile::default() };
     let mut bus = Bus::new(&[0x21], profile);
     bus.boards[0].application =
-        ucom::node::memory::MemoryApplication::new("x", &["a", "b", "c", "d"], &[], &[]);
+        ucom_sim::memory::MemoryApplication::new("x", &["a", "b", "c", "d"], &[], &[]);
     bus.number(1);
     bus.send("301#");
     bus.run(50);

@@ -1,8 +1,8 @@
 //! A chain of boards on an in-memory bus, in virtual time.
 
-use ucom::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{BoardInfo, Frame, Header, Profile, checksum, data_block};
+use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
 pub type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
 

@@ -83,7 +83,7 @@ fn d20_a_million_random_frames() {
 /// The state of a board fits into 4 KiB beside its flash and its application's buffers.
 #[test]
 fn size_of_a_board() {
-    use ucom::node::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+    use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
     let parts = size_of::<MemoryFlash>()
         + size_of::<WirePins>()
         + size_of::<MemoryStore>()

@@ -1,0 +1,242 @@
+//! DBC files: the protocol's frames, and the process data of known boards by name, for cantools, SavvyCAN and the like.
+//!
+//! CI, SO and PAR are multiplexed by their buffer offset: the first word selects which three words follow (D-15).
+//! Packages of strings share an identifier with other frames and have no mark of their own, so DSP_INFO and the IO
+//! description show their first frame's fields; debug texts and program data are raw bytes.
+mod names;
+#[cfg(test)]
+mod tests;
+
+use std::fmt::Write;
+
+use super::edges::{BoardEdges, Edge, EdgeType};
+use crate::master::io::{IoDescription, Kind, short};
+use names::Names;
+use ucom::{Endian, Function, Sender, Sequence, Status};
+
+/// An input, output or parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DbcEdge {
+    /// What its signal is called; becomes an identifier.
+    pub name: String,
+    /// What its word means (D-11).
+    pub edge: Edge,
+}
+
+/// A board whose process data are known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DbcBoard {
+    /// Its number.
+    pub number: u8,
+    /// The controller inputs, one each.
+    pub ci: Vec<DbcEdge>,
+    /// The sensor outputs.
+    pub so: Vec<DbcEdge>,
+    /// The parameters.
+    pub par: Vec<DbcEdge>,
+}
+
+impl DbcBoard {
+    /// A board with its names and what their words mean.
+    pub fn new(number: u8, description: &IoDescription, edges: &BoardEdges) -> Self {
+        let of = |kind: Kind| {
+            let pairs = description.names(kind).iter().zip(edges.all(kind));
+            pairs.map(|(name, edge)| DbcEdge { name: short(name).into(), edge: edge.clone() }).collect()
+        };
+        Self { number, ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
+    }
+}
+
+/// One signal of a message.
+struct Signal {
+    name: String,
+    /// First byte.
+    byte: usize,
+    /// Bit in that byte, for fields of less than a byte.
+    bit: usize,
+    bits: usize,
+    signed: bool,
+    /// ` M` or ` m3`, or nothing.
+    multiplex: String,
+    /// Scale, offset and unit, where they are known.
+    edge: Option<Edge>,
+}
+
+impl Signal {
+    fn field(name: &str, byte: usize, bits: usize) -> Self {
+        Self { name: name.into(), byte, bit: 0, bits, signed: false, multiplex: String::new(), edge: None }
+    }
+
+    fn line(&self, endian: Endian, receiver: &str) -> String {
+        // Motorola order counts from the field's most significant bit, which stands in its first byte.
+        let big = endian == Endian::Big && self.bits > 8;
+        let start = self.byte * 8 + if big { 7 } else { self.bit };
+        let (order, sign) = (u8::from(!big), if self.signed { '-' } else { '+' });
+        let (low, high) = match (self.signed, self.bits) {
+            (true, _) => (-32768_i64, 32767),
+            (false, 64) => (0, 0),
+            (false, bits) => (0, (1_i64 << bits) - 1),
+        };
+        let Self { name, multiplex, bits, edge, .. } = self;
+        let (scale, offset, unit) = edge.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
+        // The shortest number that says the limit: what calculating loses is not written.
+        let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
+        let (low, high) = match edge {
+            Some(edge) if edge.known && edge.kind != EdgeType::Hex => {
+                let (low, high) = edge.limits();
+                (limit(low), limit(high))
+            }
+            _ => (low.to_string(), high.to_string()),
+        };
+        format!(
+            " SG_ {name}{multiplex} : {start}|{bits}@{order}{sign} ({scale},{offset}) [{low}|{high}] \"{unit}\" {receiver}\n"
+        )
+    }
+}
+
+/// The text of a DBC file for these boards, with the byte order of their words.
+///
+/// Boards with numbers above 31 are left out. The broadcasts of the PC are in it in any case.
+pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
+    let mut boards: Vec<(&DbcBoard, Sequence)> = boards
+        .iter()
+        .filter_map(|b| Some((b, Sequence::new(b.number).filter(|n| n.number() > 0)?)))
+        .collect();
+    boards.sort_by_key(|(_, number)| *number);
+    boards.dedup_by_key(|(_, number)| *number);
+    let mut text = String::from("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: PC UCOM");
+    for (_, number) in &boards {
+        let _ = write!(text, " UCOM{number}");
+    }
+    text.push_str("\n\n");
+    let mut comments = String::new();
+    for function in Function::ALL {
+        if function.from_pc() && function.broadcast() {
+            message(&mut text, function, Sequence::ZERO, fields(function), endian);
+            comment(&mut comments, function, Sequence::ZERO, "to all boards");
+        } else if function == Function::Error {
+            message(&mut text, function, Sequence::ZERO, fields(function), endian);
+            comment(&mut comments, function, Sequence::ZERO, "from a board without a number");
+        }
+    }
+    for k in 0..4 {
+        let Some(function) = Function::report(k) else { continue };
+        for number in Sequence::all() {
+            message(&mut text, function, number, fields(function), endian);
+        }
+    }
+    for (board, number) in &boards {
+        for function in Function::ALL {
+            let signals = match function {
+                Function::Ci => multiplexed(&board.ci, "ci"),
+                Function::DspCi => multiplexed(&board.ci, "initial_ci"),
+                Function::So => multiplexed(&board.so, "so"),
+                Function::Par => multiplexed(&board.par, "par"),
+                Function::Report0 | Function::Report1 | Function::Report2 | Function::Report3 => continue,
+                _ => fields(function),
+            };
+            message(&mut text, function, *number, signals, endian);
+            comment(&mut comments, function, *number, "");
+        }
+    }
+    text.push_str(&comments);
+    let codes = ucom::ErrorCode::ALL.map(|code| format!(" {} \"{}\"", code.number(), code.name())).concat();
+    for number in [Sequence::ZERO].into_iter().chain(boards.iter().map(|(_, number)| *number)) {
+        let _ = writeln!(text, "VAL_ {} code{codes} ;", Function::Error.id(number));
+    }
+    text
+}
+
+/// The fields of a function whose layout is the same for all boards.
+fn fields(function: Function) -> Vec<Signal> {
+    let status = |byte| {
+        let bits = Status::NAMES.iter().enumerate();
+        bits.map(move |(i, (name, _))| Signal {
+            bit: 7 - i,
+            ..Signal::field(&name.to_ascii_lowercase(), byte, 1)
+        })
+    };
+    let word = |name: &str, byte| Signal::field(name, byte, 16);
+    match function {
+        Function::Error => vec![Signal::field("code", 0, 8)],
+        Function::InitAck => vec![Signal::field("sequence", 0, 8)],
+        Function::SetStatus => {
+            let mut signals = vec![Signal::field("mask", 0, 8)];
+            signals.extend(status(1));
+            signals
+        }
+        Function::DspInfo => {
+            let mut signals = vec![word("flash_number", 0), Signal::field("sequence", 2, 8)];
+            signals.extend(status(3));
+            signals.extend([word("program_id", 4), word("flash_date", 6)]);
+            signals
+        }
+        Function::Report0 | Function::Report1 | Function::Report2 | Function::Report3 => {
+            vec![Signal::field("ucom_id", 0, 8)]
+        }
+        Function::DumpIo => vec![word("ci", 0), word("so", 2), word("par", 4)],
+        Function::Admin => {
+            let names = ["run", "active", "debug", "global_debug"];
+            names.iter().enumerate().map(|(i, name)| Signal::field(name, i, 8)).collect()
+        }
+        Function::Prog | Function::Debug => {
+            (0..8).map(|i| Signal::field(&format!("byte_{i}"), i, 8)).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The signals of a buffer: the offset selects, three words each.
+fn multiplexed(edges: &[DbcEdge], kind: &str) -> Vec<Signal> {
+    let offset = Signal { multiplex: " M".into(), ..Signal::field("offset", 0, 16) };
+    let mut signals = vec![offset];
+    let mut names = Names::without(&["offset"]);
+    for (i, edge) in edges.iter().enumerate().take(1 << 16) {
+        signals.push(Signal {
+            name: names.name(&edge.name, &format!("{kind}_{i}")),
+            byte: 2 + 2 * (i % 3),
+            bit: 0,
+            bits: 16,
+            signed: edge.edge.signed(),
+            multiplex: format!(" m{}", i - i % 3),
+            edge: Some(edge.edge.clone()),
+        });
+    }
+    signals
+}
+
+fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<Signal>, endian: Endian) {
+    // What boards without any edge never send needs no selector.
+    let signals = if signals.len() == 1 && signals[0].multiplex == " M" { Vec::new() } else { signals };
+    let length = match function {
+        Function::Ci | Function::So | Function::Par | Function::DspCi => 8,
+        _ => signals.iter().map(|s| s.byte + s.bits.div_ceil(8)).max().unwrap_or(0),
+    };
+    let report = (16..20).contains(&function.number());
+    let board = match number {
+        Sequence::ZERO => "UCOM".into(),
+        _ if report => "UCOM".into(),
+        n => format!("UCOM{n}"),
+    };
+    let (sender, receiver) = match function.sender() {
+        Sender::Board => (board.as_str(), "PC"),
+        // A frame to everybody is the PC's; under its number a board says most.
+        Sender::Both if number != Sequence::ZERO => (board.as_str(), "PC"),
+        _ => ("PC", board.as_str()),
+    };
+    let _ = writeln!(text, "BO_ {} {}_{number}: {length} {sender}", function.id(number), function.name());
+    signals.iter().for_each(|s| text.push_str(&s.line(endian, receiver)));
+    text.push('\n');
+}
+
+fn comment(comments: &mut String, function: Function, number: Sequence, more: &str) {
+    let sentence = match function {
+        Function::DspInfo | Function::DumpIo => " Packages of strings follow under the same identifier.",
+        Function::Debug => " Packages of strings: the first counts those that follow.",
+        _ => "",
+    };
+    let gap = if more.is_empty() { "" } else { "; " };
+    let end = if more.is_empty() { "" } else { "." };
+    let doc = function.doc().replace('"', "'");
+    let _ = writeln!(comments, "CM_ BO_ {} \"{doc}{gap}{more}{end}{sentence}\";", function.id(number));
+}

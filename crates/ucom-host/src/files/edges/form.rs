@@ -1,0 +1,134 @@
+//! The TOML of an edge table, and what its numbers may be.
+
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+use super::given::may_follow;
+use super::{Edge, EdgeType};
+
+/// Largest scale and offset; smallest scale is its inverse. Keeps what is shown within what a number can hold.
+pub(super) const LARGEST: f64 = 1e9;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    #[serde(default)]
+    pub(super) program: Vec<FileProgram>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FileProgram {
+    #[serde(default, deserialize_with = "one_or_many")]
+    pub(super) program_id: Vec<u16>,
+    #[serde(default)]
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) ci: BTreeMap<String, FileEdge>,
+    #[serde(default)]
+    pub(super) so: BTreeMap<String, FileEdge>,
+    #[serde(default)]
+    pub(super) par: BTreeMap<String, FileEdge>,
+}
+
+#[derive(Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct FileEdge {
+    #[serde(rename = "type")]
+    pub(super) kind: EdgeType,
+    pub(super) scale: f64,
+    pub(super) offset: f64,
+    pub(super) unit: String,
+    pub(super) min: Option<f64>,
+    pub(super) max: Option<f64>,
+}
+
+impl Default for FileEdge {
+    fn default() -> Self {
+        Self { kind: EdgeType::Int16, scale: 1.0, offset: 0.0, unit: String::new(), min: None, max: None }
+    }
+}
+
+/// `0x1234` or `[0x1234, 0x4B3F]`. Not as an untagged enum: that would lose the place of a mistake.
+fn one_or_many<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u16>, D::Error> {
+    struct Ids;
+    impl<'de> serde::de::Visitor<'de> for Ids {
+        type Value = Vec<u16>;
+
+        fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+            f.write_str("a Program ID, 0x0000 to 0xFFFF, or a list of them")
+        }
+
+        fn visit_i64<E: serde::de::Error>(self, n: i64) -> Result<Vec<u16>, E> {
+            let id = u16::try_from(n);
+            id.map(|id| vec![id]).map_err(|_| E::invalid_value(serde::de::Unexpected::Signed(n), &self))
+        }
+
+        fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut list: A) -> Result<Vec<u16>, A::Error> {
+            let mut ids = Vec::new();
+            while let Some(id) = list.next_element()? {
+                ids.push(id);
+            }
+            Ok(ids)
+        }
+    }
+    deserializer.deserialize_any(Ids)
+}
+
+impl FileEdge {
+    pub(super) fn check(self) -> Result<Edge, String> {
+        let Self { kind, scale, offset, unit, min, max } = self;
+        if matches!(kind, EdgeType::Hex | EdgeType::Bool) {
+            if scale != 1.0 || offset != 0.0 || min.is_some() || max.is_some() {
+                return Err("hex and bool have no scale, offset, min and max".into());
+            }
+        } else if !(1.0 / LARGEST..=LARGEST).contains(&scale.abs()) {
+            return Err(format!("scale = {scale}, but its size must be 1e-9 to 1e9"));
+        }
+        if let Some(wrong) =
+            [Some(offset), min, max].into_iter().flatten().find(|x| !x.is_finite() || x.abs() > LARGEST)
+        {
+            return Err(format!("{wrong} is outside -1e9..1e9"));
+        }
+        if let (Some(min), Some(max)) = (min, max)
+            && min > max
+        {
+            return Err(format!("min = {min} is above max = {max}"));
+        }
+        if unit.chars().count() > 16 || unit.chars().any(|c| c.is_control() || c == '"') {
+            return Err(format!("unit {unit:?}: at most 16 characters, no quotation mark"));
+        }
+        if !may_follow(&unit) || unit.trim() != unit {
+            return Err(format!("unit {unit:?} cannot stand behind a number"));
+        }
+        let edge = Edge { kind, scale, offset, unit, min: None, max: None, known: true, raw_only: false };
+        let ((low, high), (least, most)) = (edge.range(), edge.limits());
+        let beyond = |x: &f64| !(low - 0.5 * scale.abs()..=high + 0.5 * scale.abs()).contains(x);
+        for (key, limit) in [("min", min), ("max", max)] {
+            if let Some(limit) = limit.filter(beyond) {
+                return Err(format!("{key} = {limit} is outside {least}..{most}, what the word can hold"));
+            }
+        }
+        let edge = Edge { min, max, ..edge };
+        let (from, to) = edge.allowed();
+        if from > to {
+            let (min, max) = edge.limits();
+            return Err(format!("no word lies between min = {min} and max = {max}"));
+        }
+        Ok(edge)
+    }
+}
+
+/// What the TOML library says, in words for whoever wrote the table.
+pub(super) fn people(words: &str) -> String {
+    let terms = [
+        ("duplicate key", "the same key is given twice"),
+        ("expected f64", "expected a number, as 0.1"),
+        ("expected struct FileEdge", "expected an edge, as { scale = 0.1 }"),
+        ("expected struct FileProgram", "expected a program, as [[program]]"),
+        ("expected a map", "expected edges by their names"),
+        ("expected a sequence", "expected a list: [[program]] has two brackets"),
+        ("expected a string", "expected a text in quotation marks"),
+    ];
+    terms.iter().fold(words.to_owned(), |text, (theirs, ours)| text.replace(theirs, ours))
+}

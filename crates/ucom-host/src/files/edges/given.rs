@@ -1,0 +1,151 @@
+//! A value as people write it: on a command line, in a parameter file.
+use core::fmt;
+use core::str::FromStr;
+
+/// Longest unit, in bytes.
+const UNIT_MAX: usize = 32;
+
+/// A value before it is known which edge it is for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Given {
+    /// `0x05DC`: the word itself, whatever the edge's type and scale.
+    Raw(u16),
+    /// `15.5 deg`: in the unit of the edge. `15.5`: where the edge has no unit; without a table, the word as a number.
+    Number {
+        /// The number.
+        value: f64,
+        /// The unit behind it; empty: none was given.
+        unit: String,
+    },
+    /// `on`, `off`, `true`, `false`, `yes`, `no`.
+    Switch(bool),
+}
+
+/// A text that is no value.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GivenError {
+    /// Hexadecimal, but no word of 16 bits.
+    #[error("\"{0}\" is no word of 16 bits; they are 0x0000 to 0xFFFF")]
+    Hex(String),
+    /// Nothing that a value can be.
+    #[error(
+        "\"{0}\" is no value; values are numbers (15.5deg; without a unit where there is none), words (0x05DC), on and off"
+    )]
+    Form(String),
+}
+
+impl FromStr for Given {
+    type Err = GivenError;
+
+    fn from_str(text: &str) -> Result<Self, GivenError> {
+        let text = text.trim();
+        match text.to_ascii_lowercase().as_str() {
+            "on" | "true" | "yes" => return Ok(Self::Switch(true)),
+            "off" | "false" | "no" => return Ok(Self::Switch(false)),
+            _ => {}
+        }
+        if let Some(digits) = text.strip_prefix("0x").or(text.strip_prefix("0X")) {
+            let hex = digits.chars().all(|c| c.is_ascii_hexdigit());
+            let word = u16::from_str_radix(digits, 16).ok().filter(|_| hex);
+            return word.map(Self::Raw).ok_or_else(|| GivenError::Hex(text.into()));
+        }
+        let wrong = || GivenError::Form(text.into());
+        // Words like "inf" and "nan" are numbers for Rust, not for people.
+        if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || text.len() > 64 {
+            return Err(wrong());
+        }
+        // The longest beginning that is a number; what follows is its unit.
+        let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
+        let mut parts = ends.map(|end| text.split_at(end));
+        let (value, unit) =
+            parts.find_map(|(n, unit)| number(n).map(|n| (n, unit.trim()))).ok_or_else(wrong)?;
+        if !may_follow(unit) || unit.len() > UNIT_MAX {
+            return Err(wrong());
+        }
+        // 0o10 and -0x10 are numbers elsewhere, not 0 in a unit of that name.
+        let mut letters = unit.chars();
+        let joined = !text.contains(char::is_whitespace);
+        if joined
+            && letters.next().is_some_and(|c| c.is_ascii_alphabetic())
+            && letters.next().is_some_and(|c| c.is_ascii_hexdigit())
+            && unit.contains(|c: char| c.is_ascii_digit())
+        {
+            return Err(wrong());
+        }
+        Ok(Self::Number { value, unit: unit.into() })
+    }
+}
+
+/// Whether a unit can stand behind a number without becoming a part of it.
+pub(super) fn may_follow(unit: &str) -> bool {
+    !unit.starts_with(|c: char| c.is_ascii_digit() || "+-.,_:;'".contains(c))
+}
+
+fn number(text: &str) -> Option<f64> {
+    let digits = text.trim_start_matches(['+', '-']);
+    let begins = digits.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+    text.parse::<f64>().ok().filter(|n| n.is_finite() && begins)
+}
+
+impl fmt::Display for Given {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Raw(word) => write!(f, "0x{word:04X}"),
+            Self::Number { value, unit } => {
+                let size = value.abs();
+                // 1e300 is not told with 300 zeros.
+                if *value != 0.0 && !(1e-6..1e15).contains(&size) {
+                    write!(f, "{value:e}")?;
+                } else {
+                    write!(f, "{value}")?;
+                }
+                if unit.is_empty() { Ok(()) } else { write!(f, " {unit}") }
+            }
+            Self::Switch(on) => f.write_str(if *on { "on" } else { "off" }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn number(value: f64, unit: &str) -> Result<Given, GivenError> {
+        Ok(Given::Number { value, unit: unit.into() })
+    }
+
+    #[test]
+    fn d11_values_are_words_numbers_with_units_and_switches() {
+        let given = |text: &str| text.parse::<Given>();
+        assert_eq!(given("0x05DC"), Ok(Given::Raw(1500)));
+        assert_eq!(given(" -20 "), number(-20.0, ""));
+        assert_eq!(given("15.5deg"), number(15.5, "deg"));
+        assert_eq!(given("1e3 mA/deg"), number(1000.0, "mA/deg"));
+        assert_eq!(given("3 °C"), number(3.0, "°C"));
+        assert_eq!(given("5 e"), number(5.0, "e"));
+        assert_eq!(given("Off"), Ok(Given::Switch(false)));
+        for wrong in [
+            "", "x", "0x10000", "0x", "0x-1", "0x+1", "nan", "inf", "-inf", "1e999", "--3", "1.2.3", "1,5",
+            "1 000", "0o10", "-0x10", "0b11", "1:30", "0xFFFFF", "1'000",
+        ] {
+            assert!(given(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
+        // What is taken is taken again as it is shown, with a blank more.
+        assert!(given(&format!("0{}", "µ".repeat(31))).is_err());
+        for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
+            assert_eq!(given(text).unwrap().to_string(), short);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_a_value_or_an_error(text in any::<String>()) {
+            if let Ok(given) = text.parse::<Given>() {
+                prop_assert_eq!(given.to_string().parse::<Given>(), Ok(given));
+            }
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! The file: TOML, by Program ID.
+
+use super::Edge;
+use super::form::{File, FileEdge, LARGEST, people};
+use crate::files::text::{TextError, quoted, read_text};
+use crate::master::io::{IoDescription, Kind, short};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// The page about these files.
+pub const EDGE_HELP: &str = include_str!("help.txt");
+
+/// Tables of several programs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EdgeTable {
+    programs: Vec<ProgramEdges>,
+    given: bool,
+}
+
+/// What is known of one program's edges.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ProgramEdges {
+    /// Program IDs of the versions that it fits.
+    pub program_ids: Vec<u16>,
+    /// For people.
+    pub name: String,
+    ci: BTreeMap<String, Edge>,
+    so: BTreeMap<String, Edge>,
+    par: BTreeMap<String, Edge>,
+}
+
+/// Why a file is no edge table.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EdgeTableError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Text(#[from] TextError),
+    /// Not TOML of this form; the text names the line.
+    #[error("{0}")]
+    Form(String),
+    /// A program without an ID.
+    #[error("program {number} has no program_id")]
+    NoId {
+        /// Which, from 1.
+        number: usize,
+    },
+    /// One Program ID in two tables.
+    #[error("program 0x{id:04X} is given twice")]
+    Twice {
+        /// The Program ID.
+        id: u16,
+    },
+    /// A number that makes no sense.
+    #[error("program 0x{id:04X}, {kind} `{edge}`: {what}")]
+    Edge {
+        /// The first Program ID.
+        id: u16,
+        /// `CI`, `SO` or `PAR`.
+        kind: &'static str,
+        /// The edge.
+        edge: String,
+        /// What is wrong, with the limit.
+        what: String,
+    },
+    /// In a file.
+    #[error("{}: {source}", path.display())]
+    In {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        source: Box<EdgeTableError>,
+    },
+}
+
+impl EdgeTable {
+    /// Reads TOML.
+    pub fn parse(text: &str) -> Result<Self, EdgeTableError> {
+        let file: File = toml::from_str(text).map_err(|e| EdgeTableError::Form(people(&e.to_string())))?;
+        let mut table = Self { programs: Vec::new(), given: true };
+        for (i, program) in file.program.into_iter().enumerate() {
+            let Some(&id) = program.program_id.first() else {
+                return Err(EdgeTableError::NoId { number: i + 1 });
+            };
+            for (n, id) in program.program_id.iter().enumerate() {
+                if table.program(*id).is_some()
+                    || program.program_id.iter().take(n).any(|before| before == id)
+                {
+                    return Err(EdgeTableError::Twice { id: *id });
+                }
+            }
+            let edges = |kind: Kind, list: BTreeMap<String, FileEdge>| {
+                let one = |(edge, of): (String, FileEdge)| match of.check() {
+                    Ok(checked) => Ok((edge, checked)),
+                    Err(what) => Err(EdgeTableError::Edge { id, kind: kind.name(), edge, what }),
+                };
+                list.into_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>()
+            };
+            table.programs.push(ProgramEdges {
+                ci: edges(Kind::Ci, program.ci)?,
+                so: edges(Kind::So, program.so)?,
+                par: edges(Kind::Par, program.par)?,
+                program_ids: program.program_id,
+                name: program.name,
+            });
+        }
+        Ok(table)
+    }
+
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, EdgeTableError> {
+        let text = read_text(path)?;
+        Self::parse(&text).map_err(|e| EdgeTableError::In { path: path.into(), source: Box::new(e) })
+    }
+
+    /// Whether it was read from anything; otherwise nobody has said what words mean.
+    pub fn is_given(&self) -> bool {
+        self.given
+    }
+
+    /// What is known of a program.
+    pub fn program(&self, id: u16) -> Option<&ProgramEdges> {
+        self.programs.iter().find(|p| p.program_ids.contains(&id))
+    }
+
+    /// The file's text for programs that are to get a table: every name, and what the texts of the boards seem to say about
+    /// scale and unit, to be looked over by somebody who knows.
+    pub fn template(programs: &[(u16, &IoDescription)]) -> String {
+        let mut text = String::from(
+            "# What the words of inputs, outputs and parameters mean; `ucom help edges` explains the keys.\n\
+             # Begun from the texts of the boards: look over types, scales and units before you trust them.\n",
+        );
+        for (id, description) in programs {
+            text += &format!(
+                "\n[[program]]\nprogram_id = 0x{id:04X}\nname = {}\n",
+                quoted(&description.description)
+            );
+            for (kind, title) in [(Kind::Ci, "ci"), (Kind::So, "so"), (Kind::Par, "par")] {
+                text += &format!("\n[program.{title}]\n");
+                if kind != Kind::So {
+                    text += "# Boards tell no limits: add them, as { …, min = -60, max = 60 }, before anything moves.\n";
+                }
+                let mut used = BTreeSet::new();
+                for (i, name) in description.names(kind).iter().enumerate() {
+                    let unique = description.find(0, kind, short(name)) == Ok(i as u16);
+                    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_';
+                    let key = match short(name) {
+                        name if unique && !name.is_empty() && name.chars().all(bare) => name.to_owned(),
+                        name if unique => quoted(name),
+                        _ => format!("\"#{i}\""),
+                    };
+                    // Two edges of one name, and a third that is called by the number of the second: nothing to be done.
+                    if used.insert(key.clone()) {
+                        text += &format!("{key} = {{ {} }}\n", told(name));
+                    }
+                }
+            }
+        }
+        text
+    }
+}
+
+/// `scale = 0.01, unit = "deg"` from `position [0.01 deg]`.
+fn told(name: &str) -> String {
+    let bracket =
+        name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
+    let mut keys = vec!["type = \"int16\"".to_owned()];
+    let Some(inside) = bracket else { return keys.concat() };
+    let (scale, unit) = match inside.split_once(' ') {
+        Some((number, unit)) if number.parse::<f64>().is_ok_and(|n| n.is_finite()) => {
+            (number.parse().ok(), unit.trim())
+        }
+        _ => (None, inside),
+    };
+    let scale = scale.filter(|n: &f64| (1.0 / LARGEST..=LARGEST).contains(n));
+    keys.extend(scale.map(|n| format!("scale = {n}")));
+    let told = FileEdge { unit: unit.into(), ..Default::default() };
+    if told.check().is_ok() && !unit.is_empty() {
+        keys.push(format!("unit = {}", quoted(unit)));
+    }
+    keys.join(", ")
+}
+
+impl ProgramEdges {
+    /// Which edges of one kind are known, by the table's own names.
+    pub fn names(&self, kind: Kind) -> impl Iterator<Item = &String> {
+        self.of(kind).keys()
+    }
+
+    fn of(&self, kind: Kind) -> &BTreeMap<String, Edge> {
+        match kind {
+            Kind::Ci => &self.ci,
+            Kind::So => &self.so,
+            Kind::Par => &self.par,
+        }
+    }
+
+    /// What is known of an edge: by its whole text, its text without the unit in brackets, or its number. Small and
+    /// capital letters are the same where names stay distinct by that, as they are for names that people give.
+    pub fn edge(&self, kind: Kind, index: usize, name: &str) -> Option<&Edge> {
+        let all = self.of(kind);
+        let like = |wanted: &str| {
+            let mut found = all.iter().filter(|(key, _)| key.trim().eq_ignore_ascii_case(wanted.trim()));
+            found.next().filter(|_| found.next().is_none()).map(|(_, edge)| edge)
+        };
+        all.get(name)
+            .or_else(|| all.get(short(name)))
+            .or_else(|| like(name))
+            .or_else(|| like(short(name)))
+            .or_else(|| all.get(&format!("#{index}")))
+    }
+
+    /// Names of the table that the program has not: mistakes in writing, mostly.
+    pub fn strays(&self, description: &IoDescription) -> Vec<String> {
+        let mut strays = Vec::new();
+        for kind in [Kind::Ci, Kind::So, Kind::Par] {
+            let names = description.names(kind);
+            let fits = |key: &str| {
+                let key_is = |n: &str| n.trim().eq_ignore_ascii_case(key.trim());
+                let by_name = names.iter().any(|n| key_is(n) || key_is(short(n)));
+                by_name || (0..names.len()).any(|i| key == format!("#{i}"))
+            };
+            strays.extend(
+                self.names(kind).filter(|key| !fits(key)).map(|key| format!("{} `{key}`", kind.name())),
+            );
+        }
+        strays
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::panic;
+
+    use super::*;
+    use crate::files::edges::BoardEdges;
+    use ucom::Profile;
+
+    fn texts(list: &[&str]) -> Vec<String> {
+        list.iter().map(|t| (*t).to_owned()).collect()
+    }
+
+    fn description() -> IoDescription {
+        IoDescription {
+            description: "head \"pan\"".into(),
+            ci: texts(&["set_position [0.01 deg]", "stiffness"]),
+            so: texts(&["position [0.01 deg]", "x", "x"]),
+            par: texts(&["kp [mA/deg]", "müde [1/2 \\]"]),
+        }
+    }
+
+    /// D-11: by Program ID; what a table does not name stays a bare word.
+    #[test]
+    fn d11_tables_are_found_by_program_and_name() {
+        let text = "[[program]]\nprogram_id = [0x1234, 0x4B3F]\n[program.ci]\nset_position = { scale = 0.01, unit = \"deg\" }\n\
+                    [program.so]\n\"#2\" = { type = \"hex\" }\n\"y\" = { type = \"bool\" }\n";
+        let table = EdgeTable::parse(text).unwrap();
+        assert!(table.program(0x1235).is_none());
+        let program = table.program(0x4B3F).unwrap();
+        let edges = BoardEdges::new(&description(), Some(program), &Profile::default());
+        assert_eq!(edges.get(Kind::Ci, 0).unwrap().text_with_unit(1500), "15.00 deg");
+        assert_eq!(edges.get(Kind::Ci, 1).unwrap().text(1500), "1500");
+        assert_eq!(edges.get(Kind::So, 2).unwrap().text(1500), "0x05DC");
+        assert_eq!(program.strays(&description()), ["SO `y`"]);
+    }
+
+    #[test]
+    fn d11_what_makes_no_sense_is_refused_with_its_place() {
+        let refused = |edge: &str| {
+            let text = format!("[[program]]\nprogram_id = 1\n[program.par]\nkp = {{ {edge} }}\n");
+            EdgeTable::parse(&text).unwrap_err().to_string()
+        };
+        assert_eq!(
+            refused("scale = 0"),
+            "program 0x0001, PAR `kp`: scale = 0, but its size must be 1e-9 to 1e9"
+        );
+        assert!(refused("scale = nan").contains("NaN"));
+        assert!(refused("offset = inf").contains("inf"));
+        assert!(refused("min = 2, max = 1").contains("min = 2 is above max = 1"));
+        let said = refused("scale = 0.01, unit = \"deg\", min = -60, max = 400");
+        assert!(said.contains("max = 400 is outside -327.68..327.67, what the word can hold"), "{said}");
+        assert!(refused("type = \"uint16\", min = -1").contains("min = -1 is outside 0..65535"));
+        assert!(refused("scale = 100, min = 110, max = 150").contains("no word lies between"));
+        assert!(refused("type = \"bool\", scale = 2").contains("have no scale"));
+        assert!(refused("unit = \"2m\"").contains("behind a number"));
+        assert!(refused("scales = 2").contains("line 4") && refused("type = \"int8\"").contains("line 4"));
+        let said = refused("scale = \"x\"");
+        assert!(said.contains("expected a number") && !said.contains("f64"), "{said}");
+        let form = |text: &str| EdgeTable::parse(text).unwrap_err().to_string();
+        assert!(form("[[program]]\nname = \"x\"").contains("program 1 has no program_id"));
+        assert!(form("[[program]]\nprogram_id = [1, 1]").contains("0x0001 is given twice"));
+        assert!(form("[[program]]\nprogram_id = 1\n[[program]]\nprogram_id = 1").contains("given twice"));
+        assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
+    }
+
+    /// D-11: letters in another case are the same name, as where values are given.
+    #[test]
+    fn d11_names_of_the_table_are_found_in_any_case() {
+        let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\
+                    STIFFNES = {}\n";
+        let table = EdgeTable::parse(text).unwrap();
+        let program = table.program(1).unwrap();
+        let edges = BoardEdges::new(&description(), Some(program), &Profile::default());
+        assert_eq!(edges.get(Kind::Ci, 0).unwrap().unit, "deg");
+        assert_eq!(program.strays(&description()), ["CI `STIFFNES`"]);
+        assert!(table.is_given() && !EdgeTable::default().is_given());
+    }
+
+    /// A template is a table, and it names every edge.
+    #[test]
+    fn a_template_is_a_table_of_all_edges() {
+        let text = EdgeTable::template(&[(0x1234, &description())]);
+        let table = EdgeTable::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let program = table.program(0x1234).unwrap();
+        assert!(program.strays(&description()).is_empty());
+        for kind in [Kind::Ci, Kind::So, Kind::Par] {
+            for (i, name) in description().names(kind).iter().enumerate() {
+                assert!(program.edge(kind, i, name).is_some(), "{name}\n{text}");
+            }
+        }
+        let edge = program.edge(Kind::Ci, 0, "set_position [0.01 deg]").unwrap();
+        assert_eq!((edge.scale, edge.unit.as_str()), (0.01, "deg"));
+        assert_eq!(program.edge(Kind::Par, 0, "kp").unwrap().unit, "mA/deg");
+    }
+}

@@ -1,0 +1,71 @@
+//! Why a value cannot be written to an edge.
+/// Why a value cannot be written to an edge.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ValueError {
+    /// Too large or too small.
+    #[error("{given} is outside {min}..{max}{}", space(unit))]
+    Range {
+        /// What was given.
+        given: String,
+        /// Smallest value.
+        min: String,
+        /// Largest value.
+        max: String,
+        /// Their unit.
+        unit: String,
+    },
+    /// Given in another unit than the edge's.
+    #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]
+    Unit {
+        /// What was given.
+        given: String,
+        /// The edge's unit.
+        unit: String,
+    },
+    /// A number alone, where it could be the word or a value in the signal's unit.
+    #[error("{given}: {}, or the word itself as 0x0000", no_unit(given, unit))]
+    NoUnit {
+        /// What was given.
+        given: String,
+        /// The edge's unit; empty: the table scales it and names none.
+        unit: String,
+    },
+    /// Between two words.
+    #[error("{given}: it is a whole number")]
+    Fraction {
+        /// What was given.
+        given: String,
+    },
+    /// Not 0 or 1, on or off.
+    #[error("{given}: it is on or off")]
+    Switch {
+        /// What was given.
+        given: String,
+    },
+    /// A number or a switch, and nobody knows what it means here.
+    #[error(
+        "{given}: the edge table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
+    )]
+    Meaning {
+        /// What was given.
+        given: String,
+    },
+    /// On or off, but the edge is a number.
+    #[error("{given}: it is a number")]
+    NoSwitch {
+        /// What was given.
+        given: String,
+    },
+}
+
+pub(super) fn space(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+fn no_unit(given: &str, unit: &str) -> String {
+    match unit.is_empty() {
+        true => "the table scales it and names no unit: add one to the table (unit = \"ratio\") and give it"
+            .into(),
+        false => format!("the unit is missing: `{given}{unit}`"),
+    }
+}

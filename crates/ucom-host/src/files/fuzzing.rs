@@ -1,0 +1,146 @@
+//! What the fuzz targets run: every file reader on any bytes. A panic, or a promise broken, is a finding.
+
+use std::io::Cursor;
+use ucom::Profile;
+
+use crate::ProfileFile;
+use crate::master::io::{IoDescription, Kind};
+
+use super::edges::{BoardEdges, EdgeTable, Given};
+use super::image::{Format, Gaps, Image, ImageOptions};
+use super::inventory::Inventory;
+use super::params::{ParamsFile, SavedBoard, SavedEdge, check_board, params_text};
+use super::recording::{CandumpWriter, FZI_HEADER, FziWriter, McapWriter, Recording, read_mcap};
+
+/// Images in every form; the first byte chooses.
+pub fn image(data: &[u8]) {
+    let Some((&choice, data)) = data.split_first() else { return };
+    let format = [None, Some(Format::Bin), Some(Format::IntelHex), Some(Format::SRecord)];
+    let gaps = if choice & 4 == 0 { Gaps::Refuse } else { Gaps::Fill };
+    let options = ImageOptions {
+        format: format[usize::from(choice & 3)],
+        gaps,
+        swap_bytes: choice & 8 != 0,
+        max_bytes: 1 << 16,
+        ..Default::default()
+    };
+    if let Ok(image) = Image::parse(data, &options) {
+        assert!(!image.bytes().is_empty() && image.bytes().len().is_multiple_of(2));
+        assert!(image.bytes().len() <= (1 << 16) + 1);
+    }
+}
+
+/// Recordings in every form; what is read is written in the same form and gives the same.
+pub fn recording(data: &[u8]) {
+    // Text forms count microseconds, and what is written is whole.
+    let as_written = |recording: &mut Recording| {
+        recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
+        recording.broken_off = None;
+    };
+    if let Ok(mut recording) = Recording::read_candump(data) {
+        as_written(&mut recording);
+        let mut out = CandumpWriter::new(Vec::new());
+        recording.records.iter().for_each(|r| out.write(r).expect("a vector takes all"));
+        let again = Recording::read_candump(&out.into_inner()[..]).expect("our own form");
+        assert_eq!(again.records, recording.records);
+    }
+    let mut stream = FZI_HEADER.as_bytes().to_vec();
+    stream.push(b'\n');
+    stream.extend_from_slice(data);
+    if let Ok(mut recording) = Recording::read_fzi(&stream[..]) {
+        as_written(&mut recording);
+        let mut out = FziWriter::new(Vec::new()).expect("a vector takes all");
+        recording.records.iter().for_each(|r| out.write(r).expect("a frame of this form"));
+        assert_eq!(Recording::read_fzi(&out.into_inner()[..]).expect("our own form"), recording);
+    }
+    if let Ok(recording) = read_mcap(data) {
+        let profile = recording.profile.as_deref().unwrap_or_default();
+        let mut out = McapWriter::new(Cursor::new(Vec::new()), profile).expect("a vector takes all");
+        recording.records.iter().for_each(|r| out.write(r, None).expect("a vector takes all"));
+        let file = out.finish().expect("a vector takes all").into_inner();
+        assert_eq!(read_mcap(&file).expect("our own form").records, recording.records);
+    }
+}
+
+/// Inventories; what is read is written as a text that gives the same.
+pub fn inventory(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    if let Ok(inventory) = Inventory::parse(text) {
+        assert_eq!(Inventory::parse(&inventory.to_toml()).expect("our own form"), inventory);
+    }
+}
+
+/// Edge tables: for every edge of one, what is shown of a word gives that word again, unless a limit forbids it.
+pub fn edges(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(table) = EdgeTable::parse(text) else { return };
+    for id in [0x1234, 1, 0, 0xFFFF] {
+        let Some(program) = table.program(id) else { continue };
+        for kind in [Kind::Ci, Kind::So, Kind::Par] {
+            for (i, name) in program.names(kind).enumerate() {
+                let Some(edge) = program.edge(kind, i, name) else { continue };
+                for word in [0, 1, 0x7FFF, 0x8000, 0xFFFF] {
+                    let given: Given = edge.text_with_unit(word).parse().expect("what is shown can be given");
+                    let (again, text) = (edge.word(&given), edge.text(word));
+                    let limited = edge.min.is_some() || edge.max.is_some();
+                    // Offsets that are far larger than the scale leave no digits for it.
+                    let coarse = edge.offset.abs() > edge.scale.abs() * 1e9;
+                    // A scaled edge without a unit takes only words themselves.
+                    let no_unit = edge.unit.is_empty() && (edge.scale != 1.0 || edge.offset != 0.0);
+                    if no_unit && matches!(again, Err(super::edges::ValueError::NoUnit { .. })) {
+                        continue;
+                    }
+                    let same = again.as_ref().is_ok_and(|w| edge.text(*w) == text);
+                    assert!(
+                        same || limited || coarse || edge.kind == super::EdgeType::Bool,
+                        "{edge:?} {word} {text} {again:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Parameter files: what is read is checked against a board, and what fits is written as a text that gives the same words.
+pub fn params(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(file) = ParamsFile::parse(text) else { return };
+    let profile = Profile::default();
+    for board in &file.boards {
+        let names =
+            |list: &[super::params::ParamsEntry]| list.iter().map(|e| e.name.clone()).collect::<Vec<_>>();
+        let description =
+            IoDescription { ci: names(&board.ci), par: names(&board.par), ..Default::default() };
+        let edges = BoardEdges::new(&description, None, &profile);
+        let Ok((_, par)) = check_board(board, &description, &edges) else { continue };
+        let word = |i: usize| par.iter().find(|w| usize::from(w.index) == i).map(|w| w.word);
+        let saved = |(i, edge): (usize, &super::Edge)| SavedEdge {
+            edge: edge.clone(),
+            word: word(i),
+            remark: String::new(),
+        };
+        let all = edges.all(Kind::Par).iter().enumerate().map(saved).collect();
+        let saved = SavedBoard {
+            number: board.number,
+            description: description.clone(),
+            par: all,
+            ..Default::default()
+        };
+        let again = ParamsFile::parse(&params_text(&[saved])).expect("our own form");
+        let again = again.board(board.number).expect("the same board");
+        let (_, words) = check_board(again, &description, &edges).expect("our own names and values");
+        let pairs =
+            |list: &[super::params::ParamsWord]| list.iter().map(|w| (w.index, w.word)).collect::<Vec<_>>();
+        let mut before = pairs(&par);
+        before.sort_unstable();
+        assert_eq!(pairs(&words), before);
+    }
+}
+
+/// Text of a profile file.
+pub fn profile(data: &[u8]) {
+    let Ok(text) = core::str::from_utf8(data) else { return };
+    if let Ok(profile) = Profile::from_toml(text) {
+        assert_eq!(Profile::from_toml(&profile.to_toml()), Ok(profile));
+    }
+}

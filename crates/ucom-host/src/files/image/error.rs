@@ -1,0 +1,183 @@
+//! Why a file is no image.
+
+use super::Format;
+use std::path::PathBuf;
+
+/// Why a file cannot be used as an image.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// No data byte.
+    #[error("the image holds no data")]
+    Empty,
+    /// An executable instead of an image.
+    #[error("this is an ELF file, not an image; `objcopy -O srec` or `-O binary` makes one")]
+    Elf,
+    /// A text, and no record in it.
+    #[error(
+        "line 1, column 1: a text and no image, no line is a record of Intel HEX or S-record: \"{starts}…\""
+    )]
+    Text {
+        /// How it begins.
+        starts: String,
+    },
+    /// An editor has put a mark before the first record.
+    #[error("byte 1: a {mark} byte order mark stands before the text; save it as plain ASCII")]
+    ByteOrderMark {
+        /// The encoding that it stands for.
+        mark: &'static str,
+    },
+    /// Bytes that may be anything.
+    #[error("{name}: no record of Intel HEX or S-record, and no `.bin`")]
+    NotBin {
+        /// The file.
+        name: String,
+    },
+    /// No such form.
+    #[error("unknown image format `{name}`: one of bin, hex, srec")]
+    UnknownFormat {
+        /// What was asked for.
+        name: String,
+    },
+    /// More than the limit.
+    #[error("the image has {bytes} bytes, the limit is {limit}")]
+    TooLarge {
+        /// Its size, or that of the file.
+        bytes: u64,
+        /// The limit.
+        limit: usize,
+    },
+    /// A line is no good record.
+    #[error("line {line}, column {column}: {problem}")]
+    Line {
+        /// From 1.
+        line: usize,
+        /// From 1.
+        column: usize,
+        /// What is wrong.
+        problem: LineProblem,
+    },
+    /// The file ends before its end record.
+    #[error("no end record after line {lines}: the {format} file was cut off")]
+    NoEnd {
+        /// Form of the file.
+        format: Format,
+        /// Lines read.
+        lines: usize,
+    },
+    /// Records leave addresses out.
+    #[error(
+        "{bytes} bytes at word address 0x{address_words:X} are in no record; \
+         fill gaps with FF if the loader may write them"
+    )]
+    Gap {
+        /// First address without data, words.
+        address_words: u32,
+        /// Length of the gap, bytes.
+        bytes: usize,
+    },
+    /// The image does not fit into 32-bit word addresses.
+    #[error("{words} words from word address 0x{address_words:X} end beyond 32 bits")]
+    AddressRange {
+        /// Load address, words.
+        address_words: u32,
+        /// Length, words.
+        words: u32,
+    },
+}
+
+/// What is wrong with a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LineProblem {
+    /// Not the mark of a record.
+    #[error("a record starts with `{expected}`")]
+    Start {
+        /// The mark.
+        expected: char,
+    },
+    /// Not a hexadecimal digit.
+    #[error("not a hexadecimal digit")]
+    Digit,
+    /// The record has another length than it says.
+    #[error("the record says {said} bytes and has {has}")]
+    Length {
+        /// By its length byte.
+        said: usize,
+        /// In the line.
+        has: usize,
+    },
+    /// Wrong checksum.
+    #[error("checksum is {has:02X}, should be {should:02X}")]
+    Checksum {
+        /// In the line.
+        has: u8,
+        /// By the bytes.
+        should: u8,
+    },
+    /// No such record.
+    #[error("record type {kind} is unknown")]
+    Type {
+        /// The number.
+        kind: u8,
+    },
+    /// A word that starts or ends in the middle.
+    #[error("address 0x{address:X} and length {bytes} do not make whole words")]
+    HalfWord {
+        /// Address in the record's unit.
+        address: u64,
+        /// Data bytes.
+        bytes: usize,
+    },
+    /// An address that has another value already.
+    #[error("byte address 0x{address:X} is given twice with different values")]
+    Overlap {
+        /// First such address, bytes.
+        address: u64,
+    },
+    /// Data that would make the image larger than the limit.
+    #[error("the image gets larger than {limit} bytes: 0x{from:X} to 0x{to:X} (byte addresses)")]
+    TooLarge {
+        /// The limit, bytes.
+        limit: usize,
+        /// Lowest address, bytes.
+        from: u64,
+        /// End of the highest, bytes.
+        to: u64,
+    },
+    /// More than one end.
+    #[error("data after the end record")]
+    AfterEnd,
+    /// The count record disagrees.
+    #[error("the count record says {said} data records, there are {has}")]
+    Count {
+        /// By the record.
+        said: u32,
+        /// In the file.
+        has: u32,
+    },
+}
+
+impl ImageError {
+    /// The records are sound, but their addresses leave gaps, overlap or go too far: perhaps they count something else.
+    pub fn is_of_addresses(&self) -> bool {
+        use LineProblem::{HalfWord, Overlap, TooLarge};
+        matches!(
+            self,
+            Self::Gap { .. }
+                | Self::AddressRange { .. }
+                | Self::Line { problem: HalfWord { .. } | Overlap { .. } | TooLarge { .. }, .. }
+        )
+    }
+
+    pub(super) fn line(line: usize, column: usize, problem: LineProblem) -> Self {
+        Self::Line { line, column, problem }
+    }
+}

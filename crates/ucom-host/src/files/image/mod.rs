@@ -1,0 +1,302 @@
+//! Firmware images: raw bytes, Intel HEX and Motorola S-records become the bytes that go on the wire; a text never does
+//! unless it is asked for.
+//!
+//! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of
+//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are told by
+//! their records: where those leave gaps or overlap in one unit and follow each other without any in the other one. What one
+//! record or two can mean is not guessed; the unit can always be given.
+mod detect;
+mod error;
+mod hex;
+mod segments;
+mod srec;
+#[cfg(test)]
+mod tests;
+
+use core::fmt;
+use core::str::FromStr;
+
+pub use error::{ImageError, LineProblem};
+use segments::Segments;
+
+/// Most bytes of an image unless [`ImageOptions::max_bytes`] says otherwise: 1 MiB.
+pub const MAX_BYTES: usize = 1 << 20;
+
+/// So many records in a row are no coincidence: a hole as long as the record before it may be meant once, and in a table of
+/// interrupt vectors behind each, whose records are short.
+const EVIDENCE: usize = 3;
+/// Bytes that they have on average at least; linkers write 16 and more.
+const EVIDENCE_BYTES: usize = 12;
+
+/// Form of an image file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Raw bytes in wire order.
+    Bin,
+    /// Intel HEX (records `:LLAAAATT…`).
+    IntelHex,
+    /// Motorola S-record (records `S1…`, `S2…`, `S3…`).
+    SRecord,
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Bin => "bin",
+            Self::IntelHex => "hex",
+            Self::SRecord => "srec",
+        })
+    }
+}
+
+impl FromStr for Format {
+    type Err = ImageError;
+
+    /// `bin`, `hex` or `srec`.
+    fn from_str(text: &str) -> Result<Self, ImageError> {
+        match text {
+            "bin" => Ok(Self::Bin),
+            "hex" | "ihex" => Ok(Self::IntelHex),
+            "srec" | "s19" | "s28" | "s37" => Ok(Self::SRecord),
+            _ => Err(ImageError::UnknownFormat { name: text.into() }),
+        }
+    }
+}
+
+/// What an address of a record counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AddressUnit {
+    /// Bytes.
+    Byte,
+    /// Words of 16 bits, two bytes of the record each.
+    Word,
+}
+
+impl fmt::Display for AddressUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Byte => "byte",
+            Self::Word => "word",
+        })
+    }
+}
+
+/// What to do with addresses between the first and the last byte that no record fills.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Gaps {
+    /// Refuse the file.
+    #[default]
+    Refuse,
+    /// Fill with 0xFF, the erased state of flash, and tell in [`Image::notes`].
+    Fill,
+}
+
+/// How to read an image file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageOptions {
+    /// Form of the file, whatever it holds; `None` decides by content and name, and takes no text for raw bytes.
+    pub format: Option<Format>,
+    /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX, and the other one where at least three records
+    /// follow each other in that one alone.
+    pub address_unit: Option<AddressUnit>,
+    /// Gaps between records.
+    pub gaps: Gaps,
+    /// Swaps the two bytes of each word: for tool chains that write the other order than the wire has.
+    pub swap_bytes: bool,
+    /// Load address in words: that of raw bytes (0 if `None`), and in place of the file's own otherwise.
+    pub load_address_words: Option<u32>,
+    /// Most bytes, gaps included.
+    pub max_bytes: usize,
+}
+
+impl Default for ImageOptions {
+    fn default() -> Self {
+        Self {
+            format: None,
+            address_unit: None,
+            gaps: Gaps::Refuse,
+            swap_bytes: false,
+            load_address_words: None,
+            max_bytes: MAX_BYTES,
+        }
+    }
+}
+
+/// Something about an image that its user should know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageNote {
+    /// A gap was filled with 0xFF.
+    GapFilled {
+        /// First address without data, words.
+        address_words: u32,
+        /// Its length, bytes.
+        bytes: usize,
+    },
+    /// The last word had one byte; 0xFF was added.
+    LastWordPadded,
+    /// The records follow each other only if their addresses count this, which is not what their form usually counts.
+    AddressesCount(AddressUnit),
+}
+
+impl fmt::Display for ImageNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::GapFilled { address_words, bytes } => {
+                write!(f, "gap of {bytes} bytes at word address 0x{address_words:X} filled with FF")
+            }
+            Self::LastWordPadded => f.write_str("odd number of bytes: FF added to fill the last word"),
+            Self::AddressesCount(unit) => {
+                write!(f, "addresses taken as those of {unit}s: only so the records follow each other")
+            }
+        }
+    }
+}
+
+/// An image as the loader takes it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    bytes: Vec<u8>,
+    address_words: u32,
+    format: Format,
+    notes: Vec<ImageNote>,
+}
+
+impl Image {
+    /// Reads a file's content, as of a `.bin` where the options say nothing and it is none of the others.
+    pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
+        Self::parse_named(None, content, options)
+    }
+
+    fn parse_named(
+        name: Option<&std::path::Path>,
+        content: &[u8],
+        options: &ImageOptions,
+    ) -> Result<Self, ImageError> {
+        if content.is_empty() {
+            return Err(ImageError::Empty);
+        }
+        let format = options.format.map_or_else(|| Format::of(name, content), Ok)?;
+        let mut image = match format {
+            Format::Bin => Self::raw(content, options)?,
+            Format::IntelHex | Format::SRecord => Self::records(content, format, options)?,
+        };
+        if image.bytes.len() % 2 == 1 {
+            image.bytes.push(0xFF);
+            image.notes.push(ImageNote::LastWordPadded);
+        }
+        if options.swap_bytes {
+            image.bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.swap(0, 1));
+        }
+        if let Some(address) = options.load_address_words {
+            image.address_words = address;
+        }
+        let words = u32::try_from(image.bytes.len() / 2).unwrap_or(u32::MAX);
+        if image.address_words.checked_add(words).is_none() {
+            return Err(ImageError::AddressRange { address_words: image.address_words, words });
+        }
+        Ok(image)
+    }
+
+    /// Reads a file.
+    pub fn read(path: &std::path::Path, options: &ImageOptions) -> Result<Self, ImageError> {
+        let io = |source: std::io::Error| ImageError::Io { path: path.into(), source };
+        // A record takes at most 14 characters a byte (one byte in an S-record with 32-bit address and line end).
+        let most = (options.max_bytes as u64).saturating_mul(16).saturating_add(4096);
+        let length = std::fs::metadata(path).map_err(io)?.len();
+        if length > most {
+            return Err(ImageError::TooLarge { bytes: length, limit: options.max_bytes });
+        }
+        Self::parse_named(Some(path), &std::fs::read(path).map_err(io)?, options)
+    }
+
+    fn raw(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
+        if content.len() > options.max_bytes {
+            return Err(ImageError::TooLarge { bytes: content.len() as u64, limit: options.max_bytes });
+        }
+        Ok(Self { bytes: content.to_vec(), address_words: 0, format: Format::Bin, notes: Vec::new() })
+    }
+
+    /// An image of records, in the unit of their form or in the one in which alone they follow each other.
+    fn records(content: &[u8], format: Format, options: &ImageOptions) -> Result<Self, ImageError> {
+        let (usual, other) = match format {
+            Format::SRecord => (AddressUnit::Word, AddressUnit::Byte),
+            _ => (AddressUnit::Byte, AddressUnit::Word),
+        };
+        let read = |unit, gaps| {
+            let mut segments = Segments::new(unit, options.max_bytes);
+            match format {
+                Format::SRecord => srec::read(content, &mut segments)?,
+                _ => hex::read(content, &mut segments)?,
+            }
+            let (records, mut notes) = (segments.records(), Vec::new());
+            let (address_words, bytes) = segments.join(gaps, &mut notes)?;
+            Ok((Self { bytes, address_words, format, notes }, records))
+        };
+        if let Some(unit) = options.address_unit {
+            return read(unit, options.gaps).map(|(image, _)| image);
+        }
+        match read(usual, Gaps::Refuse) {
+            Ok((image, _)) => Ok(image),
+            Err(e) => match read(other, Gaps::Refuse) {
+                Ok((mut image, records))
+                    if e.is_of_addresses()
+                        && records >= EVIDENCE
+                        && image.bytes.len() >= records * EVIDENCE_BYTES =>
+                {
+                    image.notes.push(ImageNote::AddressesCount(other));
+                    Ok(image)
+                }
+                _ if options.gaps == Gaps::Fill => read(usual, Gaps::Fill).map(|(image, _)| image),
+                _ => Err(e),
+            },
+        }
+    }
+
+    /// The bytes in wire order; an even number of them, at least two.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Load address, words.
+    pub fn address_words(&self) -> u32 {
+        self.address_words
+    }
+
+    /// Length, words.
+    pub fn length_words(&self) -> u32 {
+        (self.bytes.len() / 2) as u32
+    }
+
+    /// Form of the file it came from, in words.
+    pub fn format_name(&self) -> &'static str {
+        match self.format {
+            Format::Bin => "raw bytes",
+            Format::IntelHex => "Intel HEX",
+            Format::SRecord => "S-record",
+        }
+    }
+
+    /// Form of the file it came from.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// What its records' addresses count; `None` for raw bytes, which have none.
+    pub fn address_unit(&self, options: &ImageOptions) -> Option<AddressUnit> {
+        let detected = self.notes.iter().find_map(|note| match note {
+            ImageNote::AddressesCount(unit) => Some(*unit),
+            _ => None,
+        });
+        let usual = match self.format {
+            Format::Bin => return None,
+            Format::IntelHex => AddressUnit::Byte,
+            Format::SRecord => AddressUnit::Word,
+        };
+        Some(options.address_unit.or(detected).unwrap_or(usual))
+    }
+
+    /// What was changed on the way.
+    pub fn notes(&self) -> &[ImageNote] {
+        &self.notes
+    }
+}

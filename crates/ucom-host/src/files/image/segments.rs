@@ -1,0 +1,132 @@
+//! Data of records, put in order of address.
+
+use super::{AddressUnit, Gaps, ImageError, ImageNote, LineProblem};
+use std::collections::BTreeMap;
+
+/// Runs of bytes by byte address; neighbours are one run.
+pub(super) struct Segments {
+    unit: AddressUnit,
+    limit: usize,
+    runs: BTreeMap<u64, Vec<u8>>,
+    records: usize,
+}
+
+impl Segments {
+    pub(super) fn new(unit: AddressUnit, limit: usize) -> Self {
+        Self { unit, limit, runs: BTreeMap::new(), records: 0 }
+    }
+
+    /// Takes the data of one record at `address` in the file's unit.
+    pub(super) fn add(&mut self, address: u64, data: &[u8]) -> Result<(), LineProblem> {
+        if data.is_empty() {
+            return Ok(());
+        }
+        self.records += 1;
+        let start = match self.unit {
+            AddressUnit::Byte => address,
+            AddressUnit::Word if data.len().is_multiple_of(2) => address * 2,
+            AddressUnit::Word => return Err(LineProblem::HalfWord { address, bytes: data.len() }),
+        };
+        let end = start + data.len() as u64;
+        let from = self.runs.first_key_value().map_or(start, |(a, _)| start.min(*a));
+        let to = self.runs.last_key_value().map_or(end, |(a, run)| end.max(a + run.len() as u64));
+        if to - from > self.limit as u64 {
+            return Err(LineProblem::TooLarge { limit: self.limit, from, to });
+        }
+        let mut rest = data;
+        let mut at = start;
+        // What lies over earlier data must equal it.
+        let covering: Vec<u64> = self.covering(start, end);
+        for run_start in covering {
+            let Some(run) = self.runs.get(&run_start) else { continue };
+            let run_end = run_start + run.len() as u64;
+            if run_start > at {
+                let (before, after) = rest.split_at(((run_start - at) as usize).min(rest.len()));
+                self.put(at, before);
+                rest = after;
+                at = run_start;
+            }
+            let Some(run) = self.runs.get(&run_start) else { continue };
+            let shared = (run_end.min(end).saturating_sub(at)) as usize;
+            let (over, after) = rest.split_at(shared.min(rest.len()));
+            let old = run.get((at - run_start) as usize..).unwrap_or_default();
+            if let Some(i) = over.iter().zip(old).position(|(new, old)| new != old) {
+                return Err(LineProblem::Overlap { address: at + i as u64 });
+            }
+            at += over.len() as u64;
+            rest = after;
+        }
+        self.put(at, rest);
+        Ok(())
+    }
+
+    /// Records with data so far.
+    pub(super) fn records(&self) -> usize {
+        self.records
+    }
+
+    /// Starts of the runs that share addresses with `start..end`.
+    fn covering(&self, start: u64, end: u64) -> Vec<u64> {
+        let before = self.runs.range(..start).next_back();
+        let before = before.filter(|(a, run)| *a + run.len() as u64 > start).map(|(a, _)| *a);
+        before.into_iter().chain(self.runs.range(start..end).map(|(a, _)| *a)).collect()
+    }
+
+    /// Adds bytes at addresses that are free.
+    fn put(&mut self, at: u64, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        if let Some((start, run)) = self.runs.range_mut(..at).next_back()
+            && start + run.len() as u64 == at
+        {
+            run.extend_from_slice(bytes);
+            return;
+        }
+        self.runs.insert(at, bytes.to_vec());
+    }
+
+    /// The whole as words: load address and bytes.
+    pub(super) fn join(self, gaps: Gaps, notes: &mut Vec<ImageNote>) -> Result<(u32, Vec<u8>), ImageError> {
+        let Some((&first, _)) = self.runs.first_key_value() else { return Err(ImageError::Empty) };
+        let words = |byte: u64| u32::try_from(byte / 2);
+        let beyond = ImageError::AddressRange { address_words: u32::MAX, words: 0 };
+        let Ok(address_words) = words(first) else { return Err(beyond) };
+        if first % 2 == 1 {
+            // The other half of the first word belongs to no record.
+            return Err(ImageError::Gap { address_words, bytes: 1 });
+        }
+        let mut bytes: Vec<u8> = Vec::new();
+        for (start, run) in self.runs {
+            let missing = (start - first) as usize - bytes.len();
+            if missing > 0 {
+                let at = words(first + bytes.len() as u64).unwrap_or(u32::MAX);
+                match gaps {
+                    Gaps::Refuse => return Err(ImageError::Gap { address_words: at, bytes: missing }),
+                    Gaps::Fill => notes.push(ImageNote::GapFilled { address_words: at, bytes: missing }),
+                }
+                bytes.resize(bytes.len() + missing, 0xFF);
+            }
+            bytes.extend_from_slice(&run);
+        }
+        Ok((address_words, bytes))
+    }
+}
+
+/// Two hexadecimal digits a byte; a problem comes with its column from 0.
+pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> {
+    if let Some(i) = digits.iter().position(|d| !d.is_ascii_hexdigit()) {
+        return Err((i, LineProblem::Digit));
+    }
+    if digits.len() % 2 == 1 {
+        return Err((digits.len(), LineProblem::Digit));
+    }
+    let value = |d: u8| (d as char).to_digit(16).unwrap_or(0) as u8;
+    Ok(digits.as_chunks::<2>().0.iter().map(|[high, low]| value(*high) << 4 | value(*low)).collect())
+}
+
+/// Lines with their number from 1, without line ends and surrounding blanks; empty ones are left out.
+pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let lines = content.split(|b| *b == b'\n').enumerate();
+    lines.map(|(i, line)| (i + 1, line.trim_ascii())).filter(|(_, line)| !line.is_empty())
+}

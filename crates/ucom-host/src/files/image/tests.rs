@@ -1,0 +1,236 @@
+//! References: records from the formats' own published examples, and encoders written here from the formats' rules.
+
+use proptest::prelude::*;
+use std::panic;
+
+use super::*;
+
+fn parse(text: &str) -> Result<Image, ImageError> {
+    Image::parse(text.as_bytes(), &ImageOptions::default())
+}
+
+fn problem(text: &str) -> (usize, usize, LineProblem) {
+    match parse(text) {
+        Err(ImageError::Line { line, column, problem }) => (line, column, problem),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn hex_line(address: u16, kind: u8, data: &[u8]) -> String {
+    let mut bytes = vec![data.len() as u8, (address >> 8) as u8, address as u8, kind];
+    bytes.extend(data);
+    let sum = bytes.iter().map(|b| u32::from(*b)).sum::<u32>();
+    bytes.push((256 - sum % 256) as u8);
+    format!(":{}\n", bytes.iter().map(|b| format!("{b:02X}")).collect::<String>())
+}
+
+fn s_line(kind: u8, width: usize, address: u32, data: &[u8]) -> String {
+    let mut bytes = vec![(width + data.len() + 1) as u8];
+    bytes.extend(&address.to_be_bytes()[4 - width..]);
+    bytes.extend(data);
+    let sum = bytes.iter().map(|b| u32::from(*b)).sum::<u32>();
+    bytes.push(255 - (sum % 256) as u8);
+    format!("S{kind}{}\n", bytes.iter().map(|b| format!("{b:02X}")).collect::<String>())
+}
+
+#[test]
+fn intel_hex_as_published() {
+    // The example of the format's Wikipedia page (addresses in bytes).
+    let text = ":10010000214601360121470136007EFE09D2190140\n\
+                :100110002146017E17C20001FF5F16002148011928\n\
+                :10012000194E79234623965778239EDA3F01B2CAA7\n\
+                :100130003F0156702B5E712B722B732146013421C7\n\
+                :00000001FF\n";
+    let image = parse(text).unwrap();
+    assert_eq!((image.format(), image.address_words(), image.length_words()), (Format::IntelHex, 0x80, 32));
+    assert_eq!(image.bytes()[..4], [0x21, 0x46, 0x01, 0x36]);
+    assert!(image.notes().is_empty());
+}
+
+#[test]
+fn s_records_as_published_count_words_here() {
+    // The example of the format's manual page, made whole; as byte addresses it has no gap, as word addresses it has.
+    let text = "S00F000068656C6C6F202020202000003C\n\
+                S11F00007C0802A6900100049421FFF07C6C1B787C8C23783C6000003863000026\n\
+                S11F001C4BFFFFE5398000007D83637880010014382100107C0803A64E800020E9\n\
+                S111003848656C6C6F20776F726C642E0A0042\n\
+                S5030003F9\n\
+                S9030000FC\n";
+    let words = ImageOptions { address_unit: Some(AddressUnit::Word), ..Default::default() };
+    let gap = Image::parse(text.as_bytes(), &words);
+    assert!(matches!(gap, Err(ImageError::Gap { address_words: 14, bytes: 28 })));
+    let options = ImageOptions { address_unit: Some(AddressUnit::Byte), ..Default::default() };
+    let image = Image::parse(text.as_bytes(), &options).unwrap();
+    assert_eq!(image.bytes().len(), 70);
+    assert!(image.bytes().ends_with(b"Hello world.\n\0"));
+    assert_eq!(problem(&text.replace("S5030003F9", "S5030002FA")).2, LineProblem::Count { said: 2, has: 3 });
+}
+
+/// Which unit addresses count is told by records that follow each other in one unit alone; one or two records tell nothing.
+#[test]
+fn the_unit_of_addresses_is_told_by_the_records() {
+    let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
+    let file = |count: usize, length: usize, step: u32| {
+        let lines = bytes.chunks(length).take(count).zip(0..);
+        lines.map(|(data, i)| s_line(1, 2, 0x100 + i * step, data)).collect::<String>()
+            + &s_line(9, 2, 0, &[])
+    };
+    let told = |text: &str| {
+        let image = parse(text)?;
+        let unit = image.address_unit(&ImageOptions::default());
+        Ok::<_, ImageError>((image.address_words(), image.bytes().to_vec(), unit, image.notes().to_vec()))
+    };
+    let in_words = told(&file(4, 16, 8)).unwrap();
+    assert_eq!(in_words, (0x100, bytes.clone(), Some(AddressUnit::Word), vec![]));
+    let in_bytes = told(&file(4, 16, 16)).unwrap();
+    let note = ImageNote::AddressesCount(AddressUnit::Byte);
+    assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
+    // A hole that is meant, or one unit or the other: it is not guessed.
+    assert!(matches!(told(&file(2, 16, 16)), Err(ImageError::Gap { address_words: 0x108, bytes: 16 })));
+    // A table of vectors: two words in each place of four.
+    assert!(matches!(told(&file(16, 4, 4)), Err(ImageError::Gap { address_words: 0x102, bytes: 4 })));
+    // Intel HEX whose addresses count words: their bytes lie over each other otherwise.
+    let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
+    let hex = lines.collect::<String>() + ":00000001FF\n";
+    let note = ImageNote::AddressesCount(AddressUnit::Word);
+    assert_eq!(told(&hex).unwrap(), (0x100, bytes.clone(), Some(AddressUnit::Word), vec![note]));
+}
+
+#[test]
+fn what_is_wrong_is_named_with_line_and_column() {
+    let good = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
+    assert!(parse(&good).is_ok());
+    assert_eq!(problem(&good.replace("0102", "0103")).2, LineProblem::Checksum { has: 0xF2, should: 0xF1 });
+    assert_eq!(problem(&good.replace(":00000001FF", "nonsense")).0, 2);
+    assert_eq!(problem(&good.replace(":00000001FF", ":000000G1FF")), (2, 8, LineProblem::Digit));
+    assert_eq!(problem(&good.replace(":04", ":05")), (1, 2, LineProblem::Length { said: 5, has: 4 }));
+    let twice = hex_line(0, 0, &[1, 2]) + &hex_line(1, 0, &[9, 2]) + ":00000001FF\n";
+    assert_eq!(problem(&twice), (2, 1, LineProblem::Overlap { address: 1 }));
+    assert!(matches!(parse(&hex_line(0, 0, &[1, 2])), Err(ImageError::NoEnd { lines: 1, .. })));
+    let far =
+        hex_line(0, 0, &[1, 2]) + &hex_line(0, 4, &[0x12, 0]) + &hex_line(0, 0, &[1, 2]) + ":00000001FF";
+    assert!(matches!(problem(&far).2, LineProblem::TooLarge { limit: MAX_BYTES, from: 0, .. }));
+    assert!(matches!(Image::parse(b"", &Default::default()), Err(ImageError::Empty)));
+    assert!(matches!(Image::parse(b"\x7fELF..", &Default::default()), Err(ImageError::Elf)));
+    let options = ImageOptions { max_bytes: 3, ..Default::default() };
+    let large = Image::parse(&[0; 4], &options);
+    assert!(matches!(large, Err(ImageError::TooLarge { bytes: 4, limit: 3 })));
+}
+
+#[test]
+fn gaps_are_refused_or_filled_with_a_word() {
+    let text = hex_line(0x10, 0, &[1, 2]) + &hex_line(0x16, 0, &[3, 4]) + ":00000001FF\n";
+    assert!(matches!(parse(&text), Err(ImageError::Gap { address_words: 9, bytes: 4 })));
+    let options = ImageOptions { gaps: Gaps::Fill, ..Default::default() };
+    let image = Image::parse(text.as_bytes(), &options).unwrap();
+    assert_eq!(image.bytes(), [1, 2, 0xFF, 0xFF, 0xFF, 0xFF, 3, 4]);
+    assert_eq!(image.notes(), [ImageNote::GapFilled { address_words: 9, bytes: 4 }]);
+}
+
+#[test]
+fn raw_bytes_are_whole_words() {
+    let image = Image::parse(&[1, 2, 3], &Default::default()).unwrap();
+    assert_eq!((image.bytes(), image.notes()), (&[1, 2, 3, 0xFF][..], &[ImageNote::LastWordPadded][..]));
+    let options = ImageOptions { swap_bytes: true, load_address_words: Some(7), ..Default::default() };
+    let image = Image::parse(&[1, 2, 3, 4], &options).unwrap();
+    assert_eq!((image.bytes(), image.address_words()), (&[2, 1, 4, 3][..], 7));
+    let options = ImageOptions { load_address_words: Some(u32::MAX), ..Default::default() };
+    assert!(matches!(Image::parse(&[1, 2], &options), Err(ImageError::AddressRange { .. })));
+    // Forced: a text of records may be taken as it stands.
+    let forced = ImageOptions { format: Some(Format::Bin), ..Default::default() };
+    assert_eq!(Image::parse(b":00000001FF\n", &forced).unwrap().bytes(), b":00000001FF\n");
+}
+
+/// A text is never raw bytes, whatever its name; what is wrong is named with its place.
+#[test]
+fn a_text_is_no_image() {
+    let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
+    let srec = s_line(1, 2, 0, &[1, 2, 3, 4]) + &s_line(9, 2, 0, &[]);
+    let dir = tempfile::tempdir().unwrap();
+    let read = |name: &str, content: &[u8]| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        Image::read(&path, &ImageOptions::default())
+    };
+    for name in ["a.hex", "a.s19", "a.bin", "a.txt", "a"] {
+        assert_eq!(read(name, hex.as_bytes()).unwrap().format(), Format::IntelHex, "{name}: by content");
+        assert_eq!(read(name, srec.as_bytes()).unwrap().format(), Format::SRecord, "{name}: by content");
+        for comment in ["; made by a linker\n", "# x\n", "// x\n"] {
+            let wrong = read(name, (comment.to_owned() + &hex).as_bytes());
+            let place = ImageError::line(1, 1, LineProblem::Start { expected: ':' });
+            assert_eq!(wrong.unwrap_err().to_string(), place.to_string(), "{name} {comment}");
+            let wrong = read(name, (srec.clone() + comment).as_bytes()).unwrap_err().to_string();
+            assert!(wrong.starts_with("line 3, column 1: "), "{name} {comment}: {wrong}");
+        }
+        for mark in [&b"\xEF\xBB\xBF"[..], b"\xFF\xFE"] {
+            let wrong = read(name, &[mark, hex.as_bytes()].concat());
+            assert!(matches!(wrong, Err(ImageError::ByteOrderMark { .. })), "{name}: {wrong:?}");
+        }
+        let texts: [&[u8]; 5] = [
+            b"dear reader, this is no firmware\n",
+            b"par.kp = 3\n",
+            "Gr\u{fc}\u{df}e aus der Werkstatt\n".as_bytes(),
+            b"h\0a\0l\0l\0o\0 \0w\0e\0l\0t\0",
+            b"U",
+        ];
+        for text in texts {
+            assert!(read(name, text).is_err(), "{name}: {text:?}");
+            let raw = ImageOptions { format: Some(Format::Bin), ..Default::default() };
+            assert!(Image::parse(text, &raw).is_ok());
+        }
+    }
+    // A name promises records: their first mistake is told.
+    assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
+    assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
+    let bytes: Vec<u8> = (0..=255).collect();
+    assert_eq!(read("a.bin", &bytes).unwrap().bytes(), bytes);
+    for name in ["a", "a.img", "a.txt"] {
+        assert!(matches!(read(name, &bytes), Err(ImageError::NotBin { .. })), "{name}");
+    }
+}
+
+proptest! {
+    /// The same bytes in the three forms, records of any size in any order, give the same image.
+    #[test]
+    fn three_forms_are_one_image(
+        words in prop::collection::vec(any::<[u8; 2]>(), 1..300),
+        base in 0_u32..0x8000,
+        step in 1_usize..120,
+        seed in any::<u64>(),
+    ) {
+        let bytes = words.concat();
+        let mut hex = Vec::new();
+        let mut srec = Vec::new();
+        for (i, chunk) in bytes.chunks(step * 2).enumerate() {
+            let word = base + (i * step) as u32;
+            let byte = word * 2;
+            hex.push(hex_line(0, 4, &((byte >> 16) as u16).to_be_bytes()) + &hex_line(byte as u16, 0, chunk));
+            srec.push(s_line(3, 4, word, chunk));
+        }
+        let mut order: Vec<usize> = (0..hex.len()).collect();
+        order.sort_by_key(|i| (*i as u64 + 1).wrapping_mul(seed | 1));
+        let pick = |lines: &[String]| order.iter().map(|i| lines[*i].as_str()).collect::<String>();
+        let from_hex = parse(&(pick(&hex) + ":00000001FF\r\n")).unwrap();
+        let from_srec = parse(&(pick(&srec) + &s_line(7, 4, 0, &[]))).unwrap();
+        prop_assert_eq!(from_hex.bytes(), &bytes[..]);
+        prop_assert_eq!(from_srec.bytes(), &bytes[..]);
+        prop_assert_eq!((from_hex.address_words(), from_srec.address_words()), (base, base));
+    }
+
+    /// Any bytes and any one damaged byte: an image or a named error, no panic.
+    #[test]
+    fn anything_is_an_image_or_an_error(
+        data in prop::collection::vec(any::<u8>(), 0..300),
+        form in 0_u8..4, at in any::<prop::sample::Index>(), with in any::<u8>(),
+    ) {
+        let format = [None, Some(Format::Bin), Some(Format::IntelHex), Some(Format::SRecord)][usize::from(form)];
+        let options = ImageOptions { format, gaps: Gaps::Fill, ..Default::default() };
+        let _ = Image::parse(&data, &options);
+        let mut text = (hex_line(0x20, 0, &[1, 2, 3, 4]) + ":00000001FF\n").into_bytes();
+        let i = at.index(text.len());
+        text[i] = with;
+        if let Ok(image) = Image::parse(&text, &options) {
+            prop_assert!(image.bytes().len().is_multiple_of(2) && !image.bytes().is_empty());
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! A file against the boards that are there: every mistake with its place, before anything is sent.
+
+use super::{ParamsBoard, ParamsEntry, Place};
+use crate::files::edges::{BoardEdges, ValueError};
+use crate::master::Error;
+use crate::master::io::{IoDescription, Kind};
+use std::collections::BTreeMap;
+use ucom::BoardInfo;
+
+/// A board as it is.
+#[derive(Clone, Copy, Debug)]
+pub struct ParamsTarget<'a> {
+    /// Its answer to PC_INFO.
+    pub info: &'a BoardInfo,
+    /// Its name in the inventory; `None`: it has none.
+    pub name: Option<&'a str>,
+}
+
+/// A word that a file has for a board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ParamsWord {
+    /// Place in the buffer.
+    pub index: u16,
+    /// The whole text of the edge.
+    pub name: String,
+    /// The word.
+    pub word: u16,
+    /// The value in the edge's unit, with the unit.
+    pub text: String,
+    /// `0.04 → 0.0` where the value lies between two words.
+    pub rounded: Option<String>,
+}
+
+/// One mistake of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ParamsProblem {
+    /// Where in the file.
+    pub place: Place,
+    /// For which board.
+    pub board: u8,
+    /// What it is.
+    pub kind: ParamsProblemKind,
+}
+
+impl core::fmt::Display for ParamsProblem {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { place, board, kind } = self;
+        // The library's own words for a name that is not there begin with the board.
+        let board = if matches!(kind, ParamsProblemKind::NoEdge(_)) {
+            String::new()
+        } else {
+            format!("board {board}: ")
+        };
+        write!(f, "{place}: {board}{kind}")
+    }
+}
+
+/// What can be wrong.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParamsProblemKind {
+    /// Nobody answers under this number.
+    #[error("it does not answer")]
+    Absent,
+    /// Another board stands there.
+    #[error("its flash number is 0x{found:04X}, the file is for 0x{wanted:04X}")]
+    WrongFlash {
+        /// The file's.
+        wanted: u16,
+        /// The board's.
+        found: u16,
+    },
+    /// The inventory has another name for it.
+    #[error("the file is for `{wanted}`, the inventory calls it {}", found.as_ref().map_or("nothing".into(), |f| format!("`{f}`")))]
+    WrongName {
+        /// The file's.
+        wanted: String,
+        /// The inventory's.
+        found: Option<String>,
+    },
+    /// Another program is on it.
+    #[error("its program is {}, the names in the file belong to 0x{wanted:04X}", found.map_or("missing".into(), |f| format!("0x{f:04X}")))]
+    WrongProgram {
+        /// The file's.
+        wanted: u16,
+        /// The board's; `None`: it has no application.
+        found: Option<u16>,
+    },
+    /// No edge has this name.
+    #[error("{0}")]
+    NoEdge(Error),
+    /// Two entries mean the same edge.
+    #[error("{kind} `{name}` is given twice, first in line {first}")]
+    Twice {
+        /// `CI` or `PAR`.
+        kind: &'static str,
+        /// As in the file.
+        name: String,
+        /// Line of the first.
+        first: u32,
+    },
+    /// The value does not fit.
+    #[error("{kind} `{name}`: {problem}")]
+    Value {
+        /// `CI` or `PAR`.
+        kind: &'static str,
+        /// As in the file.
+        name: String,
+        /// Why.
+        problem: ValueError,
+    },
+}
+
+/// Whether the board is the one that the file means, and has the program that it means.
+pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<ParamsProblem> {
+    let mut problems = Vec::new();
+    let mut say = |kind| problems.push(ParamsProblem { place: board.place, board: board.number, kind });
+    let info = target.info;
+    if let Some(wanted) = board.flash_number
+        && wanted != info.flash_number
+    {
+        say(ParamsProblemKind::WrongFlash { wanted, found: info.flash_number });
+    }
+    if let Some(wanted) = &board.name
+        && target.name != Some(wanted)
+    {
+        say(ParamsProblemKind::WrongName { wanted: wanted.clone(), found: target.name.map(str::to_owned) });
+    }
+    let found = info.has_application().then_some(info.program_id);
+    if let Some(wanted) = board.program_id
+        && found != Some(wanted)
+    {
+        say(ParamsProblemKind::WrongProgram { wanted, found });
+    }
+    problems
+}
+
+/// The words for a board whose description is known: first inputs, then parameters; or every mistake.
+pub fn check_board(
+    board: &ParamsBoard,
+    description: &IoDescription,
+    edges: &BoardEdges,
+) -> Result<(Vec<ParamsWord>, Vec<ParamsWord>), Vec<ParamsProblem>> {
+    let mut problems = Vec::new();
+    let mut words =
+        |kind, entries| check_entries(board.number, kind, entries, description, edges, &mut problems);
+    let (ci, par) = (words(Kind::Ci, &board.ci), words(Kind::Par, &board.par));
+    if problems.is_empty() { Ok((ci, par)) } else { Err(problems) }
+}
+
+fn check_entries(
+    board: u8,
+    kind: Kind,
+    entries: &[ParamsEntry],
+    description: &IoDescription,
+    edges: &BoardEdges,
+    problems: &mut Vec<ParamsProblem>,
+) -> Vec<ParamsWord> {
+    let mut lines: BTreeMap<u16, u32> = BTreeMap::new();
+    let mut words = Vec::new();
+    for ParamsEntry { name, given, place } in entries {
+        let mut say = |problem| problems.push(ParamsProblem { place: *place, board, kind: problem });
+        let index = match description.find(board, kind, name) {
+            Ok(index) => index,
+            Err(e) => {
+                say(ParamsProblemKind::NoEdge(e));
+                continue;
+            }
+        };
+        if let Some(first) = lines.insert(index, place.line) {
+            say(ParamsProblemKind::Twice { kind: kind.name(), name: name.clone(), first });
+            continue;
+        }
+        let Some(edge) = edges.get(kind, index.into()) else { continue };
+        match edge.word(given) {
+            Ok(word) => words.push(ParamsWord {
+                index,
+                name: description.names(kind).get(usize::from(index)).cloned().unwrap_or_default(),
+                word,
+                text: edge.text_with_unit(word),
+                rounded: edge.rounded(given, word).map(|sent| format!("{given} → {sent}")),
+            }),
+            Err(problem) => say(ParamsProblemKind::Value { kind: kind.name(), name: name.clone(), problem }),
+        }
+    }
+    words
+}

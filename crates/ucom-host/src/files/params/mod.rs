@@ -1,0 +1,114 @@
+//! Parameter files: which parameters, and which first inputs, boards are to have. YAML, written to be edited.
+//!
+//! The protocol has no way to read parameters back (D-35), so a file never says what is on a board. It says what somebody
+//! wants there; who stands where is checked by flash number or name, and the names belong to a Program ID.
+
+mod check;
+mod read;
+mod write;
+
+pub use check::{ParamsProblem, ParamsProblemKind, ParamsTarget, ParamsWord, check_board, check_identity};
+pub use write::{SavedBoard, SavedEdge, params_text};
+
+use super::edges::Given;
+use super::text::{TextError, read_text};
+use std::path::{Path, PathBuf};
+
+/// The page about these files.
+pub const PARAMS_HELP: &str = include_str!("help.txt");
+
+/// A parameter file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ParamsFile {
+    /// Its boards, each number once, in the order of the file.
+    pub boards: Vec<ParamsBoard>,
+}
+
+/// One board of a parameter file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParamsBoard {
+    /// Position in the chain.
+    pub number: u8,
+    /// Where it stands in the file.
+    pub place: Place,
+    /// The flash number that must stand there.
+    pub flash_number: Option<u16>,
+    /// The name in the inventory that must stand there; a board has this or a flash number, or both.
+    pub name: Option<String>,
+    /// The program that the names belong to; `None`: the file says `any`.
+    pub program_id: Option<u16>,
+    /// Parameters.
+    pub par: Vec<ParamsEntry>,
+    /// First inputs, for a start.
+    pub ci: Vec<ParamsEntry>,
+}
+
+/// A value of a parameter file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParamsEntry {
+    /// Name or number of the edge.
+    pub name: String,
+    /// The value.
+    pub given: Given,
+    /// Where it stands in the file.
+    pub place: Place,
+}
+
+/// A place in a text, from 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// Line.
+    pub line: u32,
+    /// Column.
+    pub column: u32,
+}
+
+impl core::fmt::Display for Place {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "line {}, column {}", self.line, self.column)
+    }
+}
+
+/// Why a text is no parameter file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParamsError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Text(#[from] TextError),
+    /// Not YAML of this form.
+    #[error("{place}: {what}")]
+    Form {
+        /// Where.
+        place: Place,
+        /// What is wrong.
+        what: String,
+    },
+    /// Not YAML of this form, at no place.
+    #[error("{0}")]
+    Nowhere(String),
+    /// In a file.
+    #[error("{}: {source}", path.display())]
+    In {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        source: Box<ParamsError>,
+    },
+}
+
+impl ParamsFile {
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, ParamsError> {
+        let text = read_text(path)?;
+        Self::parse(&text).map_err(|e| ParamsError::In { path: path.into(), source: Box::new(e) })
+    }
+
+    /// The values for a board.
+    pub fn board(&self, number: u8) -> Option<&ParamsBoard> {
+        self.boards.iter().find(|b| b.number == number)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+//! The text of a parameter file: values that are wanted, and every other name as a comment.
+
+use crate::files::edges::{Edge, EdgeType, Given};
+use crate::files::text::quoted;
+use crate::master::io::{IoDescription, Kind, short};
+use std::fmt::Write;
+
+/// A board to be written down.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SavedBoard {
+    /// Its number.
+    pub number: u8,
+    /// Its flash number.
+    pub flash_number: u16,
+    /// Its name in the inventory; empty: none.
+    pub name: String,
+    /// Its program.
+    pub program_id: u16,
+    /// The names of its edges.
+    pub description: IoDescription,
+    /// Parameters, in the order of the buffer.
+    pub par: Vec<SavedEdge>,
+    /// Inputs, in the order of the buffer.
+    pub ci: Vec<SavedEdge>,
+}
+
+/// What is written of one edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SavedEdge {
+    /// Its meaning.
+    pub edge: Edge,
+    /// The word that is wanted; `None`: the name becomes a comment.
+    pub word: Option<u16>,
+    /// For a wanted word when it was written, for others what is known beside.
+    pub remark: String,
+}
+
+/// The text of a parameter file.
+pub fn params_text(boards: &[SavedBoard]) -> String {
+    let mut text = String::from(
+        "# Parameters of boards; `ucom help params` explains the form, `ucom par --apply FILE` writes them.\n\
+         # Values are what is wanted. What is on a board cannot be read: names without a value are comments.\n\
+         boards:\n",
+    );
+    if boards.is_empty() {
+        return text.replace("boards:\n", "boards: []\n");
+    }
+    for board in boards {
+        let _ = writeln!(text, "  - board: {}", board.number);
+        let _ = writeln!(text, "    flash_number: 0x{:04X}", board.flash_number);
+        if !board.name.is_empty() {
+            let _ = writeln!(text, "    name: {}", quoted(&board.name));
+        }
+        let _ = writeln!(
+            text,
+            "    program_id: 0x{:04X}{}",
+            board.program_id,
+            comment(&board.description.description)
+        );
+        for (kind, title, edges) in [(Kind::Par, "par", &board.par), (Kind::Ci, "ci", &board.ci)] {
+            if edges.is_empty() {
+                continue;
+            }
+            let _ = writeln!(text, "    {title}:");
+            for (i, saved) in edges.iter().enumerate() {
+                line(&mut text, board, kind, i, saved);
+            }
+        }
+    }
+    text
+}
+
+fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &SavedEdge) {
+    let key = key(&board.description, kind, i);
+    let (low, high) = saved.edge.limits();
+    let unit = if saved.edge.unit.is_empty() { String::new() } else { format!(" {}", saved.edge.unit) };
+    let remark = if saved.remark.is_empty() { String::new() } else { format!("; {}", saved.remark) };
+    let limits = format!("{low}..{high}{unit}{remark}");
+    let _ = match saved.word {
+        Some(word) => {
+            let value = value(&saved.edge, word);
+            let meaning = if value.starts_with("0x") && saved.edge.kind != EdgeType::Hex {
+                format!("{}; ", saved.edge.text_with_unit(word))
+            } else {
+                String::new()
+            };
+            writeln!(text, "      {key}: {value}{}", comment(&(meaning + &limits)))
+        }
+        None => writeln!(text, "      # {key}:{}", comment(&limits).replacen("   #", "  #", 1)),
+    };
+}
+
+/// What a word is written as. A file is read again with another edge table, or with none; a bare number would then be another
+/// word. So there is a unit behind each number, which whoever does not know it refuses, or it is the word itself.
+fn value(edge: &Edge, word: u16) -> String {
+    let raw = format!("0x{word:04X}");
+    let text = match edge.kind {
+        EdgeType::Bool if edge.known && word <= 1 => return edge.text(word),
+        EdgeType::Int16 | EdgeType::Uint16 if edge.known && !edge.unit.is_empty() => {
+            edge.text_with_unit(word)
+        }
+        _ => return raw,
+    };
+    // A digit that rounding has lost, or a limit that the word does not keep.
+    if text.parse::<Given>().map(|given| edge.word(&given)) != Ok(Ok(word)) {
+        return raw;
+    }
+    let plain = |c: char| c.is_ascii_alphanumeric() || " .-/%^*_°µ²³Ω".contains(c);
+    if text.chars().all(plain) { text } else { quoted(&text) }
+}
+
+/// A remark at the end of a line. Texts of boards may hold anything: only what is one line stays.
+fn comment(words: &str) -> String {
+    let one_line: String = words.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let one_line = one_line.replace(['\u{2028}', '\u{2029}', '\u{FEFF}', '\u{FFFE}', '\u{FFFF}'], " ");
+    if one_line.trim().is_empty() { String::new() } else { format!("   # {}", one_line.trim()) }
+}
+
+/// The name of an edge, as short as it can be and still mean this one.
+fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
+    let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
+    let full = description.names(kind).get(i).map_or("", String::as_str);
+    // A board may call another edge "#1": further signs make the number different from every name.
+    let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
+    let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
+    let name = names.chain(numbers).find(|name| means(name)).unwrap_or_default();
+    let word = name.starts_with(|c: char| c.is_ascii_alphabetic())
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    // Words that YAML takes for something else.
+    let taken = ["null", "true", "false", "yes", "no", "on", "off", "y", "n"];
+    if word && !taken.contains(&name.to_ascii_lowercase().as_str()) { name } else { quoted(&name) }
+}

@@ -1,0 +1,95 @@
+//! Why a recording cannot be read or written.
+
+use std::path::{Path, PathBuf};
+/// Why a recording cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The file cannot be used.
+    #[error("{}{source}", prefix(path))]
+    Io {
+        /// The file; empty where it is not known.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A line is no record.
+    #[error("line {line}: {problem}")]
+    Line {
+        /// From 1.
+        line: usize,
+        /// What is wrong.
+        problem: RecordProblem,
+    },
+    /// Not an FZI-CAN stream of version 1.2.
+    #[error("the first line is `{first}`, not `{}`", super::FZI_HEADER)]
+    FziHeader {
+        /// What it is.
+        first: String,
+    },
+    /// The form has no place for this frame.
+    #[error("FZI-CAN holds classic data frames of 11-bit ids only, this one is {frame}")]
+    NotRepresentable {
+        /// The frame.
+        frame: String,
+    },
+    /// An MCAP file is damaged.
+    #[error("{}{problem}", prefix(path))]
+    Mcap {
+        /// The file; empty where it is not known.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// What is wrong with a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RecordProblem {
+    /// Longer than any record.
+    #[error("longer than {} bytes; is this a recording?", super::MAX_LINE)]
+    TooLong,
+    /// Wrong number of columns.
+    #[error("a line of candump is `(seconds) interface ID#DATA`")]
+    Columns,
+    /// Not a time.
+    #[error("not a time in seconds")]
+    Time,
+    /// Not an identifier.
+    #[error("not an identifier")]
+    Id,
+    /// Not a length.
+    #[error("not a length of 0 to 8")]
+    Length,
+    /// Not data.
+    #[error("the data are not pairs of hexadecimal digits, or too many")]
+    Data,
+    /// The file ends in the middle of it: even what can be read of it may be only its beginning.
+    #[error("the file is broken off here: the line has no end")]
+    BrokenOff,
+    /// Wrong number of columns.
+    #[error("a line of FZI-CAN is `sec.usec id dlc` and eight bytes")]
+    FziColumns,
+}
+
+fn prefix(path: &Path) -> String {
+    if path.as_os_str().is_empty() { String::new() } else { format!("{}: ", path.display()) }
+}
+
+impl RecordingError {
+    pub(super) fn with_path(self, file: &Path) -> Self {
+        match self {
+            Self::Io { source, path } if path.as_os_str().is_empty() => {
+                Self::Io { path: file.into(), source }
+            }
+            Self::Mcap { problem, .. } => Self::Mcap { path: file.into(), problem },
+            other => other,
+        }
+    }
+}
+
+impl From<std::io::Error> for RecordingError {
+    fn from(source: std::io::Error) -> Self {
+        Self::Io { path: PathBuf::new(), source }
+    }
+}

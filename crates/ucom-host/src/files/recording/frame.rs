@@ -1,0 +1,96 @@
+//! One frame of a recording, foreign ones included.
+
+use std::fmt;
+/// What kind of frame it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameKind {
+    /// Classic data frame.
+    Data,
+    /// Remote frame: no data, asks for so many bytes.
+    Remote {
+        /// The length asked for, 0..8.
+        length: u8,
+    },
+    /// CAN FD.
+    Fd {
+        /// Flags as candump writes them: 1 bit rate switch, 2 error state.
+        flags: u8,
+    },
+    /// Not a frame but an error that the adapter reports.
+    Error,
+}
+
+/// A frame as recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordedFrame {
+    /// Identifier; of an error report the error class.
+    pub id: u32,
+    /// 29 bits.
+    pub extended: bool,
+    /// Kind.
+    pub kind: FrameKind,
+    /// Payload.
+    pub data: Vec<u8>,
+    /// Raw DLC 9..15 of a classic frame with eight bytes, as candump notes it.
+    pub dlc: Option<u8>,
+}
+
+impl RecordedFrame {
+    /// A classic data frame with an 11-bit identifier.
+    pub fn classic(id: u16, data: &[u8]) -> Self {
+        Self { id: id.into(), extended: false, kind: FrameKind::Data, data: data.to_vec(), dlc: None }
+    }
+
+    /// Identifier and payload when this is a classic data frame with an 11-bit identifier (D-02); `None`: foreign.
+    pub fn as_classic(&self) -> Option<(u16, &[u8])> {
+        let id = u16::try_from(self.id).ok().filter(|id| *id <= 0x7FF)?;
+        (self.kind == FrameKind::Data && !self.extended && self.data.len() <= 8)
+            .then_some((id, &self.data[..]))
+    }
+}
+
+/// As candump writes it.
+impl fmt::Display for RecordedFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.kind == FrameKind::Error {
+            write!(f, "{:08X}#", 0x2000_0000 | self.id)?;
+        } else if self.extended {
+            write!(f, "{:08X}#", self.id)?;
+        } else {
+            write!(f, "{:03X}#", self.id)?;
+        }
+        match self.kind {
+            FrameKind::Remote { length: 0 } => write!(f, "R")?,
+            FrameKind::Remote { length } => write!(f, "R{length}")?,
+            FrameKind::Fd { flags } => write!(f, "#{:X}", flags & 0xF)?,
+            FrameKind::Data | FrameKind::Error => {}
+        }
+        self.data.iter().try_for_each(|byte| write!(f, "{byte:02X}"))?;
+        if let Some(dlc) = self.dlc {
+            write!(f, "_{dlc:X}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Who sent a frame, where the recording knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Received (`R`).
+    Received,
+    /// Sent by the recorder itself (`T`).
+    Sent,
+}
+
+/// A line of a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// Time since the recorder's epoch, ns.
+    pub time_ns: u64,
+    /// Name of the interface.
+    pub channel: String,
+    /// Who sent it.
+    pub direction: Option<Direction>,
+    /// The frame.
+    pub frame: RecordedFrame,
+}

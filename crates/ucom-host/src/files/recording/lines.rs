@@ -1,0 +1,70 @@
+//! Lines of the text forms: a record each, with blank lines and comments between.
+
+use super::{MAX_LINE, Record, RecordProblem, RecordingError};
+use std::io::{BufRead, Read};
+
+/// Reads records line by line.
+pub(super) struct Lines<R> {
+    input: R,
+    number: usize,
+    /// The last line had no end.
+    endless: bool,
+    failed: bool,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// From the start of the file.
+    pub fn new(input: R) -> Self {
+        Self { input, number: 0, endless: false, failed: false }
+    }
+
+    /// The next line without blanks around it; `None` at the end of the file. Memory is bounded whatever comes.
+    pub fn line(&mut self) -> Result<Option<String>, RecordingError> {
+        let mut line = Vec::new();
+        self.input.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line)?;
+        if line.is_empty() {
+            return Ok(None);
+        }
+        self.number += 1;
+        if line.len() > MAX_LINE {
+            return Err(self.error(RecordProblem::TooLong));
+        }
+        self.endless = line.last() != Some(&b'\n');
+        Ok(Some(String::from_utf8_lossy(&line).trim().to_owned()))
+    }
+
+    /// The next record, made by `parse` from its line; the first error ends it. `comment` sees the comments before it.
+    pub fn record(
+        &mut self,
+        parse: fn(&str) -> Result<Record, RecordProblem>,
+        comment: impl FnMut(&str),
+    ) -> Option<Result<Record, RecordingError>> {
+        if self.failed {
+            return None;
+        }
+        let next = self.try_record(parse, comment);
+        self.failed = next.is_err();
+        next.transpose()
+    }
+
+    fn try_record(
+        &mut self,
+        parse: fn(&str) -> Result<Record, RecordProblem>,
+        mut comment: impl FnMut(&str),
+    ) -> Result<Option<Record>, RecordingError> {
+        while let Some(line) = self.line()? {
+            if line.starts_with('#') {
+                comment(&line);
+            } else if self.endless && !line.is_empty() {
+                return Err(self.error(RecordProblem::BrokenOff));
+            } else if !line.is_empty() {
+                return parse(&line).map(Some).map_err(|problem| self.error(problem));
+            }
+        }
+        Ok(None)
+    }
+
+    fn error(&self, problem: RecordProblem) -> RecordingError {
+        RecordingError::Line { line: self.number, problem }
+    }
+}

@@ -1,0 +1,207 @@
+//! Recordings of a bus: `candump -L`, FZI-CAN 1.2 and MCAP.
+//!
+//! A recording is only meaningful with the profile that was in use. MCAP keeps it as metadata. The two text forms have no
+//! place for it that every reader accepts (python-can's candump reader takes each line for a frame), so it lies beside
+//! the recording as a file of its own, see [`profile_path`]; comment lines `# …` with it are read where they occur.
+mod candump;
+mod error;
+mod frame;
+mod fzi;
+mod lines;
+mod mcap;
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+pub use candump::{CandumpReader, CandumpWriter};
+pub use error::{RecordProblem, RecordingError};
+pub use frame::{Direction, FrameKind, Record, RecordedFrame};
+pub use fzi::{FZI_HEADER, FziReader, FziWriter};
+pub use mcap::{McapWriter, read_mcap};
+
+/// Longest line of a text recording, bytes; more is no recording.
+pub const MAX_LINE: usize = 4096;
+
+/// Form of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RecordingFormat {
+    /// Lines `(sec.frac) interface ID#DATA` of can-utils.
+    Candump,
+    /// FZI-CAN stream 1.2.
+    FziCan,
+    /// MCAP with one channel of JSON messages.
+    Mcap,
+}
+
+impl RecordingFormat {
+    /// By the file's first bytes.
+    pub fn detect(start: &[u8]) -> Self {
+        if start.starts_with(b"\x89MCAP0\r\n") {
+            Self::Mcap
+        } else if start.trim_ascii_start().starts_with(b"# FZI-CAN") {
+            Self::FziCan
+        } else {
+            Self::Candump
+        }
+    }
+
+    /// By the ending of a name: `.mcap`, `.fzi`; candump otherwise.
+    pub fn of_path(path: &Path) -> Self {
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("mcap") => Self::Mcap,
+            Some("fzi" | "fzican") => Self::FziCan,
+            _ => Self::Candump,
+        }
+    }
+}
+
+/// Where the profile of a text recording lies: `NAME.profile.toml` beside it.
+pub fn profile_path(recording: &Path) -> PathBuf {
+    let mut name = recording.as_os_str().to_owned();
+    name.push(".profile.toml");
+    name.into()
+}
+
+/// A whole recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recording {
+    /// The profile in use, as TOML; `None`: not known.
+    pub profile: Option<String>,
+    /// Frames in the order of the file.
+    pub records: Vec<Record>,
+    /// Where and how the file ends in the middle of a record, as after a writer that was killed; `None`: it is whole.
+    pub broken_off: Option<String>,
+}
+
+impl Recording {
+    /// Reads a file of any of the forms, and the profile beside it.
+    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let io = |source| RecordingError::Io { path: path.into(), source };
+        let mut file = BufReader::new(File::open(path).map_err(io)?);
+        let format = RecordingFormat::detect(file.fill_buf().map_err(io)?);
+        let mut recording = match format {
+            RecordingFormat::Mcap => read_mcap(&std::fs::read(path).map_err(io)?),
+            RecordingFormat::FziCan => Self::read_fzi(file),
+            RecordingFormat::Candump => Self::read_candump(file),
+        }
+        .map_err(|e| e.with_path(path))?;
+        if recording.profile.is_none()
+            && let Ok(text) = std::fs::read_to_string(profile_path(path))
+        {
+            recording.profile = Some(text);
+        }
+        Ok(recording)
+    }
+
+    /// Reads candump lines.
+    pub fn read_candump(input: impl BufRead) -> Result<Self, RecordingError> {
+        let mut reader = CandumpReader::new(input);
+        let (records, broken_off) = whole(&mut reader)?;
+        Ok(Self { profile: reader.into_profile(), records, broken_off })
+    }
+
+    /// Reads an FZI-CAN stream.
+    pub fn read_fzi(input: impl BufRead) -> Result<Self, RecordingError> {
+        let (records, broken_off) = whole(&mut FziReader::new(input)?)?;
+        Ok(Self { profile: None, records, broken_off })
+    }
+}
+
+/// The records of a text up to its end, and how that looks if it is none.
+fn whole(
+    lines: &mut dyn Iterator<Item = Result<Record, RecordingError>>,
+) -> Result<(Vec<Record>, Option<String>), RecordingError> {
+    let mut records = Vec::new();
+    for record in lines {
+        match record {
+            Ok(record) => records.push(record),
+            Err(e @ RecordingError::Line { problem: RecordProblem::BrokenOff, .. }) => {
+                return Ok((records, Some(e.to_string())));
+            }
+            Err(e) => return Err(e),
+        }
+    }
+    Ok((records, None))
+}
+
+/// Writes a recording of any form to a file.
+pub enum RecordingWriter {
+    /// candump.
+    Candump(CandumpWriter<BufWriter<File>>),
+    /// FZI-CAN.
+    FziCan(FziWriter<BufWriter<File>>),
+    /// MCAP.
+    Mcap(Box<McapWriter<BufWriter<File>>>),
+}
+
+impl RecordingWriter {
+    /// Makes the file, and for text forms the profile's beside it.
+    pub fn create(path: &Path, format: RecordingFormat, profile: &str) -> Result<Self, RecordingError> {
+        let io = |source| RecordingError::Io { path: path.into(), source };
+        let out = BufWriter::new(File::create(path).map_err(io)?);
+        if format != RecordingFormat::Mcap {
+            let beside = profile_path(path);
+            std::fs::write(&beside, profile).map_err(|source| RecordingError::Io { path: beside, source })?;
+        }
+        match format {
+            RecordingFormat::Candump => Ok(Self::Candump(CandumpWriter::new(out))),
+            RecordingFormat::FziCan => FziWriter::new(out).map(Self::FziCan),
+            RecordingFormat::Mcap => McapWriter::new(out, profile).map(|w| Self::Mcap(Box::new(w))),
+        }
+        .map_err(|e| e.with_path(path))
+    }
+
+    /// Adds a frame. FZI-CAN cannot hold foreign frames: that is an error, and nothing is written.
+    pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
+        match self {
+            Self::Candump(w) => w.write(record),
+            Self::FziCan(w) => w.write(record),
+            Self::Mcap(w) => w.write(record, name),
+        }
+    }
+
+    /// Lets all that was written reach the file: a writer that is killed later loses only what came since.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        match self {
+            Self::Candump(w) => w.flush(),
+            Self::FziCan(w) => w.flush(),
+            Self::Mcap(w) => w.flush(),
+        }
+    }
+
+    /// Writes what is left; without it an MCAP file has no index and a text file may lack its last lines.
+    pub fn finish(self) -> Result<(), RecordingError> {
+        match self {
+            Self::Candump(w) => Ok(w.into_inner().flush()?),
+            Self::FziCan(w) => Ok(w.into_inner().flush()?),
+            Self::Mcap(w) => w.finish().and_then(|mut out| Ok(out.flush()?)),
+        }
+    }
+}
+
+/// `sec.fraction` with any number of digits as nanoseconds; finer digits are dropped.
+fn seconds(text: &str) -> Option<u64> {
+    let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
+    let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
+    if whole.is_empty() || !digits(whole) || !digits(fraction) {
+        return None;
+    }
+    let mut ns = 0_u64;
+    for i in 0..9 {
+        ns = ns * 10 + u64::from(fraction.as_bytes().get(i).map_or(0, |b| b - b'0'));
+    }
+    whole.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(ns)
+}
+
+/// Bytes from pairs of hexadecimal digits, at most `most`.
+fn hex_bytes(text: &str, most: usize) -> Option<Vec<u8>> {
+    let digits = text.as_bytes();
+    if digits.len() % 2 == 1 || digits.len() > most * 2 || !digits.iter().all(u8::is_ascii_hexdigit) {
+        return None;
+    }
+    let value = |d: u8| (d as char).to_digit(16).unwrap_or(0) as u8;
+    Some(digits.as_chunks::<2>().0.iter().map(|[high, low]| value(*high) << 4 | value(*low)).collect())
+}

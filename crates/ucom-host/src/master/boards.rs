@@ -1,0 +1,126 @@
+//! The boards as last seen, and their supervision by life signs (D-51).
+
+use std::collections::BTreeMap;
+use ucom::{Admin, BoardInfo, ErrorCode, Function, Status, StringAssembler};
+
+/// How a board's life signs are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Life {
+    /// No life sign yet, or the application was stopped on purpose.
+    #[default]
+    Unarmed,
+    /// In time.
+    Alive,
+    /// One is missing.
+    Late,
+    /// Three are missing.
+    Lost,
+}
+
+/// So long a board's last life sign may still be under way when its application has ended, µs.
+const UNDER_WAY: u64 = 100_000;
+
+/// What is known of a board.
+#[derive(Clone, Debug, Default)]
+pub struct Board {
+    /// Its last answer to PC_INFO.
+    pub info: Option<BoardInfo>,
+    /// Its description, when it came whole.
+    pub description: Option<String>,
+    /// Its flags, as it last told them.
+    pub admin: Option<Admin>,
+    /// Supervision.
+    pub life: Life,
+    /// Last life sign, µs.
+    pub alive_at: Option<u64>,
+    /// Last frame of any kind, µs, and which.
+    pub last: Option<(u64, Function)>,
+    /// Last sensor output, µs: the control loop was running then.
+    pub so_at: Option<u64>,
+    /// It has rebooted since it got its number.
+    pub rebooted: bool,
+    /// Errors it reported, newest last, at most 16: time in µs and code.
+    pub errors: Vec<(u64, ErrorCode)>,
+    /// How many errors it reported.
+    pub error_count: u64,
+    /// Strings of its own that could not be put together.
+    pub bad_strings: u64,
+    /// MCA_DSP_READY that came, asked for or not.
+    pub ready_count: u64,
+    /// Since when its application is known to be stopped, and not to start by itself.
+    pub(crate) stopped_at: Option<u64>,
+    /// When it was last told to start, until it shows that it has.
+    pub(crate) starting_since: Option<u64>,
+    pub(crate) debug: Option<Box<StringAssembler>>,
+}
+
+impl Board {
+    /// The status as last read.
+    pub fn status(&self) -> Option<Status> {
+        self.info.map(|info| info.status)
+    }
+
+    /// Whether the control loop runs, by what was last heard.
+    pub fn running(&self, now: u64) -> bool {
+        let so = self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000);
+        so || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
+    }
+
+    pub(crate) fn error(&mut self, at: u64, code: ErrorCode) {
+        self.error_count += 1;
+        if self.errors.len() >= 16 {
+            self.errors.remove(0);
+        }
+        self.errors.push((at, code));
+    }
+
+    /// Whether a life sign under its number cannot be its own (D-08).
+    pub(crate) fn cannot_be_alive(&self, now: u64) -> bool {
+        self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
+    }
+
+    /// The application has ended or is about to: its life signs are no longer expected, nothing of it is known.
+    pub(crate) fn application_ended(&mut self) {
+        self.life = Life::Unarmed;
+        self.alive_at = None;
+        self.admin = None;
+        self.so_at = None;
+    }
+}
+
+/// All boards by number.
+#[derive(Clone, Debug, Default)]
+pub struct Boards {
+    boards: BTreeMap<u8, Board>,
+}
+
+impl Boards {
+    /// A board of which something is known.
+    pub fn get(&self, number: u8) -> Option<&Board> {
+        self.boards.get(&number)
+    }
+
+    /// All of them in the order of their numbers.
+    pub fn iter(&self) -> impl Iterator<Item = (u8, &Board)> {
+        self.boards.iter().map(|(n, board)| (*n, board))
+    }
+
+    pub(crate) fn of(&mut self, number: u8) -> &mut Board {
+        self.boards.entry(number & 31).or_default()
+    }
+
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (u8, &mut Board)> {
+        self.boards.iter_mut().map(|(n, board)| (*n, board))
+    }
+
+    /// All numbers are void.
+    pub(crate) fn clear(&mut self) {
+        self.boards.clear();
+    }
+
+    /// Numbers of the boards whose UCoM id this is.
+    pub(crate) fn with_ucom_id(&self, ucom_id: u8) -> Option<u8> {
+        let has = |board: &Board| board.info.is_some_and(|info| info.flash_number as u8 == ucom_id);
+        self.boards.iter().find(|(_, board)| has(board)).map(|(n, _)| *n)
+    }
+}

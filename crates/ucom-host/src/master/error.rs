@@ -1,0 +1,372 @@
+//! What can go wrong in a procedure, with the facts in it, the command that helps and the exit code of the commands.
+use core::fmt;
+
+use super::load::LoadForecast;
+use ucom::{ErrorCode, Function, Status};
+
+/// The last frame that was heard from a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LastHeard {
+    /// What it was.
+    pub function: Function,
+    /// How long before the error, ms.
+    pub ago_ms: u64,
+}
+
+/// Prints `last heard: MCA_ALIVE 120 ms ago`, or that there was nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heard(pub Option<LastHeard>);
+
+impl fmt::Display for Heard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(LastHeard { function, ago_ms }) => {
+                write!(f, "last heard: {} {ago_ms} ms ago", function.name())
+            }
+            None => f.write_str("nothing heard from it at all"),
+        }
+    }
+}
+
+/// Why a procedure did not do what was asked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A board did not answer.
+    #[error("board {board} does not answer {} ({tries} tries, {waited_ms} ms; {})", asked.name(), Heard(*last))]
+    NoAnswer {
+        /// Its number.
+        board: u8,
+        /// What was asked.
+        asked: Function,
+        /// How often.
+        tries: u32,
+        /// Time from the first request to giving up, ms.
+        waited_ms: u64,
+        /// What was last heard from it.
+        last: Option<LastHeard>,
+    },
+    /// An answer never came whole.
+    #[error("board {board}: the answer to {} never came whole ({tries} tries): {problem}", asked.name())]
+    Incomplete {
+        /// Its number.
+        board: u8,
+        /// What was asked.
+        asked: Function,
+        /// How often.
+        tries: u32,
+        /// What was wrong with the last one.
+        problem: Incomplete,
+    },
+    /// Answers of a board contradict each other.
+    #[error(
+        "board {board}: its answers to PC_INFO contradict each other in {tries} tries (two boards with one number?)"
+    )]
+    Contradiction {
+        /// Its number.
+        board: u8,
+        /// How often it was asked.
+        tries: u32,
+    },
+    /// The board reported an error.
+    #[error("board {board} reports {code} during {during}: {}", code.meaning())]
+    Device {
+        /// Its number.
+        board: u8,
+        /// The code.
+        code: ErrorCode,
+        /// What was going on.
+        during: &'static str,
+    },
+    /// Acknowledge of PC_INIT under one number with another in it (D-24).
+    #[error("DSP_INITACK under number {id} says number {data}: the board is refused")]
+    AckMismatch {
+        /// By the identifier.
+        id: u8,
+        /// By the data.
+        data: u8,
+    },
+    /// DSP_INFO under one number with another in it.
+    #[error("board {board} says that its number is {says}: it is refused")]
+    WrongSequence {
+        /// By the identifier.
+        board: u8,
+        /// By the data.
+        says: u8,
+    },
+    /// Another board than the one that was named.
+    #[error("board {board} has flash number 0x{found:04X}, not 0x{wanted:04X}")]
+    WrongBoard {
+        /// Its number.
+        board: u8,
+        /// The flash number that was named.
+        wanted: u16,
+        /// The one it has.
+        found: u16,
+    },
+    /// Two boards have one number: whatever it is told, both do.
+    #[error(
+        "two boards answer to number {board}: {}{}",
+        Sharing(found),
+        if *given_back { "; it was taken back from both" } else { "" }
+    )]
+    NumberShared {
+        /// The number.
+        board: u8,
+        /// The flash numbers of those that answered to it; twice the same one when they cannot be told apart.
+        found: Vec<u16>,
+        /// Nobody answers to it any more.
+        given_back: bool,
+    },
+    /// Giving a number could give it to the first board of the chain.
+    #[error("board {other} does not answer: without a number it would take number {board}")]
+    MayTakeNumber {
+        /// The number that was to be given.
+        board: u8,
+        /// The first board.
+        other: u8,
+    },
+    /// A status was set and is not what was set.
+    #[error(
+        "board {board}: status is {} after {tries} tries, wanted {} of the bits {}",
+        status,
+        wanted,
+        mask
+    )]
+    StatusNotTaken {
+        /// Its number.
+        board: u8,
+        /// Bits that were to change.
+        mask: Status,
+        /// What they were to be.
+        wanted: Status,
+        /// The status that was read.
+        status: Status,
+        /// How often it was set.
+        tries: u32,
+    },
+    /// A state was not reached.
+    #[error("board {board}: {what} not within {waited_ms} ms; status {status}")]
+    NotReached {
+        /// Its number.
+        board: u8,
+        /// What was waited for.
+        what: &'static str,
+        /// How long, ms.
+        waited_ms: u64,
+        /// The last status.
+        status: Status,
+    },
+    /// Flags were sent and others came back.
+    #[error("board {board} answers MCA_ADMIN_DATA with `{is}` instead of `{wanted}`")]
+    AdminRefused {
+        /// Its number.
+        board: u8,
+        /// What was sent.
+        wanted: ucom::Admin,
+        /// What it says.
+        is: ucom::Admin,
+    },
+    /// Another PC is on the bus (D-08).
+    #[error("another PC is on the bus: {} to {to} was heard {ago_ms} ms ago", function.name())]
+    ForeignMaster {
+        /// What it sent.
+        function: Function,
+        /// To which number.
+        to: u8,
+        /// When, ms.
+        ago_ms: u64,
+    },
+    /// Boards run their control loop.
+    #[error("{} running: program data would outrank their process data", Boards(boards))]
+    Running {
+        /// Their numbers.
+        boards: Vec<u8>,
+    },
+    /// Control loops run, and what was asked for could stop them where they are, or worse.
+    #[error("{} running its control loop", Boards(boards))]
+    LoopRuns {
+        /// Their numbers.
+        boards: Vec<u8>,
+    },
+    /// Who reports is not who has a number: numbering anew would mean other boards than before.
+    #[error(
+        "boards that report: {reports}, with a number: {boards}, or two share a flash id: not as `ucom init` leaves a chain"
+    )]
+    NotNumbered {
+        /// Different reports.
+        reports: u32,
+        /// Boards with a number.
+        boards: u32,
+    },
+    /// The bus would be too busy.
+    #[error("{0}")]
+    Load(LoadForecast),
+    /// The procedure needs a board that is at work for another one.
+    #[error("{} busy with {with}", Boards(boards))]
+    Busy {
+        /// The boards.
+        boards: Vec<u8>,
+        /// The other procedure.
+        with: &'static str,
+    },
+    /// A number that no board has.
+    #[error("{number} is no board number (1 to 31, and {first} is the first here)")]
+    NoBoard {
+        /// The number.
+        number: u8,
+        /// `addr.first`.
+        first: u32,
+    },
+    /// No application is on the board, or it is not started.
+    #[error("board {board}: {}", if *valid { "its application is not started" } else { "it has no valid application" })]
+    NoApplication {
+        /// Its number.
+        board: u8,
+        /// It has one, but it is not running.
+        valid: bool,
+    },
+    /// No edge of that name.
+    #[error("board {board} has no {kind} `{name}`{}", Near(near))]
+    NoEdge {
+        /// Its number.
+        board: u8,
+        /// `CI`, `SO` or `PAR`.
+        kind: &'static str,
+        /// What was asked for.
+        name: String,
+        /// Names like it.
+        near: Vec<String>,
+    },
+    /// A board describes itself otherwise than was known when values for it were chosen (D-36).
+    #[error(
+        "board {board}: its inputs, outputs and parameters are not those that were known under its program"
+    )]
+    StaleNames {
+        /// Its number.
+        board: u8,
+    },
+    /// The board's image or plan cannot be sent.
+    #[error("{0}")]
+    Plan(#[from] super::update::PlanError),
+    /// The update of a board failed; see [`UpdateReport`](super::update::UpdateReport).
+    #[error("board {board}: {failure}")]
+    Update {
+        /// Its number.
+        board: u8,
+        /// Why.
+        failure: super::update::UpdateFailure,
+    },
+    /// A board that was being started, or had been, is gone; by `on_lost` all were stopped (D-51).
+    #[error("board {board} was lost while boards were started: all are stopped")]
+    Lost {
+        /// Its number.
+        board: u8,
+    },
+    /// The caller says that the bus is gone, see [`Master::abandon`](super::Master::abandon).
+    #[error("the bus failed: {reason}")]
+    Bus {
+        /// What its driver said.
+        reason: String,
+    },
+    /// The caller asked to end.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// What is wrong with an answer of several frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Incomplete {
+    /// The first frame is not what it must be.
+    #[error("it began with {len} bytes instead of {need}")]
+    Start {
+        /// Bytes that came.
+        len: u8,
+        /// Bytes of the first frame.
+        need: u8,
+    },
+    /// Silence in the middle.
+    #[error("{complete} of {of} strings came, then silence")]
+    Silence {
+        /// Whole strings.
+        complete: u32,
+        /// How many there should be.
+        of: u32,
+    },
+    /// A frame that fits nowhere.
+    #[error("a frame of string {string} fits nowhere")]
+    Misfit {
+        /// Number of the string, from 0.
+        string: u32,
+    },
+    /// Frames beyond the end.
+    #[error("more frames came than the totals allow")]
+    Surplus,
+    /// More strings than can be.
+    #[error("it announces {strings} strings; is the byte order right?")]
+    TooMany {
+        /// How many.
+        strings: u32,
+    },
+    /// Counts that are small numbers in the other order of bytes.
+    #[error(
+        "it announces {strings} strings, every count a multiple of 256: the byte order is probably wrong"
+    )]
+    ByteOrder {
+        /// How many.
+        strings: u32,
+    },
+    /// Packages of a buffer are missing.
+    #[error("{missing} of {of} packages are missing")]
+    Packages {
+        /// How many.
+        missing: u32,
+        /// How many there should be.
+        of: u32,
+    },
+}
+
+/// `board 1 is`, `boards 1, 2 are`.
+struct Boards<'a>(&'a [u8]);
+
+impl fmt::Display for Boards<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list: Vec<String> = self.0.iter().map(u8::to_string).collect();
+        match self.0 {
+            [one] => write!(f, "board {one} is"),
+            _ => write!(f, "boards {} are", list.join(", ")),
+        }
+    }
+}
+
+/// `flash numbers 0x0021 and 0x0042`, or `both with flash number 0x0021`.
+pub(crate) struct Sharing<'a>(pub &'a [u16]);
+
+impl fmt::Display for Sharing<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            [first, rest @ ..] if rest.iter().all(|other| other == first) => {
+                write!(f, "both with flash number 0x{first:04X}")
+            }
+            all => {
+                let list: Vec<String> = all.iter().map(|n| format!("0x{n:04X}")).collect();
+                write!(f, "flash numbers {}", list.join(" and "))
+            }
+        }
+    }
+}
+
+struct Near<'a>(&'a [String]);
+
+impl fmt::Display for Near<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() { Ok(()) } else { write!(f, "; there is `{}`", self.0.join("`, `")) }
+    }
+}
+
+/// What makes two boards take one number, and what helps.
+pub(crate) const SHARED_CAUSE: (&str, &str) = (
+    "both took it from one PC_INIT: an init pin is strapped or shorted, or a PC repeated it blindly",
+    "`ucom stop all` if anything runs, then `ucom init` numbers all anew; if it comes again, power one of them down and \
+     check the init wires",
+);

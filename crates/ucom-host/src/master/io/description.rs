@@ -1,0 +1,124 @@
+//! Names of a board's inputs, outputs and parameters (D-36).
+use serde::{Deserialize, Serialize};
+
+use crate::master::Error;
+use ucom::{BoardInfo, Dimensions};
+
+/// Which of the three buffers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Controller inputs.
+    Ci,
+    /// Sensor outputs.
+    So,
+    /// Parameters.
+    Par,
+}
+
+impl Kind {
+    /// `CI`, `SO` or `PAR`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ci => "CI",
+            Self::So => "SO",
+            Self::Par => "PAR",
+        }
+    }
+}
+
+/// What a description is kept under: Program ID and flash date (D-36), and the board, because one image can serve boards
+/// whose applications differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct DescriptionKey {
+    /// Of the board.
+    pub flash_number: u16,
+    /// Checksum of its program.
+    pub program_id: u16,
+    /// When that was written, encoded.
+    pub date: u16,
+}
+
+impl DescriptionKey {
+    /// Of a board's answer to PC_INFO.
+    pub const fn of(info: &BoardInfo) -> Self {
+        Self { flash_number: info.flash_number, program_id: info.program_id, date: info.date }
+    }
+}
+
+/// The application's description of itself and of every edge; kept under a [`DescriptionKey`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct IoDescription {
+    /// The application; may differ from the board's own description in DSP_INFO.
+    pub description: String,
+    /// Controller inputs.
+    pub ci: Vec<String>,
+    /// Sensor outputs.
+    pub so: Vec<String>,
+    /// Parameters.
+    pub par: Vec<String>,
+}
+
+impl IoDescription {
+    /// How many of each.
+    pub fn dimensions(&self) -> Dimensions {
+        let count = |list: &[String]| u16::try_from(list.len()).unwrap_or(u16::MAX);
+        Dimensions { ci: count(&self.ci), so: count(&self.so), par: count(&self.par) }
+    }
+
+    /// The texts of a buffer.
+    pub fn names(&self, kind: Kind) -> &[String] {
+        match kind {
+            Kind::Ci => &self.ci,
+            Kind::So => &self.so,
+            Kind::Par => &self.par,
+        }
+    }
+
+    /// Place of an edge: by its text, in any case when only one fits, with or without the unit in brackets behind it, or by
+    /// its number (`#3` or `3`).
+    pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
+        let names = self.names(kind);
+        let only = |matches: &dyn Fn(&String) -> bool| {
+            let mut found = names.iter().enumerate().filter(|(_, n)| matches(n)).map(|(i, _)| i);
+            found.next().filter(|_| found.next().is_none())
+        };
+        let index = only(&|n| n == name)
+            .or_else(|| only(&|n| n.trim().eq_ignore_ascii_case(name.trim())))
+            .or_else(|| only(&|n| short(n).eq_ignore_ascii_case(name.trim())))
+            .or_else(|| name.trim_start_matches('#').parse().ok().filter(|i| *i < names.len()));
+        if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
+            return Ok(index);
+        }
+        // A unit in brackets makes no name less like another.
+        let like = |n: &str| strsim::jaro_winkler(n, name).max(strsim::jaro_winkler(short(n), name));
+        let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
+        near.retain(|(likeness, _)| *likeness > 0.6);
+        near.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let near = near.into_iter().take(3).map(|(_, n)| n.clone()).collect();
+        Err(Error::NoEdge { board, kind: kind.name(), name: name.into(), near })
+    }
+}
+
+/// A text without the unit in brackets behind it.
+pub fn short(text: &str) -> &str {
+    text.split_once(" [").map_or(text, |(name, _)| name).trim()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_found_by_name_or_number() {
+        let texts = |list: &[&str]| list.iter().map(|t| (*t).to_owned()).collect();
+        let io = IoDescription { ci: texts(&["Target", "target speed", "x", "x"]), ..Default::default() };
+        assert_eq!(io.find(1, Kind::Ci, "Target"), Ok(0));
+        assert_eq!(io.find(1, Kind::Ci, "TARGET SPEED"), Ok(1));
+        assert_eq!(io.find(1, Kind::Ci, "#3"), Ok(3));
+        let units = IoDescription { par: texts(&["kp [mA/deg]", "kp_2 [mA]", "KD"]), ..Default::default() };
+        assert_eq!((units.find(1, Kind::Par, "KP"), units.find(1, Kind::Par, "kd")), (Ok(0), Ok(2)));
+        assert!(io.find(1, Kind::Ci, "x").is_err(), "two edges have this name");
+        let text = io.find(1, Kind::Ci, "traget").unwrap_err().to_string();
+        assert!(text.contains("board 1 has no CI `traget`; there is `Target`"), "{text}");
+    }
+}

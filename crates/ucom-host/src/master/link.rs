@@ -1,0 +1,284 @@
+//! What a procedure can do: send, wait for frames, sleep.
+//!
+//! Procedures are `async` functions. Nothing of an executor is behind them: the compiler makes each a state machine,
+//! [`Master`](super::Master) moves it on when a frame arrives or its time has come, and they read like the steps they
+//! are. No lock is ever held while one waits.
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
+
+use super::request::numbers;
+use super::shared::{Core, Filter, Forget, Heard, Session};
+use super::times::{MS, Times};
+use super::{Error, Event, ProcedureId};
+use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
+
+/// A procedure's hold on the bus.
+#[derive(Clone)]
+pub(crate) struct Link {
+    pub(crate) core: Arc<Mutex<Core>>,
+    pub(crate) id: ProcedureId,
+}
+
+/// The lock of the core; a panic elsewhere leaves it usable.
+pub(crate) fn lock(core: &Mutex<Core>) -> MutexGuard<'_, Core> {
+    core.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Link {
+    pub(crate) fn with<T>(&self, f: impl FnOnce(&mut Core) -> T) -> T {
+        f(&mut lock(&self.core))
+    }
+
+    pub(crate) fn now(&self) -> u64 {
+        self.with(|core| core.now)
+    }
+
+    pub(crate) fn times(&self) -> Times {
+        self.with(|core| core.times)
+    }
+
+    pub(crate) fn profile(&self) -> Profile {
+        self.with(|core| core.profile)
+    }
+
+    /// Everybody, or 0 where the profile has no number for it.
+    pub(crate) fn everybody(&self) -> Sequence {
+        self.profile().unnumbered()
+    }
+
+    pub(crate) fn note(&self, text: String) {
+        self.with(|core| core.event(Event::Note { id: self.id, text }));
+    }
+
+    /// Sends and waits until the frame has left.
+    pub(crate) async fn send(&self, to: Sequence, message: ToBoard) {
+        let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Nothing));
+        self.left(serial).await;
+    }
+
+    /// As [`Link::send`]; what was heard before the frame left is forgotten.
+    pub(crate) async fn ask(&self, to: Sequence, message: ToBoard) {
+        let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::All));
+        self.left(serial).await;
+    }
+
+    /// As [`Link::ask`], but errors are kept: program data, where an error may come in the middle of a block. Returns when
+    /// the frame left.
+    pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
+        let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
+        self.left(serial).await;
+        self.with(|core| core.sent_at)
+    }
+
+    /// As [`Link::send`] with a frame of any form.
+    pub(crate) async fn send_frame(&self, frame: Frame) {
+        let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::Nothing));
+        self.left(serial).await;
+    }
+
+    /// Waits until everything queued so far, by whomever, has left.
+    pub(crate) async fn flush(&self) {
+        let serial = self.with(|core| core.queued());
+        self.left(serial).await;
+    }
+
+    pub(crate) async fn left(&self, serial: u64) {
+        poll_fn(|_| if self.with(|core| core.left(serial)) { Poll::Ready(()) } else { Poll::Pending }).await;
+    }
+
+    /// Hears these functions of these boards from now on, and their errors.
+    pub(crate) fn listen(&self, boards: u32, functions: &[Function]) {
+        self.with(|core| {
+            if let Some(inbox) = core.inboxes.get_mut(&self.id) {
+                inbox.filter = Filter::new(boards, functions);
+                inbox.heard.clear();
+            }
+        });
+    }
+
+    /// The next frame of the inbox, or `None` when `until` has come first.
+    pub(crate) async fn next(&self, until: u64) -> Option<Heard> {
+        poll_fn(|_| {
+            self.with(|core| {
+                let fired = core.fired;
+                let Some(inbox) = core.inboxes.get_mut(&self.id) else { return Poll::Ready(None) };
+                if let Some(heard) = inbox.heard.pop_front() {
+                    inbox.wake = None;
+                    return Poll::Ready(Some(heard));
+                }
+                if fired >= until {
+                    inbox.wake = None;
+                    return Poll::Ready(None);
+                }
+                inbox.wake = Some(until);
+                Poll::Pending
+            })
+        })
+        .await
+    }
+
+    /// Waits; what is heard meanwhile stays in the inbox.
+    pub(crate) async fn sleep(&self, us: u64) {
+        self.sleep_until(self.now() + us).await;
+    }
+
+    /// The same up to a time.
+    pub(crate) async fn sleep_until(&self, until: u64) {
+        poll_fn(|_| {
+            self.with(|core| {
+                let fired = core.fired;
+                let Some(inbox) = core.inboxes.get_mut(&self.id) else { return Poll::Ready(()) };
+                if fired >= until {
+                    inbox.wake = None;
+                    return Poll::Ready(());
+                }
+                inbox.wake = Some(until);
+                Poll::Pending
+            })
+        })
+        .await;
+    }
+
+    /// Waits until nothing that the procedure listens to has come for `us`; at most 20 times as long.
+    pub(crate) async fn quiet(&self, us: u64) {
+        let limit = self.now() + 20 * us;
+        while self.next((self.now() + us).min(limit)).await.is_some() {
+            if self.now() >= limit {
+                break;
+            }
+        }
+    }
+
+    /// Ends `work` with [`Error::Cancelled`] when the caller asks to, with [`Error::Bus`] when he says that the bus is
+    /// gone, with [`Error::NumberShared`] once when two boards with one number show, unless it bears that; its queued frames
+    /// do not leave then.
+    pub(crate) async fn or_cancel<T>(
+        &self,
+        work: impl Future<Output = Result<T, Error>>,
+    ) -> Result<T, Error> {
+        let mut work = pin!(work);
+        poll_fn(|context| {
+            let ended = self.with(|core| {
+                let inbox = core.inboxes.get_mut(&self.id)?;
+                let gone = inbox.bus_gone.clone().map(|reason| Error::Bus { reason });
+                let cancelled = core::mem::take(&mut inbox.cancel).then_some(Error::Cancelled);
+                let mut ended = gone.or(cancelled);
+                if ended.is_none() && !inbox.bears_shared_numbers {
+                    ended = core.holders.shared(inbox.claims);
+                    // What follows undoes something.
+                    inbox.bears_shared_numbers = ended.is_some();
+                }
+                if ended.is_some() {
+                    core.forget_queued(self.id);
+                }
+                ended
+            });
+            match ended {
+                Some(error) => Poll::Ready(Err(error)),
+                None => work.as_mut().poll(context),
+            }
+        })
+        .await
+    }
+
+    /// Becomes master before the first intrusive command (D-08): looks for another one, then sends ALIVE until the
+    /// session ends.
+    pub(crate) async fn become_master(&self, force: bool) -> Result<(), Error> {
+        self.look_for_master(force).await?;
+        self.with(|core| {
+            if core.session == Session::Quiet {
+                core.start_session();
+            }
+        });
+        Ok(())
+    }
+
+    /// This PC is the master of the bus.
+    pub(crate) fn is_master(&self) -> bool {
+        self.with(|core| core.session != Session::Quiet)
+    }
+
+    /// Listens until `master.listen` has passed, refuses when another PC was heard in that time (D-08). Not when this PC
+    /// is master already, or is forced.
+    pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
+        let already = self.with(|core| core.session != Session::Quiet);
+        if !already && !force {
+            let (since, listen, now) =
+                self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
+            // The time before the command counts when the bus was listened to.
+            if now < since + listen {
+                self.sleep(since + listen - now).await;
+            }
+            self.no_foreign_master(listen)?;
+            self.whose_life_signs(listen).await;
+            self.no_foreign_master(2 * listen)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses when another PC was heard within the last `window` µs.
+    fn no_foreign_master(&self, window: u64) -> Result<(), Error> {
+        let (now, heard) = self.with(|core| (core.now, core.foreign_master));
+        match heard.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
+            Some((at, function, to)) => {
+                Err(Error::ForeignMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// A life sign under the number of a board may be the board's, or another PC's for that board alone: whether it is
+    /// started, the board knows. Without an answer it is taken for the board's.
+    async fn whose_life_signs(&self, window: u64) {
+        let recent =
+            |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);
+        let unknown: Vec<u8> = self.with(|core| {
+            let boards = core.boards.iter().filter(|(_, b)| b.info.is_none() && recent(core, b.alive_at));
+            boards.map(|(number, _)| number).collect()
+        });
+        for board in unknown {
+            let answer = numbers(self, board).await;
+            let stopped = |core: &Core| core.boards.get(board).is_some_and(|b| b.stopped_at.is_some());
+            if answer.is_ok() && self.with(|core| stopped(core)) {
+                self.with(|core| core.foreign_pc(Function::Alive, board, &[]));
+            }
+        }
+    }
+
+    /// From now on two boards with one number do not end this procedure, or do.
+    pub(crate) fn bear_shared_numbers(&self, bears: bool) {
+        self.with(|core| {
+            if let Some(inbox) = core.inboxes.get_mut(&self.id) {
+                inbox.bears_shared_numbers = bears;
+            }
+        });
+    }
+
+    /// The board's number, checked against the profile.
+    pub(crate) fn board(&self, number: u8) -> Result<Sequence, Error> {
+        let profile = self.profile();
+        let wrong = Error::NoBoard { number, first: profile.addr_first };
+        Sequence::new(number).filter(|n| profile.is_board(*n)).ok_or(wrong)
+    }
+
+    /// A board's error, as what the procedure ends with.
+    pub(crate) fn device(board: u8, message: &FromBoard, during: &'static str) -> Option<Error> {
+        match message {
+            FromBoard::Error(code) => Some(Error::Device { board, code: *code, during }),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn no_answer(&self, board: u8, asked: Function, tries: u32, since: u64) -> Error {
+        self.with(|core| Error::NoAnswer {
+            board,
+            asked,
+            tries,
+            waited_ms: core.now.saturating_sub(since) / MS,
+            last: core.last_heard(board),
+        })
+    }
+}

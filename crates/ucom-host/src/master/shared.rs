@@ -1,0 +1,395 @@
+//! What all procedures share: the clock, frames on their way out, inboxes, the boards as last seen.
+
+use super::boards::Boards;
+use super::error::LastHeard;
+use super::holders::Holders;
+use super::io::{DescriptionKey, IoDescription, ProcessData};
+use super::statistics::Statistics;
+use super::times::Times;
+use super::{Event, ProcedureId};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use ucom::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, Status, ToBoard};
+
+/// Most events that wait for their user.
+const MAX_EVENTS: usize = 4096;
+/// Most frames that wait for a procedure.
+const MAX_HEARD: usize = 16_384;
+
+/// A frame of a board for a procedure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heard {
+    /// By [`Core::passed`].
+    pub at: u64,
+    pub from: u8,
+    pub message: FromBoard,
+}
+
+/// What a procedure wants to hear.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Filter {
+    /// Boards by bit.
+    pub boards: u32,
+    /// Functions by bit.
+    pub functions: u32,
+}
+
+impl Filter {
+    pub(crate) fn new(boards: u32, functions: &[Function]) -> Self {
+        let functions = functions.iter().fold(0, |bits, f| bits | 1 << f.number());
+        // A board's error is an answer to anything.
+        Self { boards, functions: functions | 1 << Function::Error.number() }
+    }
+
+    fn takes(&self, from: u8, function: Function) -> bool {
+        let report = (16..20).contains(&function.number());
+        self.functions >> function.number() & 1 == 1 && (report || self.boards >> from & 1 == 1)
+    }
+}
+
+/// What a procedure has heard and waits for.
+#[derive(Debug, Default)]
+pub(crate) struct Inbox {
+    pub name: &'static str,
+    pub claims: u32,
+    pub filter: Filter,
+    pub heard: VecDeque<Heard>,
+    /// Every frame as it is, for a procedure that looks at frames themselves.
+    pub raw: Option<VecDeque<(u64, Frame)>>,
+    pub wake: Option<u64>,
+    pub cancel: bool,
+    /// Two boards with one number do not end it: a stop, what undoes something, or what sees to numbers itself.
+    pub bears_shared_numbers: bool,
+    /// Nothing can be sent or heard any more, and why.
+    pub bus_gone: Option<String>,
+}
+
+/// What a procedure forgets when one of its frames leaves: it cannot be an answer to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Forget {
+    Nothing,
+    /// All but errors.
+    Answers,
+    All,
+}
+
+struct Outgoing {
+    serial: u64,
+    owner: Option<ProcedureId>,
+    /// What of that which the owner has heard is forgotten when this frame leaves.
+    forget: Forget,
+    what: What,
+}
+
+enum What {
+    Frame(Frame),
+    /// The package of a board's inputs that begins with this word: as they are when it leaves, so what waits is never
+    /// stale.
+    Inputs {
+        board: u8,
+        offset: u16,
+    },
+}
+
+/// Whether this PC is master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Session {
+    /// Only listens and asks.
+    Quiet,
+    /// Sends ALIVE.
+    Master { next_alive: u64 },
+}
+
+pub(crate) struct Core {
+    pub profile: Profile,
+    pub times: Times,
+    /// Time of the last call.
+    pub now: u64,
+    /// Time up to which waiting ends: that of the last `poll`. Up to then the caller has handed over all that came, which a
+    /// late one has not up to `now`.
+    pub fired: u64,
+    /// Time that has certainly passed between the frames that came: what was between the last one and the next `poll`. A
+    /// caller that hands over late what came at once adds nothing, so it makes no gap in a string.
+    pub passed: u64,
+    /// When the last frame was handed over.
+    handed_over: u64,
+    /// Since when the bus has been listened to.
+    pub since: Option<u64>,
+    pub session: Session,
+    /// Another PC's last frame.
+    pub foreign_master: Option<(u64, Function, u8)>,
+    /// Reports until then are answers.
+    pub report_until: u64,
+    /// Stops of the policy that are said again, and when: one frame can be lost.
+    pub stops: Vec<(u64, Sequence)>,
+    /// When inputs may be repeated again.
+    pub inputs_from: u64,
+    pub boards: Boards,
+    /// Who answers to which number.
+    pub holders: Holders,
+    pub data: BTreeMap<u8, ProcessData>,
+    pub descriptions: BTreeMap<DescriptionKey, IoDescription>,
+    pub statistics: Statistics,
+    pub inboxes: BTreeMap<ProcedureId, Inbox>,
+    urgent: VecDeque<Frame>,
+    normal: VecDeque<Outgoing>,
+    /// Packages of inputs in `normal`, each once: the queue stays short on a bus that does not carry them all.
+    waiting_inputs: BTreeSet<(u8, u16)>,
+    queued: u64,
+    sent: u64,
+    /// When the last frame of a procedure left.
+    pub sent_at: u64,
+    events: VecDeque<Event>,
+    dropped: u64,
+}
+
+impl Core {
+    pub(crate) fn new(profile: Profile) -> Self {
+        Self {
+            profile,
+            times: Times::of(&profile),
+            now: 0,
+            fired: 0,
+            passed: 0,
+            handed_over: 0,
+            since: None,
+            session: Session::Quiet,
+            foreign_master: None,
+            report_until: 0,
+            stops: Vec::new(),
+            inputs_from: 0,
+            boards: Boards::default(),
+            holders: Holders::default(),
+            data: BTreeMap::new(),
+            descriptions: BTreeMap::new(),
+            statistics: Statistics::new(profile.bitrate),
+            inboxes: BTreeMap::new(),
+            urgent: VecDeque::new(),
+            normal: VecDeque::new(),
+            waiting_inputs: BTreeSet::new(),
+            queued: 0,
+            sent: 0,
+            sent_at: 0,
+            events: VecDeque::new(),
+            dropped: 0,
+        }
+    }
+
+    /// Time never goes back.
+    pub(crate) fn advance(&mut self, now: u64) {
+        self.now = self.now.max(now);
+        self.since.get_or_insert(self.now);
+    }
+
+    pub(crate) fn event(&mut self, event: Event) {
+        // The end of a procedure must arrive, whatever else is lost.
+        if self.events.len() >= MAX_EVENTS && !matches!(event, Event::Done { .. }) {
+            self.dropped += 1;
+        } else {
+            self.events.push_back(event);
+        }
+    }
+
+    pub(crate) fn take_event(&mut self) -> Option<Event> {
+        let event = self.events.pop_front();
+        if event.is_none() && self.dropped > 0 {
+            return Some(Event::Overflow { dropped: core::mem::take(&mut self.dropped) });
+        }
+        event
+    }
+
+    /// Queues a frame that must not wait behind others: life signs and stops.
+    pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
+        self.urgent.push_back(message.encode(to, &self.profile));
+    }
+
+    /// Queues a frame; its serial number is that of [`Core::left`].
+    pub(crate) fn queue(
+        &mut self,
+        owner: Option<ProcedureId>,
+        to: Sequence,
+        message: ToBoard,
+        forget: Forget,
+    ) -> u64 {
+        self.queue_frame(owner, message.encode(to, &self.profile), forget)
+    }
+
+    pub(crate) fn queue_frame(&mut self, owner: Option<ProcedureId>, frame: Frame, forget: Forget) -> u64 {
+        self.push(owner, forget, What::Frame(frame))
+    }
+
+    /// Queues the package of a board's inputs that begins with word `offset`, unless it waits already.
+    pub(crate) fn queue_inputs(&mut self, board: u8, offset: u16) {
+        if self.waiting_inputs.insert((board, offset)) {
+            self.push(None, Forget::Nothing, What::Inputs { board, offset });
+        }
+    }
+
+    fn push(&mut self, owner: Option<ProcedureId>, forget: Forget, what: What) -> u64 {
+        self.queued += 1;
+        self.normal.push_back(Outgoing { serial: self.queued, owner, forget, what });
+        self.queued
+    }
+
+    /// Serial number of the last frame queued.
+    pub(crate) fn queued(&self) -> u64 {
+        self.queued
+    }
+
+    /// Whether a frame has left.
+    pub(crate) fn left(&self, serial: u64) -> bool {
+        self.sent >= serial
+    }
+
+    /// The next frame for the bus.
+    pub(crate) fn pop(&mut self) -> Option<Frame> {
+        let frame = self.urgent.pop_front().or_else(|| self.pop_normal())?;
+        self.note_sent(&frame);
+        Some(frame)
+    }
+
+    fn pop_normal(&mut self) -> Option<Frame> {
+        loop {
+            let next = self.normal.pop_front()?;
+            self.sent = next.serial;
+            self.sent_at = self.now;
+            if let Some(inbox) = next.owner.and_then(|owner| self.inboxes.get_mut(&owner)) {
+                match next.forget {
+                    Forget::Nothing => {}
+                    Forget::Answers => inbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
+                    Forget::All => {
+                        inbox.heard.clear();
+                        inbox.raw.iter_mut().for_each(VecDeque::clear);
+                    }
+                }
+            }
+            let frame = match next.what {
+                What::Frame(frame) => Some(frame),
+                What::Inputs { board, offset } => self.inputs_frame(board, offset),
+            };
+            // What there is no more of needs no frame.
+            if frame.is_some() {
+                return frame;
+            }
+        }
+    }
+
+    fn inputs_frame(&mut self, board: u8, offset: u16) -> Option<Frame> {
+        self.waiting_inputs.remove(&(board, offset));
+        let package = BufferPackage::at(&self.data.get(&board)?.ci, offset)?;
+        Some(ToBoard::Ci(package).encode(Sequence::new(board)?, &self.profile))
+    }
+
+    fn note_sent(&mut self, frame: &Frame) {
+        let now = self.now;
+        self.statistics.sent(now, frame);
+        let Ok((function, to)) = frame.address() else { return };
+        self.holders_may_change(function, to, frame.data());
+        let starts = |status: &u8| Status(*status).has(Status::MSTART);
+        match function {
+            Function::Start => self.may_start(to),
+            Function::SetStatus if frame.data().get(1).is_some_and(starts) => self.may_start(to),
+            Function::Reset => {
+                self.report_until = self.report_until.max(now + self.times.report_window + 500_000)
+            }
+            Function::AskReport => {
+                self.report_until = self.report_until.max(now + self.times.report_ask + 500_000)
+            }
+            _ => {}
+        }
+    }
+
+    /// A board, or everybody, was told to start the application.
+    fn may_start(&mut self, to: Sequence) {
+        let everybody = self.profile.everybody() == Some(to);
+        let told = self.boards.iter_mut().filter(|(number, _)| everybody || *number == to.number());
+        told.for_each(|(_, board)| board.stopped_at = None);
+    }
+
+    /// Drops what a procedure has queued.
+    pub(crate) fn forget_queued(&mut self, owner: ProcedureId) {
+        self.retain_queued(|next| next.owner != Some(owner));
+    }
+
+    /// Drops a board's inputs that wait.
+    pub(crate) fn forget_inputs(&mut self, board: u8) {
+        self.waiting_inputs.retain(|(of, _)| *of != board);
+        self.retain_queued(|next| !matches!(next.what, What::Inputs { board: of, .. } if of == board));
+    }
+
+    fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
+        self.normal.retain(keep);
+        // Whoever waits for a frame in front of the first one left must not wait for ever.
+        let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
+        self.sent = self.sent.max(before_first);
+    }
+
+    pub(crate) fn idle(&self) -> bool {
+        self.urgent.is_empty() && self.normal.is_empty()
+    }
+
+    /// A frame is handed over.
+    pub(crate) fn mark_time(&mut self) {
+        self.passed += self.fired.saturating_sub(self.handed_over);
+        self.handed_over = self.now;
+    }
+
+    /// Gives a board's message to the procedures that want it.
+    pub(crate) fn deliver(&mut self, from: u8, message: FromBoard) {
+        let at = self.passed;
+        for inbox in self.inboxes.values_mut() {
+            if inbox.filter.takes(from, message.function()) && inbox.heard.len() < MAX_HEARD {
+                inbox.heard.push_back(Heard { at, from, message });
+            }
+        }
+    }
+
+    /// Gives a frame as it is to the procedures that want it so.
+    pub(crate) fn deliver_raw(&mut self, frame: &Frame) {
+        let at = self.now;
+        for raw in self.inboxes.values_mut().filter_map(|inbox| inbox.raw.as_mut()) {
+            if raw.len() < MAX_HEARD {
+                raw.push_back((at, *frame));
+            }
+        }
+    }
+
+    /// The procedure that has claimed a board.
+    pub(crate) fn owner(&self, board: u8) -> Option<ProcedureId> {
+        self.inboxes.iter().find(|(_, inbox)| inbox.claims >> board & 1 == 1).map(|(id, _)| *id)
+    }
+
+    pub(crate) fn last_heard(&self, board: u8) -> Option<LastHeard> {
+        let (at, function) = self.boards.get(board)?.last?;
+        Some(LastHeard { function, ago_ms: self.now.saturating_sub(at) / 1000 })
+    }
+
+    /// A frame that is not ours.
+    pub(crate) fn foreign(&mut self, foreign: Foreign) {
+        if self.statistics.foreign(self.now, foreign) {
+            self.event(Event::Foreign(foreign));
+        }
+    }
+
+    /// A frame that only a PC sends.
+    pub(crate) fn foreign_pc(&mut self, function: Function, to: u8, data: &[u8]) {
+        self.statistics.foreign_pc += 1;
+        if let Some(to) = Sequence::new(to) {
+            self.holders_may_change(function, to, data);
+        }
+        if let Some(to) = Sequence::new(to)
+            && matches!(function, Function::Start | Function::SetStatus)
+        {
+            self.may_start(to);
+        }
+        if function == Function::AskReport {
+            // The reports that follow answer the other PC: nobody has rebooted.
+            self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
+        }
+        // Once a second at most.
+        let news = self.foreign_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
+        self.foreign_master = Some((self.now, function, to));
+        if news {
+            self.event(Event::ForeignMaster { function, to });
+        }
+    }
+}

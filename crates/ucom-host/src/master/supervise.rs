@@ -1,0 +1,373 @@
+//! The master's own duties beside the procedures: life signs of both sides, policies, repeated inputs.
+use super::boards::Life;
+use super::event::Supervision;
+use super::io::{ProcessData, Snapshot};
+use super::link::lock;
+use super::load::frame_bits;
+use super::shared::{Core, Session};
+use super::{Event, Master};
+use ucom::profile::{AliveMode, OnLost};
+use ucom::{
+    Admin, Assembled, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status,
+    StringAssembler, ToBoard,
+};
+
+/// Between a stop and its repetition, µs.
+const STOP_AGAIN: u64 = 30_000;
+/// Percent of the bus that repeated inputs may take.
+const INPUTS_SHARE: u64 = 70;
+/// How far they may be behind that and catch up, µs.
+const INPUTS_CREDIT: u64 = 5_000;
+
+impl Master {
+    /// Stops control loops (ADMIN_DATA, all 0) before everything else that is to be sent, and twice again a moment later: those
+    /// of these boards, the last one first, or of everybody. No answer is waited for; [`Request::Stop`](super::Request::Stop) sees to each
+    /// board.
+    pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
+        let mut core = lock(&self.core);
+        core.advance(now);
+        let profile = core.profile;
+        let valid = |number: u8| Sequence::new(number).filter(|n| profile.is_board(*n));
+        let to: Vec<Sequence> = match (boards, profile.everybody()) {
+            (Some(boards), _) => boards.iter().rev().copied().filter_map(valid).collect(),
+            (None, Some(everybody)) => vec![everybody],
+            (None, None) => (0..32).filter_map(valid).collect(),
+        };
+        to.iter().for_each(|to| match profile.everybody() == Some(*to) {
+            true => core.stop_all_inputs(),
+            false => core.stop_inputs(to.number()),
+        });
+        to.into_iter().for_each(|to| core.stop_running(to));
+    }
+}
+
+impl Core {
+    /// From now on life signs go out.
+    pub(crate) fn start_session(&mut self) {
+        if self.session == Session::Quiet {
+            self.session = Session::Master { next_alive: self.now };
+        }
+    }
+
+    /// What has to happen by `now` whether a procedure runs or not.
+    pub(crate) fn duties(&mut self) {
+        let now = self.now;
+        if let Session::Master { next_alive } = self.session
+            && now >= next_alive
+        {
+            self.send_alive();
+            let period = self.times.alive_pc;
+            // After a long pause of the caller the rhythm starts anew instead of catching up.
+            let next = if now - next_alive >= period { now + period } else { next_alive + period };
+            self.session = Session::Master { next_alive: next };
+        }
+        let mut lost = Vec::new();
+        let mut events = Vec::new();
+        for (number, board) in self.boards.iter_mut() {
+            let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
+            // Not up to `now`: the life sign may be among what the caller has not handed over yet.
+            let age = self.fired.saturating_sub(at);
+            if age >= self.times.alive_lost && board.life != Life::Lost {
+                board.life = Life::Lost;
+                events.push((number, Supervision::Lost));
+                lost.push(number);
+            } else if age > self.times.alive_late && board.life == Life::Alive {
+                board.life = Life::Late;
+                events.push((number, Supervision::Late));
+            }
+        }
+        for (board, change) in events {
+            self.event(Event::Supervision { board, change });
+        }
+        if !lost.is_empty() {
+            self.on_lost(&lost);
+        }
+        self.stop_again();
+        self.repeat_inputs();
+    }
+
+    fn send_alive(&mut self) {
+        let mode = self.profile.alive_mode;
+        let everybody = self.profile.everybody();
+        if mode != AliveMode::Unicast
+            && let Some(everybody) = everybody
+        {
+            self.urgent(everybody, ToBoard::Alive);
+        }
+        if mode != AliveMode::Broadcast || everybody.is_none() {
+            let known: Vec<u8> =
+                self.boards.iter().filter(|(_, b)| b.info.is_some()).map(|(n, _)| n).collect();
+            for number in known.into_iter().filter_map(Sequence::new) {
+                self.urgent(number, ToBoard::Alive);
+            }
+        }
+    }
+
+    /// The policy for boards whose life signs are gone; only a master stops boards.
+    fn on_lost(&mut self, lost: &[u8]) {
+        lost.iter().for_each(|board| self.stop_inputs(*board));
+        if self.session == Session::Quiet {
+            return;
+        }
+        let stopped: Vec<Sequence> = match (self.profile.on_lost, self.profile.everybody()) {
+            (OnLost::Report, _) => return,
+            (OnLost::StopBoard, _) => lost.iter().filter_map(|n| Sequence::new(*n)).collect(),
+            (OnLost::StopAll, Some(everybody)) => vec![everybody],
+            (OnLost::StopAll, None) => self.boards.iter().filter_map(|(n, _)| Sequence::new(n)).collect(),
+        };
+        stopped.into_iter().for_each(|to| self.stop_running(to));
+        if self.profile.on_lost == OnLost::StopAll {
+            self.stop_all_inputs();
+        }
+    }
+
+    fn stop_all_inputs(&mut self) {
+        let all: Vec<u8> = self.data.keys().copied().collect();
+        all.into_iter().for_each(|number| self.stop_inputs(number));
+    }
+
+    /// Run = 0 at once, and twice again: what stops motion must not hang on one frame. It has no further effect.
+    fn stop_running(&mut self, to: Sequence) {
+        self.urgent(to, ToBoard::Admin(Admin::default()));
+        self.stops.extend([(self.now + STOP_AGAIN, to), (self.now + 2 * STOP_AGAIN, to)]);
+    }
+
+    fn stop_again(&mut self) {
+        let now = self.now;
+        let due: Vec<Sequence> = self.stops.iter().filter(|(at, _)| *at <= now).map(|(_, to)| *to).collect();
+        self.stops.retain(|(at, _)| *at > now);
+        due.into_iter().for_each(|to| self.urgent(to, ToBoard::Admin(Admin::default())));
+    }
+
+    /// No repetition of a board's inputs any more, and none that waits. Those of a board that is only being started are no
+    /// repetition yet.
+    pub(crate) fn stop_inputs(&mut self, board: u8) {
+        if self.data.get_mut(&board).is_some_and(|data| data.repeat.take().is_some()) {
+            self.forget_inputs(board);
+        }
+    }
+
+    /// CI again every `ci.period`, so that a lost frame heals (D-34): whoever has waited longest is first.
+    ///
+    /// All repetitions together leave the bus to others for a part of the time, whatever was started with force: answers
+    /// and life signs come after inputs on the bus, and a socket takes more frames than the bus carries.
+    fn repeat_inputs(&mut self) {
+        if self.session == Session::Quiet {
+            return;
+        }
+        let packages = |data: &ProcessData| data.ci.len().div_ceil(3) as u64;
+        while self.inputs_from <= self.now
+            && let Some((_, board, packages)) = self
+                .data
+                .iter()
+                .filter_map(|(board, data)| Some((data.repeat?, *board, packages(data))))
+                .min()
+                .filter(|(at, ..)| *at <= self.now)
+        {
+            let us = packages * frame_bits(8) * 1_000_000 / u64::from(self.profile.bitrate.max(1));
+            let credit = self.now.saturating_sub(INPUTS_CREDIT);
+            self.inputs_from = self.inputs_from.max(credit) + us * 100 / INPUTS_SHARE;
+            self.send_inputs(board);
+        }
+    }
+
+    /// All CI of a board, and the time of the next repetition.
+    pub(crate) fn send_inputs(&mut self, board: u8) {
+        let Some(data) = self.data.get_mut(&board) else { return };
+        if let Some(at) = data.repeat {
+            let next = at + self.times.ci;
+            data.repeat = Some(if self.now >= next { self.now + self.times.ci } else { next });
+        }
+        let offsets: Vec<u16> = ucom::Packages::new(&data.ci).map(|package| package.offset).collect();
+        offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
+    }
+
+    /// An input that has changed, at once. Where all inputs are this PC's its whole package goes (it is atomic, D-34); else
+    /// the word alone (DLC 4, D-15), for those beside it are not known here.
+    pub(crate) fn send_input(&mut self, board: u8, index: u16) {
+        let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
+        if data.repeat.is_some() {
+            return self.queue_inputs(board, index - index % 3);
+        }
+        let Some(word) = data.ci.get(usize::from(index)) else { return };
+        let package = ucom::BufferPackage { offset: index, count: 1, words: [*word, 0, 0] };
+        let payload = package.payload(self.profile.endian, true);
+        let frame = Frame::of(ToBoard::Ci(package).function(), to, payload);
+        self.queue_frame(None, frame, super::shared::Forget::Nothing);
+    }
+
+    /// When duties are due next.
+    pub(crate) fn duties_deadline(&self) -> Option<u64> {
+        let alive = match self.session {
+            Session::Quiet => None,
+            Session::Master { next_alive } => Some(next_alive),
+        };
+        let supervised = self.boards.iter().filter_map(|(_, board)| {
+            let at = board.alive_at?;
+            match board.life {
+                Life::Alive => Some(at + self.times.alive_late + 1),
+                Life::Late => Some(at + self.times.alive_lost),
+                Life::Unarmed | Life::Lost => None,
+            }
+        });
+        let quiet = self.session == Session::Quiet;
+        let repeats = self.data.values().filter_map(|data| data.repeat.filter(|_| !quiet));
+        let inputs = repeats.map(|at| at.max(self.inputs_from));
+        let stops = self.stops.iter().map(|(at, _)| *at);
+        alive.into_iter().chain(supervised).chain(inputs).chain(stops).min()
+    }
+
+    /// A frame from the bus.
+    pub(crate) fn received(&mut self, received: Result<Frame, Foreign>) {
+        self.mark_time();
+        if let Ok(frame) = &received {
+            self.deliver_raw(frame);
+        }
+        let frame = match received.and_then(|frame| frame.address().map(|address| (frame, address))) {
+            Ok((frame, (function, number))) => {
+                self.statistics.received(self.now, &frame);
+                if self.is_pc(function, number, &frame) {
+                    return self.foreign_pc(function, number.number(), frame.data());
+                }
+                frame
+            }
+            Err(foreign) => return self.foreign(foreign),
+        };
+        match FromBoard::decode(&frame, &self.profile) {
+            Ok((from, FromBoard::Report(report))) => self.report(from, report),
+            Ok((from, message)) => self.board_says(from.number(), message),
+            Err(_) => self.statistics.undecodable += 1,
+        }
+    }
+
+    /// Whether only a PC can have sent it (D-08, D-12).
+    fn is_pc(&self, function: Function, number: Sequence, frame: &Frame) -> bool {
+        let everybody = number == self.profile.unnumbered();
+        match function {
+            Function::DumpIo => frame.dlc() == 0,
+            Function::Alive => {
+                everybody || self.boards.get(number.number()).is_some_and(|b| b.cannot_be_alive(self.now))
+            }
+            Function::Admin => everybody,
+            _ => !function.from_board(),
+        }
+    }
+
+    fn report(&mut self, from: Sequence, report: Report) {
+        let message = FromBoard::Report(report);
+        let asked = self.now <= self.report_until;
+        self.deliver(from.number(), message);
+        if asked {
+            return;
+        }
+        let ucom_id = report.ucom_id;
+        match self.boards.with_ucom_id(ucom_id) {
+            Some(board) => {
+                let was_running =
+                    self.boards.get(board).is_some_and(|b| b.life != Life::Unarmed || b.running(self.now));
+                self.holders.forget(board);
+                let known = self.boards.of(board);
+                if core::mem::replace(&mut known.rebooted, true) && !was_running {
+                    return;
+                }
+                known.application_ended();
+                known.info = known.info.map(|info| BoardInfo { status: Status(0), ..info });
+                self.forget_parameters(board);
+                self.event(Event::Supervision { board, change: Supervision::Rebooted { ucom_id } });
+                if was_running {
+                    self.on_lost(&[board]);
+                }
+            }
+            None => {
+                let board = self.profile.unnumbered().number();
+                self.event(Event::Supervision { board, change: Supervision::UnknownRebooted { ucom_id } });
+            }
+        }
+    }
+
+    fn board_says(&mut self, from: u8, message: FromBoard) {
+        let now = self.now;
+        let unnumbered = from == self.profile.unnumbered().number();
+        if unnumbered {
+            // Without a number a board can only complain (D-06).
+            if let FromBoard::Error(code) = message {
+                let during = self.inboxes.keys().next().copied();
+                self.event(Event::BoardError { board: from, code, during });
+            } else {
+                self.statistics.undecodable += 1;
+            }
+            // A probe wants to know who answers under the number that should be nobody's.
+            return self.deliver(from, message);
+        }
+        self.boards.of(from).last = Some((now, message.function()));
+        if let FromBoard::Info(payload) = &message {
+            self.watch_holders(from, payload);
+        }
+        match message {
+            FromBoard::Alive => {
+                let board = self.boards.of(from);
+                board.alive_at = Some(now);
+                if core::mem::replace(&mut board.life, Life::Alive) == Life::Lost {
+                    self.event(Event::Supervision { board: from, change: Supervision::Back });
+                }
+            }
+            FromBoard::Error(code) => {
+                self.boards.of(from).error(now, code);
+                let during = self.owner(from);
+                self.event(Event::BoardError { board: from, code, during });
+            }
+            FromBoard::Admin(admin) => {
+                let board = self.boards.of(from);
+                board.stopped_at = None;
+                if board.admin.replace(admin) != Some(admin) {
+                    self.event(Event::Admin { board: from, admin });
+                }
+                if !admin.run {
+                    self.stop_inputs(from);
+                }
+            }
+            FromBoard::So(package) => {
+                let board = self.boards.of(from);
+                (board.so_at, board.stopped_at) = (Some(now), None);
+                let snapshot = self.data.get_mut(&from).and_then(|data| data.so.push(now, &package));
+                if let Some(snapshot) = snapshot.filter(|_| self.data.get(&from).is_some_and(|d| d.watched)) {
+                    let snapshot: Snapshot = snapshot;
+                    self.event(Event::Snapshot { board: from, snapshot });
+                }
+            }
+            FromBoard::Debug(payload) => {
+                let board = self.boards.of(from);
+                let assembler = board.debug.get_or_insert_with(|| Box::new(StringAssembler::new()));
+                let text = match assembler.push(self.passed, &payload, &self.profile) {
+                    Assembled::Complete(text) => Some(text.to_string()),
+                    Assembled::Partial => None,
+                    Assembled::Refused => {
+                        board.bad_strings += 1;
+                        None
+                    }
+                };
+                if let Some(text) = text {
+                    self.event(Event::Debug { board: from, text });
+                }
+            }
+            // After PC_START it is an answer; another one means nothing by itself (D-30).
+            FromBoard::McaReady => {
+                let board = self.boards.of(from);
+                board.ready_count += 1;
+                board.stopped_at = None;
+            }
+            _ => {}
+        }
+        self.deliver(from, message);
+    }
+
+    /// After a restart of its application nothing is known of a board's parameters (D-35).
+    pub(crate) fn forget_parameters(&mut self, board: u8) {
+        self.stop_inputs(board);
+        if let Some(data) = self.data.get_mut(&board) {
+            data.par.forget();
+            // Another application may have started.
+            data.told = false;
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! One board: attempts, each from its exloader to the read-back (U-4 to U-10).
+use super::campaign::{Campaign, Stage};
+use super::plan::UpdatePlan;
+use super::transfer::{Attempt, Broken, Transferred};
+use super::{UpdateFailure, UpdateOutcome};
+use crate::master::Error;
+use crate::master::control::{enter_exloader, start_application};
+use crate::master::holders::one_board_each;
+use crate::master::link::Link;
+use crate::master::request::{confirmed, identity, info, numbers};
+use ucom::{BoardInfo, ErrorCode, Status, ToBoard};
+
+/// Whether the board shows what the plan shall bring about.
+pub(super) fn has(known: &BoardInfo, plan: &UpdatePlan) -> bool {
+    known.has_application() && plan.expected.is_some_and(|expected| expected.is(known))
+}
+
+pub(super) async fn shows(link: &Link, board: u8, plan: &UpdatePlan) -> bool {
+    confirmed(link, board).await.is_ok_and(|seen| has(&seen.info, plan))
+}
+
+/// One board, from attempt number `first` on.
+pub(super) async fn one(link: &Link, run: &mut Campaign, board: u8, first: u32) -> Result<(), Error> {
+    let plan = run.plan(link, Some(board))?;
+    let profile = link.profile();
+    let mut gap_us = u64::from(profile.prog_frame_gap_us);
+    let since = link.now();
+    for number in first..=profile.prog_attempts.max(first) {
+        run.begin(board);
+        if let Some(result) = run.result(board) {
+            result.attempts = number;
+        }
+        let again = attempt(link, run, board, &plan, number, gap_us).await;
+        if let Some(result) = run.result(board) {
+            result.time_us = link.now().saturating_sub(since);
+        }
+        match again {
+            None => break,
+            // Overruns: the board needs more time between frames.
+            Some(Broken::Device { code: ErrorCode::Overrun | ErrorCode::CanOverrun, .. }) => {
+                gap_us = (gap_us * 2).max(500);
+            }
+            Some(_) => {}
+        }
+        if number < profile.prog_attempts {
+            link.note(format!("board {board}: attempt {number} failed, once more"));
+        }
+    }
+    run.active.retain(|b| *b != board);
+    Ok(())
+}
+
+/// The board that was checked, in its exloader with programming enabled.
+///
+/// Asked before each XRESET: since the check, or the attempt before, another board may have been put in its place.
+pub(super) async fn enter(link: &Link, run: &Campaign, board: u8) -> Result<(), Error> {
+    let flash_number = run.flash_number(board);
+    if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
+        && seen.flash_number != wanted
+    {
+        // One damaged answer is not another board.
+        let found = confirmed(link, board).await?.info.flash_number;
+        if found != wanted {
+            return Err(Error::WrongBoard { board, wanted, found });
+        }
+    }
+    one_board_each(link, &[board]).await?;
+    let entered = enter_exloader(link, board, flash_number).await;
+    if entered.is_err() {
+        // Whoever took the XRESET must not take the program data of another board's update.
+        leave_programming(link, board).await;
+    }
+    entered.map(drop)
+}
+
+async fn leave_programming(link: &Link, board: u8) {
+    if let Ok(to) = link.board(board) {
+        link.send(to, ToBoard::SetStatus { mask: Status::PROG.0, value: 0 }).await;
+    }
+}
+
+/// One attempt with one board; `Some`: it failed in a way that another attempt may heal (the result says how).
+async fn attempt(
+    link: &Link,
+    run: &mut Campaign,
+    board: u8,
+    plan: &UpdatePlan,
+    number: u32,
+    gap_us: u64,
+) -> Option<Broken> {
+    if let Err(error) = enter(link, run, board).await {
+        run.fail_with(board, error);
+        return None;
+    }
+    let to = link.board(board).ok()?;
+    let since = link.now();
+    let boards = vec![board];
+    let attempt = Attempt { link, plan, to, boards, number, gap_us, since };
+    let Transferred { broken, .. } = attempt.run(|_, _| run.reach(board, Stage::Erased)).await;
+    judge(link, run, board, plan, number, broken.first().map(|(_, b)| *b)).await
+}
+
+/// Read-back, or what an early end means.
+pub(super) async fn judge(
+    link: &Link,
+    run: &mut Campaign,
+    board: u8,
+    plan: &UpdatePlan,
+    attempts: u32,
+    broken: Option<Broken>,
+) -> Option<Broken> {
+    let erased = run.may_be_erased(board);
+    let failure = match broken {
+        None => {
+            verify(link, run, board, plan).await;
+            return None;
+        }
+        Some(Broken::NoFinish { .. }) if shows(link, board, plan).await => {
+            // U-9: only DSP_PROGFINISHED was lost.
+            verify(link, run, board, plan).await;
+            return None;
+        }
+        Some(Broken::NoFinish { waited_ms }) => {
+            let block = plan.frames(1).saturating_sub(1) / 8;
+            UpdateFailure::Timeout { cycle: 2, block, waited_ms, attempts, erased }
+        }
+        Some(Broken::Timeout { cycle, block, waited_ms }) => {
+            UpdateFailure::Timeout { cycle, block, waited_ms, attempts, erased }
+        }
+        Some(Broken::Device { code, cycle, block }) => {
+            UpdateFailure::Device { code, cycle, block, attempts, erased }
+        }
+    };
+    // The board must not take what comes next for the rest of this transfer. It is told while it still counts as at
+    // work: a cancel in this moment tells it, too.
+    leave_programming(link, board).await;
+    // Another board that has taken the number since complains of program data, or takes them out of turn.
+    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+        run.fail_with(board, error);
+        return None;
+    }
+    run.fail(board, failure);
+    // U-7: the image or the board is wrong, another attempt would end the same.
+    let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
+    broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
+}
+
+/// U-10: the board must show the new program; then, if wanted, it must run.
+pub(super) async fn verify(link: &Link, run: &mut Campaign, board: u8, plan: &UpdatePlan) {
+    run.reach(board, Stage::Written);
+    let known = match confirmed(link, board).await {
+        Ok(seen) => seen.info,
+        // The board said that it is done; only the read-back is missing.
+        Err(e) => return run.fail_with(board, e),
+    };
+    // Whoever shares the number was written, too, or is what has just answered.
+    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+        return run.fail_with(board, error);
+    }
+    if let Some(result) = run.result(board) {
+        result.after = Some(known);
+    }
+    let BoardInfo { program_id, date, status, .. } = known;
+    let outcome = match plan.expected {
+        Some(_) if has(&known, plan) => {
+            run.reach(board, Stage::Verified);
+            UpdateOutcome::Verified
+        }
+        Some(wanted) => {
+            let (wanted_id, wanted_date) = (wanted.program_id, wanted.date);
+            let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
+            return run.fail(board, failure);
+        }
+        // Nobody knows what the board must show; it must show an application at least, and not run another one.
+        None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
+        None => return run.fail(board, UpdateFailure::NotValid { program_id, date, status }),
+    };
+    run.end(board, outcome, None);
+    if run.options.start {
+        start(link, run, board, &known).await;
+    }
+}
+
+/// Starts the application of a board that shows `known`, and sees that it runs.
+pub(super) async fn start(link: &Link, run: &mut Campaign, board: u8, known: &BoardInfo) {
+    run.begin(board);
+    run.starting = Some(board);
+    let started = match start_application(link, board).await {
+        Ok(_) => info(link, board).await,
+        Err(e) => Err(e),
+    };
+    match started {
+        Ok(seen) if identity(&seen.info) == identity(known) && seen.info.status.has(Status::MSTART) => {
+            run.end(board, UpdateOutcome::Running, None);
+        }
+        Ok(seen) => {
+            let what = "the application does not run";
+            let error = Error::NotReached { board, what, waited_ms: 0, status: seen.info.status };
+            run.fail(board, UpdateFailure::NotRunning(Box::new(error)));
+        }
+        Err(e) => run.fail(board, UpdateFailure::NotRunning(Box::new(e))),
+    }
+    run.starting = None;
+}

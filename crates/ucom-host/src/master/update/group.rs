@@ -1,0 +1,116 @@
+//! Several boards at once, by PC_PROG to everybody: each board with PROG = 1 takes it, so all others must be known not to.
+use super::board::{enter, has, judge, one, verify};
+use super::campaign::{Campaign, Stage};
+use super::procedure::refuse;
+use super::transfer::{Attempt, Broken, Transferred};
+use crate::master::Error;
+use crate::master::link::Link;
+use crate::master::request::{TRIES, confirmed, identity, set_status};
+use crate::master::scan::statuses;
+use crate::master::times::MS;
+use ucom::{Sequence, Status, ToBoard};
+
+/// All open boards at once by broadcast; those that fall behind get attempts of their own.
+///
+/// Where the broadcast could reach a board that must not have it, boards stay open and are updated one by one.
+pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> {
+    let Some(everybody) = link.profile().everybody() else {
+        link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
+        return Ok(());
+    };
+    let selected = run.open();
+    if let Err(error) = silence_others(link, &selected).await {
+        refuse(run, &error);
+        return Ok(());
+    }
+    let plan = run.plan(link, None)?;
+    let since = link.now();
+    let (boards, stray) = gather(link, run, &selected).await;
+    if stray {
+        link.note("a board that does not answer may listen: no broadcast, the others one by one".into());
+        // Those that came up stay at work: a cancel takes them out of programming.
+        return Ok(());
+    }
+    for board in &boards {
+        if let Some(result) = run.result(*board) {
+            result.attempts = 1;
+        }
+    }
+    let gap_us = u64::from(link.profile().prog_frame_gap_us);
+    let since_transfer = link.now();
+    let attempt =
+        Attempt { link, plan: &plan, to: everybody, boards, number: 1, gap_us, since: since_transfer };
+    let erasing = |boards: &[u8], left: &[(u8, Broken)]| {
+        boards.iter().for_each(|board| run.reach(*board, Stage::Erased));
+        let listening = left.iter().filter(|(_, why)| !why.ended_transfer());
+        listening.for_each(|(board, _)| run.reach(*board, Stage::MaybeErased));
+    };
+    let Transferred { finished, broken } = attempt.run(erasing).await;
+    for board in finished {
+        judge(link, run, board, &plan, 1, None).await;
+        if let Some(result) = run.result(board) {
+            result.time_us = link.now().saturating_sub(since);
+        }
+    }
+    for (board, why) in broken {
+        if !why.ended_transfer()
+            && let Ok(seen) = confirmed(link, board).await
+        {
+            let had = run.before(board).is_some_and(|before| has(&before, &plan));
+            if has(&seen.info, &plan) && !had {
+                // A board whose READY was lost may have gone on with the others and be done. One that had this program
+                // before proves nothing by it.
+                verify(link, run, board, &plan).await;
+                continue;
+            }
+            let same = run.before(board).is_some_and(|before| identity(&before) == identity(&seen.info));
+            if same && seen.info.has_application() {
+                run.proved_untouched(board);
+            } else if run.stage(board) == Stage::MaybeErased {
+                run.reach(board, Stage::Erased);
+            }
+        }
+        if judge(link, run, board, &plan, 1, Some(why)).await.is_some() && link.profile().prog_attempts > 1 {
+            one(link, run, board, 2).await?;
+        }
+    }
+    Ok(())
+}
+
+/// Takes every number that is not selected out of programming, and reads that back.
+///
+/// A number that does not answer has been told as well, three times; who has no number takes no PC_PROG.
+async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
+    let others: Vec<Sequence> =
+        link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();
+    for _ in 0..TRIES {
+        for number in &others {
+            link.send(*number, ToBoard::SetStatus { mask: Status::PROG.0, value: 0 }).await;
+        }
+        link.sleep(20 * MS).await;
+    }
+    for (board, status) in statuses(link, &others).await {
+        if status?.has(Status::PROG) {
+            // Three more times, each read back; then it is refused.
+            set_status(link, board, Status::PROG, Status(0)).await?;
+        }
+    }
+    Ok(())
+}
+
+/// The selected boards in their exloaders. `true`: one failed, and did not say that it left programming either: it would
+/// be erased by the group's frames behind everybody's back.
+async fn gather(link: &Link, run: &mut Campaign, selected: &[u8]) -> (Vec<u8>, bool) {
+    let (mut boards, mut stray) = (Vec::new(), false);
+    for board in selected {
+        run.active.push(*board);
+        match enter(link, run, *board).await {
+            Ok(()) => boards.push(*board),
+            Err(error) => {
+                stray |= set_status(link, *board, Status::PROG, Status(0)).await.is_err();
+                run.fail_with(*board, error);
+            }
+        }
+    }
+    (boards, stray)
+}

@@ -1,0 +1,141 @@
+//! How an update ended, named, with the exit code of the command.
+use serde::Serialize;
+
+use super::{PlannedImage, Unverifiable, UpdateFailure};
+use ucom::BoardInfo;
+
+/// How far a board got.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum UpdateOutcome {
+    /// Nothing was erased: the board has what it had.
+    #[default]
+    NotStarted,
+    /// The user ended it before anything was erased: the board has what it had.
+    Cancelled,
+    /// The image was there already (U-3); nothing was sent.
+    UpToDate,
+    /// Something was erased and no image is complete: the board stays in its exloader and can be programmed again.
+    Incomplete,
+    /// The board may have lost what it had, and does not tell.
+    Unknown,
+    /// The board says it is written, but PC_INFO did not confirm the new Program ID and date: it showed others, nothing,
+    /// or nobody knows what to expect ([`UpdateReport::unverifiable`]).
+    Written,
+    /// PC_INFO shows the new Program ID and date (U-10).
+    Verified,
+    /// Written, and the application runs; verified unless [`UpdateReport::unverifiable`] says why not.
+    Running,
+}
+
+impl UpdateOutcome {
+    /// The name in JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NotStarted => "not-started",
+            Self::Cancelled => "cancelled",
+            Self::UpToDate => "up-to-date",
+            Self::Incomplete => "incomplete",
+            Self::Unknown => "unknown",
+            Self::Written => "written",
+            Self::Verified => "verified",
+            Self::Running => "running",
+        }
+    }
+
+    /// The board has the image.
+    pub const fn is_done(self) -> bool {
+        matches!(self, Self::UpToDate | Self::Verified | Self::Running)
+    }
+}
+
+/// What became of one board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UpdateResult {
+    /// Its number.
+    pub board: u8,
+    /// Its flash number, when it answered.
+    pub flash_number: Option<u16>,
+    /// What PC_INFO showed before.
+    pub before: Option<BoardInfo>,
+    /// What PC_INFO showed after the board said that it is done.
+    pub after: Option<BoardInfo>,
+    /// How far it got.
+    pub outcome: UpdateOutcome,
+    /// Attempts that were made.
+    pub attempts: u32,
+    /// Why it failed.
+    pub failure: Option<UpdateFailure>,
+    /// From XRESET to the last answer, µs.
+    pub time_us: u64,
+}
+
+impl UpdateResult {
+    pub(crate) fn new(board: u8) -> Self {
+        Self {
+            board,
+            flash_number: None,
+            before: None,
+            after: None,
+            outcome: UpdateOutcome::NotStarted,
+            attempts: 0,
+            failure: None,
+            time_us: 0,
+        }
+    }
+}
+
+/// What became of all boards.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct UpdateReport {
+    /// In the order of the list.
+    pub boards: Vec<UpdateResult>,
+    /// Nothing was sent but questions.
+    pub dry_run: bool,
+    /// Program ID that the boards shall show; `None`: nobody knows it.
+    pub program_id: Option<u16>,
+    /// Why nobody knows it: what was written could not be verified then.
+    pub unverifiable: Option<Unverifiable>,
+    /// What was written and could not be verified counts as done.
+    pub accept_unverified: bool,
+    /// What was sent, the image first.
+    pub images: Vec<PlannedImage>,
+    /// Flash date of the image.
+    pub date: u16,
+    /// Bytes of both cycles.
+    pub bytes: u64,
+}
+
+impl UpdateReport {
+    /// Exit code of the command: that of the worst board (5, then 3, 1, 4, 2).
+    pub fn exit_code(&self) -> u8 {
+        let codes = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::exit_code);
+        // Done, says the board, and nobody can tell.
+        let trusted = |b: &&UpdateResult| {
+            let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
+            self.unverifiable.is_some() && !self.accept_unverified && done && b.failure.is_none()
+        };
+        let codes = codes.chain(self.boards.iter().filter(trusted).map(|_| 5));
+        let rank = |code: &u8| [0, 2, 4, 1, 3, 5].iter().position(|c| c == code);
+        codes.max_by_key(rank).unwrap_or(0)
+    }
+}
+
+/// How far an update is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// The boards that get the image now.
+    pub boards: Vec<u8>,
+    /// 1 to `prog.attempts`.
+    pub attempt: u32,
+    /// 1 or 2.
+    pub cycle: u32,
+    /// Bytes of both cycles that were taken in this attempt.
+    pub bytes: u64,
+    /// Bytes of both cycles.
+    pub total: u64,
+    /// Bytes per second so far.
+    pub rate: u64,
+    /// Remaining time at that rate, µs.
+    pub remaining_us: u64,
+}

@@ -1,0 +1,227 @@
+//! Profile files: TOML with the keys of [`KEYS`].
+
+use std::fmt::Write;
+
+use ucom::Profile;
+use ucom::profile::{KEYS, Kind, ProfileError};
+
+/// Why a profile file is refused.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ProfileFileError {
+    /// Not TOML.
+    #[error("profile: {0}")]
+    Toml(String),
+    /// A key that no profile has.
+    #[error("profile: there is no key `{key}`{}; the keys are: {}", near(.nearest), known())]
+    UnknownKey {
+        /// The key in the file.
+        key: String,
+        /// The known key that looks most like it.
+        nearest: Option<&'static str>,
+    },
+    /// A value outside the key's range.
+    #[error("profile: {key} = {value}, but it must be {range}; see `ucom help profile`")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// The value in the file.
+        value: String,
+        /// What is allowed.
+        range: &'static str,
+    },
+    /// Values that contradict each other.
+    #[error("profile: {0}")]
+    Contradiction(&'static str),
+}
+
+fn near(nearest: &Option<&'static str>) -> String {
+    nearest.map(|name| format!(", did you mean `{name}`?")).unwrap_or_default()
+}
+
+fn known() -> String {
+    KEYS.iter().map(|key| key.name).collect::<Vec<_>>().join(", ")
+}
+
+fn unknown(key: &str) -> ProfileFileError {
+    let likeness = |name: &str| strsim::jaro_winkler(name, key);
+    let nearest = KEYS
+        .iter()
+        .map(|known| known.name)
+        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
+        .filter(|name| likeness(name) > 0.75);
+    ProfileFileError::UnknownKey { key: key.to_string(), nearest }
+}
+
+/// `a.b = 1` and `[a] b = 1` are the same key.
+fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, toml::Value)>) {
+    for (name, value) in table {
+        let name = if prefix.is_empty() { name } else { format!("{prefix}.{name}") };
+        match value {
+            toml::Value::Table(table) if !KEYS.iter().any(|key| key.name == name) => {
+                if table.is_empty() && !KEYS.iter().any(|key| key.name.starts_with(&format!("{name}."))) {
+                    out.push((name, toml::Value::Table(table)));
+                } else {
+                    flatten(&name, table, out);
+                }
+            }
+            value => out.push((name, value)),
+        }
+    }
+}
+
+/// A profile as a file.
+pub trait ProfileFile: Sized {
+    /// A profile from TOML; keys that the text does not have keep their defaults.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no TOML, keys that no profile has, and values that do not fit: each with what would.
+    fn from_toml(text: &str) -> Result<Self, ProfileFileError>;
+
+    /// All keys as TOML, each with its meaning in a comment.
+    fn to_toml(&self) -> String;
+}
+
+impl ProfileFile for Profile {
+    fn from_toml(text: &str) -> Result<Self, ProfileFileError> {
+        let table: toml::Table =
+            text.parse().map_err(|e: toml::de::Error| ProfileFileError::Toml(e.to_string()))?;
+        let mut entries = Vec::new();
+        flatten("", table, &mut entries);
+        let mut profile = Self::default();
+        for (name, value) in entries {
+            let text = match &value {
+                toml::Value::String(text) => text.clone(),
+                other => other.to_string(),
+            };
+            match profile.set(&name, &text) {
+                Ok(()) => {}
+                Err(ProfileError::Value(key)) => {
+                    return Err(ProfileFileError::Value {
+                        key: key.name,
+                        value: value.to_string(),
+                        range: key.range,
+                    });
+                }
+                Err(_) => return Err(unknown(&name)),
+            }
+        }
+        match profile.check() {
+            Err(ProfileError::Contradiction(why)) => Err(ProfileFileError::Contradiction(why)),
+            _ => Ok(profile),
+        }
+    }
+
+    fn to_toml(&self) -> String {
+        let mut text =
+            String::from("# Compatibility profile. Every key may be left out; see `ucom help profile`.\n");
+        for key in KEYS {
+            let value = key.value(self).to_string();
+            let value = match key.kind {
+                Kind::Number => value,
+                Kind::YesNo => (value == "yes").to_string(),
+                Kind::Word => format!("\"{value}\""),
+            };
+            let _ = write!(text, "\n# {} {}.\n{} = {value}\n", key.doc, capital(key.range), key.name);
+        }
+        text
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut characters = text.chars();
+    characters.next().map(|first| first.to_uppercase().chain(characters).collect()).unwrap_or_default()
+}
+
+/// What `ucom help profile` prints: every key with default, range, rule and meaning.
+pub fn profile_help() -> String {
+    let mut text = String::from(
+        "A profile says how the boards on a bus read what the published description leaves open. It is a TOML\n\
+         file for `--profile FILE`; every key may be left out, unknown keys are an error. `a.b = 1` and\n\
+         `[a]` with `b = 1` are the same. `ucom probe` measures what a real board can tell.\n",
+    );
+    for key in KEYS {
+        let _ = write!(text, "\n{} = {}\n    {} {}.\n", key.name, key.default, key.doc, capital(key.range));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use ucom::profile::{Broadcast, Endian, ReportMode};
+
+    #[test]
+    fn a_written_profile_reads_back() {
+        let mut profile = Profile::default();
+        assert_eq!(Profile::from_toml(&profile.to_toml()), Ok(profile));
+        for (key, value) in [
+            ("endian", "big"),
+            ("addr.broadcast", "31"),
+            ("addr.first", "0"),
+            ("report.mode", "all4"),
+            ("chain.auto_opinit", "yes"),
+            ("prog.plan", "pmem-xmem"),
+            ("alive.pc_lost", "2500"),
+        ] {
+            profile.set(key, value).unwrap();
+        }
+        assert_eq!(Profile::from_toml(&profile.to_toml()), Ok(profile));
+    }
+
+    #[test]
+    fn d10_both_forms_of_keys() {
+        let profile =
+            Profile::from_toml("endian = 'big'\n[report]\nmode = 'seq'\n[addr]\nbroadcast = 31").unwrap();
+        assert_eq!((profile.endian, profile.report_mode), (Endian::Big, ReportMode::Seq));
+        assert_eq!(profile.addr_broadcast, Broadcast::ThirtyOne);
+        assert_eq!(Profile::from_toml("prog.endian = 'big'").unwrap().prog_endian, Endian::Big);
+        assert_eq!(Profile::from_toml(""), Ok(Profile::default()));
+    }
+
+    #[test]
+    fn unknown_keys_are_an_error_that_helps() {
+        let error = Profile::from_toml("report.mod = 'seq'").unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("`report.mod`, did you mean `report.mode`?") && text.contains("load.limit"),
+            "{text}"
+        );
+        for bad in ["zzz = 1", "prog = 1", "[zzz]", "endian.x = 1", "[prog.plan]\nx = 1"] {
+            assert!(Profile::from_toml(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn values_out_of_range_are_an_error_that_helps() {
+        for (bad, part) in [
+            ("string.max = 513", "8 to 512"),
+            ("so.period = -1", "1 to 60000"),
+            ("so.period = 1.5", "1 to 60000"),
+            ("endian = 'middle'", "little or big"),
+            ("prog.attempts = 99999999999", "1 to 10"),
+            ("chain.auto_opinit = 1", "yes or no"),
+            ("addr.first = 0", "cannot both be 0"),
+        ] {
+            let text = Profile::from_toml(bad).unwrap_err().to_string();
+            assert!(text.contains(part), "{text}");
+        }
+        assert!(matches!(Profile::from_toml("x = = 2"), Err(ProfileFileError::Toml(_))));
+    }
+
+    #[test]
+    fn help_names_every_key_and_its_range() {
+        let help = profile_help();
+        for key in KEYS {
+            assert!(help.contains(&format!("\n{} = {}\n", key.name, key.default)), "{}", key.name);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(text in "\\PC{0,80}") {
+            crate::files::fuzzing::profile(text.as_bytes());
+        }
+    }
+}

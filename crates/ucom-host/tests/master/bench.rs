@@ -1,0 +1,393 @@
+//! A bus in memory and in virtual time: the master on one side, boards or a script on the other, faults in between.
+
+use std::collections::BTreeMap;
+
+use ucom::node::{Node, NodeConfig, Record};
+use ucom::{Frame, Profile};
+use ucom_host::master::{Event, Master, Outcome, ProcedureId, Request, frame_bits};
+use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+
+/// Microseconds of a millisecond.
+pub const MS: u64 = 1000;
+
+/// Somebody on the bus beside the master.
+pub trait Member {
+    fn poll(&mut self, now: u64) -> Option<Frame>;
+    fn sent(&mut self, now: u64, frame: &Frame);
+    fn receive(&mut self, now: u64, frame: &Frame);
+    fn deadline(&self) -> u64;
+    /// The board behind it.
+    fn board(&mut self) -> Option<&mut TestNode> {
+        None
+    }
+}
+
+pub type TestNode = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
+
+impl Member for TestNode {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        Node::poll(self, now)
+    }
+    fn sent(&mut self, now: u64, frame: &Frame) {
+        Node::sent(self, now, frame);
+    }
+    fn receive(&mut self, now: u64, frame: &Frame) {
+        Node::receive(self, now, frame);
+    }
+    fn deadline(&self) -> u64 {
+        self.next_deadline()
+    }
+    fn board(&mut self) -> Option<&mut TestNode> {
+        Some(self)
+    }
+}
+
+/// A peer that knows nothing but a table of frames.
+#[derive(Default)]
+pub struct Script {
+    /// What is answered, and after how many ms.
+    rules: Vec<Rule>,
+    due: BTreeMap<(u64, u64), Frame>,
+    serial: u64,
+    waiting: Option<Frame>,
+}
+
+struct Rule {
+    ask: Frame,
+    /// How often it still applies.
+    uses: u32,
+    /// Requests that are let pass before.
+    skip: u32,
+    answers: Vec<(u64, Frame)>,
+}
+
+pub fn frame(text: &str) -> Frame {
+    text.parse().unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+impl Script {
+    /// `answers`: `"ms frame"` or `"frame"`, separated by blanks between entries, e.g. `["441#21", "5:482#42"]`.
+    pub fn on(self, ask: &str, answers: &[&str]) -> Self {
+        self.rule(ask, 0, u32::MAX, answers)
+    }
+
+    /// Only the first time.
+    pub fn once(self, ask: &str, answers: &[&str]) -> Self {
+        self.rule(ask, 0, 1, answers)
+    }
+
+    pub fn rule(mut self, ask: &str, skip: u32, uses: u32, answers: &[&str]) -> Self {
+        let answer = |text: &&str| match text.split_once(':') {
+            Some((ms, text)) => (ms.parse::<u64>().unwrap() * MS, frame(text)),
+            None => (300, frame(text)),
+        };
+        self.rules.push(Rule { ask: frame(ask), uses, skip, answers: answers.iter().map(answer).collect() });
+        self
+    }
+
+    /// Sends by itself at a time, ms.
+    pub fn at(mut self, ms: u64, text: &str) -> Self {
+        self.serial += 1;
+        self.due.insert((ms * MS, self.serial), frame(text));
+        self
+    }
+}
+
+impl Member for Script {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        if self.waiting.is_none()
+            && let Some((&key, &frame)) = self.due.first_key_value()
+            && key.0 <= now
+        {
+            self.due.remove(&key);
+            self.waiting = Some(frame);
+            return Some(frame);
+        }
+        None
+    }
+    fn sent(&mut self, _: u64, _: &Frame) {
+        self.waiting = None;
+    }
+    fn receive(&mut self, now: u64, frame: &Frame) {
+        for rule in self.rules.iter_mut().filter(|r| r.ask == *frame && r.uses > 0) {
+            if rule.skip > 0 {
+                rule.skip -= 1;
+                continue;
+            }
+            rule.uses -= 1;
+            for (after, frame) in &rule.answers {
+                self.serial += 1;
+                self.due.insert((now + after, self.serial), *frame);
+            }
+            break;
+        }
+    }
+    fn deadline(&self) -> u64 {
+        self.due.first_key_value().map_or(u64::MAX, |((at, _), _)| *at)
+    }
+}
+
+/// What happens to one frame on its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    Lost,
+    Doubled,
+    /// It arrives after the next one.
+    Swapped,
+    /// ms.
+    Delayed(u64),
+    /// A bit of the data, or of the identifier where there are none.
+    Corrupted(u8),
+}
+
+/// Who sent a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum From {
+    Master,
+    Member(usize),
+}
+
+pub struct Bench {
+    pub master: Master,
+    pub members: Vec<Box<dyn Member>>,
+    pub now: u64,
+    /// Every frame that was put on the bus, with the time it was complete.
+    pub log: Vec<(u64, From, Frame)>,
+    pub events: Vec<(u64, Event)>,
+    /// Frame number and its fault.
+    pub fault: Option<(usize, Fault)>,
+    /// Frames with these beginnings are lost, each so often; `<` is the master, `>` a board.
+    pub lose: Vec<(&'static str, u32)>,
+    /// Nothing arrives any more at members or at the master.
+    pub cut: Vec<usize>,
+    pending_master: Option<Frame>,
+    pending: Vec<Option<Frame>>,
+    held: Option<(From, Frame)>,
+    delayed: Vec<(u64, From, Frame)>,
+    /// The driver is dead (killed tool).
+    pub dead: bool,
+}
+
+impl Bench {
+    pub fn new(profile: Profile, members: Vec<Box<dyn Member>>) -> Self {
+        let pending = members.iter().map(|_| None).collect();
+        Self {
+            master: Master::new(profile),
+            members,
+            now: 0,
+            log: Vec::new(),
+            events: Vec::new(),
+            fault: None,
+            lose: Vec::new(),
+            cut: Vec::new(),
+            pending_master: None,
+            pending,
+            held: None,
+            delayed: Vec::new(),
+            dead: false,
+        }
+    }
+
+    /// One more on the bus.
+    pub fn join(&mut self, member: Box<dyn Member>) {
+        self.members.push(member);
+        self.pending.push(None);
+    }
+
+    pub fn script(script: Script) -> Self {
+        Self::new(Profile::default(), vec![Box::new(script)])
+    }
+
+    /// A chain of real boards with an application each.
+    pub fn chain(flash_ids: &[u16]) -> Self {
+        Self::chain_with(flash_ids, Profile::default())
+    }
+
+    pub fn chain_with(flash_ids: &[u16], profile: Profile) -> Self {
+        let mut pins = WirePins::chain(flash_ids.len());
+        let boards =
+            flash_ids.iter().map(|flash| Box::new(node(*flash, pins.remove(0), profile)) as Box<dyn Member>);
+        Self::new(profile, boards.collect())
+    }
+
+    /// One frame over the bus, or a step in time; `false`: nothing happens before `limit`.
+    fn step(&mut self, limit: u64) -> bool {
+        self.deliver_delayed();
+        if self.pending_master.is_none() && !self.dead {
+            self.pending_master = self.master.poll(self.now);
+        }
+        self.drain();
+        for (i, member) in self.members.iter_mut().enumerate() {
+            if self.pending[i].is_none() {
+                self.pending[i] = member.poll(self.now);
+            }
+        }
+        let masters = self.pending_master.map(|f| (f.id(), From::Master));
+        let others =
+            self.pending.iter().enumerate().filter_map(|(i, f)| f.map(|f| (f.id(), From::Member(i))));
+        if let Some((_, from)) = masters.into_iter().chain(others).min_by_key(|(id, _)| *id) {
+            self.transmit(from);
+            return true;
+        }
+        let mut next = self.members.iter().map(|m| m.deadline()).min().unwrap_or(u64::MAX);
+        if !self.dead {
+            next = next.min(self.master.next_deadline().unwrap_or(u64::MAX));
+        }
+        next = next.min(self.delayed.iter().map(|(at, ..)| *at).min().unwrap_or(u64::MAX));
+        if self.now >= limit {
+            return false;
+        }
+        self.now = next.max(self.now + 1).min(limit);
+        true
+    }
+
+    fn transmit(&mut self, from: From) {
+        let frame = match from {
+            From::Master => self.pending_master.take(),
+            From::Member(i) => self.pending[i].take(),
+        };
+        let frame = frame.unwrap();
+        self.now += frame_bits(frame.dlc());
+        if let From::Member(i) = from {
+            self.members[i].sent(self.now, &frame);
+        }
+        let number = self.log.len();
+        self.log.push((self.now, from, frame));
+        let text = format!("{} {frame}", if from == From::Master { '<' } else { '>' });
+        let lose = self.lose.iter_mut().find(|(start, left)| *left > 0 && text.starts_with(*start));
+        let lost = lose.map(|(_, left)| *left -= 1).map(|()| Fault::Lost);
+        let fault = lost.or(self.fault.filter(|(at, _)| *at == number).map(|(_, fault)| fault));
+        match fault {
+            Some(Fault::Lost) => {}
+            Some(Fault::Doubled) => {
+                self.deliver(from, frame);
+                self.deliver(from, frame);
+            }
+            Some(Fault::Swapped) => {
+                self.held = Some((from, frame));
+                return;
+            }
+            Some(Fault::Delayed(ms)) => self.delayed.push((self.now + ms * MS, from, frame)),
+            Some(Fault::Corrupted(bit)) => self.deliver(from, corrupted(&frame, bit)),
+            None => self.deliver(from, frame),
+        }
+        if let Some((from, frame)) = self.held.take() {
+            self.deliver(from, frame);
+        }
+    }
+
+    fn deliver_delayed(&mut self) {
+        let now = self.now;
+        let due: Vec<_> = self.delayed.iter().filter(|(at, ..)| *at <= now).copied().collect();
+        self.delayed.retain(|(at, ..)| *at > now);
+        due.into_iter().for_each(|(_, from, frame)| self.deliver(from, frame));
+    }
+
+    fn deliver(&mut self, from: From, frame: Frame) {
+        for (i, member) in self.members.iter_mut().enumerate() {
+            if from != From::Member(i) && !self.cut.contains(&i) {
+                member.receive(self.now, &frame);
+            }
+        }
+        let silent = matches!(from, From::Member(i) if self.cut.contains(&i));
+        if from != From::Master && !self.dead && !silent {
+            self.master.handle(self.now, frame.address().map(|_| frame));
+        }
+        self.drain();
+    }
+
+    fn drain(&mut self) {
+        while let Some(event) = self.master.take_event() {
+            self.events.push((self.now, event));
+        }
+    }
+
+    /// Lets time pass.
+    pub fn run(&mut self, ms: u64) {
+        let until = self.now + ms * MS;
+        while self.now < until && self.step(until) {}
+    }
+
+    /// Starts a procedure and waits for its end; panics when it takes more than `limit_s` of virtual time.
+    pub fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
+        let id = self.master.start(self.now, request).expect("nothing else is under way");
+        self.wait(id, limit_s)
+    }
+
+    pub fn wait(&mut self, id: ProcedureId, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
+        let limit = self.now + limit_s * 1000 * MS;
+        let seen = self.events.len();
+        loop {
+            let done = self.events[seen.min(self.events.len())..].iter().find_map(|(_, e)| match e {
+                Event::Done { id: which, result } if *which == id => Some(result.clone()),
+                _ => None,
+            });
+            if let Some(result) = done {
+                return result;
+            }
+            assert!(
+                self.step(limit),
+                "still busy after {limit_s} s of virtual time (fault {:?})",
+                self.fault
+            );
+        }
+    }
+
+    /// What the master sent, as text.
+    pub fn sent(&self) -> Vec<String> {
+        self.log.iter().filter(|(_, from, _)| *from == From::Master).map(|(.., f)| f.to_string()).collect()
+    }
+
+    /// Times at which the master sent this frame.
+    pub fn times_of(&self, text: &str) -> Vec<u64> {
+        let wanted = frame(text);
+        self.log
+            .iter()
+            .filter(|(_, from, f)| *from == From::Master && *f == wanted)
+            .map(|(at, ..)| *at)
+            .collect()
+    }
+
+    pub fn count(&self, text: &str) -> usize {
+        self.times_of(text).len()
+    }
+
+    pub fn board(&mut self, i: usize) -> &mut TestNode {
+        self.members[i].board().expect("a board")
+    }
+}
+
+/// One bit is wrong: behind a gateway that has computed a new check.
+fn corrupted(frame: &Frame, bit: u8) -> Frame {
+    if frame.dlc() == 0 {
+        return Frame::new(frame.id() ^ 1 << (bit % 11), &[]).unwrap();
+    }
+    let mut data = frame.data().to_vec();
+    let place = usize::from(bit) % (8 * data.len());
+    data[place / 8] ^= 1 << (place % 8);
+    Frame::new(frame.id(), &data).unwrap()
+}
+
+/// The texts of the golden chain.
+pub const CI: [&str; 2] = ["target velocity", "current limit"];
+pub const SO: [&str; 4] = ["pos_soll", "pos_ist", "current", "temperature"];
+pub const PAR: [&str; 3] = ["P", "I", "D"];
+
+/// The program that every board of the bench has: an id and a date.
+pub const OLD: (u16, u16) = (0x1234, 0x386E);
+
+pub fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {
+    let mut memory = MemoryFlash::default();
+    let image = [0x55; 64];
+    memory.install(Record { program_id: OLD.0, date: OLD.1, address: 0, words: 32 }, &image);
+    let store = MemoryStore { autostart: false, description: b"UCoM2 head pan".to_vec() };
+    let mut application = MemoryApplication::new("head pan control", &CI, &SO, &PAR);
+    application.initial_ci = vec![7, 9];
+    let config = NodeConfig { profile, seed: u32::from(flash) + 1, ..NodeConfig::new(flash) };
+    Node::new(config, memory, pins, store, application, 0)
+}
+
+/// The golden image: byte i is (37·i + 11) mod 256.
+pub fn image(len: usize) -> Vec<u8> {
+    (0..len).map(|i| (37 * i + 11) as u8).collect()
+}

@@ -1,0 +1,33 @@
+//! The master with the boards of this crate.
+
+use ucom_host::master::{InitOptions, Outcome, Request};
+
+use crate::bench::Bench;
+
+pub fn initialised(flash_ids: &[u16]) -> Bench {
+    let mut bench = Bench::chain(flash_ids);
+    match bench.go(Request::Init(InitOptions::default()), 60) {
+        Ok(Outcome::Init(report)) => assert!(report.is_ok(), "{:?}", report.findings),
+        other => panic!("{other:?}"),
+    }
+    bench
+}
+
+/// P-2: chains of 1, 3 and 31 boards; 31 boards leave no PC_INIT(32) to be sent.
+#[test]
+fn p2_init_of_real_boards() {
+    for count in [1_u16, 3, 31] {
+        let ids: Vec<u16> = (1..=count).collect();
+        let mut bench = initialised(&ids);
+        for (i, _) in ids.iter().enumerate() {
+            assert_eq!(bench.board(i).number().map(|n| n.number()), Some(i as u8 + 1));
+        }
+        let highest = bench
+            .sent()
+            .iter()
+            .filter_map(|t| u16::from_str_radix(&t[..3], 16).ok())
+            .filter(|id| id >> 6 == 10)
+            .max();
+        assert_eq!(highest, Some(0x280 + (count + 1).min(31)));
+    }
+}

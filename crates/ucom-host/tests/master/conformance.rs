@@ -1,0 +1,318 @@
+//! The conformance tests: boards of this crate pass them all, and each mistake is found by the test that is meant for it.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use ucom::profile::Endian;
+use ucom::{Frame, Function, Profile};
+use ucom_host::master::conformance::{
+    ConformanceOptions, ConformanceProgram, ConformanceReport, Verdict, test_names,
+};
+use ucom_host::master::{Event, InitOptions, Outcome, Request};
+use ucom_sim::memory::WirePins;
+
+use crate::bench::{Bench, From, Member, TestNode, frame, image, node};
+
+/// Everything that is allowed.
+fn all() -> ConformanceOptions {
+    let program =
+        ConformanceProgram { board: 1, flash_number: 0x21, image: image(1000), address: 0, date: 0x5C21 };
+    ConformanceOptions { init: true, run: true, program: Some(program), ..Default::default() }
+}
+
+fn numbered(mut bench: Bench) -> Bench {
+    bench.go(Request::Init(InitOptions::default()), 60).unwrap();
+    bench
+}
+
+fn judged(bench: &mut Bench, options: ConformanceOptions) -> ConformanceReport {
+    match bench.go(Request::Conformance(options), 2_000) {
+        Ok(Outcome::Conformance(report)) => report,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn failed(report: &ConformanceReport) -> Vec<String> {
+    let failed = report.tests.iter().filter(|t| matches!(t.verdict, Verdict::Fail(_)));
+    failed.map(|t| format!("{} {:?} {:?}", t.id, t.board, t.verdict)).collect()
+}
+
+/// Every test, in both byte orders; only what needs a special bus is left out.
+#[test]
+fn boards_of_this_crate_pass_every_test() {
+    for endian in [Endian::Little, Endian::Big] {
+        let profile = Profile { endian, prog_endian: endian, ..Profile::default() };
+        let mut bench = numbered(Bench::chain_with(&[0x21, 0x42, 0x63], profile));
+        let report = judged(&mut bench, all());
+        assert!(failed(&report).is_empty(), "{endian}: {:?}", failed(&report));
+        let skipped: Vec<&str> =
+            report.tests.iter().filter(|t| matches!(t.verdict, Verdict::Skipped(_))).map(|t| t.id).collect();
+        // Nothing is started when the asking tests come.
+        assert_eq!(
+            skipped,
+            ["D-T10", "D-T11", "D-T10", "D-T11", "D-T10", "D-T11", "D-T19", "D-T20", "D-T21"]
+        );
+        for n in 0..3 {
+            assert!(!bench.board(n).application.running && bench.board(n).number().is_some());
+        }
+        for i in 0..3 {
+            bench.go(Request::Start { board: i + 1, force: false }, 20).unwrap();
+        }
+        let only = ["D-T10", "D-T11"].map(str::to_owned).to_vec();
+        assert_eq!(judged(&mut bench, ConformanceOptions { only, ..Default::default() }).passed(), 6);
+    }
+}
+
+/// What is not allowed does not happen: the frames of a run without options.
+#[test]
+fn without_options_only_harmless_frames_leave() {
+    let mut bench = numbered(Bench::chain(&[0x21, 0x42]));
+    bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
+    let before = bench.log.len();
+    let report = judged(&mut bench, ConformanceOptions::default());
+    assert_eq!((failed(&report).len(), report.passed()), (0, 5));
+    let mut last = 0;
+    for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
+        let function = frame.id() >> 6;
+        // PC_INFO, PC_REPORT, a number that the board has already, dumps; life signs go on as `start` began them.
+        assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
+        if function == 10 {
+            // A number is given only to who has just said that it has it.
+            assert_eq!(last, u16::from(Function::Info.number()) << 6 | frame.id() & 31, "{frame}");
+        }
+        if function != 26 {
+            last = frame.id();
+        }
+    }
+    let told = bench.events.iter().filter(|(_, e)| matches!(e, Event::Tested { .. })).count();
+    assert_eq!(told, 7, "one event of each test that may be done, D-T2 and three of each board");
+    let listed = |id: &str| report.tests.iter().any(|t| t.id == id);
+    assert!(test_names().all(listed), "all are listed, also those that cannot be done");
+    assert!(bench.board(0).status().0 == 0x8B && bench.board(1).status().0 == 0x1B);
+}
+
+#[test]
+fn running_boards_are_left_alone() {
+    let mut bench = numbered(Bench::chain(&[0x21]));
+    let run = ucom_host::master::RunOptions {
+        boards: vec![ucom_host::master::RunBoard { board: 1, ..Default::default() }],
+        ..Default::default()
+    };
+    bench.go(Request::Run(run), 20).unwrap();
+    let refused = bench.go(Request::Conformance(all()), 20).unwrap_err();
+    assert_eq!(refused.exit_code(), 4, "{refused}");
+}
+
+/// A board with a mistake: what it hears and what it says goes through its hands.
+struct Flawed {
+    inner: TestNode,
+    mistake: Mistake,
+    waiting: Vec<Frame>,
+    inside: Option<Frame>,
+    count: usize,
+}
+
+/// What becomes of a frame: heard by the board, or said by it.
+#[derive(Clone, Copy)]
+struct Mistake {
+    hears: fn(&TestNode, &Frame) -> Vec<Frame>,
+    says: fn(&TestNode, &Frame, usize) -> Vec<Frame>,
+}
+
+const NONE: Mistake = Mistake { hears: |_, f| vec![*f], says: |_, f, _| vec![*f] };
+
+impl Member for Flawed {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        if self.waiting.is_empty() && self.inside.is_none() {
+            let said = self.inner.poll(now)?;
+            self.inside = Some(said);
+            self.count += 1;
+            self.waiting = (self.mistake.says)(&self.inner, &said, self.count);
+            if self.waiting.is_empty() {
+                self.inside = None;
+                self.inner.sent(now, &said);
+            }
+        }
+        self.waiting.first().copied()
+    }
+    fn sent(&mut self, now: u64, _: &Frame) {
+        if !self.waiting.is_empty() {
+            self.waiting.remove(0);
+        }
+        if self.waiting.is_empty()
+            && let Some(said) = self.inside.take()
+        {
+            self.inner.sent(now, &said);
+        }
+    }
+    fn receive(&mut self, now: u64, frame: &Frame) {
+        for frame in (self.mistake.hears)(&self.inner, frame) {
+            self.inner.receive(now, &frame);
+        }
+    }
+    fn deadline(&self) -> u64 {
+        if self.waiting.is_empty() { self.inner.next_deadline() } else { 0 }
+    }
+    fn board(&mut self) -> Option<&mut TestNode> {
+        Some(&mut self.inner)
+    }
+}
+
+/// The first of two boards has the mistake.
+fn with(mistake: Mistake) -> Bench {
+    let mut pins = WirePins::chain(2);
+    let profile = Profile::default();
+    let first = Flawed {
+        inner: node(0x21, pins.remove(0), profile),
+        mistake,
+        waiting: Vec::new(),
+        inside: None,
+        count: 0,
+    };
+    let second = node(0x42, pins.remove(0), profile);
+    Bench::new(profile, vec![Box::new(first), Box::new(second)])
+}
+
+/// Each mistake is found by its test.
+#[test]
+fn each_mistake_is_found_by_its_test() {
+    let mistakes: [(&str, Mistake); 17] = [
+        ("D-T1", Mistake { says: |_, f, _| if f.id() == 0x441 { vec![*f, *f] } else { vec![*f] }, ..NONE }),
+        // Every second report does not come.
+        (
+            "D-T2",
+            Mistake { says: |_, f, n| if f.id() == 0x441 && n % 2 == 0 { vec![] } else { vec![*f] }, ..NONE },
+        ),
+        // A request without a number is answered with an error.
+        (
+            "D-T3",
+            Mistake {
+                hears: |b, f| {
+                    if b.number().is_none() && f.id() == 0x2C1 { vec![*f, frame("240#")] } else { vec![*f] }
+                },
+                ..NONE
+            },
+        ),
+        // The pin does not follow PC_SETSTATUS.
+        (
+            "D-T4",
+            Mistake {
+                hears: |_, f| {
+                    // The chain must be numbered before; it is the second time that fails.
+                    static HEARD: AtomicUsize = AtomicUsize::new(0);
+                    let raised = f.to_string() == "1C1#0202";
+                    if raised && HEARD.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
+                },
+                ..NONE
+            },
+        ),
+        (
+            "D-T5",
+            Mistake {
+                hears: |b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] },
+                ..NONE
+            },
+        ),
+        // The value is masked.
+        (
+            "D-T6",
+            Mistake { hears: |_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] }, ..NONE },
+        ),
+        // MSTART goes with EXLRUN.
+        (
+            "D-T7",
+            Mistake {
+                hears: |_, f| if f.to_string() == "1C1#1000" { vec![frame("1C1#4040")] } else { vec![*f] },
+                ..NONE
+            },
+        ),
+        // PROG stays 0.
+        (
+            "D-T8",
+            Mistake {
+                hears: |_, f| if f.id() == 0x041 { vec![*f, frame("1C1#0400")] } else { vec![*f] },
+                ..NONE
+            },
+        ),
+        ("D-T9", Mistake { says: |_, f, _| if f.id() == 0x501 { vec![] } else { vec![*f] }, ..NONE }),
+        (
+            "D-T10",
+            Mistake {
+                hears: |_, f| if f.to_string() == "581#00" { vec![frame("581#")] } else { vec![*f] },
+                ..NONE
+            },
+        ),
+        (
+            "D-T11",
+            Mistake {
+                says: |_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] },
+                ..NONE
+            },
+        ),
+        (
+            "D-T12",
+            Mistake { says: |_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] }, ..NONE },
+        ),
+        // A life sign is enough to start it again.
+        (
+            "D-T13",
+            Mistake {
+                hears: |b, f| {
+                    let ready = f.to_string() == "680#" && b.status().0 == 0x8B;
+                    if ready { vec![*f, frame("541#")] } else { vec![*f] }
+                },
+                ..NONE
+            },
+        ),
+        // Life signs stop it.
+        (
+            "D-T14",
+            Mistake {
+                hears: |b, f| {
+                    if f.to_string() == "680#" && b.application.running {
+                        vec![frame("601#00000000")]
+                    } else {
+                        vec![*f]
+                    }
+                },
+                ..NONE
+            },
+        ),
+        (
+            "D-T15",
+            Mistake {
+                hears: |_, f| {
+                    if f.to_string() == "601#02000000" { vec![frame("601#00000000")] } else { vec![*f] }
+                },
+                ..NONE
+            },
+        ),
+        ("D-T17", Mistake { says: |_, f, _| if f.id() == 0x101 { vec![] } else { vec![*f] }, ..NONE }),
+        (
+            "D-T18",
+            Mistake {
+                says: |_, f, _| if f.to_string() == "081#0A" { vec![*f, *f] } else { vec![*f] },
+                ..NONE
+            },
+        ),
+    ];
+    for (id, mistake) in mistakes {
+        let mut bench = with(mistake);
+        // A board that does not follow the numbers is numbered by hand.
+        if bench.go(Request::Init(InitOptions::default()), 60).is_err() {
+            panic!("{id}: no numbers");
+        }
+        if ["D-T10", "D-T11"].contains(&id) {
+            bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
+        }
+        let options = ConformanceOptions { only: vec![id.into()], ..all() };
+        let report = judged(&mut bench, options);
+        assert!(report.failed() > 0, "{id}: {report:?}");
+        // The boards without the mistake pass it.
+        let mut bench = numbered(with(NONE));
+        if ["D-T10", "D-T11"].contains(&id) {
+            bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
+        }
+        let report = judged(&mut bench, ConformanceOptions { only: vec![id.into()], ..all() });
+        assert!(failed(&report).is_empty(), "{id}: {:?}", failed(&report));
+    }
+}

@@ -1,0 +1,172 @@
+//! Probe and doctor.
+
+use ucom::profile::{AliveMode, Endian, ReportMode};
+use ucom::{Checksum, Profile};
+use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
+use ucom_host::master::probe::ProbeOptions;
+use ucom_host::master::{InitFinding, InitOptions, Outcome, Request, ScanFinding};
+
+use crate::bench::{Bench, image};
+use crate::chain::initialised;
+use crate::update::options;
+
+/// P-20: boards with other readings give them away; the profile found is theirs.
+#[test]
+fn p20_probe_finds_the_profile() {
+    let others = [
+        Profile::default(),
+        Profile { endian: Endian::Big, ..Profile::default() },
+        Profile { endian: Endian::Big, string_count_includes_header: true, ..Profile::default() },
+        Profile {
+            report_mode: ReportMode::All4,
+            chain_auto_opinit: true,
+            dlc_strict: true,
+            ..Profile::default()
+        },
+        Profile {
+            endian: Endian::Big,
+            string_count_includes_header: true,
+            report_mode: ReportMode::All4,
+            chain_auto_opinit: true,
+            ..Profile::default()
+        },
+        Profile { report_mode: ReportMode::Seq, ..Profile::default() },
+        Profile { addr_broadcast: ucom::profile::Broadcast::None, ..Profile::default() },
+    ];
+    for profile in others {
+        let mut bench = Bench::chain_with(&[0x21, 0x42, 0x63], profile);
+        // The tool starts from the defaults.
+        bench.master = ucom_host::master::Master::new(Profile::default());
+        let probe = Request::Probe(ProbeOptions { init: true, ..Default::default() });
+        let Ok(Outcome::Probe(report)) = bench.go(probe, 120) else { panic!() };
+        assert_eq!(report.profile, profile, "{}", report.table());
+        assert_eq!(report.boards, [1, 2, 3]);
+    }
+}
+
+/// D-10: with the wrong byte order the order is what is named, and `probe`; not the wire, the load or the flash numbers.
+#[test]
+fn d10_a_wrong_byte_order_is_named() {
+    for (boards, here) in [(Endian::Big, Endian::Little), (Endian::Little, Endian::Big)] {
+        let new = || {
+            let mut bench =
+                Bench::chain_with(&[0x21, 0x42], Profile { endian: boards, ..Profile::default() });
+            bench.master = ucom_host::master::Master::new(Profile { endian: here, ..Profile::default() });
+            bench
+        };
+        let mut bench = new();
+        let init = Request::Init(InitOptions { expected: vec![(1, 0x21), (2, 0x42)], force: false });
+        let Ok(Outcome::Init(report)) = bench.go(init, 60) else { panic!("no init") };
+        assert_eq!(report.findings, [InitFinding::ByteOrder { endian: here }], "{here:?}");
+        let Ok(Outcome::Scan(scan)) = bench.go(Request::Scan, 60) else { panic!("no scan") };
+        assert_eq!(scan.findings, [ScanFinding::ByteOrder { endian: here }], "{here:?}");
+        let (statistics, boards) = (bench.master.statistics(), bench.master.boards());
+        let (profile, scan) = (bench.master.profile(), Some(scan));
+        let all = findings(&Observation { statistics, boards, profile, scan, ..Default::default() });
+        let problems: Vec<_> = all.iter().filter(|f| f.severity != Severity::Good).collect();
+        assert_eq!(problems.len(), 1, "{problems:?}");
+        assert!(
+            problems[0].what.contains("byte order") && problems[0].next.contains("ucom probe"),
+            "{problems:?}"
+        );
+        // `io`: an application that runs is needed to describe itself.
+        bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
+        let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
+        assert!(error.to_string().contains("byte order") && error.hint().contains("ucom probe"), "{error:?}");
+    }
+    // What only fits by chance is not taken for it.
+    let mut bench = Bench::chain(&[0x2121, 0x42]);
+    assert!(matches!(bench.go(Request::Init(InitOptions::default()), 60), Ok(Outcome::Init(r)) if r.is_ok()));
+}
+
+/// Without `init` only harmless frames leave.
+#[test]
+fn p20_probe_is_harmless_unless_allowed() {
+    let mut bench = initialised(&[0x21]);
+    bench.master = ucom_host::master::Master::new(Profile::default());
+    let before = bench.log.len();
+    let Ok(Outcome::Probe(report)) = bench.go(Request::Probe(ProbeOptions::default()), 60) else { panic!() };
+    assert_eq!(report.profile, Profile::default());
+    let row = |key: &str| report.rows.iter().find(|r| r.key == key).unwrap();
+    assert!(row("endian").measured && !row("chain.auto_opinit").measured);
+    for (_, from, frame) in &bench.log[before..] {
+        let harmless = matches!(frame.id() >> 6, 8 | 9 | 22 | 23);
+        assert!(harmless || *from != crate::bench::From::Master, "{frame}");
+    }
+}
+
+/// The checksum of a board's program, and the life signs that a running board counts.
+#[test]
+fn probe_of_checksum_and_life_signs() {
+    let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
+    let mut bench = Bench::chain_with(&[0x21], theirs);
+    bench.go(Request::Init(InitOptions::default()), 20).unwrap();
+    bench.go(Request::Update(options(&[1], 1000)), 60).unwrap();
+    bench.master = ucom_host::master::Master::new(Profile::default());
+    let asked = ProbeOptions { image: Some(image(1000)), alive: true, ..Default::default() };
+    let Ok(Outcome::Probe(report)) = bench.go(Request::Probe(asked), 120) else { panic!() };
+    assert_eq!(report.profile.prog_checksum, Checksum::Sum16, "{}", report.table());
+    assert_eq!(report.profile.alive_mode, AliveMode::Broadcast);
+    assert!(report.rows.iter().any(|r| r.key == "alive.mode" && r.measured));
+    assert!(!bench.board(0).application.running);
+}
+
+fn text(o: &Observation) -> String {
+    findings(o).iter().map(|f| format!("{:?} {} / {} / {}\n", f.severity, f.what, f.why, f.next)).collect()
+}
+
+fn observe(bench: &mut Bench) -> Observation {
+    let scan = match bench.go(Request::Scan, 30) {
+        Ok(Outcome::Scan(report)) => Some(report),
+        other => panic!("{other:?}"),
+    };
+    Observation {
+        listened_us: bench.now,
+        now_us: bench.now,
+        statistics: bench.master.statistics(),
+        boards: bench.master.boards(),
+        scan,
+        profile: Profile::default(),
+        ..Default::default()
+    }
+}
+
+#[test]
+fn doctor_tells_silence_rate_and_termination_apart() {
+    let mut silent = observe(&mut Bench::chain(&[]));
+    assert!(text(&silent).contains("Problem no frame within"));
+    silent.controller = Some(Controller { no_acknowledge: 3, ..Default::default() });
+    assert!(text(&silent).contains("nobody acknowledges our frames (3 times)"));
+    silent.controller = Some(Controller { protocol_errors: 40, ..Default::default() });
+    assert!(text(&silent).contains(
+        "40 bus errors and no frame / frames are there but none can be read: usually another bit rate"
+    ));
+    silent.other_bitrate = Some(500_000);
+    assert!(text(&silent).contains("wrong bit rate: frames come at 500000 bit/s"));
+    let mut good = observe(&mut initialised(&[0x21, 0x42]));
+    good.controller = Some(Controller { tec: Some(0), rec: Some(0), ..Default::default() });
+    assert!(findings(&good).iter().all(|f| f.severity == Severity::Good), "{}", text(&good));
+    assert!(text(&good).contains("2 boards already have numbers"));
+    good.controller =
+        Some(Controller { protocol_errors: 7, tec: Some(120), rec: Some(3), ..Default::default() });
+    assert!(text(&good).contains("termination missing"));
+}
+
+#[test]
+fn doctor_names_what_is_wrong_in_the_chain() {
+    let mut bench = Bench::chain(&[0x21, 0x42]);
+    let o = observe(&mut bench);
+    assert!(text(&o).contains("2 boards, none has a number"), "{}", text(&o));
+    let mut bench = initialised(&[0x21, 0x42]);
+    let now = bench.now;
+    bench.board(1).restart(now);
+    bench.run(300);
+    let o = observe(&mut bench);
+    let t = text(&o);
+    assert!(
+        t.contains("1 board has no number beside 1 that has one / a reboot, or the init wire behind board 1"),
+        "{t}"
+    );
+    assert!(t.contains("board 2 rebooted"), "{t}");
+    assert!(findings(&o).is_sorted_by_key(|f| f.severity));
+}

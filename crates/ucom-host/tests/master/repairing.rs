@@ -1,0 +1,131 @@
+//! One board gets its number back (5.4): never two boards with one number and a success, whatever is lost.
+
+use ucom_host::master::{Error, Outcome, Request};
+
+use crate::bench::{Bench, Fault};
+use crate::chain::initialised;
+use crate::update::{options, update};
+
+const FLASH: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
+
+/// A chain of four; these boards have rebooted, the pins of the others are still on.
+fn rebooted(boards: &[u8]) -> Bench {
+    let mut bench = initialised(&FLASH);
+    for board in boards {
+        bench.go(Request::Reset { board: Some(*board), force: false }, 20).unwrap();
+    }
+    bench
+}
+
+fn repair(bench: &mut Bench, board: u8) -> Result<Outcome, Error> {
+    let flash_number = FLASH[usize::from(board) - 1];
+    bench.go(Request::Repair { board, flash_number, force: false }, 120)
+}
+
+fn numbers(bench: &mut Bench) -> Vec<u8> {
+    (0..FLASH.len()).map(|i| bench.board(i).number().map_or(0, |n| n.number())).collect()
+}
+
+/// What the repair of board 2 said must be true: a success means that this board has the number and no other.
+fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
+    let numbers = numbers(bench);
+    match result {
+        Ok(_) => assert_eq!(numbers, [1, 2, 3, 0], "{what}: {result:?}"),
+        Err(Error::NumberShared { given_back: true, .. } | Error::WrongBoard { .. }) => {
+            assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
+        }
+        // Not heard, or its neighbour keeps its pin on: nothing is claimed.
+        Err(error) => assert!([1, 3, 4].contains(&error.exit_code()), "{what}: {result:?}"),
+    }
+}
+
+/// D-21: with two boards without a number, each behind a raised pin, only the one that is meant takes it.
+#[test]
+fn d21_a_number_goes_to_one_board_only() {
+    let mut bench = rebooted(&[2, 4]);
+    let result = repair(&mut bench, 2);
+    assert!(matches!(&result, Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42), "{result:?}");
+    is_sound(&mut bench, &result, "nothing lost");
+    // The pins are on again: the other one gets its number, too, and a board that is well is only asked.
+    assert!(repair(&mut bench, 4).is_ok());
+    assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
+    let before = (bench.count("281#"), bench.count("1C1#0200"));
+    assert!(repair(&mut bench, 1).is_ok());
+    assert_eq!((bench.count("281#"), bench.count("1C1#0200")), before);
+}
+
+/// The first board's incoming pin is always active: without its number no other number can be given.
+#[test]
+fn d21_the_first_board_takes_any_number() {
+    let mut bench = rebooted(&[1, 3]);
+    let error = repair(&mut bench, 3).unwrap_err();
+    assert_eq!(error, Error::MayTakeNumber { board: 3, other: 1 });
+    assert_eq!((error.exit_code(), numbers(&mut bench)), (4, vec![0, 2, 0, 4]));
+    repair(&mut bench, 1).unwrap();
+    repair(&mut bench, 3).unwrap();
+    assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
+}
+
+/// Every single frame of a repair lost or doubled.
+#[test]
+fn d21_no_single_fault_gives_a_number_twice() {
+    let (from, to) = {
+        let mut bench = rebooted(&[2, 4]);
+        let before = bench.log.len();
+        repair(&mut bench, 2).unwrap();
+        (before, bench.log.len())
+    };
+    for fault in [Fault::Lost, Fault::Doubled] {
+        for at in from..to {
+            let mut bench = rebooted(&[2, 4]);
+            bench.fault = Some((at, fault));
+            let result = repair(&mut bench, 2);
+            is_sound(&mut bench, &result, &format!("frame {at} {fault:?}"));
+            assert!(result.is_ok(), "frame {at} {fault:?}: {result:?}");
+        }
+    }
+}
+
+/// Many frames lost at once: those that lower the other board's pin, its answers, those of the board that is meant.
+#[test]
+fn d21_no_losses_give_a_number_twice() {
+    let mut shared = 0;
+    for lowering in [0, 1, 3, 4, 9] {
+        for others_answers in [0, 3, u32::MAX] {
+            for acknowledges in [0, 1, 2, u32::MAX] {
+                for answers in [0, 1, 5, u32::MAX] {
+                    let mut bench = rebooted(&[2, 4]);
+                    bench.lose = vec![
+                        ("< 1C3#0200", lowering),
+                        ("> 143#", others_answers),
+                        ("> 0C2#", acknowledges),
+                        ("> 142#", answers),
+                    ];
+                    let what = format!("{:?}", bench.lose);
+                    let result = repair(&mut bench, 2);
+                    is_sound(&mut bench, &result, &what);
+                    shared += u32::from(matches!(result, Err(Error::NumberShared { given_back: true, .. })));
+                }
+            }
+        }
+    }
+    assert!(shared > 0, "a pin that stays on unheard is found out by its consequence");
+}
+
+/// U-4: the repair of an update takes the same way.
+#[test]
+fn u4_an_update_gives_a_number_to_one_board_only() {
+    let mut bench = rebooted(&[4]);
+    let id = bench.master.start(bench.now, Request::Update(options(&[2], 128))).unwrap();
+    while bench.count("042#") == 0 {
+        bench.run(1);
+    }
+    // It reboots in the moment of XRESET.
+    let reset = crate::bench::frame("002#");
+    let now = bench.now;
+    bench.members[1].receive(now, &reset);
+    let Ok(Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+    assert_eq!((report.exit_code(), numbers(&mut bench)), (0, vec![1, 2, 3, 0]), "{report:?}");
+    assert!(bench.count("282#") > 1, "it was repaired");
+    assert_eq!(update(&mut bench, options(&[2], 128)).exit_code(), 0);
+}

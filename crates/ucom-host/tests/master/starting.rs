@@ -1,0 +1,155 @@
+//! A run that does not come about leaves every board as it was found.
+
+use ucom::node::Phase;
+use ucom::profile::OnLost;
+use ucom::{Admin, Profile};
+use ucom_host::master::{
+    AdminChange, Error, Event, InitOptions, Outcome, Request, RunBoard, RunOptions, Setting, Supervision,
+};
+
+use crate::bench::{Bench, MS};
+use crate::chain::initialised;
+
+const IDS: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
+/// What the boards of [`found`] do before the run, in their order.
+const FOUND: [(Phase, bool); 4] =
+    [(Phase::Idle, false), (Phase::Ready, false), (Phase::Running, false), (Phase::Running, true)];
+
+fn run(boards: &[u8], active: bool, force: bool) -> Request {
+    let board = |b: &u8| RunBoard { board: *b, ..Default::default() };
+    Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active, force })
+}
+
+/// Four boards: idle, started, running with safe outputs, running with active ones.
+fn found(profile: Profile) -> Bench {
+    let mut bench = Bench::chain_with(&IDS, profile);
+    bench.go(Request::Init(InitOptions::default()), 20).unwrap();
+    bench.go(Request::Start { board: 2, force: false }, 10).unwrap();
+    bench.go(run(&[3], false, true), 20).unwrap();
+    bench.go(run(&[4], true, true), 20).unwrap();
+    assert_eq!(now_is(&mut bench), FOUND);
+    bench
+}
+
+fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
+    [0, 1, 2, 3].map(|i| (bench.board(i).phase(), bench.board(i).application.active))
+}
+
+/// P-19: too much load is refused, and nothing is left started that was not; where the descriptions are known, nothing is
+/// even started.
+#[test]
+fn p19_a_refusal_leaves_every_board_as_it_was() {
+    let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
+    let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
+    assert!(matches!(error, Error::Load(_)) && error.exit_code() == 4, "{error}");
+    assert_eq!(now_is(&mut bench), FOUND);
+    // The boards have one program, whose description is known.
+    assert_eq!(bench.count("301#"), 0, "nothing was started");
+
+    let mut bench = initialised(&IDS);
+    let name = Setting { name: "no such input".into(), value: 1 };
+    let mut boards: Vec<RunBoard> = (1..=4).map(|board| RunBoard { board, ..Default::default() }).collect();
+    boards[3].ci = vec![name];
+    let options = RunOptions { boards, active: true, force: false };
+    for known in [false, true] {
+        let before = bench.count("301#");
+        let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
+        assert!(matches!(error, Error::NoEdge { board: 4, .. }), "{error}");
+        assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
+        // The names of board 4 are those of board 1, once that has been asked.
+        assert_eq!(bench.count("301#") - before, usize::from(!known));
+    }
+}
+
+/// Whatever board does not answer to whatever step: the others are as they were found.
+#[test]
+fn a_run_that_fails_is_undone() {
+    let steps = [("> 14", "PC_INFO"), ("> 60", "flags"), ("> 6C", "initial inputs")];
+    for (start, what) in steps {
+        for silent in 1..=4_usize {
+            let mut bench = found(Profile::default());
+            let start: &'static str = Box::leak(format!("{start}{silent}#").into_boxed_str());
+            bench.lose = vec![(start, 100_000)];
+            let result = bench.go(run(&[1, 2, 3, 4], true, false), 120);
+            assert!(result.is_err(), "{what} of board {silent} lost: {result:?}");
+            let (after, silent) = (now_is(&mut bench), silent - 1);
+            for board in (0..4).filter(|board| *board != silent) {
+                assert_eq!(after[board], FOUND[board], "board {} {what} of {} lost", board + 1, silent + 1);
+            }
+            // Its own state could not be read, but it is never left with active outputs that it did not have.
+            assert!(!after[silent].1 || FOUND[silent].1, "{what}: {after:?}");
+        }
+    }
+}
+
+/// Ctrl-C at any moment of a start.
+#[test]
+fn a_run_that_is_cancelled_is_undone() {
+    let mut bench = found(Profile::default());
+    let begin = bench.now;
+    bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap();
+    let whole = (bench.now - begin) / MS;
+    for at in 0..=whole {
+        let mut bench = found(Profile::default());
+        let now = bench.now;
+        let id = bench.master.start(now, run(&[1, 2, 3, 4], true, false)).unwrap();
+        bench.run(at);
+        bench.master.cancel(id);
+        match bench.wait(id, 60) {
+            Err(Error::Cancelled) => assert_eq!(now_is(&mut bench), FOUND, "cancelled after {at} ms"),
+            Ok(_) => {
+                assert!(now_is(&mut bench).iter().all(|(phase, active)| *phase == Phase::Running && *active))
+            }
+            Err(error) => panic!("cancelled after {at} ms: {error}"),
+        }
+    }
+}
+
+/// D-51: a board is lost while others are still being started: none is started after that, and all are as they were found.
+/// Where a loss is only to be told, the others go on.
+#[test]
+fn d51_a_board_lost_while_others_start() {
+    for on_lost in [OnLost::StopAll, OnLost::Report] {
+        let mut bench = Bench::chain_with(&IDS, Profile { on_lost, ..Profile::default() });
+        bench.go(Request::Init(InitOptions::default()), 20).unwrap();
+        bench.go(run(&[1], true, false), 20).unwrap();
+        for i in 1..4 {
+            bench.board(i).application.start_us = 1_500_000;
+        }
+        let now = bench.now;
+        let id = bench.master.start(now, run(&[2, 3, 4, 1], true, false)).unwrap();
+        bench.run(500);
+        bench.cut = vec![0];
+        let result = bench.wait(id, 60);
+        let lost = Event::Supervision { board: 1, change: Supervision::Lost };
+        assert!(bench.events.iter().any(|(_, e)| *e == lost), "{on_lost:?}: {result:?}");
+        let started = ["542#", "543#", "544#"].map(|text| bench.count(text));
+        match on_lost {
+            OnLost::StopAll => {
+                assert_eq!(result, Err(Error::Lost { board: 1 }));
+                assert_eq!(started, [0; 3]);
+            }
+            // It ends with board 1, which does not answer.
+            _ => {
+                assert!(matches!(result, Err(Error::NoAnswer { board: 1, .. })), "{result:?}");
+                assert_eq!(started, [1; 3]);
+            }
+        }
+        for i in 1..4 {
+            assert_eq!(bench.board(i).phase(), Phase::Idle, "{on_lost:?} board {}", i + 1);
+        }
+    }
+}
+
+/// Once a run has failed nothing of it is under way any more.
+#[test]
+fn after_a_failed_run_boards_are_free() {
+    let mut bench = initialised(&IDS);
+    bench.lose = vec![("> 6C4#", 100)];
+    bench.go(run(&[2, 4], true, false), 60).unwrap_err();
+    bench.go(Request::Start { board: 2, force: false }, 10).unwrap();
+    let change = AdminChange { debug: Some(true), ..Default::default() };
+    let result = bench.go(Request::Admin { board: 2, change, force: false }, 10);
+    let admin = Admin { debug: true, ..Admin::default() };
+    assert_eq!(result, Ok(Outcome::Admin { board: 2, admin }));
+}

@@ -1,0 +1,182 @@
+//! What is to stop stops: on a bus that loses frames and reports errors, and when a board has only been told to start.
+
+use ucom::node::Phase;
+use ucom::{ErrorCode, Profile};
+use ucom_host::master::{Error, Master, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel};
+
+use crate::bench::{Bench, CI, MS, Script};
+use crate::chain::initialised;
+use crate::update::{options, update};
+
+fn run(boards: &[u8]) -> Request {
+    let board = |b: &u8| RunBoard { board: *b, ..Default::default() };
+    Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active: true, force: false })
+}
+
+/// From now on board 1 reports error 7 (CAN_RECEIVE) again and again: what a bad bus looks like.
+fn bad_bus(bench: &mut Bench) {
+    let from = bench.now / MS;
+    bench.join(Box::new((0..20_000).step_by(10).fold(Script::default(), |s, ms| s.at(from + ms, "081#07"))));
+}
+
+/// Section 9 (codes 6 to 8: log): an error beside a lost ADMIN_DATA does not end the tries.
+#[test]
+fn an_error_of_a_bad_bus_does_not_end_a_stop() {
+    for lost in ["< 601#00000000", "< 601#01000000"] {
+        let mut bench = initialised(&[0x21]);
+        bench.go(run(&[1]), 30).unwrap();
+        bad_bus(&mut bench);
+        bench.lose = vec![(lost, 1)];
+        let result = bench.go(Request::Stop { board: 1, level: StopLevel::Loop, force: true }, 30);
+        assert!(result.is_ok(), "{lost}: {result:?}");
+        assert!(!bench.board(0).application.running, "{lost}");
+    }
+    // When nothing comes of all tries the error is told.
+    let mut bench = initialised(&[0x21]);
+    bench.go(run(&[1]), 30).unwrap();
+    bad_bus(&mut bench);
+    bench.lose = vec![("< 601#", 1000)];
+    let result = bench.go(Request::Stop { board: 1, level: StopLevel::Loop, force: true }, 30);
+    assert!(matches!(result, Err(Error::Device { code: ErrorCode::CanReceive, .. })), "{result:?}");
+    assert_eq!(bench.count("601#00000000"), 3);
+}
+
+/// Section 9, D-30: a start waits for its board while that reports errors of the bus; error 11 ends it at once.
+#[test]
+fn an_error_of_a_bad_bus_does_not_end_a_start() {
+    let mut bench = initialised(&[0x21]);
+    bench.board(0).application.start_us = 500_000;
+    bad_bus(&mut bench);
+    let result = bench.go(Request::Start { board: 1, force: false }, 30);
+    assert!(matches!(result, Ok(Outcome::Started(_))), "{result:?}");
+    assert_eq!(bench.count("301#"), 1);
+
+    let refuses = Script::default().on("201#", &["141#2100011BFFFFFFFF", "141#0000"]).on("301#", &["081#0B"]);
+    let mut bench = Bench::script(refuses);
+    let result = bench.go(Request::Start { board: 1, force: true }, 30);
+    let code = ErrorCode::AutostartForbidden;
+    assert_eq!(result, Err(Error::Device { board: 1, code, during: "PC_START" }));
+    assert_eq!(bench.count("301#"), 1);
+}
+
+/// A board that is not heard is told to stop again and again, at every level.
+#[test]
+fn a_board_that_is_not_heard_is_told_more_than_once() {
+    for level in [StopLevel::Outputs, StopLevel::Loop, StopLevel::Application] {
+        let mut bench = initialised(&[0x21]);
+        bench.go(run(&[1]), 30).unwrap();
+        // Three are those that wait for an answer.
+        bench.lose = vec![("> 141#", 1000), ("< 601#", 3)];
+        let result = bench.go(Request::Stop { board: 1, level, force: true }, 30);
+        assert!(result.is_err(), "{level:?}");
+        assert!(!bench.board(0).application.active, "{level:?}");
+        assert!(level == StopLevel::Outputs || !bench.board(0).application.running, "{level:?}");
+    }
+}
+
+/// Ctrl-C while a board starts whose status does not show it yet: it is not taken for stopped.
+#[test]
+fn a_board_that_is_still_starting_is_stopped() {
+    let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
+    for request in [run(&[1]), Request::Start { board: 1, force: true }] {
+        // It shows that it is started one second after it was told; it stops when it is told to after that.
+        let (idle, started) = (info("1B"), info("8B"));
+        let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
+        let started: Vec<&str> = started.iter().map(String::as_str).collect();
+        let was_run = matches!(request, Request::Run(_));
+        // Asked before it is told to start, at the stop and when the stop is read back; then it is up.
+        let script = Script::default().rule("201#", 0, 3, &idle).on("201#", &started);
+        let mut bench = Bench::script(script.on("601#00000000", &["601#00000000"]));
+        bench.run(2_000);
+        let id = bench.master.start(bench.now, request).unwrap();
+        bench.run(200);
+        assert_eq!(bench.count("301#"), 1);
+        let told = bench.times_of("301#")[0];
+        bench.master.cancel(id);
+        let result = bench.wait(id, 60);
+        assert_eq!(result, Err(Error::Cancelled));
+        if !was_run {
+            // A start leaves it to its caller to stop what it began.
+            bench.go(Request::Stop { board: 1, level: StopLevel::Application, force: true }, 60).unwrap_err();
+        }
+        let stops = bench.times_of("1C1#8000");
+        let timeout = u64::from(Profile::default().start_timeout) * MS;
+        assert!(stops[0] < told + timeout, "told to stop at once: {stops:?}, {told}");
+        assert!(stops.iter().any(|at| *at >= told + timeout), "and again once it is up: {stops:?}, {told}");
+    }
+}
+
+/// A board that takes its time to start is idle again after Ctrl-C, whenever that comes.
+#[test]
+fn slow_boards_are_idle_after_a_cancelled_run() {
+    for at in (0..1_000).step_by(90) {
+        let mut bench = initialised(&[0x21, 0x42]);
+        bench.board(1).application.start_us = 1_000_000;
+        let id = bench.master.start(bench.now, run(&[1, 2])).unwrap();
+        bench.run(at);
+        bench.master.cancel(id);
+        let result = bench.wait(id, 60);
+        bench.run(3_000);
+        let phases = [0, 1].map(|i| bench.board(i).phase());
+        assert_eq!(phases, [Phase::Idle; 2], "{at} ms: {result:?}");
+    }
+}
+
+/// The stop of everybody leaves before anything else, and three times; of some boards, only to these.
+#[test]
+fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
+    let mut bench = initialised(&[0x21, 0x42, 0x63]);
+    bench.go(run(&[1, 2, 3]), 30).unwrap();
+    bench.run(500);
+    bench.lose = vec![("< 600#", 2)];
+    let now = bench.now;
+    bench.master.stop_at_once(now, None);
+    bench.run(100);
+    let times = bench.times_of("600#00000000");
+    assert!(times.len() == 3 && times[0] - now < 2 * MS, "{times:?} at {now}");
+    assert!((0..3).all(|i| !bench.board(i).application.running));
+
+    let mut bench = initialised(&[0x21, 0x42, 0x63]);
+    bench.go(run(&[1, 2, 3]), 30).unwrap();
+    let now = bench.now;
+    bench.master.stop_at_once(now, Some(&[1, 3]));
+    bench.run(100);
+    assert_eq!([0, 1, 2].map(|i| bench.board(i).application.running), [false, true, false]);
+    assert_eq!(["601#00000000", "603#00000000", "600#00000000"].map(|f| bench.count(f)), [3, 3, 0]);
+    // A stop is the start in reverse.
+    assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
+}
+
+/// U-2: whether a board runs is asked twice: one answer can be lost, and its outputs, too.
+#[test]
+fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
+    let mut bench = initialised(&[0x21, 0x42]);
+    bench.go(run(&[2]), 30).unwrap();
+    bench.lose = vec![("> 382#", 100_000), ("> 142#4200", 1)];
+    let report = update(&mut bench, options(&[1], 128));
+    assert_eq!(report.exit_code(), 4, "{report:?}");
+    assert_eq!(bench.count("041#"), 0);
+}
+
+/// A board that runs keeps the inputs that another PC gave it, unless the user gives it some.
+#[test]
+fn a_board_that_runs_is_not_given_initial_inputs() {
+    for given in [false, true] {
+        let mut bench = initialised(&[0x21]);
+        bench.go(run(&[1]), 30).unwrap();
+        let now = bench.now;
+        bench.master.set_input(now, 1, CI[0], 1234).unwrap();
+        bench.run(100);
+        assert_eq!(bench.board(0).application.ci, [1234, 9]);
+        // Another PC takes over.
+        bench.master = Master::new(Profile::default());
+        let ci = given.then(|| Setting { name: CI[1].into(), value: 5 });
+        let board = RunBoard { board: 1, ci: ci.into_iter().collect(), par: Vec::new() };
+        let options = RunOptions { boards: vec![board], active: true, force: true };
+        bench.go(Request::Run(options), 30).unwrap();
+        bench.run(500);
+        let expected = if given { [7, 5] } else { [1234, 9] };
+        assert_eq!(bench.board(0).application.ci, expected, "given {given}");
+        assert!(bench.board(0).application.active);
+    }
+}

@@ -1,0 +1,380 @@
+//! Updates that do not go to their end: a bus that fails, a cancel, another board in the place of the one that is meant.
+
+use ucom::{Frame, Status};
+use ucom_host::master::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateReport};
+use ucom_host::master::{Error, Event, Master, Outcome, Request};
+
+use crate::bench::{Bench, From, Member, OLD, Script};
+use crate::chain::initialised;
+use crate::loader::{Loader, loader};
+use crate::update::{check_program, options, update};
+
+const DATE: u16 = 0x3AC1;
+
+/// Starts an update and lets it run until `stop`; then `end` ends it, and the report comes at once.
+fn ended(
+    bench: &mut Bench,
+    options: UpdateOptions,
+    stop: impl Fn(&Bench) -> bool,
+    end: fn(&mut Bench, ucom_host::master::ProcedureId),
+) -> UpdateReport {
+    let id = bench.master.start(bench.now, Request::Update(options)).unwrap();
+    while !stop(bench) {
+        bench.run(1);
+    }
+    end(bench, id);
+    bench.run(10_000);
+    let report = bench.events.iter().find_map(|(_, event)| match event {
+        Event::Done { id: which, result: Ok(Outcome::Update(report)) } if *which == id => {
+            Some(report.clone())
+        }
+        _ => None,
+    });
+    report.expect("the update has ended")
+}
+
+fn unplugged(bench: &mut Bench, id: ucom_host::master::ProcedureId) {
+    bench.master.abandon(id, "the adapter is gone");
+}
+
+fn count(bench: &Bench, start: &str) -> usize {
+    bench.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
+}
+
+/// D-46: the bus fails at any frame of an update of two boards. The report comes at once, says of no board more or less
+/// than it is, and the exit code is 5 as soon as something was erased.
+#[test]
+fn d46_a_bus_that_fails_leaves_a_report() {
+    let (from, to) = {
+        let mut bench = initialised(&[0x21, 0x42]);
+        let before = bench.log.len();
+        update(&mut bench, options(&[1, 2], 128));
+        (before, bench.log.len())
+    };
+    let mut seen = std::collections::BTreeSet::new();
+    for at in from..to {
+        let mut bench = initialised(&[0x21, 0x42]);
+        let report = ended(&mut bench, options(&[1, 2], 128), |b| b.log.len() >= at, unplugged);
+        assert_eq!(report.boards.len(), 2);
+        for (i, result) in report.boards.iter().enumerate() {
+            let holds = check_program(&mut bench, i, 128);
+            let bus = Error::Bus { reason: "the adapter is gone".into() };
+            match result.outcome {
+                UpdateOutcome::NotStarted => {
+                    assert_eq!(holds, OLD, "{at}: {report:?}");
+                    assert_eq!(result.failure, Some(UpdateFailure::NoAnswer(Box::new(bus))), "{at}");
+                }
+                UpdateOutcome::Incomplete | UpdateOutcome::Written => {
+                    assert_eq!(result.failure, Some(UpdateFailure::After(Box::new(bus))), "{at}");
+                    assert_eq!(report.exit_code(), 5, "{at}: {report:?}");
+                }
+                UpdateOutcome::Verified => assert_eq!((holds.1, &result.failure), (DATE, &None), "{at}"),
+                other => panic!("{at}: {other:?}"),
+            }
+            assert!(holds == OLD || result.outcome != UpdateOutcome::NotStarted, "{at}: {report:?}");
+            seen.insert(result.outcome.name());
+        }
+        let touched = report
+            .boards
+            .iter()
+            .any(|b| matches!(b.outcome, UpdateOutcome::Incomplete | UpdateOutcome::Written));
+        let done = report.boards.iter().all(|b| b.failure.is_none());
+        let exit = if touched {
+            5
+        } else if done {
+            0
+        } else {
+            3
+        };
+        assert_eq!(report.exit_code(), exit, "{at}: {report:?}");
+    }
+    let all = ["incomplete", "not-started", "verified", "written"];
+    assert_eq!(seen.into_iter().collect::<Vec<_>>(), all);
+}
+
+/// Nothing is sent any more by a procedure whose bus is gone, also when it was just being cancelled.
+#[test]
+fn an_abandoned_update_sends_nothing() {
+    for cancel_first in [false, true] {
+        let mut bench = initialised(&[0x21]);
+        let before = |b: &Bench| count(b, "2C1#") >= 3 * 8 + 11;
+        let id = bench.master.start(bench.now, Request::Update(options(&[1], 128))).unwrap();
+        while !before(&bench) {
+            bench.run(1);
+        }
+        if cancel_first {
+            bench.master.cancel(id);
+        }
+        let sent = bench.sent().len();
+        bench.master.abandon(id, "the adapter is gone");
+        let Ok(Outcome::Update(report)) = bench.wait(id, 1) else { panic!() };
+        assert_eq!((report.exit_code(), report.boards[0].outcome), (5, UpdateOutcome::Incomplete));
+        bench.run(2000);
+        assert!(bench.sent()[sent..].iter().all(|t| t == "680#"), "{:?}", &bench.sent()[sent..]);
+        assert!(!bench.master.is_busy());
+    }
+    // Any other procedure ends with the error.
+    let mut bench = initialised(&[0x21]);
+    let id = bench.master.start(bench.now, Request::Scan).unwrap();
+    bench.master.abandon(id, "the adapter is gone");
+    let error = bench.wait(id, 1).unwrap_err();
+    assert_eq!((error.exit_code(), error.code()), (3, "bus"));
+    assert!(error.to_string().contains("the adapter is gone"));
+}
+
+/// P-12: cancelled before the erase a campaign ends with 4: boards that are done stay done, the others have what they had.
+#[test]
+fn p12_a_cancelled_campaign() {
+    let mut bench = initialised(&[0x21, 0x42, 0x63]);
+    let begun = |b: &Bench| count(b, "2C2#") >= 3;
+    let report = ended(&mut bench, options(&[1, 2, 3], 128), begun, |b, id| b.master.cancel(id));
+    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
+    assert_eq!((outcomes, report.exit_code()), (vec!["verified", "cancelled", "cancelled"], 4));
+    assert!(report.boards[1].failure.as_ref().unwrap().to_string().contains("nothing was erased"));
+    assert_eq!((check_program(&mut bench, 1, 128), check_program(&mut bench, 2, 128)), (OLD, OLD));
+}
+
+/// A cancel while the new application is being started: the board is verified, and that is what the report says.
+#[test]
+fn p12_cancelled_while_it_starts() {
+    let mut bench = initialised(&[0x21]);
+    let start = UpdateOptions { start: true, ..options(&[1], 128) };
+    let report = ended(&mut bench, start, |b| count(b, "301#") >= 1, |b, id| b.master.cancel(id));
+    let left = UpdateOutcome::Verified;
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (left, 5));
+    assert_eq!(check_program(&mut bench, 0, 128).1, DATE);
+    // It was stopped again; where its answers are lost nobody knows, and that is what is said.
+    assert!(!bench.board(0).status().has(ucom::Status::MSTART));
+    let mut bench = initialised(&[0x21]);
+    let start = UpdateOptions { start: true, ..options(&[1], 128) };
+    let begun = |b: &Bench| count(b, "301#") >= 1;
+    let report = ended(&mut bench, start, begun, |b, id| {
+        b.lose = vec![("> 141#", u32::MAX)];
+        b.master.cancel(id);
+    });
+    let left = UpdateOutcome::Running;
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Verified, 5));
+    assert!(report.boards[0].failure.as_ref().unwrap().to_string().contains("may be started"));
+}
+
+/// `--start` also starts a board that has the image already; a cancel before that says so.
+#[test]
+fn a_board_that_is_up_to_date_is_started() {
+    let mut bench = initialised(&[0x21, 0x42]);
+    update(&mut bench, options(&[1], 128));
+    let start = UpdateOptions { start: true, keep_going: true, ..options(&[1, 2], 128) };
+    let mut cancelled = initialised(&[0x21, 0x42]);
+    update(&mut cancelled, options(&[1], 128));
+    let begun = |b: &Bench| count(b, "2C2#") >= 3;
+    let report = ended(&mut cancelled, start.clone(), begun, |b, id| b.master.cancel(id));
+    let left = UpdateOutcome::UpToDate;
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
+    assert_eq!((report.exit_code(), count(&cancelled, "301#")), (4, 0));
+    let blocks = count(&bench, "2C1#");
+    let report = update(&mut bench, start.clone());
+    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
+    assert_eq!((outcomes, report.exit_code()), (vec!["running", "running"], 0), "{report:?}");
+    assert_eq!(count(&bench, "2C1#"), blocks);
+    // All are up to date and run: nothing is left to do.
+    let sent = count(&bench, "301#");
+    assert_eq!((update(&mut bench, start).exit_code(), count(&bench, "301#")), (0, sent));
+}
+
+/// A board that answers and does not enable programming has reported, not gone silent: exit code 1.
+#[test]
+fn a_board_that_does_not_enable_programming_answers() {
+    let info = ["141#2100011B34126E38", "141#0000"];
+    let mut bench = Bench::script(Script::default().on("201#", &info));
+    let report = update(&mut bench, options(&[1], 128));
+    let Some(UpdateFailure::Reported(e)) = &report.boards[0].failure else { panic!("{report:?}") };
+    assert!(matches!(**e, Error::StatusNotTaken { board: 1, .. }), "{e}");
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::NotStarted, 1));
+}
+
+/// U-1 before every attempt: a board that was swapped since the last one gets no XRESET and no program data.
+#[test]
+fn u1_a_board_that_is_swapped_between_attempts() {
+    let swapped = |resets, cancelled| if resets == 1 && cancelled { "4200" } else { "2100" };
+    let special = |_, block| (block == 33).then_some("081#01");
+    let mut bench = loader(Loader { flash: swapped, special, ..Loader::new(34) });
+    let report = update(&mut bench, options(&[1], 1000));
+    let wrong = Error::WrongBoard { board: 1, wanted: 0x21, found: 0x42 };
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::After(Box::new(wrong.clone()))));
+    assert_eq!((bench.count("041#"), report.exit_code()), (1, 5), "{report:?}");
+    // In the very moment of XRESET: refused, taken out of programming, and nothing is written.
+    let mut bench = loader(Loader { flash: |n, _| if n == 0 { "2100" } else { "4200" }, ..Loader::new(34) });
+    let report = update(&mut bench, options(&[1], 1000));
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
+    assert_eq!((count(&bench, "2C1#"), bench.count("1C1#0400"), report.exit_code()), (0, 1, 4));
+}
+
+/// One damaged answer is not another board.
+#[test]
+fn one_damaged_answer_is_no_swapped_board() {
+    let mut bench = initialised(&[0x21]);
+    let asked = {
+        let mut bench = initialised(&[0x21]);
+        let before = bench.log.len();
+        update(&mut bench, options(&[1], 128));
+        let reset = bench.log.iter().position(|(.., f)| f.to_string() == "041#").unwrap();
+        let info = |(i, (.., f)): (usize, &(u64, From, Frame))| {
+            (f.to_string().starts_with("141#21") && i > before && i < reset).then_some(i)
+        };
+        bench.log.iter().enumerate().filter_map(info).next_back().unwrap()
+    };
+    bench.fault = Some((asked, crate::bench::Fault::Corrupted(1)));
+    let report = update(&mut bench, options(&[1], 128));
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Verified, 0), "{report:?}");
+}
+
+/// A board that goes silent at XRESET, and another one that takes its number when it is given back (5.4).
+#[derive(Default)]
+struct Impostor {
+    silent: bool,
+    other: bool,
+    out: Vec<(u64, Frame)>,
+}
+
+impl Member for Impostor {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        self.out.first().filter(|(at, _)| *at <= now).map(|(_, frame)| *frame)
+    }
+    fn sent(&mut self, _: u64, _: &Frame) {
+        self.out.remove(0);
+    }
+    fn deadline(&self) -> u64 {
+        self.out.first().map_or(u64::MAX, |(at, _)| *at)
+    }
+    fn receive(&mut self, now: u64, frame: &Frame) {
+        let mut say = |text: &str| self.out.push((now + 300, crate::bench::frame(text)));
+        match frame.to_string().as_str() {
+            "041#" => self.silent = true,
+            "1C1#0800" => self.other = false,
+            "281#" => {
+                self.other = true;
+                say("0C1#01");
+            }
+            "201#" if self.other => {
+                say("141#4200011934126E38");
+                say("141#0000");
+            }
+            "201#" if !self.silent => {
+                say("141#2100011B34126E38");
+                say("141#0000");
+            }
+            _ => {}
+        }
+    }
+}
+
+/// 5.4: another board took the number: refused with exit code 4, nothing is written, and it does not keep the number.
+#[test]
+fn u4_repair_that_finds_another_board_is_refused() {
+    let mut bench = Bench::new(Default::default(), vec![Box::new(Impostor::default())]);
+    let report = update(&mut bench, options(&[1], 1000));
+    let wrong = Error::WrongBoard { board: 1, wanted: 0x21, found: 0x42 };
+    assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
+    assert_eq!((report.exit_code(), count(&bench, "2C1#")), (4, 0));
+    assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
+    assert_eq!(bench.count("1C1#0800"), 3);
+    // Pin off before the number is given (5.4).
+    let sent = bench.sent();
+    let place = |text: &str| sent.iter().position(|t| t == text).unwrap();
+    assert!(place("1C1#0200") < place("281#"));
+}
+
+/// D-08: a dry run says what would happen, so it looks for another PC, too; it still sends nothing but questions.
+#[test]
+fn d08_a_dry_run_looks_for_another_pc() {
+    let info = ["141#2100011B34126E38", "141#0000"];
+    let foreign = (0..40)
+        .fold(Script::default().on("201#", &info).on("200#", &info), |script, i| script.at(50 * i, "680#"));
+    let mut bench = Bench::script(foreign);
+    let dry = UpdateOptions { dry_run: true, ..options(&[1], 1000) };
+    let report = update(&mut bench, dry.clone());
+    let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
+    assert!(matches!(**e, Error::ForeignMaster { .. }), "{e}");
+    assert_eq!(report.exit_code(), 4);
+    assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
+    assert!(!bench.master.is_master());
+    // Without one: fine, and no life signs either.
+    let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
+    assert_eq!(update(&mut bench, dry).exit_code(), 0);
+    assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
+}
+
+/// A board that has the image already and was left in programming mode, as by a tool that was killed, does not stay in it; a dry
+/// run changes nothing.
+#[test]
+fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
+    let left = || {
+        let mut bench = initialised(&[0x21, 0x42]);
+        update(&mut bench, options(&[1], 128));
+        bench.go(Request::XReset { board: 1, force: false }, 20).unwrap();
+        assert!(bench.board(0).status().has(Status::PROG));
+        bench
+    };
+    for start in [false, true] {
+        let mut bench = left();
+        let from = bench.log.len();
+        let report = update(&mut bench, UpdateOptions { start, ..options(&[1], 128) });
+        let wanted = if start { UpdateOutcome::Running } else { UpdateOutcome::UpToDate };
+        assert_eq!((report.boards[0].outcome, report.exit_code()), (wanted, 0), "{report:?}");
+        assert!(!bench.board(0).status().has(Status::PROG));
+        assert!(bench.log[from..].iter().all(|(.., f)| !f.to_string().starts_with("2C1#")), "not programmed");
+    }
+    let mut bench = left();
+    let report = update(&mut bench, UpdateOptions { dry_run: true, ..options(&[1], 128) });
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::UpToDate, 0));
+    assert!(bench.board(0).status().has(Status::PROG));
+    // It cannot be ended: that is said.
+    let mut bench = left();
+    bench.lose = vec![("< 1C1#", u32::MAX)];
+    let report = update(&mut bench, options(&[1], 128));
+    let code = report.boards[0].failure.as_ref().map(UpdateFailure::code);
+    assert_eq!((code, report.boards[0].outcome), (Some("still-programming"), UpdateOutcome::UpToDate));
+    assert_ne!(report.exit_code(), 0);
+}
+
+/// P-12: cancelled at any time while such boards are looked at and taken out of programming mode: none stays in it that is called
+/// up to date and not named. The same where the bus fails.
+#[test]
+fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
+    let left = || {
+        let mut bench = initialised(&[0x21, 0x42]);
+        update(&mut bench, options(&[1, 2], 64));
+        for board in [1, 2] {
+            bench.go(Request::XReset { board, force: false }, 20).unwrap();
+        }
+        // A tool that starts anew listens for another PC before it sends what changes anything (D-08).
+        bench.master = Master::new(ucom::Profile::default());
+        bench
+    };
+    let (mut whole, since) = (left(), left().now);
+    update(&mut whole, options(&[1, 2], 64));
+    let took = whole.now - since;
+    let cancel: fn(&mut Bench, ucom_host::master::ProcedureId) = |bench, id| bench.master.cancel(id);
+    for end in [cancel, unplugged] {
+        let (mut taken_out, mut named) = (0, 0);
+        for after in (0..=took).step_by(10_000) {
+            let mut bench = left();
+            let at = bench.now + after;
+            let report = ended(&mut bench, options(&[1, 2], 64), |b| b.now >= at, end);
+            for (i, result) in report.boards.iter().enumerate() {
+                let code = result.failure.as_ref().map(UpdateFailure::code);
+                if !bench.board(i).status().has(Status::PROG) {
+                    taken_out += 1;
+                } else if result.outcome == UpdateOutcome::UpToDate {
+                    assert_eq!(code, Some("still-programming"), "after {after} µs: {result:?}");
+                    named += 1;
+                } else {
+                    // It was not looked at yet.
+                    assert!(matches!(code, Some("cancelled" | "bus")), "after {after} µs: {result:?}");
+                }
+            }
+        }
+        assert!(named > 0 && taken_out > 0, "{named} named, {taken_out} taken out");
+    }
+}

@@ -1,0 +1,257 @@
+//! Updates of several boards at once: who takes part, who must not, and what is said of those that fell behind.
+
+use ucom::{Frame, Profile};
+use ucom_host::master::update::{UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome};
+use ucom_host::master::{Error, Request};
+
+use crate::bench::{Bench, From, Member, OLD};
+use crate::chain::initialised;
+use crate::update::{check_program, options, update};
+
+const DATE: u16 = 0x3AC1;
+
+fn group(boards: &[u8]) -> UpdateOptions {
+    UpdateOptions { mode: UpdateMode::Group, keep_going: true, ..options(boards, 128) }
+}
+
+/// Frames of PC_PROG to everybody.
+fn broadcasts(bench: &Bench) -> usize {
+    bench.log.iter().filter(|(.., f)| f.id() == 0x2C0).count()
+}
+
+/// D-46: every number that is not selected is told to leave programming and asked whether it did: the answers to one
+/// PC_INFO to everybody may be lost, and a board left with PROG = 1 would be erased with the group.
+#[test]
+fn d46_a_group_leaves_other_boards_alone() {
+    for lose in [vec![], vec![("> 142#", 2)], vec![("> 142#", 2), ("< 1C2#0400", 2)]] {
+        let mut bench = initialised(&[0x21, 0x42, 0x63]);
+        bench.go(Request::XReset { board: 2, force: false }, 20).unwrap();
+        bench.lose = lose.clone();
+        let report = update(&mut bench, group(&[1, 3]));
+        assert!(report.boards.iter().all(|b| b.outcome == UpdateOutcome::Verified), "{lose:?}: {report:?}");
+        assert_eq!(check_program(&mut bench, 1, 128), OLD, "{lose:?}");
+        assert_eq!(broadcasts(&bench), 48, "{lose:?}");
+        let first = bench.log.iter().position(|(.., f)| f.id() == 0x2C0).unwrap();
+        let told = |number: u16| {
+            let told = |(_, from, f): &(u64, From, Frame)| {
+                *from == From::Master && f.id() == 0x1C0 + number && f.data() == [4, 0]
+            };
+            bench.log[..first].iter().any(told)
+        };
+        assert!((1..=31).filter(|n| *n != 1 && *n != 3).all(told), "{lose:?}");
+        assert!(!told(1) && !told(3));
+    }
+}
+
+/// A board that keeps PROG = 1 whatever it is told.
+#[derive(Default)]
+struct Stubborn {
+    out: Vec<(u64, Frame)>,
+}
+
+impl Member for Stubborn {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        self.out.first().filter(|(at, _)| *at <= now).map(|(_, frame)| *frame)
+    }
+    fn sent(&mut self, _: u64, _: &Frame) {
+        self.out.remove(0);
+    }
+    fn deadline(&self) -> u64 {
+        self.out.first().map_or(u64::MAX, |(at, _)| *at)
+    }
+    fn receive(&mut self, now: u64, frame: &Frame) {
+        // It does not answer questions to everybody.
+        if frame.to_string() == "209#" {
+            self.out.push((now + 300, crate::bench::frame("149#7700091F34126E38")));
+            self.out.push((now + 301, crate::bench::frame("149#0000")));
+        }
+    }
+}
+
+/// D-46: a board outside the group that stays in programming: refused before anything is sent to the group.
+#[test]
+fn d46_a_group_is_refused_while_another_board_listens() {
+    let mut bench = initialised(&[0x21, 0x42]);
+    bench.join(Box::new(Stubborn::default()));
+    let report = update(&mut bench, group(&[1, 2]));
+    for result in &report.boards {
+        let Some(UpdateFailure::Refused(e)) = &result.failure else { panic!("{report:?}") };
+        assert!(matches!(**e, Error::StatusNotTaken { board: 9, .. }), "{e}");
+    }
+    assert_eq!((report.exit_code(), broadcasts(&bench), bench.count("041#")), (4, 0, 0));
+    assert_eq!((check_program(&mut bench, 0, 128), check_program(&mut bench, 1, 128)), (OLD, OLD));
+}
+
+/// D-42: no frame of a block before every selected board has answered the one before it.
+#[test]
+fn d42_a_group_waits_for_every_board() {
+    let mut bench = initialised(&[0x21, 0x42, 0x63]);
+    bench.board(2).flash.erase_us = 4_000_000;
+    let before = bench.log.len();
+    let report = update(&mut bench, group(&[1, 3]));
+    assert_eq!(report.exit_code(), 0, "{report:?}");
+    let (mut in_block, mut answers) = (0, 2);
+    for (_, _, frame) in &bench.log[before..] {
+        match frame.to_string().get(..4) {
+            Some("2C0#") => {
+                if in_block == 8 {
+                    in_block = 0;
+                }
+                if in_block == 0 {
+                    assert_eq!(answers, 2, "a block before all have answered");
+                    answers = 0;
+                }
+                in_block += 1;
+            }
+            Some("181#" | "183#" | "101#" | "103#") => answers += 1,
+            _ => {}
+        }
+    }
+}
+
+/// A selected board hears XRESET and is not heard any more: it would be erased by the group's frames behind everybody's
+/// back. So there are none: the others are updated one by one.
+#[test]
+fn a_board_that_may_listen_unheard_ends_the_broadcast() {
+    let mut bench = initialised(&[0x21, 0x42, 0x63]);
+    let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
+    while bench.count("043#") == 0 {
+        bench.run(1);
+    }
+    bench.lose = vec![("> 143#", u32::MAX)];
+    let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
+    assert_eq!(outcomes, ["verified", "verified", "not-started"], "{report:?}");
+    assert_eq!((report.exit_code(), broadcasts(&bench)), (3, 0));
+    assert_eq!(check_program(&mut bench, 2, 128), OLD);
+}
+
+/// A board whose READY is lost falls behind; whether it went on listening is found out, not guessed.
+#[test]
+fn a_board_that_fell_behind_is_asked() {
+    // In cycle 1 and 2: it went on with the others and is done, nothing is sent again.
+    for block in [0, 2, 3, 5] {
+        let mut bench = initialised(&[0x21, 0x42]);
+        let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
+        while bench.log.iter().filter(|(.., f)| f.to_string().starts_with("182#")).count() < block {
+            bench.run(1);
+        }
+        bench.lose = vec![("> 182#", 1), ("> 102#", 1)];
+        let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+        assert_eq!(report.exit_code(), 0, "block {block}: {report:?}");
+        assert_eq!((bench.count("042#"), check_program(&mut bench, 1, 128).1), (1, DATE), "block {block}");
+    }
+}
+
+/// A board that fell behind before the erase and is never heard again may be erased: outcome `unknown`, exit code 5.
+#[test]
+fn a_board_that_was_lost_in_a_group_may_be_erased() {
+    let mut bench = initialised(&[0x21, 0x42]);
+    let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
+    while broadcasts(&bench) < 4 {
+        bench.run(1);
+    }
+    bench.lose = vec![("> 182#", u32::MAX), ("> 142#", u32::MAX), ("> 102#", u32::MAX), ("> 0C2#", u32::MAX)];
+    let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+    assert_eq!(report.boards[0].outcome, UpdateOutcome::Verified, "{report:?}");
+    assert_eq!((report.boards[1].outcome, report.exit_code()), (UpdateOutcome::Unknown, 5));
+    let failure = report.boards[1].failure.as_ref().unwrap();
+    assert!(matches!(failure, UpdateFailure::MayBeErased(_)), "{failure}");
+    assert!(failure.to_string().contains("may be erased"));
+    assert_ne!(check_program(&mut bench, 1, 128), OLD, "it was");
+    // It dropped out for good before that: what it shows is what it had, so nothing was erased.
+    let mut bench = initialised(&[0x21, 0x42]);
+    let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
+    while broadcasts(&bench) < 4 {
+        bench.run(1);
+    }
+    bench.cut = vec![1];
+    while broadcasts(&bench) < 48 {
+        bench.run(1);
+    }
+    bench.cut.clear();
+    bench.lose = vec![("> 182#", u32::MAX)];
+    let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+    assert_eq!((report.boards[1].outcome, report.exit_code()), (UpdateOutcome::NotStarted, 3), "{report:?}");
+    assert_eq!(check_program(&mut bench, 1, 128), OLD);
+}
+
+/// A board that says what the published list has for its CAN controller goes on listening: it is erased with the others
+/// and that is said, or it is asked and has the program.
+#[test]
+fn d43_not_every_error_ends_a_transfer() {
+    for code in ["06", "08", "09", "0B", "2A"] {
+        for heard in [true, false] {
+            let mut bench = initialised(&[0x21, 0x42]);
+            let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
+            while broadcasts(&bench) < 10 {
+                bench.run(1);
+            }
+            let now = bench.now;
+            bench.master.handle(now, Ok(crate::bench::frame(&format!("082#{code}"))));
+            if !heard {
+                bench.lose = vec![("> 142#", u32::MAX), ("> 182#", u32::MAX), ("> 102#", u32::MAX)];
+            }
+            let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+            assert_ne!(check_program(&mut bench, 1, 128), OLD, "{code}: it was erased");
+            let expected = if heard { (UpdateOutcome::Verified, 0) } else { (UpdateOutcome::Unknown, 5) };
+            assert_eq!((report.boards[1].outcome, report.exit_code()), expected, "{code}: {report:?}");
+        }
+    }
+}
+
+/// U-3 forced: a board that fell behind and had the same program before proves nothing by showing it.
+#[test]
+fn u3_what_was_there_before_proves_nothing() {
+    let mut bench = initialised(&[0x21, 0x42]);
+    assert_eq!(update(&mut bench, group(&[1, 2])).exit_code(), 0);
+    let forced = UpdateOptions { force: true, ..group(&[1, 2]) };
+    let start = bench.log.len();
+    let id = bench.master.start(bench.now, Request::Update(forced)).unwrap();
+    while broadcasts(&bench) < 48 + 4 {
+        bench.run(1);
+    }
+    bench.cut = vec![1];
+    while broadcasts(&bench) < 2 * 48 {
+        bench.run(1);
+    }
+    bench.cut.clear();
+    let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
+    assert_eq!(
+        (report.boards[1].outcome, report.boards[1].attempts),
+        (UpdateOutcome::Verified, 2),
+        "{report:?}"
+    );
+    let own = bench.log[start..].iter().filter(|(.., f)| f.id() == 0x2C2).count();
+    assert_eq!(own, 48, "it was programmed by itself");
+}
+
+/// A cancel while one board of the group gets its own attempt takes the others out of programming, too.
+#[test]
+fn p12_a_cancel_reaches_every_board_of_the_group() {
+    let mut bench = initialised(&[0x21, 0x42, 0x63]);
+    let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
+    while bench.count("043#") == 0 {
+        bench.run(1);
+    }
+    // Board 3 listens unheard: no broadcast, one by one; board 2 waits with PROG = 1.
+    bench.lose = vec![("> 143#", u32::MAX)];
+    while bench.log.iter().filter(|(.., f)| f.id() == 0x2C1).count() < 4 {
+        bench.run(1);
+    }
+    assert!(bench.board(1).status().has(ucom::Status::PROG));
+    bench.master.cancel(id);
+    let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 60) else { panic!() };
+    assert_ne!(report.exit_code(), 0);
+    assert!(!bench.board(1).status().has(ucom::Status::PROG), "{report:?}");
+}
+
+/// Where no number reaches everybody a group is updated one by one.
+#[test]
+fn d04_no_broadcast_no_group() {
+    let profile = Profile { addr_broadcast: ucom::profile::Broadcast::None, ..Profile::default() };
+    let mut bench = Bench::chain_with(&[0x21, 0x42], profile);
+    assert!(bench.go(Request::Init(Default::default()), 60).is_ok());
+    let report = update(&mut bench, group(&[1, 2]));
+    assert_eq!((report.exit_code(), broadcasts(&bench)), (0, 0), "{report:?}");
+}

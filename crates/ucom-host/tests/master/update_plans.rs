@@ -1,0 +1,163 @@
+//! Updates by other plans and headers than the usual ones: what each cycle may destroy, what can be verified, and what the
+//! report says where nothing can.
+
+use ucom::profile::{HeaderForm, Plan};
+use ucom::{Checksum, Memory, Profile};
+use ucom_host::master::update::{
+    PlanError, Unverifiable, UpdateFailure, UpdateImage, UpdateOptions, UpdateOutcome, UpdateReport,
+};
+use ucom_host::master::{Error, InitOptions, Request};
+
+use crate::bench::{Bench, OLD, image};
+use crate::loader::Loader;
+use crate::update::{options, update};
+
+fn with_plan(prog_plan: Plan) -> Profile {
+    Profile { prog_plan, ..Profile::default() }
+}
+
+/// 16 data blocks as the image, and 64 bytes beside it where the plan takes them.
+fn two(plan: Plan) -> UpdateOptions {
+    let second = UpdateImage { bytes: vec![9; 64], address_words: 0x20 };
+    let second = (plan != Plan::VerifyWrite).then_some(second);
+    UpdateOptions { second, ..options(&[1], 1000) }
+}
+
+/// The exit codes 1 and 3 before an erase and 5 after it, by plan: only `verify-write` and `exloader-app` leave flash
+/// alone in their first cycle.
+#[test]
+fn d40_what_the_first_cycle_may_have_erased() {
+    let cases = [
+        (Plan::VerifyWrite, 34, false),
+        (Plan::ExloaderApp, 2 + 17, false),
+        (Plan::PmemXmem, 17 + 2, true),
+        (Plan::Raw, 16 + 1, true),
+    ];
+    for (plan, blocks, erased) in cases {
+        let left = if erased { UpdateOutcome::Incomplete } else { UpdateOutcome::NotStarted };
+        type Special = fn(usize, usize) -> Option<&'static str>;
+        let ends: [(Special, u8); 3] = [
+            (|_, block| (block == 1).then_some("081#01"), 1),
+            (|_, block| (block == 0).then_some("081#02"), 1),
+            (|_, block| (block == 1).then_some(""), 3),
+        ];
+        for (special, before) in ends {
+            let board = Loader { special, ..Loader::new(blocks) };
+            let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
+            let report = update(&mut bench, two(plan));
+            assert_eq!(report.exit_code(), if erased { 5 } else { before }, "{plan}: {report:?}");
+            assert_eq!(report.boards[0].outcome, left, "{plan}: {report:?}");
+        }
+        // The last block: erased by every plan.
+        let board = Loader { special: |_, block| (block == 16).then_some("081#03"), ..Loader::new(blocks) };
+        let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
+        let expected = if plan == Plan::VerifyWrite { 1 } else { 5 };
+        assert_eq!(update(&mut bench, two(plan)).exit_code(), expected, "{plan}");
+    }
+}
+
+/// Both images reach their memories, and the report has address, length and Program ID of each.
+#[test]
+fn d40_two_images_reach_two_memories() {
+    for (plan, memory) in [(Plan::ExloaderApp, Memory::Ram), (Plan::PmemXmem, Memory::Data)] {
+        let mut bench = Bench::chain_with(&[0x21], with_plan(plan));
+        assert!(bench.go(Request::Init(InitOptions::default()), 60).is_ok());
+        let report = update(&mut bench, two(plan));
+        assert_eq!(
+            (report.boards[0].outcome, report.exit_code()),
+            (UpdateOutcome::Verified, 0),
+            "{report:?}"
+        );
+        let flash = &bench.board(0).flash;
+        assert_eq!(flash.bytes(Memory::Program)[..1000], image(1000));
+        assert_eq!(flash.bytes(memory)[0x40..0x80], [9; 64], "{plan}");
+        let [first, second] = report.images.as_slice() else { panic!("{report:?}") };
+        assert_eq!((first.memory, first.address_words, first.bytes), (Some(Memory::Program), Some(0), 1000));
+        assert_eq!((second.memory, second.address_words, second.bytes), (Some(memory), Some(0x20), 64));
+        assert_eq!((first.program_id, report.program_id), (Some(0x4B3F), Some(0x4B3F)));
+        assert_ne!(second.program_id, first.program_id);
+        let cycles = if plan == Plan::ExloaderApp { [(2, 2), (1, 1)] } else { [(1, 1), (2, 2)] };
+        assert_eq!([first.cycles, second.cycles], cycles);
+    }
+}
+
+/// A raw update of a board that shows this afterwards.
+fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> UpdateReport {
+    let board = Loader { info: ["34126E38", after], done_status, ..Loader::new(32) };
+    let mut bench = Bench::new(with_plan(Plan::Raw), vec![Box::new(board)]);
+    update(&mut bench, UpdateOptions { expect_program_id, ..options(&[1], 1000) })
+}
+
+/// U-10 where the image hides its Program ID: never `verified`, done only when the board shows an application, and the
+/// report says why it could not be verified, how it can be, and what the board showed before and after.
+#[test]
+fn u10_what_cannot_be_verified_says_so() {
+    let report = raw("3F4BC13A", 0x1B, None);
+    let board = &report.boards[0];
+    assert_eq!((board.outcome, &board.failure, report.exit_code()), (UpdateOutcome::Written, &None, 5));
+    // As good as verified to whoever says so.
+    assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit_code(), 0);
+    assert_eq!((report.unverifiable, report.program_id), (Some(Unverifiable::RawPlan), None));
+    assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
+    let shown = [board.before, board.after].map(|info| info.map(|i| (i.program_id, i.date)));
+    assert_eq!(shown, [Some(OLD), Some((0x4B3F, 0x3AC1))]);
+    // No application, or another one runs: the board's own word is not enough.
+    for (after, status) in [("FFFFFFFF", 0x1B), ("3F4BC13A", 0x8B)] {
+        let report = raw(after, status, None);
+        let failure = report.boards[0].failure.clone();
+        assert!(matches!(failure, Some(UpdateFailure::NotValid { .. })), "{report:?}");
+        assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Written, 5));
+    }
+}
+
+/// U-10 with a Program ID that the user names: verified against that, and refused where the image has another one.
+#[test]
+fn u10_a_named_program_id_is_verified() {
+    let report = raw("3F4BC13A", 0x1B, Some(0x4B3F));
+    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Verified, 0), "{report:?}");
+    assert_eq!((report.unverifiable, report.program_id), (None, Some(0x4B3F)));
+    let report = raw("3F4BC13A", 0x1B, Some(0x4B40));
+    assert!(matches!(
+        report.boards[0].failure,
+        Some(UpdateFailure::NotVerified { program_id: 0x4B3F, wanted_id: 0x4B40, wanted_date: None, .. })
+    ));
+    assert_eq!(report.exit_code(), 5);
+    // There already (U-3).
+    let report = raw("3F4BC13A", 0x1B, Some(OLD.0));
+    assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::UpToDate, 0));
+    // An image whose Program ID is known must have it.
+    let mut bench = Bench::new(Profile::default(), vec![Box::new(Loader::new(34))]);
+    let other = UpdateOptions { expect_program_id: Some(0x4B40), ..options(&[1], 1000) };
+    let error = bench.go(Request::Update(other), 60).unwrap_err();
+    assert_eq!(error, Error::Plan(PlanError::OtherProgram { image: 0x4B3F, expected: 0x4B40 }));
+    assert_eq!((error.exit_code(), bench.sent().len()), (4, 0));
+    let same = UpdateOptions { expect_program_id: Some(0x4B3F), ..options(&[1], 1000) };
+    assert_eq!(update(&mut bench, same).boards[0].outcome, UpdateOutcome::Verified);
+}
+
+/// U-9 needs something to compare: without it a lost DSP_PROGFINISHED is no success.
+#[test]
+fn u9_not_where_nothing_is_expected() {
+    let board = Loader { special: |_, block| (block == 31).then_some(""), ..Loader::new(32) };
+    let mut bench = Bench::new(with_plan(Plan::Raw), vec![Box::new(board)]);
+    let report = update(&mut bench, options(&[1], 1000));
+    assert_eq!((report.exit_code(), report.boards[0].attempts), (5, 3), "{report:?}");
+}
+
+/// Boards of this crate without checksums, or without headers: written, started, and said to be unverified.
+#[test]
+fn boards_without_checksum_or_header() {
+    let none = Profile { prog_checksum: Checksum::None, ..Profile::default() };
+    let headerless = Profile { prog_header: HeaderForm::None, ..Profile::default() };
+    for (profile, why, bytes) in
+        [(none, Unverifiable::NoChecksum, 1000), (headerless, Unverifiable::NoHeader, 0x10000)]
+    {
+        let mut bench = Bench::chain_with(&[0x21], profile);
+        assert!(bench.go(Request::Init(InitOptions::default()), 60).is_ok());
+        let unverified = UpdateOptions { start: true, accept_unverified: true, ..options(&[1], bytes) };
+        let report = update(&mut bench, unverified);
+        assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Running, 0), "{report:?}");
+        assert_eq!(report.unverifiable, Some(why));
+        assert_eq!(bench.board(0).flash.bytes(Memory::Program)[..bytes], image(bytes));
+    }
+}

@@ -1,0 +1,166 @@
+//! The application of a simulated board behind the words of the protocol.
+use super::file::BoardConfig;
+use super::model::Model;
+use ucom::Dimensions;
+use ucom::node::{Application, Text};
+
+/// From the start of the program until it serves requests, µs.
+const UP_US: u64 = 60_000;
+/// Longest stretch of time that axes are moved in one go, s.
+const MOST_S: f64 = 5.0;
+
+/// The program of a board: its model behind the words of the protocol.
+#[derive(Clone, Debug)]
+pub(super) struct SimApplication {
+    model: Model,
+    name: Vec<u8>,
+    texts: [Vec<Vec<u8>>; 3],
+    received: Vec<u16>,
+    ci: Vec<u16>,
+    par: Vec<u16>,
+    so: Vec<u16>,
+    up_at: u64,
+    /// Up to when the model has moved.
+    moved_us: u64,
+    running: bool,
+    active: bool,
+    debug: Vec<Vec<u8>>,
+}
+
+impl SimApplication {
+    pub fn new(config: &BoardConfig) -> Self {
+        let model = Model::new(&config.axes);
+        let texts = |names: &[String]| names.iter().map(|name| latin1(name)).collect();
+        Self {
+            name: latin1(&format!("{} control", config.description)),
+            texts: [texts(model.ci_names()), texts(model.so_names()), texts(model.par_names())],
+            received: model.initial_ci().to_vec(),
+            ci: model.initial_ci().to_vec(),
+            par: model.initial_par().to_vec(),
+            so: model.outputs().collect(),
+            model,
+            up_at: 0,
+            moved_us: 0,
+            running: false,
+            active: false,
+            debug: Vec::new(),
+        }
+    }
+
+    /// The axes move whether a program runs or not.
+    pub fn pass(&mut self, now_us: u64) {
+        // What nothing drives has come to rest after that.
+        let seconds = (now_us.saturating_sub(self.moved_us) as f64 * 1e-6).min(MOST_S);
+        self.moved_us = self.moved_us.max(now_us);
+        let driven = self.running && self.active;
+        if let Some(text) = self.model.advance(seconds, driven, &self.ci, &self.par) {
+            self.say(&text);
+        }
+    }
+
+    /// The power is gone: nothing drives the axes, and the program has forgotten everything.
+    pub fn power_lost(&mut self, now_us: u64) {
+        self.pass(now_us);
+        self.stop();
+        self.debug.clear();
+    }
+
+    /// Whether anything drives the axes.
+    pub fn is_driven(&self) -> bool {
+        self.running && self.active
+    }
+
+    fn say(&mut self, text: &str) {
+        if self.debug.len() < 32 {
+            self.debug.push(latin1(text));
+        }
+    }
+}
+
+impl Application for SimApplication {
+    fn start(&mut self, now_us: u64) {
+        self.pass(now_us);
+        self.received.copy_from_slice(self.model.initial_ci());
+        self.ci.copy_from_slice(self.model.initial_ci());
+        self.par.copy_from_slice(self.model.initial_par());
+        self.up_at = now_us + UP_US;
+        self.say("application started");
+    }
+
+    fn stop(&mut self) {
+        (self.running, self.active) = (false, false);
+    }
+
+    fn is_up(&mut self, now_us: u64) -> bool {
+        now_us >= self.up_at
+    }
+
+    fn dimensions(&self) -> Dimensions {
+        let [ci, so, par] = [self.received.len(), self.so.len(), self.par.len()].map(|n| n as u16);
+        Dimensions { ci, so, par }
+    }
+
+    fn text(&self, text: Text) -> &[u8] {
+        let (list, index) = match text {
+            Text::Application => return &self.name,
+            Text::Ci(index) => (&self.texts[0], index),
+            Text::So(index) => (&self.texts[1], index),
+            Text::Par(index) => (&self.texts[2], index),
+        };
+        list.get(usize::from(index)).map_or(&[], |text| text)
+    }
+
+    fn initial_ci(&self, index: u16) -> u16 {
+        self.model.initial_ci().get(usize::from(index)).copied().unwrap_or(0)
+    }
+
+    fn ci(&mut self) -> &mut [u16] {
+        &mut self.received
+    }
+
+    fn latch_ci(&mut self) {
+        self.ci.copy_from_slice(&self.received);
+    }
+
+    fn par(&mut self) -> &mut [u16] {
+        &mut self.par
+    }
+
+    fn sample_so(&mut self) {
+        self.so.clear();
+        self.so.extend(self.model.outputs());
+    }
+
+    fn so(&self) -> &[u16] {
+        &self.so
+    }
+
+    fn run(&mut self, now_us: u64, running: bool) {
+        self.pass(now_us);
+        self.running = running;
+        self.say(if running { "control loop runs" } else { "control loop ended" });
+    }
+
+    fn step(&mut self, now_us: u64) {
+        self.pass(now_us);
+    }
+
+    fn outputs(&mut self, active: bool) {
+        self.active = active;
+    }
+
+    fn debug_text(&self) -> Option<&[u8]> {
+        self.debug.first().map(Vec::as_slice)
+    }
+
+    fn debug_done(&mut self) {
+        if !self.debug.is_empty() {
+            self.debug.remove(0);
+        }
+    }
+}
+
+/// Characters that Latin-1 does not have become `?`.
+pub(super) fn latin1(text: &str) -> Vec<u8> {
+    text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect()
+}

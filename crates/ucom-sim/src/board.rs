@@ -1,0 +1,285 @@
+//! A board of the simulated chain: the node that real boards run, with simulated parts and faults around it.
+
+use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
+
+use super::application::{SimApplication, latin1};
+use super::file::BoardConfig;
+use crate::memory::{MemoryFlash, MemoryStore, WirePins};
+use ucom::node::{Node, NodeConfig, Phase, Pins, Record};
+use ucom::profile::{Endian, HeaderForm};
+use ucom::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard, checksum};
+
+/// While a frame waits for the bus, time passes inside the board in steps of this, µs.
+const WAIT_US: u64 = 500;
+/// So much later than the other one a board with a number that is not its own reacts, µs: no two boards answer in the same
+/// bit time for long, and frames that do destroy each other.
+const BEHIND_US: u64 = 5_000;
+
+pub(super) struct Board {
+    node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
+    /// First of the chain: the incoming pin is strapped.
+    strapped: bool,
+    /// Faults that hold at present.
+    pub unpowered: bool,
+    pub silent: bool,
+    pub deaf: bool,
+    pub ack_held: bool,
+    /// What it hears reaches it so much later, µs.
+    behind_us: u64,
+    /// What it has still to hear, and when.
+    coming: VecDeque<(u64, u32, Format, Payload)>,
+    /// The frame that waits for the bus.
+    waiting: Option<Frame>,
+    /// An acknowledgement that does not leave.
+    held: Option<Frame>,
+    next_us: u64,
+    /// A state that cannot be, if there ever was one.
+    pub violation: Option<&'static str>,
+}
+
+impl Board {
+    pub fn new(config: &BoardConfig, strapped: bool, seed: u64) -> Self {
+        let mut flash = MemoryFlash::default();
+        if config.application {
+            let image = image(config);
+            let program_id = program_id(config, &image);
+            let record = Record { program_id, date: config.date, address: 0, words: image.len() as u32 / 2 };
+            flash.install(record, &image);
+        }
+        let headerless_words = if config.profile.prog_header == HeaderForm::None { 500 } else { 0 };
+        let node_config = NodeConfig {
+            profile: config.profile,
+            seed: (seed as u32) | 1,
+            headerless_words,
+            ..NodeConfig::new(config.flash_id)
+        };
+        let pins = WirePins::default();
+        pins.input.store(strapped, Ordering::SeqCst);
+        let store = MemoryStore { autostart: config.autostart, description: latin1(&config.description) };
+        let node = Node::new(node_config, flash, pins, store, SimApplication::new(config), 0);
+        Self {
+            node,
+            strapped,
+            unpowered: false,
+            silent: false,
+            deaf: false,
+            ack_held: false,
+            behind_us: 0,
+            coming: VecDeque::new(),
+            waiting: None,
+            held: None,
+            next_us: 0,
+            violation: None,
+        }
+    }
+
+    /// When it wants to be looked at next, µs.
+    pub fn next_us(&self) -> u64 {
+        if self.unpowered { u64::MAX } else { self.next_us }
+    }
+
+    /// Time has come to `now_us`; a frame is what it puts into its controller.
+    pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
+        if self.unpowered {
+            return None;
+        }
+        if !self.ack_held
+            && let Some(frame) = self.held.take()
+        {
+            self.waiting = Some(frame);
+            return Some(frame);
+        }
+        while let Some((_, id, format, payload)) = self.coming.pop_front_if(|(at, ..)| *at <= now_us) {
+            // Frames that are not of this protocol are counted and ignored (D-02).
+            let _ = self.node.receive_any(now_us, id, format, payload.bytes());
+        }
+        let frame = self.node.poll(now_us);
+        let out = frame.and_then(|frame| self.through(now_us, frame));
+        self.schedule(now_us);
+        out
+    }
+
+    /// What faults leave of a frame that the board sends.
+    fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
+        if self.silent {
+            // Its controller believes that somebody acknowledged.
+            self.node.sent(now_us, &frame);
+            return None;
+        }
+        let acknowledges = frame.address().is_ok_and(|(function, _)| function == Function::InitAck);
+        if self.ack_held && acknowledges {
+            self.held = Some(frame);
+            return None;
+        }
+        self.waiting = Some(frame);
+        Some(frame)
+    }
+
+    fn schedule(&mut self, now_us: u64) {
+        self.violation = self.violation.or(self.node.status().contradiction());
+        self.next_us = match (&self.held, &self.waiting) {
+            // The fault may end at any time.
+            (Some(_), _) => now_us + WAIT_US,
+            (None, Some(_)) => self.node.next_deadline().max(now_us + WAIT_US),
+            (None, None) => self.node.next_deadline().max(now_us + 1),
+        };
+        if let Some((at, ..)) = self.coming.front() {
+            self.next_us = self.next_us.min(*at).max(now_us + 1);
+        }
+    }
+
+    /// Its frame was on the bus.
+    pub fn sent(&mut self, now_us: u64, frame: &Frame) {
+        if self.waiting == Some(*frame) {
+            self.waiting = None;
+        }
+        if !self.unpowered {
+            self.node.sent(now_us, frame);
+            self.next_us = now_us;
+        }
+    }
+
+    /// Its controller gave the frame up.
+    pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
+        if self.waiting == Some(*frame) {
+            self.waiting = None;
+        }
+        if !self.unpowered {
+            self.node.not_sent(now_us, frame);
+            self.next_us = now_us;
+        }
+    }
+
+    /// A frame of another member was on the bus.
+    pub fn hear(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
+        if !self.unpowered && !self.deaf {
+            if let (1.., Some(payload)) = (self.behind_us, Payload::new(data)) {
+                self.coming.push_back((now_us + self.behind_us, id, format, payload));
+                self.next_us = self.next_us.min(now_us + self.behind_us);
+                return;
+            }
+            // Frames that are not of this protocol are counted and ignored (D-02).
+            let _ = self.node.receive_any(now_us, id, format, data);
+            self.next_us = now_us;
+        }
+    }
+
+    /// Level of the outgoing pin.
+    pub fn outgoing(&self) -> bool {
+        !self.unpowered && self.node.pins.output.load(Ordering::SeqCst)
+    }
+
+    /// The wire from the board before has this level; broken or unpowered, it is inactive.
+    pub fn set_incoming(&mut self, now_us: u64, level: bool) {
+        let level = self.strapped || level;
+        if self.node.pins.input.swap(level, Ordering::SeqCst) != level {
+            self.next_us = self.next_us.min(now_us);
+        }
+    }
+
+    pub fn power(&mut self, now_us: u64, on: bool) {
+        if on == self.unpowered {
+            self.unpowered = !on;
+            self.waiting = None;
+            self.coming.clear();
+            self.held = None;
+            if on {
+                self.node.power_up(now_us);
+                self.next_us = now_us;
+            } else {
+                self.node.application.power_lost(now_us);
+                self.node.flash.power_up();
+                self.node.pins.set_init_out(false);
+            }
+        }
+    }
+
+    /// Its application crashes, the watchdog reboots it (D-26).
+    pub fn crash(&mut self, now_us: u64) {
+        if !self.unpowered {
+            self.waiting = None;
+            self.held = None;
+            self.node.restart(now_us);
+            self.next_us = now_us;
+        }
+    }
+
+    /// It takes this number, as by a PC_INIT that another board has taken already.
+    pub fn take_number(&mut self, now_us: u64, number: Sequence) {
+        if self.unpowered {
+            return;
+        }
+        self.behind_us = BEHIND_US;
+        let profile = self.node.config().profile;
+        if let Some(own) = self.node.number() {
+            let forget = ToBoard::SetStatus { mask: Status::INIT.0, value: 0 };
+            self.node.receive(now_us, &forget.encode(own, &profile));
+        }
+        // Only for this moment its incoming pin is active.
+        let level = self.node.pins.input.swap(true, Ordering::SeqCst);
+        self.node.receive(now_us, &ToBoard::Init.encode(number, &profile));
+        self.node.pins.input.store(level, Ordering::SeqCst);
+        self.next_us = now_us;
+    }
+
+    pub fn break_flash(&mut self, broken: bool) {
+        self.node.flash.fail_after = broken.then_some(0);
+    }
+
+    pub fn state(&self) -> BoardState {
+        BoardState {
+            powered: !self.unpowered,
+            phase: self.node.phase(),
+            status: self.node.status(),
+            number: self.node.number().map(|n| n.number()),
+            program: self.node.record().map(|r| (r.program_id, r.date)),
+            driven: self.node.application.is_driven(),
+        }
+    }
+}
+
+/// What a board of the chain is doing; for tests and displays, nothing of it goes over the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BoardState {
+    /// It has power.
+    pub powered: bool,
+    /// S1 to S6.
+    pub phase: Phase,
+    /// Status byte.
+    pub status: Status,
+    /// Sequence number.
+    pub number: Option<u8>,
+    /// Program ID and date of the valid application.
+    pub program: Option<(u16, u16)>,
+    /// Something drives its axes.
+    pub driven: bool,
+}
+
+/// An application as the factory programs it: made from the description, so that boards have different ones.
+fn image(config: &BoardConfig) -> Vec<u8> {
+    let seed = config.description.bytes().fold(7_u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into()));
+    let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();
+    image.extend([0, 0]);
+    let Some(wanted) = config.program_id else { return image };
+    // The last word makes the checksum what the file asks for.
+    for word in 0..=u16::MAX {
+        image.truncate(254);
+        image.extend(word.to_le_bytes());
+        if program_id(config, &image) == wanted {
+            break;
+        }
+    }
+    image
+}
+
+fn program_id(config: &BoardConfig, image: &[u8]) -> u16 {
+    match (config.profile.prog_checksum, config.program_id) {
+        (Checksum::None, given) => given.unwrap_or(0),
+        (kind, _) => checksum(kind, words_order(config), image),
+    }
+}
+
+fn words_order(config: &BoardConfig) -> Endian {
+    config.profile.prog_endian
+}

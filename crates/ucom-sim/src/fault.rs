@@ -1,0 +1,303 @@
+//! Faults of a simulated chain: what, when, for how long.
+use serde::Deserialize;
+
+/// What `ucom help faults` prints.
+pub const FAULT_HELP: &str = include_str!("fault.txt");
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultKind {
+    /// A board has no power.
+    PowerLoss,
+    /// Nothing that a board sends reaches the bus.
+    Silent,
+    /// A board hears nothing.
+    Deaf,
+    /// A board's application crashes; it reboots by its watchdog (D-26).
+    Crash,
+    /// The init wire behind a board is broken.
+    WireBroken,
+    /// A board takes the number of the one before it, as when a PC_INIT was repeated blindly (D-24).
+    SameNumber,
+    /// A board's acknowledgement of its number does not leave it (D-24).
+    AckHeld,
+    /// A board's flash memory cannot be written.
+    FlashBroken,
+    /// Another PC is master of the bus (D-08).
+    ForeignMaster,
+    /// Frames of other protocols (D-02).
+    ForeignFrames,
+    /// A share of the frames between chain and clients is lost.
+    Lost(f64),
+    /// In a share of the frames a bit is turned over.
+    Corrupted(f64),
+    /// A share of the frames comes twice.
+    Doubled(f64),
+    /// A share of the frames is destroyed on the wire; error counters rise, up to bus-off.
+    Disturbed(f64),
+}
+
+/// When a fault begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trigger {
+    /// So many µs after the start.
+    At(u64),
+    /// When the so manieth frame with this identifier was on the bus.
+    Frame {
+        /// Identifier.
+        id: u16,
+        /// From 1.
+        count: u64,
+    },
+}
+
+/// One fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What.
+    pub kind: FaultKind,
+    /// Position of the board in the chain, from 1; 0 for faults of the bus.
+    pub board: usize,
+    /// When.
+    pub trigger: Trigger,
+    /// How long, µs; `None` for ever.
+    pub duration_us: Option<u64>,
+}
+
+/// Why a fault file cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FaultError {
+    /// Not TOML of this form; the text says where and why.
+    #[error("{0}")]
+    Form(String),
+    /// There is no such kind.
+    #[error("fault {fault}: there is no kind `{kind}`; kinds are {}", KINDS.join(", "))]
+    Kind {
+        /// Number in the file, from 1.
+        fault: usize,
+        /// As written.
+        kind: String,
+    },
+    /// A key that this kind needs is missing.
+    #[error("fault {fault}: {kind} needs {key}")]
+    Missing {
+        /// Number in the file, from 1.
+        fault: usize,
+        /// The kind.
+        kind: String,
+        /// The key.
+        key: &'static str,
+    },
+    /// A key that means nothing here.
+    #[error("fault {fault}: {key} means nothing for {kind}; remove it")]
+    Superfluous {
+        /// Number in the file, from 1.
+        fault: usize,
+        /// The kind.
+        kind: String,
+        /// The key.
+        key: &'static str,
+    },
+    /// A value that cannot be.
+    #[error("fault {fault}: {key} must be {range}")]
+    Range {
+        /// Number in the file, from 1.
+        fault: usize,
+        /// The key.
+        key: &'static str,
+        /// What is allowed.
+        range: &'static str,
+    },
+}
+
+const KINDS: [&str; 14] = [
+    "power-loss",
+    "silent",
+    "deaf",
+    "crash",
+    "wire-broken",
+    "same-number",
+    "ack-held",
+    "flash-broken",
+    "foreign-master",
+    "foreign-frames",
+    "lost",
+    "corrupted",
+    "doubled",
+    "disturbed",
+];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    fault: Vec<Entry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    kind: String,
+    board: Option<usize>,
+    at_s: Option<f64>,
+    on_id: Option<u16>,
+    on_count: Option<u64>,
+    for_s: Option<f64>,
+    share: Option<f64>,
+}
+
+impl Fault {
+    /// The faults of a file.
+    pub fn from_toml(text: &str) -> Result<Vec<Self>, FaultError> {
+        let file: File = toml::from_str(text).map_err(|e| FaultError::Form(e.to_string()))?;
+        file.fault.into_iter().enumerate().map(|(i, entry)| entry.checked(i + 1)).collect()
+    }
+
+    /// A fault that begins now, of a line such as `power-loss board=2 for_s=1`.
+    pub fn from_line(line: &str) -> Result<Self, FaultError> {
+        let mut words = line.split_whitespace();
+        let kind = words.next().unwrap_or_default();
+        let mut text = format!("[[fault]]\nkind = '{}'\n", kind.replace('\'', ""));
+        for word in words {
+            text += word;
+            text.push('\n');
+        }
+        let faults = Self::from_toml(&text)?;
+        faults.first().copied().ok_or_else(|| FaultError::Form(line.into()))
+    }
+}
+
+impl Entry {
+    fn checked(self, fault: usize) -> Result<Fault, FaultError> {
+        let missing = |key| FaultError::Missing { fault, kind: self.kind.clone(), key };
+        let superfluous = |key| FaultError::Superfluous { fault, kind: self.kind.clone(), key };
+        let range = |key, range| FaultError::Range { fault, key, range };
+        let share = || {
+            let share = self.share.ok_or_else(|| missing("share"))?;
+            if (0.0..=1.0).contains(&share) { Ok(share) } else { Err(range("share", "0 to 1")) }
+        };
+        let kind = match self.kind.as_str() {
+            "power-loss" => FaultKind::PowerLoss,
+            "silent" => FaultKind::Silent,
+            "deaf" => FaultKind::Deaf,
+            "crash" => FaultKind::Crash,
+            "wire-broken" => FaultKind::WireBroken,
+            "same-number" => FaultKind::SameNumber,
+            "ack-held" => FaultKind::AckHeld,
+            "flash-broken" => FaultKind::FlashBroken,
+            "foreign-master" => FaultKind::ForeignMaster,
+            "foreign-frames" => FaultKind::ForeignFrames,
+            "lost" => FaultKind::Lost(share()?),
+            "corrupted" => FaultKind::Corrupted(share()?),
+            "doubled" => FaultKind::Doubled(share()?),
+            "disturbed" => FaultKind::Disturbed(share()?),
+            _ => return Err(FaultError::Kind { fault, kind: self.kind }),
+        };
+        let shared = matches!(
+            kind,
+            FaultKind::Lost(_) | FaultKind::Corrupted(_) | FaultKind::Doubled(_) | FaultKind::Disturbed(_)
+        );
+        if self.share.is_some() && !shared {
+            return Err(superfluous("share"));
+        }
+        let of_a_board = kind.of_a_board();
+        let board = match self.board {
+            Some(_) if !of_a_board => return Err(superfluous("board")),
+            None if of_a_board => return Err(missing("board")),
+            Some(board) if !(1..=31).contains(&board) => return Err(range("board", "1 to 31")),
+            board => board.unwrap_or(0),
+        };
+        let time = |key, value: f64| {
+            let allowed = (0.0..=1e6).contains(&value);
+            if allowed { Ok((value * 1e6) as u64) } else { Err(range(key, "0 to 1000000 seconds")) }
+        };
+        let trigger = match (self.at_s, self.on_id, self.on_count) {
+            (Some(_), Some(_), _) => return Err(superfluous("on_id")),
+            (at, None, None) => Trigger::At(time("at_s", at.unwrap_or(0.0))?),
+            (None, Some(id), count) if id <= 0x7FF => Trigger::Frame { id, count: count.unwrap_or(1).max(1) },
+            (_, Some(_), _) => return Err(range("on_id", "an identifier, 0 to 0x7FF")),
+            (_, None, Some(_)) => return Err(superfluous("on_count")),
+        };
+        if kind == FaultKind::SameNumber && board < 2 {
+            return Err(range("board", "2 to 31: it takes the number of the board before it"));
+        }
+        if matches!(kind, FaultKind::Crash | FaultKind::SameNumber) && self.for_s.is_some() {
+            return Err(superfluous("for_s"));
+        }
+        let duration_us = self.for_s.map(|s| time("for_s", s)).transpose()?;
+        Ok(Fault { kind, board, trigger, duration_us })
+    }
+}
+
+impl FaultKind {
+    /// Whether it concerns one board.
+    pub const fn of_a_board(self) -> bool {
+        matches!(
+            self,
+            Self::PowerLoss
+                | Self::Silent
+                | Self::Deaf
+                | Self::Crash
+                | Self::WireBroken
+                | Self::SameNumber
+                | Self::AckHeld
+                | Self::FlashBroken
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_the_help_can_be_written() {
+        for kind in KINDS {
+            assert!(FAULT_HELP.contains(&format!("\n{kind} ")), "{kind} is not in the help");
+            let mut text = format!("[[fault]]\nkind = '{kind}'\nat_s = 1.5\n");
+            if matches!(kind, "lost" | "corrupted" | "doubled" | "disturbed") {
+                text += "share = 0.5\n";
+            } else if !kind.starts_with("foreign") {
+                text += "board = 2\n";
+            }
+            let fault = Fault::from_toml(&text).unwrap()[0];
+            assert_eq!(fault.trigger, Trigger::At(1_500_000));
+        }
+    }
+
+    #[test]
+    fn a_line_is_a_fault_that_begins_now() {
+        let fault = Fault::from_line("power-loss board=2 for_s=1").unwrap();
+        let now = Trigger::At(0);
+        let want = Fault { kind: FaultKind::PowerLoss, board: 2, trigger: now, duration_us: Some(1_000_000) };
+        assert_eq!(fault, want);
+        let fault = Fault::from_line("crash board=1 on_id=0x2C1 on_count=500").unwrap();
+        assert_eq!(fault.trigger, Trigger::Frame { id: 0x2C1, count: 500 });
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_its_place() {
+        for (line, part) in [
+            ("fire board=1", "kinds are power-loss"),
+            ("silent", "needs board"),
+            ("silent board=32", "1 to 31"),
+            ("lost", "needs share"),
+            ("lost share=2", "0 to 1"),
+            ("lost share=0.1 board=1", "board means nothing"),
+            ("silent board=1 share=0.1", "share means nothing"),
+            ("wire-broken board=1 share=0.1", "share means nothing"),
+            ("same-number board=2 for_s=1", "for_s means nothing"),
+            ("same-number board=1", "2 to 31"),
+            ("crash board=1 for_s=1", "for_s means nothing"),
+            ("silent board=1 at_s=-1", "seconds"),
+            ("silent board=1 at_s=1 on_id=1", "on_id means nothing"),
+            ("silent board=1 on_id=0x800", "identifier"),
+            ("silent board=1 on_count=2", "on_count means nothing"),
+            ("silent bord=1", "bord"),
+            ("", "kinds are"),
+        ] {
+            let text = Fault::from_line(line).unwrap_err().to_string();
+            assert!(text.contains(part), "{line}: {text}");
+        }
+    }
+}

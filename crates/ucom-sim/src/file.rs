@@ -1,0 +1,343 @@
+//! Chain files: which boards a simulated chain has, in the order of the wire.
+
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+use super::axis::AxisConfig;
+use ucom::profile::{Profile, ProfileError};
+
+/// The built-in chain: a humanoid head of ten boards.
+pub const HEAD: &str = include_str!("head.toml");
+/// What `ucom help sim` prints before the built-in chain.
+const FORM: &str = include_str!("file.txt");
+/// Boards that a bus can number.
+const MOST_BOARDS: usize = 31;
+/// Axes whose words a DSP of that time could serve.
+const MOST_AXES: usize = 8;
+
+/// One board.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoardConfig {
+    /// Number of its bootloader; the low byte is what DSP_REPORT tells.
+    pub flash_id: u16,
+    /// What DSP_INFO tells.
+    pub description: String,
+    /// Program ID of its application; `None` makes one from the description.
+    pub program_id: Option<u16>,
+    /// Flash date as a number.
+    pub date: u16,
+    /// It has an application.
+    pub application: bool,
+    /// Autostart is enabled.
+    pub autostart: bool,
+    /// What its application moves.
+    pub axes: Vec<AxisConfig>,
+    /// How it reads the protocol.
+    pub profile: Profile,
+}
+
+/// The boards of a chain.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChainConfig {
+    /// In the order of the wire.
+    pub boards: Vec<BoardConfig>,
+}
+
+/// Why a chain file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ChainFileError {
+    /// It cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not TOML of this form; the text says where and why.
+    #[error("{0}")]
+    Form(String),
+    /// More boards than have numbers.
+    #[error("{count} boards; a bus numbers at most {MOST_BOARDS}")]
+    Boards {
+        /// So many.
+        count: usize,
+    },
+    /// More axes than a board has words for.
+    #[error("board {board}: {count} axes; a board has 1 to {MOST_AXES}")]
+    Axes {
+        /// Position in the file, from 1.
+        board: usize,
+        /// So many.
+        count: usize,
+    },
+    /// The figures of an axis cannot be.
+    #[error("board {board}: axis {axis}: {what}")]
+    Axis {
+        /// Position in the file, from 1.
+        board: usize,
+        /// Position among the board's axes, from 1.
+        axis: usize,
+        /// What is wrong.
+        what: &'static str,
+    },
+    /// A text that the wire cannot carry.
+    #[error(
+        "board {board}: the description has {count} characters of at most 512, or some that Latin-1 does not have"
+    )]
+    Description {
+        /// Position in the file, from 1.
+        board: usize,
+        /// Characters.
+        count: usize,
+    },
+    /// A key of the board's profile.
+    #[error("board {board}: profile: {key}: {source}")]
+    Profile {
+        /// Position in the file, from 1.
+        board: usize,
+        /// The key.
+        key: String,
+        /// Why not.
+        source: ProfileError,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    board: Vec<Board>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Board {
+    flash_id: u16,
+    #[serde(default = "nameless")]
+    description: String,
+    program_id: Option<u16>,
+    #[serde(default = "some_day")]
+    date: u16,
+    #[serde(default = "yes")]
+    application: bool,
+    #[serde(default)]
+    autostart: bool,
+    #[serde(default = "one_axis")]
+    axis: Vec<AxisConfig>,
+    #[serde(default)]
+    profile: toml::Table,
+}
+
+fn nameless() -> String {
+    "UCoM2".into()
+}
+
+/// 2008-03-14 as a FAT date.
+const fn some_day() -> u16 {
+    0x386E
+}
+
+const fn yes() -> bool {
+    true
+}
+
+fn one_axis() -> Vec<AxisConfig> {
+    vec![AxisConfig::default()]
+}
+
+/// What `ucom help sim` prints.
+pub fn help() -> String {
+    format!("{FORM}\nThe built-in chain:\n\n{HEAD}")
+}
+
+impl ChainConfig {
+    /// A chain of a text; boards have `profile` unless they say otherwise.
+    pub fn from_toml(text: &str, profile: &Profile) -> Result<Self, ChainFileError> {
+        let file: File = toml::from_str(text).map_err(|e| ChainFileError::Form(e.to_string()))?;
+        let count = file.board.len();
+        if count > MOST_BOARDS {
+            return Err(ChainFileError::Boards { count });
+        }
+        let boards = file.board.into_iter().enumerate();
+        let boards = boards.map(|(i, board)| board.checked(i + 1, profile)).collect::<Result<_, _>>()?;
+        Ok(Self { boards })
+    }
+
+    /// A chain of a file.
+    pub fn read(path: &Path, profile: &Profile) -> Result<Self, ChainFileError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ChainFileError::Io { path: path.into(), source })?;
+        Self::from_toml(&text, profile).map_err(|e| match e {
+            ChainFileError::Form(text) => ChainFileError::Form(format!("{}: {text}", path.display())),
+            other => other,
+        })
+    }
+
+    /// The built-in head.
+    pub fn head(profile: &Profile) -> Self {
+        // The file is part of the program, and a test reads it.
+        Self::from_toml(HEAD, profile).unwrap_or_default()
+    }
+
+    /// The same with so many boards: the last ones left out, or more of one axis each.
+    #[must_use]
+    pub fn with_boards(mut self, count: usize, profile: &Profile) -> Self {
+        self.boards.truncate(count);
+        while self.boards.len() < count.min(MOST_BOARDS) {
+            let taken = |id: u16| self.boards.iter().any(|b| b.flash_id == id);
+            let flash_id = (0x01..0x80).find(|id| !taken(*id)).unwrap_or(0);
+            self.boards.push(BoardConfig {
+                flash_id,
+                description: format!("UCoM2 spare {}", self.boards.len() + 1),
+                program_id: None,
+                date: some_day(),
+                application: true,
+                autostart: false,
+                axes: one_axis(),
+                profile: *profile,
+            });
+        }
+        self
+    }
+
+    /// The same with these flash ids along the wire; boards beyond the list keep theirs.
+    #[must_use]
+    pub fn with_flash_ids(mut self, ids: &[u16]) -> Self {
+        for (board, id) in self.boards.iter_mut().zip(ids) {
+            board.flash_id = *id;
+        }
+        self
+    }
+}
+
+impl Board {
+    fn checked(self, board: usize, profile: &Profile) -> Result<BoardConfig, ChainFileError> {
+        let count = self.description.chars().count();
+        if count > 512 || self.description.chars().any(|c| u32::from(c) > 255) {
+            return Err(ChainFileError::Description { board, count });
+        }
+        let count = self.axis.len();
+        if !(1..=MOST_AXES).contains(&count) {
+            return Err(ChainFileError::Axes { board, count });
+        }
+        for (i, axis) in self.axis.iter().enumerate() {
+            sound(axis).map_err(|what| ChainFileError::Axis { board, axis: i + 1, what })?;
+        }
+        let mut profile = *profile;
+        let mut keys = Vec::new();
+        flatten("", self.profile, &mut keys);
+        for (key, value) in keys {
+            profile.set(&key, &value).map_err(|source| ChainFileError::Profile {
+                board,
+                key: key.clone(),
+                source,
+            })?;
+        }
+        profile.check().map_err(|source| ChainFileError::Profile { board, key: "in all".into(), source })?;
+        Ok(BoardConfig {
+            flash_id: self.flash_id,
+            description: self.description,
+            program_id: self.program_id,
+            date: self.date,
+            application: self.application,
+            autostart: self.autostart,
+            axes: self.axis,
+            profile,
+        })
+    }
+}
+
+/// `a.b = 1` and `[a] b = 1` are the same key.
+fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, String)>) {
+    for (name, value) in table {
+        let name = if prefix.is_empty() { name } else { format!("{prefix}.{name}") };
+        match value {
+            toml::Value::Table(table) => flatten(&name, table, out),
+            toml::Value::String(text) => out.push((name, text)),
+            toml::Value::Boolean(true) => out.push((name, "yes".into())),
+            toml::Value::Boolean(false) => out.push((name, "no".into())),
+            toml::Value::Integer(number) => out.push((name, number.to_string())),
+            _ => out.push((name, String::new())),
+        }
+    }
+}
+
+/// Whether an axis can be simulated.
+fn sound(axis: &AxisConfig) -> Result<(), &'static str> {
+    let figures = [
+        axis.min_deg,
+        axis.max_deg,
+        axis.start_deg,
+        axis.acceleration_per_ma,
+        axis.damping_per_s,
+        axis.friction_deg_s2,
+        axis.gravity_deg_s2,
+    ];
+    if figures.iter().any(|f| !f.is_finite() || f.abs() > 1e6) {
+        return Err("a figure is none, or above 1e6");
+    }
+    if axis.min_deg >= axis.max_deg || axis.min_deg < -327.0 || axis.max_deg > 327.0 {
+        return Err("min_deg must be below max_deg, both within -327..327: words of 0.01 deg hold no more");
+    }
+    if !(axis.min_deg..=axis.max_deg).contains(&axis.start_deg) {
+        return Err("start_deg is not between min_deg and max_deg");
+    }
+    if axis.damping_per_s < 0.0 || axis.friction_deg_s2 < 0.0 {
+        return Err("damping_per_s and friction_deg_s2 cannot be negative");
+    }
+    if axis.name.chars().any(|c| !c.is_ascii_alphanumeric() && c != '_') || axis.name.len() > 32 {
+        return Err("name must be at most 32 letters, digits and _");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn the_built_in_head_is_sound() {
+        let head = ChainConfig::from_toml(HEAD, &Profile::default()).unwrap();
+        assert_eq!(head.boards.len(), 10);
+        let ids: BTreeSet<u16> = head.boards.iter().map(|b| b.flash_id & 0x7F).collect();
+        assert_eq!(ids.len(), 10, "flash ids are told apart");
+    }
+
+    #[test]
+    fn chains_of_any_length_have_different_flash_ids() {
+        let profile = Profile::default();
+        for count in 0..=31 {
+            let chain = ChainConfig::head(&profile).with_boards(count, &profile);
+            let ids: BTreeSet<u16> = chain.boards.iter().map(|b| b.flash_id & 0x7F).collect();
+            assert_eq!((chain.boards.len(), ids.len()), (count, count));
+        }
+        let chain = ChainConfig::head(&profile).with_boards(3, &profile).with_flash_ids(&[1, 2]);
+        assert_eq!(chain.boards.iter().map(|b| b.flash_id).collect::<Vec<_>>(), [1, 2, 0x23]);
+    }
+
+    #[test]
+    fn a_board_may_read_the_protocol_in_its_own_way() {
+        let text = "[[board]]\nflash_id = 1\n[board.profile]\nendian = 'big'\nprog.checksum = 'sum16'\n[[board]]\nflash_id = 2";
+        let chain = ChainConfig::from_toml(text, &Profile::default()).unwrap();
+        assert_eq!(chain.boards[0].profile.endian, ucom::Endian::Big);
+        assert_eq!(chain.boards[1].profile, Profile::default());
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_its_place() {
+        let refused = |text: &str| ChainConfig::from_toml(text, &Profile::default()).unwrap_err().to_string();
+        assert!(refused("[[board]]\nflashid = 1").contains("flashid"));
+        assert!(refused("[[board]]\nflash_id = 1\naxis = []").contains("board 1: 0 axes"));
+        let axis = |text: &str| refused(&format!("[[board]]\nflash_id = 1\naxis = [{{{text}}}]"));
+        assert!(axis("min_deg = 5, max_deg = 3").contains("below max_deg"));
+        assert!(axis("start_deg = 100").contains("between"));
+        assert!(axis("damping_per_s = nan").contains("none"));
+        assert!(axis("name = 'a b'").contains("letters"));
+        assert!(refused("[[board]]\nflash_id = 1\n[board.profile]\nendan = 'big'").contains("endan"));
+        assert!(refused("[[board]]\nflash_id = 1\ndescription = '語'").contains("Latin-1"));
+        let many = "[[board]]\nflash_id = 1\n".repeat(32);
+        assert!(refused(&many).contains("32 boards"));
+    }
+}

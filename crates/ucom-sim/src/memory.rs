@@ -1,0 +1,377 @@
+//! A board in memory: flash with times and faults, a pin on a wire, a store, and an application that can be
+//! watched. For tests, examples and simulations.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use ucom::node::{Application, Area, Flash, FlashError, FlashState, Pins, RECORD_LEN, Store, Text};
+use ucom::{Dimensions, Memory};
+
+/// Flash, data flash and exloader RAM in memory.
+///
+/// Bits can only be cleared by writing, as in a real flash. `fail_after` makes operations fail, `cut_after`
+/// cuts the power inside one: half of it is done, and nothing after it until [`MemoryFlash::power_up`].
+#[derive(Clone, Debug)]
+pub struct MemoryFlash {
+    /// Application area of the program flash.
+    pub program: Area,
+    /// Area of the data flash.
+    pub data: Area,
+    /// Area of the exloader RAM.
+    pub ram: Area,
+    /// Duration of an erase, µs.
+    pub erase_us: u64,
+    /// Duration of a write of one block, µs.
+    pub write_us: u64,
+    /// The operation, counted from 0, that fails; later ones, too.
+    pub fail_after: Option<u64>,
+    /// The operation, counted from 0, in which the power goes.
+    pub cut_after: Option<u64>,
+    /// A byte of the program flash that stays erased whatever is written: only reading back finds it.
+    pub stuck_byte: Option<usize>,
+    /// Operations started so far.
+    pub operations: u64,
+    cells: [Vec<u8>; 3],
+    record: [u8; RECORD_LEN],
+    busy_until: u64,
+    failed: bool,
+    dark: bool,
+}
+
+impl Default for MemoryFlash {
+    /// 32 Ki words of program flash from word 0, 4 Ki words of data flash, 2 Ki words of RAM.
+    fn default() -> Self {
+        let area = |words| Area { start: 0, words };
+        Self::new(area(0x8000), area(0x1000), area(0x800))
+    }
+}
+
+impl MemoryFlash {
+    /// Erased flash with the given areas.
+    pub fn new(program: Area, data: Area, ram: Area) -> Self {
+        let cells = [program, data, ram].map(|area| vec![0xFF; 2 * area.words as usize]);
+        Self {
+            program,
+            data,
+            ram,
+            erase_us: 50_000,
+            write_us: 500,
+            fail_after: None,
+            cut_after: None,
+            stuck_byte: None,
+            operations: 0,
+            cells,
+            record: [0xFF; RECORD_LEN],
+            busy_until: 0,
+            failed: false,
+            dark: false,
+        }
+    }
+
+    /// Whether the power went in an operation.
+    pub const fn is_dark(&self) -> bool {
+        self.dark
+    }
+
+    /// The power is back; what the flash held stays.
+    pub fn power_up(&mut self) {
+        self.dark = false;
+        self.failed = false;
+        self.cut_after = None;
+        self.busy_until = 0;
+    }
+
+    /// Everything in a memory, in wire order.
+    pub fn bytes(&self, memory: Memory) -> &[u8] {
+        &self.cells[slot(memory)]
+    }
+
+    /// Puts an application there as if it had been programmed.
+    pub fn install(&mut self, record: ucom::node::Record, image: &[u8]) {
+        let start = 2 * record.address.saturating_sub(self.program.start) as usize;
+        if let Some(place) = self.cells[0].get_mut(start..start + image.len()) {
+            place.copy_from_slice(image);
+            self.record = record.build();
+        }
+    }
+
+    /// Starts an operation: 2 does all of it, 1 half, 0 nothing.
+    fn begin(&mut self, now_us: u64, duration: u64) -> Result<usize, FlashError> {
+        if self.dark {
+            return Err(FlashError);
+        }
+        let number = self.operations;
+        self.operations += 1;
+        self.failed = self.fail_after.is_some_and(|at| number >= at);
+        self.busy_until = now_us + duration;
+        if self.cut_after == Some(number) {
+            self.dark = true;
+            return Ok(1);
+        }
+        Ok(if self.failed { 0 } else { 2 })
+    }
+
+    fn range(&self, memory: Memory, address: u32, bytes: usize) -> Option<core::ops::Range<usize>> {
+        let area = self.area(memory)?;
+        area.holds(Area { start: address, words: bytes.div_ceil(2) as u32 }).then(|| {
+            let start = 2 * (address - area.start) as usize;
+            start..start + bytes
+        })
+    }
+}
+
+const fn slot(memory: Memory) -> usize {
+    match memory {
+        Memory::Program => 0,
+        Memory::Data => 1,
+        Memory::Ram => 2,
+    }
+}
+
+impl Flash for MemoryFlash {
+    fn area(&self, memory: Memory) -> Option<Area> {
+        Some([self.program, self.data, self.ram][slot(memory)]).filter(|area| area.words > 0)
+    }
+
+    fn state(&mut self, now_us: u64) -> FlashState {
+        if now_us < self.busy_until {
+            FlashState::Busy
+        } else if self.failed || self.dark {
+            FlashState::Failed
+        } else {
+            FlashState::Ready
+        }
+    }
+
+    fn erase(&mut self, now_us: u64, memory: Memory, area: Area) -> Result<(), FlashError> {
+        let range = self.range(memory, area.start, 2 * area.words as usize).ok_or(FlashError)?;
+        let halves = self.begin(now_us, self.erase_us)?;
+        let end = range.start + range.len() * halves / 2;
+        self.cells[slot(memory)][range.start..end].fill(0xFF);
+        Ok(())
+    }
+
+    fn write(&mut self, now_us: u64, memory: Memory, address: u32, data: &[u8]) -> Result<(), FlashError> {
+        let range = self.range(memory, address, data.len()).ok_or(FlashError)?;
+        let halves = self.begin(now_us, self.write_us)?;
+        let cells = &mut self.cells[slot(memory)][range];
+        let len = data.len() * halves / 2;
+        for (cell, byte) in cells.iter_mut().zip(data).take(len) {
+            *cell = if memory == Memory::Ram { *byte } else { *cell & *byte };
+        }
+        if let Some(cell) = self.stuck_byte.and_then(|at| self.cells[slot(Memory::Program)].get_mut(at)) {
+            *cell = 0xFF;
+        }
+        Ok(())
+    }
+
+    fn read(&self, memory: Memory, address: u32, data: &mut [u8]) -> Result<(), FlashError> {
+        let range = self.range(memory, address, data.len()).ok_or(FlashError)?;
+        data.copy_from_slice(&self.cells[slot(memory)][range]);
+        Ok(())
+    }
+
+    fn record(&self) -> [u8; RECORD_LEN] {
+        self.record
+    }
+
+    fn erase_record(&mut self, now_us: u64) -> Result<(), FlashError> {
+        let halves = self.begin(now_us, self.write_us)?;
+        self.record[..RECORD_LEN * halves / 2].fill(0xFF);
+        Ok(())
+    }
+
+    fn write_record(&mut self, now_us: u64, record: &[u8; RECORD_LEN]) -> Result<(), FlashError> {
+        let halves = self.begin(now_us, self.write_us)?;
+        for (cell, byte) in self.record.iter_mut().zip(record).take(RECORD_LEN * halves / 2) {
+            *cell &= *byte;
+        }
+        Ok(())
+    }
+}
+
+/// An init pin on a wire: the outgoing pin of one board is the incoming one of the next.
+#[derive(Clone, Debug, Default)]
+pub struct WirePins {
+    /// The wire from the board before.
+    pub input: Arc<AtomicBool>,
+    /// The wire to the next board.
+    pub output: Arc<AtomicBool>,
+}
+
+impl WirePins {
+    /// Pins of a chain; the first incoming pin is strapped active.
+    pub fn chain(boards: usize) -> Vec<Self> {
+        let mut input = Arc::new(AtomicBool::new(true));
+        let next = |_| {
+            let output = Arc::new(AtomicBool::new(false));
+            let pins = Self { input: input.clone(), output: output.clone() };
+            input = output;
+            pins
+        };
+        (0..boards).map(next).collect()
+    }
+}
+
+impl Pins for WirePins {
+    fn init_in(&self) -> bool {
+        self.input.load(Ordering::SeqCst)
+    }
+
+    fn set_init_out(&mut self, active: bool) {
+        self.output.store(active, Ordering::SeqCst);
+    }
+}
+
+/// ASTART and the description.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryStore {
+    /// ASTART.
+    pub autostart: bool,
+    /// Latin-1.
+    pub description: Vec<u8>,
+}
+
+impl Store for MemoryStore {
+    fn autostart(&self) -> bool {
+        self.autostart
+    }
+
+    fn set_autostart(&mut self, on: bool) {
+        self.autostart = on;
+    }
+
+    fn description(&self) -> &[u8] {
+        &self.description
+    }
+}
+
+/// An application without a process behind it: buffers, texts, and what was done to it.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryApplication {
+    /// From start to up, µs.
+    pub start_us: u64,
+    /// Its description and those of inputs, outputs and parameters, Latin-1.
+    pub texts: [Vec<Vec<u8>>; 4],
+    /// Initial inputs.
+    pub initial_ci: Vec<u16>,
+    /// Inputs as received.
+    pub ci: Vec<u16>,
+    /// Inputs in effect.
+    pub latched_ci: Vec<u16>,
+    /// Outputs; the caller changes them.
+    pub so: Vec<u16>,
+    /// Outputs of the last snapshot.
+    pub sampled_so: Vec<u16>,
+    /// Parameters.
+    pub par: Vec<u16>,
+    /// Texts for people that wait.
+    pub debug: Vec<Vec<u8>>,
+    /// Whether the control loop runs.
+    pub running: bool,
+    /// Whether the outputs are enabled.
+    pub active: bool,
+    /// Control cycles so far.
+    pub steps: u64,
+    /// When the program was started, if it is.
+    pub started_us: Option<u64>,
+}
+
+impl MemoryApplication {
+    /// As many inputs, outputs and parameters as there are texts; all 0.
+    pub fn new(text: &str, ci: &[&str], so: &[&str], par: &[&str]) -> Self {
+        let latin1 = |text: &&str| text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect();
+        let list = |texts: &[&str]| texts.iter().map(latin1).collect::<Vec<_>>();
+        Self {
+            start_us: 10_000,
+            texts: [list(&[text]), list(ci), list(so), list(par)],
+            initial_ci: vec![0; ci.len()],
+            ci: vec![0; ci.len()],
+            latched_ci: vec![0; ci.len()],
+            so: vec![0; so.len()],
+            sampled_so: vec![0; so.len()],
+            par: vec![0; par.len()],
+            ..Self::default()
+        }
+    }
+}
+
+impl Application for MemoryApplication {
+    fn start(&mut self, now_us: u64) {
+        self.started_us = Some(now_us);
+        self.par.fill(0);
+    }
+
+    fn stop(&mut self) {
+        self.started_us = None;
+        self.running = false;
+        self.active = false;
+    }
+
+    fn is_up(&mut self, now_us: u64) -> bool {
+        self.started_us.is_some_and(|start| now_us >= start + self.start_us)
+    }
+
+    fn dimensions(&self) -> Dimensions {
+        let len = |words: &Vec<u16>| u16::try_from(words.len()).unwrap_or(u16::MAX);
+        Dimensions { ci: len(&self.ci), so: len(&self.so), par: len(&self.par) }
+    }
+
+    fn text(&self, text: Text) -> &[u8] {
+        let (list, index) = match text {
+            Text::Application => (0, 0),
+            Text::Ci(index) => (1, index),
+            Text::So(index) => (2, index),
+            Text::Par(index) => (3, index),
+        };
+        self.texts[list].get(usize::from(index)).map_or(&[], Vec::as_slice)
+    }
+
+    fn initial_ci(&self, index: u16) -> u16 {
+        self.initial_ci.get(usize::from(index)).copied().unwrap_or(0)
+    }
+
+    fn ci(&mut self) -> &mut [u16] {
+        &mut self.ci
+    }
+
+    fn latch_ci(&mut self) {
+        self.latched_ci.clone_from(&self.ci);
+    }
+
+    fn par(&mut self) -> &mut [u16] {
+        &mut self.par
+    }
+
+    fn sample_so(&mut self) {
+        self.sampled_so.clone_from(&self.so);
+    }
+
+    // The snapshot is what the trait calls so.
+    #[allow(clippy::misnamed_getters)]
+    fn so(&self) -> &[u16] {
+        &self.sampled_so
+    }
+
+    fn run(&mut self, _: u64, running: bool) {
+        self.running = running;
+    }
+
+    fn step(&mut self, _: u64) {
+        self.steps += 1;
+    }
+
+    fn outputs(&mut self, active: bool) {
+        self.active = active;
+    }
+
+    fn debug_text(&self) -> Option<&[u8]> {
+        self.debug.first().map(Vec::as_slice)
+    }
+
+    fn debug_done(&mut self) {
+        if !self.debug.is_empty() {
+            self.debug.remove(0);
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! The whole: boards, init wires and faults.
+
+use super::board::{Board, BoardState};
+use super::fault::{Fault, FaultKind, Trigger};
+use super::file::ChainConfig;
+use std::collections::BTreeMap;
+use ucom::profile::Profile;
+use ucom::{Format, Frame, Sequence, ToBoard};
+
+/// How often another PC talks, µs.
+const MASTER_US: u64 = 250_000;
+/// How often another protocol's frames come, µs.
+const FOREIGN_US: u64 = 40_000;
+
+/// The boards of a chain and what else talks on their bus, as members of a bus that the caller runs.
+///
+/// Member 0 is the first board; the last member is no board but everything that faults bring onto the bus. Call
+/// [`advance`](Self::advance), then [`poll`](Self::poll) each member, put its frame on the bus, and say what came of it with
+/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent) and to the others with [`hear`](Self::hear).
+pub struct ChainSim {
+    boards: Vec<Board>,
+    profile: Profile,
+    now_us: u64,
+    random: u64,
+    /// Faults that have not begun.
+    waiting: Vec<Fault>,
+    /// Faults that hold, and when they end.
+    holding: Vec<(u64, Fault)>,
+    /// How often each identifier was on the bus; for faults that wait for one.
+    seen: BTreeMap<u16, u64>,
+    /// Init wire broken behind a board.
+    broken: Vec<bool>,
+    /// Members whose frames under way are void: their controller was reset.
+    void: Vec<usize>,
+    lost: f64,
+    corrupted: f64,
+    doubled: f64,
+    disturbed: f64,
+    master_at: Option<u64>,
+    foreign_at: Option<u64>,
+}
+
+impl ChainSim {
+    /// A chain at power-up. `profile` says how the fault `foreign-master` talks.
+    pub fn new(config: &ChainConfig, faults: Vec<Fault>, seed: u64, profile: &Profile) -> Self {
+        let board = |(i, board)| Board::new(board, i == 0, seed.wrapping_mul(31).wrapping_add(i as u64));
+        let boards: Vec<Board> = config.boards.iter().enumerate().map(board).collect();
+        let mut sim = Self {
+            broken: vec![false; boards.len()],
+            boards,
+            profile: *profile,
+            now_us: 0,
+            // xorshift must not start at 0.
+            random: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
+            waiting: faults,
+            holding: Vec::new(),
+            seen: BTreeMap::new(),
+            void: Vec::new(),
+            lost: 0.0,
+            corrupted: 0.0,
+            doubled: 0.0,
+            disturbed: 0.0,
+            master_at: None,
+            foreign_at: None,
+        };
+        sim.faults();
+        sim
+    }
+
+    /// Boards, and one more.
+    pub fn members(&self) -> usize {
+        self.boards.len() + 1
+    }
+
+    /// What each board is doing.
+    pub fn boards(&self) -> impl Iterator<Item = BoardState> {
+        self.boards.iter().map(Board::state)
+    }
+
+    /// A status that no board can have, with the board's position: a mistake in the node (section 4.1).
+    pub fn violation(&self) -> Option<(usize, &'static str)> {
+        self.boards.iter().enumerate().find_map(|(i, board)| Some((i, board.violation?)))
+    }
+
+    /// When something happens next by itself, µs; a time in the past means at once.
+    pub fn next_due_us(&self) -> u64 {
+        let boards = self.boards.iter().map(Board::next_us);
+        let begin = self.waiting.iter().filter_map(|fault| match fault.trigger {
+            Trigger::At(at) => Some(at),
+            Trigger::Frame { .. } => None,
+        });
+        let end = self.holding.iter().map(|(end, _)| *end);
+        let others = [self.master_at, self.foreign_at].into_iter().flatten();
+        boards.chain(begin).chain(end).chain(others).min().unwrap_or(u64::MAX)
+    }
+
+    /// Time goes on; never back. Members whose queues on the bus must be emptied are returned.
+    pub fn advance(&mut self, now_us: u64) -> Vec<usize> {
+        self.now_us = self.now_us.max(now_us);
+        self.faults();
+        self.wires();
+        std::mem::take(&mut self.void)
+    }
+
+    /// The next frame of a member, if it has one now.
+    pub fn poll(&mut self, member: usize) -> Option<Frame> {
+        match self.boards.get_mut(member) {
+            Some(board) if board.next_us() > self.now_us => None,
+            Some(board) => board.poll(self.now_us),
+            None => self.others(),
+        }
+    }
+
+    /// A member's frame was on the bus.
+    pub fn sent(&mut self, member: usize, frame: &Frame) {
+        match self.boards.get_mut(member) {
+            Some(board) => board.sent(self.now_us, frame),
+            None => self.count(frame),
+        }
+    }
+
+    /// A member's controller gave a frame up.
+    pub fn not_sent(&mut self, member: usize, frame: &Frame) {
+        if let Some(board) = self.boards.get_mut(member) {
+            board.not_sent(self.now_us, frame);
+        }
+    }
+
+    /// A member hears a frame of any format.
+    pub fn hear(&mut self, member: usize, id: u32, format: Format, data: &[u8]) {
+        if let Some(board) = self.boards.get_mut(member) {
+            board.hear(self.now_us, id, format, data);
+        } else if let (Ok(id), true) = (u16::try_from(id), format == Format::BUS)
+            && let Some(frame) = Frame::new(id, data)
+        {
+            // The last member hears each frame but its own once: there they are counted for triggers.
+            self.count(&frame);
+        }
+    }
+
+    /// Whether a member takes part in the bus: without power it does not even acknowledge.
+    pub fn is_powered(&self, member: usize) -> bool {
+        self.boards.get(member).is_none_or(|board| !board.unpowered)
+    }
+
+    /// Begins a fault, now or when it is due: the time of its trigger counts from now.
+    pub fn inject(&mut self, mut fault: Fault) {
+        match &mut fault.trigger {
+            Trigger::At(at) => *at += self.now_us,
+            Trigger::Frame { id, count } => *count += self.seen.get(id).copied().unwrap_or(0),
+        }
+        self.waiting.push(fault);
+    }
+
+    /// What the faults `lost`, `corrupted` and `doubled` make of data between chain and clients: none, one, or two of it.
+    pub fn through(&mut self, data: &[u8]) -> Vec<Vec<u8>> {
+        // Drawn in the same number whatever happens: one setting does not change the others' faults.
+        let [lost, corrupted, doubled, place] = [self.chance(), self.chance(), self.chance(), self.chance()];
+        if lost < self.lost {
+            return Vec::new();
+        }
+        let mut data = data.to_vec();
+        let bit = (place * (data.len() * 8) as f64) as usize;
+        if corrupted < self.corrupted
+            && let Some(byte) = data.get_mut(bit / 8)
+        {
+            *byte ^= 1 << (bit % 8);
+        }
+        let times = if doubled < self.doubled { 2 } else { 1 };
+        vec![data; times]
+    }
+
+    /// Share of the frames that are destroyed on the wire, 0 to 1: the caller's bus destroys them.
+    pub fn disturbance(&self) -> f64 {
+        self.disturbed
+    }
+
+    fn count(&mut self, frame: &Frame) {
+        *self.seen.entry(frame.id()).or_default() += 1;
+        if self.waiting.iter().any(|fault| matches!(fault.trigger, Trigger::Frame { .. })) {
+            self.faults();
+        }
+    }
+
+    /// Levels of the init pins along the chain.
+    fn wires(&mut self) {
+        for i in 1..self.boards.len() {
+            let level = self.boards[i - 1].outgoing() && !self.broken[i - 1];
+            self.boards[i].set_incoming(self.now_us, level);
+        }
+    }
+
+    /// A board takes the number of the one before it, if that has one.
+    fn share_number(&mut self, i: usize) {
+        let number = self.boards.get(i.wrapping_sub(1)).and_then(|before| before.state().number);
+        if let (Some(number), Some(board)) = (number.and_then(Sequence::new), self.boards.get_mut(i)) {
+            board.take_number(self.now_us, number);
+        }
+    }
+
+    /// A number from 0 to below 1.
+    fn chance(&mut self) -> f64 {
+        // xorshift64, Marsaglia 2003.
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        (self.random >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// What others on the bus say.
+    fn others(&mut self) -> Option<Frame> {
+        if self.master_at.is_some_and(|at| at <= self.now_us) {
+            self.master_at = Some(self.now_us + MASTER_US);
+            let alive = (self.now_us / MASTER_US).is_multiple_of(2);
+            let (message, to) = match alive {
+                true => (ToBoard::Alive, self.profile.unnumbered()),
+                false => (ToBoard::Info, Sequence::MAX),
+            };
+            return Some(message.encode(to, &self.profile));
+        }
+        if self.foreign_at.is_some_and(|at| at <= self.now_us) {
+            self.foreign_at = Some(self.now_us + FOREIGN_US);
+            let beat = (self.now_us / FOREIGN_US) as u32;
+            // One identifier with bit 5, one with function 31.
+            return Frame::new(if beat.is_multiple_of(2) { 0x3A5 } else { 0x7C3 }, &beat.to_le_bytes());
+        }
+        None
+    }
+
+    /// Begins and ends faults that are due.
+    fn faults(&mut self) {
+        let (now, seen) = (self.now_us, &self.seen);
+        let due = |fault: &Fault| match fault.trigger {
+            Trigger::At(at) => at <= now,
+            Trigger::Frame { id, count } => seen.get(&id).is_some_and(|n| *n >= count),
+        };
+        let (begin, waiting): (Vec<Fault>, Vec<Fault>) = self.waiting.drain(..).partition(due);
+        self.waiting = waiting;
+        let (end, holding): (Vec<_>, Vec<_>) = self.holding.drain(..).partition(|(end, _)| *end <= now);
+        self.holding = holding;
+        for (_, fault) in end {
+            self.set(fault, false);
+        }
+        for fault in begin {
+            self.set(fault, true);
+            if let Some(duration) = fault.duration_us {
+                self.holding.push((now + duration, fault));
+            }
+        }
+    }
+
+    fn set(&mut self, fault: Fault, on: bool) {
+        let now = self.now_us;
+        let share = |share: f64| if on { share } else { 0.0 };
+        match fault.kind {
+            FaultKind::Lost(s) => self.lost = share(s),
+            FaultKind::Corrupted(s) => self.corrupted = share(s),
+            FaultKind::Doubled(s) => self.doubled = share(s),
+            FaultKind::Disturbed(s) => self.disturbed = share(s),
+            FaultKind::ForeignMaster => self.master_at = on.then_some(now),
+            FaultKind::ForeignFrames => self.foreign_at = on.then_some(now),
+            kind => {
+                let i = fault.board.wrapping_sub(1);
+                let (Some(board), Some(broken)) = (self.boards.get_mut(i), self.broken.get_mut(i)) else {
+                    return;
+                };
+                match kind {
+                    FaultKind::PowerLoss => {
+                        board.power(now, !on);
+                        self.void.push(i);
+                    }
+                    FaultKind::Silent => board.silent = on,
+                    FaultKind::Deaf => board.deaf = on,
+                    FaultKind::AckHeld => board.ack_held = on,
+                    FaultKind::FlashBroken => board.break_flash(on),
+                    FaultKind::WireBroken => *broken = on,
+                    FaultKind::SameNumber => self.share_number(i),
+                    _ => {
+                        board.crash(now);
+                        self.void.push(i);
+                    }
+                }
+            }
+        }
+    }
+}

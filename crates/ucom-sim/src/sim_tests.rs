@@ -1,0 +1,178 @@
+//! Chains in virtual time on a bus of these tests: one frame each 100 µs, the lowest identifier first.
+use super::*;
+use ucom::node::Phase;
+use ucom::{Format, Frame, Profile};
+
+/// A chain and what was on its bus.
+struct Bench {
+    sim: ChainSim,
+    now_us: u64,
+    heard: Vec<(u64, Frame)>,
+}
+
+impl Bench {
+    fn new(boards: usize, faults: &str, seed: u64) -> Self {
+        let profile = Profile::default();
+        let chain = ChainConfig::head(&profile).with_boards(boards, &profile);
+        let faults = Fault::from_toml(faults).unwrap();
+        Self { sim: ChainSim::new(&chain, faults, seed, &profile), now_us: 0, heard: Vec::new() }
+    }
+
+    /// Lets time pass; one frame at a time is on the bus.
+    fn pass(&mut self, ms: u64) {
+        let end = self.now_us + ms * 1000;
+        let mut waiting: Vec<Option<Frame>> = vec![None; self.sim.members()];
+        while self.now_us < end {
+            for member in self.sim.advance(self.now_us) {
+                waiting[member] = None;
+            }
+            for (member, place) in waiting.iter_mut().enumerate() {
+                *place = place.or_else(|| self.sim.poll(member));
+            }
+            let first = (0..waiting.len())
+                .filter(|m| waiting[*m].is_some())
+                .min_by_key(|m| waiting[*m].map(|f| f.id()));
+            self.now_us += 100;
+            if let Some(member) = first
+                && let Some(frame) = waiting[member].take()
+            {
+                self.sim.advance(self.now_us);
+                self.sim.sent(member, &frame);
+                self.tell(&frame, Some(member));
+            }
+            assert_eq!(self.sim.violation(), None);
+        }
+    }
+
+    fn tell(&mut self, frame: &Frame, from: Option<usize>) {
+        self.heard.push((self.now_us, *frame));
+        for other in (0..self.sim.members()).filter(|m| Some(*m) != from) {
+            self.sim.hear(other, frame.id().into(), Format::BUS, frame.data());
+        }
+    }
+
+    /// The PC sends a frame; what the boards say within a time.
+    fn ask(&mut self, text: &str, ms: u64) -> Vec<String> {
+        let frame: Frame = text.parse().unwrap();
+        self.sim.advance(self.now_us);
+        self.tell(&frame, None);
+        let before = self.heard.len();
+        self.pass(ms);
+        self.heard[before..].iter().map(|(_, f)| f.to_string()).collect()
+    }
+
+    fn number(&mut self, boards: u8) {
+        for n in 1..=boards {
+            assert_eq!(self.ask(&format!("{:03X}#", 0x280 + u16::from(n)), 50), [format!("0C{n}#0{n}")]);
+            self.ask(&format!("{:03X}#0202", 0x1C0 + u16::from(n)), 20);
+        }
+    }
+}
+
+/// The same seed and the same frames at the same times are the same bus, fault by fault.
+#[test]
+fn the_same_seed_gives_the_same_frames() {
+    let run = |seed| {
+        let mut bench = Bench::new(4, "[[fault]]\nkind = 'crash'\nboard = 2\nat_s = 1.2", seed);
+        bench.pass(250);
+        bench.number(4);
+        for board in 1..=4 {
+            bench.ask(&format!("30{board}#"), 120);
+            bench.ask(&format!("54{board}#"), 20);
+        }
+        bench.pass(800);
+        bench.heard
+    };
+    let first = run(1);
+    assert!(first.len() > 300 && first == run(1));
+    // Only the back-off of unasked flags is drawn by chance: it moves with the seed.
+    assert_ne!(first, run(2));
+}
+
+/// D-26: a board that crashes reports unasked and has no number; the wire behind it goes dark.
+#[test]
+fn d26_a_crash_is_one_report_and_a_lost_number() {
+    let mut bench = Bench::new(3, "", 1);
+    bench.pass(250);
+    bench.number(2);
+    bench.sim.inject(Fault::from_line("crash board=1").unwrap());
+    let before = bench.heard.len();
+    bench.pass(500);
+    let said: Vec<String> = bench.heard[before..].iter().map(|(_, f)| f.to_string()).collect();
+    assert_eq!(said, ["441#21"]);
+    let states: Vec<BoardState> = bench.sim.boards().collect();
+    assert_eq!((states[0].number, states[0].phase), (None, Phase::Uninitialised));
+    assert_eq!(states[1].number, Some(2));
+    assert_eq!(
+        states[1].status.to_string(),
+        "EXLRUN INIT OPINIT",
+        "its incoming wire is dark, it keeps its number"
+    );
+}
+
+/// Power loss: silence, then a board as new; what its flash held stays.
+#[test]
+fn power_loss_leaves_the_flash() {
+    let mut bench = Bench::new(1, "[[fault]]\nkind = 'power-loss'\nboard = 1\nat_s = 0.4\nfor_s = 0.3", 1);
+    bench.pass(250);
+    bench.number(1);
+    bench.ask("1C1#4040", 20);
+    let program = bench.sim.boards().next().unwrap().program;
+    bench.pass(200);
+    assert!(!bench.sim.is_powered(0));
+    assert_eq!(bench.ask("240#", 100), Vec::<String>::new());
+    bench.pass(400);
+    let state = bench.sim.boards().next().unwrap();
+    assert_eq!((state.powered, state.number, state.program), (true, None, program));
+    assert_eq!(state.status.to_string(), "ASTART EXLRUN IPINIT", "ASTART is in lasting memory");
+}
+
+/// Section 8: nothing drives the axes without a PC.
+#[test]
+fn d50_outputs_are_safe_when_the_pc_is_lost() {
+    let mut bench = Bench::new(1, "", 1);
+    bench.pass(250);
+    bench.number(1);
+    bench.ask("301#", 120);
+    bench.ask("601#01010000", 50);
+    assert!(bench.sim.boards().next().unwrap().driven);
+    bench.pass(1400);
+    assert!(bench.sim.boards().next().unwrap().driven, "within 1.5 s");
+    bench.pass(200);
+    assert!(!bench.sim.boards().next().unwrap().driven);
+}
+
+#[test]
+fn faults_between_chain_and_clients_follow_their_shares() {
+    let line = |text: &str| {
+        let mut bench = Bench::new(0, "", 3);
+        bench.sim.inject(Fault::from_line(text).unwrap());
+        bench.sim.advance(1);
+        (0..1000).map(|_| bench.sim.through(&[0x55; 8])).collect::<Vec<_>>()
+    };
+    let lost = line("lost share=0.2").iter().filter(|f| f.is_empty()).count();
+    assert!((120..280).contains(&lost), "{lost}");
+    let wrong = line("corrupted share=0.2").iter().filter(|f| f[0] != [0x55; 8]).count();
+    assert!((120..280).contains(&wrong), "{wrong}");
+    let twice = line("doubled share=0.2").iter().filter(|f| f.len() == 2).count();
+    assert!((120..280).contains(&twice), "{twice}");
+    assert!(line("lost share=0").iter().all(|f| *f == [vec![0x55; 8]]));
+}
+
+/// D-24: a board that takes the number of the one before it answers to it as well, until the chain is numbered anew.
+#[test]
+fn d24_two_boards_with_one_number() {
+    let mut bench = Bench::new(3, "", 1);
+    bench.pass(250);
+    bench.number(3);
+    bench.sim.inject(Fault::from_line("same-number board=2").unwrap());
+    bench.pass(100);
+    let numbers: Vec<Option<u8>> = bench.sim.boards().map(|b| b.number).collect();
+    assert_eq!(numbers, [Some(1), Some(1), Some(3)]);
+    let heads = |said: Vec<String>| said.iter().filter(|f| f.len() == 20 && &f[8..10] == "01").count();
+    assert_eq!(heads(bench.ask("201#", 100)), 2);
+    assert_eq!(bench.ask("202#", 100), Vec::<String>::new());
+    bench.ask("000#", 500);
+    bench.number(3);
+    assert_eq!(heads(bench.ask("201#", 100)), 1);
+}

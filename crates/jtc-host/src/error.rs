@@ -1,4 +1,4 @@
-//! What can go wrong, with the facts in it, the command that helps and the exit code of the commands.
+//! What can go wrong, with the facts in it, the kind of failure and the command that helps.
 
 use jtc_wire::{
     Code, ControllerState, DataStatus, FrameStatus, FrameType, Response, Status, TrajectoryState,
@@ -8,6 +8,21 @@ use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::port::PortError;
 use crate::words;
+
+/// What kind of failure an error is: what a caller can act on without knowing each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ErrorKind {
+    /// The controller reported an error.
+    Device,
+    /// Wrong usage or unreadable input.
+    Usage,
+    /// No port, or no answer.
+    NoLink,
+    /// Refused by a check: nothing was sent or moved.
+    Refused,
+    /// Something went wrong while the arm moved, or it was cancelled.
+    Fault,
+}
 
 /// Any failure of this library.
 #[derive(Debug, thiserror::Error)]
@@ -227,25 +242,26 @@ fn heard(bytes: u64) -> String {
 }
 
 impl Error {
-    /// Exit code of the commands: 1 the device reported an error, 2 unreadable input, 3 no link, 4 refused by a check,
-    /// 5 fault while running.
-    pub fn exit_code(&self) -> u8 {
+    /// What kind of failure it is.
+    pub fn kind(&self) -> ErrorKind {
         match self {
-            Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } | Error::LinkLost { .. } => 3,
+            Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } | Error::LinkLost { .. } => {
+                ErrorKind::NoLink
+            }
             Error::Refused { .. }
             | Error::BeyondBounds { .. }
             | Error::SegmentRefused { .. }
             | Error::UploadFailed { .. }
             | Error::Device { .. }
-            | Error::StateTimeout { .. } => 1,
-            Error::File(_) | Error::Parameter(_) | Error::Frame(_) => 2,
+            | Error::StateTimeout { .. } => ErrorKind::Device,
+            Error::File(_) | Error::Parameter(_) | Error::Frame(_) => ErrorKind::Usage,
             Error::Check(_)
             | Error::DeviceLimits { .. }
             | Error::NotUploaded
             | Error::NotPaused { .. }
             | Error::NoParameters { .. }
-            | Error::IncompleteArm { .. } => 4,
-            Error::RunFault { .. } | Error::PausedByController { .. } | Error::Cancelled => 5,
+            | Error::IncompleteArm { .. } => ErrorKind::Refused,
+            Error::RunFault { .. } | Error::PausedByController { .. } | Error::Cancelled => ErrorKind::Fault,
         }
     }
 
@@ -391,6 +407,6 @@ mod tests {
             trajectory: TrajectoryState::Finish.into(),
         };
         assert!(never.to_string().contains("would start a motion"), "{never}");
-        assert_eq!((early.exit_code(), never.exit_code()), (4, 4));
+        assert_eq!([early.kind(), never.kind()], [ErrorKind::Refused; 2]);
     }
 }

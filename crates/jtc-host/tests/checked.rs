@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, Session, Trajectory, plan};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session, Trajectory, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
@@ -36,7 +36,7 @@ fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
     fast.step_ms = 2;
     let error = check(&fast).unwrap_err();
     assert!(matches!(&error, Error::Check(verdict) if !verdict.is_ok()), "{error}");
-    assert_eq!((error.code(), error.exit_code()), ("check", 4));
+    assert_eq!((error.code(), error.kind()), ("check", ErrorKind::Refused));
     // A number that no frame carries.
     let mut wild = motion(0.5);
     wild.points[3].velocity[2] = f64::NAN;
@@ -72,7 +72,7 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
         CheckedTrajectory::check(trajectory, arm, &[0.0; 6], &options)
     };
     let error = check(&arm, &motion(0.5), false).unwrap_err();
-    assert_eq!((error.code(), error.exit_code()), ("device-limits", 4));
+    assert_eq!((error.code(), error.kind()), ("device-limits", ErrorKind::Refused));
     assert!(error.to_string().contains("joint 1, acceleration_max_rad_s2: "), "{error}");
     assert!(check(&arm, &motion(0.5), true).is_ok());
     // The gravity that the controller computes with, whatever the file says: an arm without weight would pass.
@@ -107,7 +107,7 @@ fn only_what_was_uploaded_is_executed() {
         let sent = s.statistics().frames_sent;
         let error = s.execute(t).unwrap_err();
         assert!(matches!(error, Error::NotUploaded), "{error}");
-        assert_eq!((s.statistics().frames_sent, error.exit_code()), (sent, 4), "nothing is sent");
+        assert_eq!((s.statistics().frames_sent, error.kind()), (sent, ErrorKind::Refused), "nothing is sent");
     };
     refused(&mut s, &first);
     s.upload(&first, |_| Flow::Continue).unwrap();

@@ -8,7 +8,7 @@ use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
 use jtc_host::port::sim::SimPort;
 use jtc_host::port::{Port, PortError};
 use jtc_host::session::{Flow, Outcome, ParameterSource, RecoverStep, UploadOptions, UploadReport};
-use jtc_host::{CheckOptions, CheckedTrajectory, Error, Session, Trajectory, plan};
+use jtc_host::{CheckOptions, CheckedTrajectory, Error, ErrorKind, Session, Trajectory, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
@@ -171,7 +171,7 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
     assert!(seen > 10 && (f64::from(status.joints[0].position) - 0.4).abs() < 0.01);
     // Again from Finish: refused, the arm is at the end (J-34).
     let error = s.execute(&t).unwrap_err();
-    assert_eq!(error.exit_code(), 1);
+    assert_eq!(error.kind(), ErrorKind::Device);
     assert!(error.hint().contains("--approach"), "{error}");
 }
 
@@ -217,7 +217,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     let Error::RunFault { point, .. } = &error else { panic!("{error}") };
     // That of the last status on the path: up to 40 ms before the fault.
     assert!((459..600).contains(point), "{error}");
-    assert_eq!(error.exit_code(), 5);
+    assert_eq!(error.kind(), ErrorKind::Fault);
     assert!(error.to_string().contains("joint 3"), "{error}");
     let mut steps = Vec::new();
     let status = s
@@ -251,8 +251,8 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     use jtc_host::port::test::ScriptedPort;
     let mut silent = Session::new(ScriptedPort::new(Some(115_200), |_, _| Vec::new()));
     let error = silent.next_status().unwrap_err();
-    assert_eq!((error.exit_code(), error.code()), (3, "no-link"));
-    assert_eq!(silent.clear(true, 0).unwrap_err().exit_code(), 3);
+    assert_eq!((error.kind(), error.code()), (ErrorKind::NoLink, "no-link"));
+    assert_eq!(silent.clear(true, 0).unwrap_err().kind(), ErrorKind::NoLink);
     // A file is none of the things that one can plug in.
     let error = jtc_host::port::SerialPort::open("Cargo.toml", 115_200).map(drop).unwrap_err();
     assert_eq!(error.to_string(), "Cargo.toml is no serial port");
@@ -262,7 +262,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     let mut s = session(Some(921_600));
     let error = upload(&mut s, &trajectory(50)).unwrap_err();
     assert!(matches!(error, Error::SegmentRefused { segment: 0, .. }), "{error}");
-    assert_eq!(s.teach(true).unwrap_err().exit_code(), 1);
+    assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
 /// What the session wrote, while a controller behind a scripted port says nothing or the same status again and again.
@@ -323,7 +323,7 @@ fn j34_resume_only_after_a_pause() {
         );
         let error = s.resume().unwrap_err();
         assert!(matches!(error, Error::NotPaused { trajectory: t, .. } if t == trajectory), "{error}");
-        assert_eq!((error.exit_code(), written.borrow().len()), (4, 0), "{error}");
+        assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
         // Only a motion that may be slowing down can be resumed by the same command a little later.
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
@@ -350,7 +350,7 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     };
     let (mut s, written) = scripted::session(moving, Duration::from_millis(500));
     let error = s.follow(|_| Flow::Continue).unwrap_err();
-    assert_eq!((error.exit_code(), error.code()), (3, "link-lost"));
+    assert_eq!((error.kind(), error.code()), (ErrorKind::NoLink, "link-lost"));
     let text = error.to_string();
     assert!(text.contains("THE ARM MAY BE MOVING") && text.contains("point 1234 (1.234 s)"), "{text}");
     assert!(text.contains("a stop was sent") && !text.contains("goes on"), "{text}");
@@ -380,13 +380,13 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     let (sent, mut steps) = (s.statistics().frames_sent, 0);
     let error = s.recover(ParameterSource::None, |_| steps += 1).unwrap_err();
     assert!(matches!(&error, Error::NoParameters { missing } if missing.len() == 3), "{error}");
-    assert_eq!((error.exit_code(), s.statistics().frames_sent, steps), (4, sent, 0));
+    assert_eq!((error.kind(), s.statistics().frames_sent, steps), (ErrorKind::Refused, sent, 0));
     assert!(error.hint().contains("--arm FILE") && error.hint().contains("--defaults"), "{}", error.hint());
 
     let arm = Arm { pid: None, ..Arm::avena() };
     let half = arm.parameter_set();
     let error = s.recover(ParameterSource::Arm { name: "half.toml", set: &half }, |_| {}).unwrap_err();
-    assert_eq!(error.exit_code(), 4);
+    assert_eq!(error.kind(), ErrorKind::Refused);
     assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
     assert_eq!(s.statistics().frames_sent, sent);
 
@@ -458,7 +458,7 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     });
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
-    assert_eq!((error.code(), error.exit_code()), ("paused-by-controller", 5));
+    assert_eq!((error.code(), error.kind()), ("paused-by-controller", ErrorKind::Fault));
     let text = error.to_string();
     assert!(text.contains("joint 5: position error"), "{text}");
     assert!(error.hint().contains("jtc traj resume"));
@@ -472,7 +472,7 @@ fn j06_a_refused_parameter_is_named() {
     let good = Arm::avena().parameter_set();
     let said = |s: &mut Sim, set: &ParameterSet| {
         let error = s.push(set, |_| ()).expect_err("it is refused");
-        assert_eq!((error.exit_code(), error.code()), (1, "beyond-bounds"), "{error}");
+        assert_eq!((error.kind(), error.code()), (ErrorKind::Device, "beyond-bounds"), "{error}");
         error.to_string()
     };
     let mut set = ParameterSet { pid: good.pid, ..ParameterSet::default() };

@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, ParameterSource};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, Session, plan};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
@@ -96,7 +96,7 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
     s.recover(ParameterSource::ControllerDefaults, |_| {}).unwrap();
     move_arm(&mut s);
     let error = s.recover_until(ParameterSource::None, || true, |_| {}).unwrap_err();
-    assert!(matches!(error, Error::Cancelled) && error.exit_code() == 5, "{error}");
+    assert!(matches!(error, Error::Cancelled) && error.kind() == ErrorKind::Fault, "{error}");
     let status = s.fresh_status().unwrap();
     assert_eq!(
         (status.state, status.trajectory),

@@ -13,7 +13,7 @@ use ucom_host::master::{
 use crate::args::{Boards, LinkArgs};
 use crate::bus_off;
 use crate::commands::conformance::told;
-use crate::failure::{FAULT, Failure, NO_LINK};
+use crate::failure::{FAULT, Failure, NO_LINK, exit};
 use crate::link::Link;
 use crate::pump::{LOOK, Pump};
 use crate::signal::Undone;
@@ -301,7 +301,7 @@ pub fn nothing_shared(master: &Master) -> Result<(), Failure> {
 
 impl From<Error> for Failure {
     fn from(e: Error) -> Self {
-        Self::new(e.exit_code(), e.code(), &e).hint(e.hint())
+        Self::new(exit(e.kind()), e.code(), &e).hint(e.hint())
     }
 }
 

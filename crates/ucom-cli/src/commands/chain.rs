@@ -7,7 +7,7 @@ use ucom_host::master::{InitOptions, InitReport, Outcome, Request, ScanFinding, 
 
 use crate::args::{InitArgs, LinkArgs};
 use crate::driver::{Driver, nothing_shared, unexpected};
-use crate::failure::{Failure, NO_LINK};
+use crate::failure::{Failure, NO_LINK, exit};
 use crate::shape::{board_table, board_value};
 
 /// Who is there; changes nothing.
@@ -120,9 +120,9 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         };
         board_table(&report.boards, &profile) + &lines(&report.findings) + &end + renew
     });
-    match report.exit_code() {
-        0 => Ok(()),
-        code => Err(Failure::printed(code)),
+    match report.failure() {
+        None => Ok(()),
+        Some(kind) => Err(Failure::printed(exit(kind))),
     }
 }
 

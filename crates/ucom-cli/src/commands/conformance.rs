@@ -14,7 +14,7 @@ use ucom_host::master::{Outcome, Request};
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
 use crate::driver::{Driver, unexpected};
-use crate::failure::{Failure, REFUSED};
+use crate::failure::{Failure, REFUSED, exit};
 
 /// 2026-01-01: what a test programs has a date of its own, and none of the boards' own time.
 fn date(profile: &Profile) -> u16 {
@@ -56,9 +56,9 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
     };
     driver.master.end_session();
     print(&report, out);
-    match report.exit_code() {
-        0 => Ok(()),
-        code => Err(Failure::printed(code)),
+    match report.failure() {
+        None => Ok(()),
+        Some(kind) => Err(Failure::printed(exit(kind))),
     }
 }
 

@@ -13,7 +13,7 @@ use super::update_files::{Files, day};
 use super::update_report::print;
 use crate::args::{Boards, LinkArgs, UpdateArgs};
 use crate::driver::{Driver, unexpected};
-use crate::failure::{Failure, REFUSED};
+use crate::failure::{Failure, REFUSED, exit};
 
 /// Programs the boards that are meant.
 pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -51,9 +51,9 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         other => return Err(unexpected(&other)),
     };
     print(&report, &files.names, &profile, out);
-    match report.exit_code() {
-        0 => Ok(()),
-        code => Err(Failure::printed(code)),
+    match report.failure() {
+        None => Ok(()),
+        Some(kind) => Err(Failure::printed(exit(kind))),
     }
 }
 
@@ -103,7 +103,7 @@ fn cancelled(failure: Failure, args: &UpdateArgs, profile: &Profile, out: &Outpu
     }
     let report = UpdateReport { dry_run: args.dry_run, boards, ..UpdateReport::default() };
     print(&report, &[], profile, out);
-    Failure::printed(report.exit_code())
+    Failure::printed(report.failure().map_or(0, exit))
 }
 
 /// Which flash number each board must have: named, else as the inventory has it.

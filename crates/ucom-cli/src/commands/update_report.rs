@@ -8,6 +8,7 @@ use ucom::{BoardInfo, Memory, Profile};
 use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult};
 
 use super::update_files::has_header;
+use crate::failure::exit;
 use crate::shape::date;
 
 /// Prints the report; `names` are the files of its images.
@@ -26,7 +27,7 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
             _ => Value::Null,
         },
         "boards": report.boards.iter().map(|b| result(b, report, profile)).collect::<Vec<_>>(),
-        "exit": report.exit_code(),
+        "exit": report.failure().map_or(0, exit),
     });
     out.result(&value, || {
         let mut text = String::new();
@@ -148,7 +149,7 @@ fn result(b: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value {
         "attempts": b.attempts,
         "time_s": b.time_us as f64 * 1e-6,
         "error": b.failure.as_ref().map(|f| json!({
-            "code": f.code(), "message": f.to_string(), "hint": f.hint(), "exit": f.exit_code(),
+            "code": f.code(), "message": f.to_string(), "hint": f.hint(), "exit": exit(f.kind()),
         })),
     })
 }

@@ -1,4 +1,4 @@
-//! What can go wrong in a procedure, with the facts in it, the command that helps and the exit code of the commands.
+//! What can go wrong in a procedure, with the facts in it, the kind of failure and the command that helps.
 use core::fmt;
 
 use super::load::LoadForecast;

@@ -1,16 +1,19 @@
-//! What commands tell of an error beside its words: exit code, short name, next command.
-use super::Error;
+//! What there is to know of an error beside its words: kind, short name, next command.
 use super::error::{Incomplete, SHARED_CAUSE};
+use super::{Error, ErrorKind};
 
 impl Error {
-    /// Exit code of the commands: 1 the board reported an error, 3 no answer, 4 refused by a check, 5 fault while
-    /// running. An update has its own, see [`UpdateReport::exit_code`](super::update::UpdateReport::exit_code).
-    pub fn exit_code(&self) -> u8 {
+    /// What kind of failure it is. An update has its own, see [`UpdateReport::failure`](super::update::UpdateReport::failure).
+    pub fn kind(&self) -> ErrorKind {
         match self {
-            Self::Device { .. } | Self::AdminRefused { .. } | Self::StatusNotTaken { .. } => 1,
-            Self::NoEdge { .. } | Self::NoBoard { .. } => 2,
-            Self::Plan(e) => e.exit_code(),
-            Self::NoAnswer { .. } | Self::Incomplete { .. } | Self::NotReached { .. } | Self::Bus { .. } => 3,
+            Self::Device { .. } | Self::AdminRefused { .. } | Self::StatusNotTaken { .. } => {
+                ErrorKind::Device
+            }
+            Self::NoEdge { .. } | Self::NoBoard { .. } => ErrorKind::Usage,
+            Self::Plan(e) => e.kind(),
+            Self::NoAnswer { .. } | Self::Incomplete { .. } | Self::NotReached { .. } | Self::Bus { .. } => {
+                ErrorKind::NoLink
+            }
             Self::Contradiction { .. }
             | Self::AckMismatch { .. }
             | Self::WrongSequence { .. }
@@ -24,9 +27,9 @@ impl Error {
             | Self::Load(_)
             | Self::Busy { .. }
             | Self::StaleNames { .. }
-            | Self::NoApplication { .. } => 4,
-            Self::Update { failure, .. } => failure.exit_code(),
-            Self::Lost { .. } | Self::Cancelled => 5,
+            | Self::NoApplication { .. } => ErrorKind::Refused,
+            Self::Update { failure, .. } => failure.kind(),
+            Self::Lost { .. } | Self::Cancelled => ErrorKind::Fault,
         }
     }
 

@@ -13,6 +13,7 @@ use super::request::{Answer, TRIES, ask_info, confirmed, info, set_status};
 use super::scan::{REPORTS, Reports, ask_reports, collect_reports};
 use super::times::MS;
 use super::{BoardSeen, Error, Outcome, counted};
+use crate::master::ErrorKind;
 use std::collections::BTreeSet;
 use ucom::profile::Endian;
 use ucom::{FromBoard, Function, Sequence, Status, ToBoard};
@@ -43,12 +44,12 @@ impl InitReport {
         self.findings.is_empty()
     }
 
-    /// Exit code of the command: 0 ok, 3 no board at all, 1 otherwise.
-    pub fn exit_code(&self) -> u8 {
+    /// What kind of failure it is; `None`: ok.
+    pub fn failure(&self) -> Option<ErrorKind> {
         match self.findings.as_slice() {
-            [] => 0,
-            [InitFinding::NoBoards] => 3,
-            _ => 1,
+            [] => None,
+            [InitFinding::NoBoards] => Some(ErrorKind::NoLink),
+            _ => Some(ErrorKind::Device),
         }
     }
 }

@@ -4,7 +4,11 @@ use std::collections::BTreeMap;
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Frame, Profile};
-use ucom_host::master::{Event, Master, Outcome, ProcedureId, Request, frame_bits};
+use ucom_host::master::conformance::ConformanceReport;
+use ucom_host::master::update::UpdateReport;
+use ucom_host::master::{
+    Error, ErrorKind, Event, InitReport, Master, Outcome, ProcedureId, Request, frame_bits,
+};
 use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
 /// Microseconds of a millisecond.
@@ -390,4 +394,44 @@ pub fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {
 /// The golden image: byte i is (37·i + 11) mod 256.
 pub fn image(len: usize) -> Vec<u8> {
     (0..len).map(|i| (37 * i + 11) as u8).collect()
+}
+
+/// The exit code of the command, as its contract has it.
+pub trait Exit {
+    fn exit(&self) -> u8;
+}
+
+fn code(kind: Option<ErrorKind>) -> u8 {
+    match kind {
+        None => 0,
+        Some(ErrorKind::Device) => 1,
+        Some(ErrorKind::Usage) => 2,
+        Some(ErrorKind::NoLink) => 3,
+        Some(ErrorKind::Refused) => 4,
+        Some(ErrorKind::Fault) => 5,
+    }
+}
+
+impl Exit for Error {
+    fn exit(&self) -> u8 {
+        code(Some(self.kind()))
+    }
+}
+
+impl Exit for InitReport {
+    fn exit(&self) -> u8 {
+        code(self.failure())
+    }
+}
+
+impl Exit for UpdateReport {
+    fn exit(&self) -> u8 {
+        code(self.failure())
+    }
+}
+
+impl Exit for ConformanceReport {
+    fn exit(&self) -> u8 {
+        code(self.failure())
+    }
 }

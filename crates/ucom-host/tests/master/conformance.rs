@@ -1,5 +1,6 @@
 //! The conformance tests: boards of this crate pass them all, and each mistake is found by the test that is meant for it.
 
+use crate::bench::Exit;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ucom::profile::Endian;
@@ -99,7 +100,7 @@ fn running_boards_are_left_alone() {
     };
     bench.go(Request::Run(run), 20).unwrap();
     let refused = bench.go(Request::Conformance(all()), 20).unwrap_err();
-    assert_eq!(refused.exit_code(), 4, "{refused}");
+    assert_eq!(refused.exit(), 4, "{refused}");
 }
 
 /// A board with a mistake: what it hears and what it says goes through its hands.

@@ -1,6 +1,7 @@
 //! The conformance tests leave boards as they were found: at their end, when they are cancelled, when a board is gone. And
 //! what they refuse.
 
+use crate::bench::Exit;
 use ucom::{Function, Status};
 use ucom_host::master::conformance::{ConformanceOptions, ConformanceProgram, ConformanceReport, Verdict};
 use ucom_host::master::{
@@ -97,7 +98,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
             other => panic!("moment {moment}: {other:?}"),
         };
         if report.error.is_some() {
-            assert_eq!(report.exit_code(), 5);
+            assert_eq!(report.exit(), 5);
             let skipped = Verdict::Skipped("cancelled".into());
             assert!(report.tests.iter().any(|t| t.verdict == skipped), "moment {moment}");
             assert_eq!(report.tests.len(), whole.tests.len(), "moment {moment}");
@@ -129,7 +130,7 @@ fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     }
     bench.cut = vec![1];
     let report = report(&mut bench, id);
-    assert_eq!(report.exit_code(), 3, "{:?}", report.error);
+    assert_eq!(report.exit(), 3, "{:?}", report.error);
     let skipped = Verdict::Skipped("board 2 does not answer".into());
     assert!(report.tests.iter().any(|t| t.board == Some(3) && t.id == "D-T8" && t.verdict == skipped));
     assert!(report.left.iter().any(|l| l.starts_with("board 2")), "{:?}", report.left);
@@ -146,7 +147,7 @@ fn numbering_is_refused_when_a_board_has_no_number() {
     let options = ConformanceOptions { init: true, ..Default::default() };
     let refused = bench.go(Request::Conformance(options), 60).unwrap_err();
     assert_eq!(refused, Error::NotNumbered { reports: 3, boards: 2 });
-    assert_eq!(refused.exit_code(), 4);
+    assert_eq!(refused.exit(), 4);
     let changes = |f: &ucom::Frame| matches!(f.address(), Ok((Function::Reset | Function::SetStatus, _)));
     assert!(!bench.log[from..].iter().any(|(_, who, f)| *who == From::Master && changes(f)));
 }

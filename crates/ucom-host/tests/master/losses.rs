@@ -4,7 +4,7 @@ use ucom::Profile;
 use ucom::node::Phase;
 use ucom_host::master::{InitOptions, Request, RunBoard, RunOptions, StopLevel};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Exit};
 use crate::chain::initialised;
 use crate::update::{options, update};
 
@@ -35,7 +35,7 @@ fn d46_a_lost_xreset_is_repeated() {
     bench.go(Request::Start { board: 1, force: false }, 10).unwrap();
     bench.lose = vec![("< 041#", 1)];
     let report = update(&mut bench, options(&[1], 128));
-    assert_eq!(report.exit_code(), 0, "{report:?}");
+    assert_eq!(report.exit(), 0, "{report:?}");
     assert_eq!(report.boards[0].attempts, 1);
 }
 

@@ -1,5 +1,6 @@
 //! One board gets its number back (5.4): never two boards with one number and a success, whatever is lost.
 
+use crate::bench::Exit;
 use ucom_host::master::{Error, Outcome, Request};
 
 use crate::bench::{Bench, Fault};
@@ -35,7 +36,7 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
         // Not heard, or its neighbour keeps its pin on: nothing is claimed.
-        Err(error) => assert!([1, 3, 4].contains(&error.exit_code()), "{what}: {result:?}"),
+        Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
 
@@ -60,7 +61,7 @@ fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);
     let error = repair(&mut bench, 3).unwrap_err();
     assert_eq!(error, Error::MayTakeNumber { board: 3, other: 1 });
-    assert_eq!((error.exit_code(), numbers(&mut bench)), (4, vec![0, 2, 0, 4]));
+    assert_eq!((error.exit(), numbers(&mut bench)), (4, vec![0, 2, 0, 4]));
     repair(&mut bench, 1).unwrap();
     repair(&mut bench, 3).unwrap();
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
@@ -125,7 +126,7 @@ fn u4_an_update_gives_a_number_to_one_board_only() {
     let now = bench.now;
     bench.members[1].receive(now, &reset);
     let Ok(Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
-    assert_eq!((report.exit_code(), numbers(&mut bench)), (0, vec![1, 2, 3, 0]), "{report:?}");
+    assert_eq!((report.exit(), numbers(&mut bench)), (0, vec![1, 2, 3, 0]), "{report:?}");
     assert!(bench.count("282#") > 1, "it was repaired");
-    assert_eq!(update(&mut bench, options(&[2], 128)).exit_code(), 0);
+    assert_eq!(update(&mut bench, options(&[2], 128)).exit(), 0);
 }

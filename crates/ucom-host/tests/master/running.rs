@@ -1,5 +1,6 @@
 //! Descriptions, inputs, parameters, flags, supervision.
 
+use crate::bench::Exit;
 use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
 use ucom_host::master::io::{IoDescription, ParValue};
@@ -328,7 +329,7 @@ fn p19_load_forecast() {
     let options = run_options(&[1, 2, 3]);
     let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
     assert!(matches!(error, Error::Load(_)), "{error}");
-    assert_eq!(error.exit_code(), 4);
+    assert_eq!(error.exit(), 4);
     assert!((0..3).all(|i| !bench.board(i).application.running));
     assert!(bench.sent().iter().all(|t| !t.starts_with("54")));
     bench.go(Request::Run(RunOptions { force: true, ..options }), 60).unwrap();

@@ -1,5 +1,6 @@
 //! Rows of the acceptance table where the other side is a table of frames and nothing else.
 
+use crate::bench::Exit;
 use ucom_host::master::{Error, Event, InitFinding, InitOptions, Outcome, Request, ScanFinding};
 
 use crate::bench::{Bench, Script};
@@ -72,7 +73,7 @@ fn p2_init_of_nobody() {
     let report = init(&mut bench);
     assert_eq!(report.findings, [InitFinding::NoBoards]);
     assert_eq!(bench.count("000#"), 1);
-    assert_eq!(report.exit_code(), 3);
+    assert_eq!(report.exit(), 3);
 }
 
 /// P-3: INITACK is lost: PC_INFO is asked before any repetition of PC_INIT.
@@ -138,7 +139,7 @@ fn p17_d08_second_master() {
         let result = bench.go(Request::Init(InitOptions::default()), 10);
         assert!(matches!(result, Err(Error::ForeignMaster { .. })), "{foreign}: {result:?}");
         assert!(bench.sent().is_empty(), "{:?}", bench.sent());
-        assert_eq!(result.unwrap_err().exit_code(), 4);
+        assert_eq!(result.unwrap_err().exit(), 4);
         let mut bench = Bench::script(golden(1).at(100, foreign));
         let forced = InitOptions { force: true, ..Default::default() };
         assert!(matches!(bench.go(Request::Init(forced), 10), Ok(Outcome::Init(r)) if r.is_ok()));

@@ -1,5 +1,6 @@
 //! Another PC's life signs for single boards (D-08), and single boards that are reset.
 
+use crate::bench::Exit;
 use ucom::Profile;
 use ucom::node::Phase;
 use ucom::{Function, Status};
@@ -77,7 +78,7 @@ fn a_single_reset_is_checked() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let error = bench.go(reset(4), 10).unwrap_err();
     assert!(matches!(error, Error::NoAnswer { board: 4, asked: Function::Info, .. }), "{error:?}");
-    assert_eq!((error.exit_code(), bench.count("004#")), (3, 0));
+    assert_eq!((error.exit(), bench.count("004#")), (3, 0));
     assert!(error.hint().contains("ucom scan"), "{}", error.hint());
 
     // Whatever single frame of it is lost: done, or the board still has its number and that is said.

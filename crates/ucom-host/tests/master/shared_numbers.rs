@@ -1,5 +1,6 @@
 //! Two boards with one number (D-24): a named error in whatever is asked of that number, before anything is changed.
 
+use crate::bench::Exit;
 use ucom::{Profile, Status};
 use ucom_host::master::conformance::ConformanceOptions;
 use ucom_host::master::probe::ProbeOptions;
@@ -33,7 +34,7 @@ fn sharing(flash: [u16; 2], more: &[(u64, &str)]) -> Bench {
 
 fn is_shared(error: &Error, flash: [u16; 2]) -> bool {
     let shared = Error::NumberShared { board: 1, found: flash.to_vec(), given_back: false };
-    *error == shared && error.exit_code() == 4 && error.code() == "number-shared"
+    *error == shared && error.exit() == 4 && error.code() == "number-shared"
 }
 
 /// Everything that names the board, or changes all of them.
@@ -82,7 +83,7 @@ fn refuses(flash: [u16; 2]) {
             match bench.go(request, 60) {
                 Err(error) => assert!(is_shared(&error, flash), "{what}: {error:?}"),
                 Ok(Outcome::Update(report)) => {
-                    assert_eq!(report.exit_code(), 4, "{what}");
+                    assert_eq!(report.exit(), 4, "{what}");
                     let failure = report.boards[0].failure.clone().unwrap();
                     let UpdateFailure::Refused(error) = failure else { panic!("{what}: {failure:?}") };
                     assert!(is_shared(&error, flash), "{what}: {error:?}");
@@ -162,9 +163,7 @@ fn d24_it_is_named_when_it_shows_in_an_update() {
     let options = || UpdateOptions::new(vec![target], image.clone(), 0x3AC1);
     let frames = {
         let mut bench = crate::chain::initialised(&[0x21]);
-        assert!(
-            matches!(bench.go(Request::Update(options()), 60), Ok(Outcome::Update(r)) if r.exit_code() == 0)
-        );
+        assert!(matches!(bench.go(Request::Update(options()), 60), Ok(Outcome::Update(r)) if r.exit() == 0));
         program_frames(&bench)
     };
     for flash in [0x42, 0x21] {
@@ -187,7 +186,7 @@ fn d24_it_is_named_when_it_shows_in_an_update() {
                 let code = failure.as_ref().map(UpdateFailure::code);
                 assert_eq!(code, Some("number-shared"), "{what}: {failure:?}");
                 let erased = report.boards[0].outcome != UpdateOutcome::NotStarted;
-                assert_eq!(report.exit_code(), if erased { 5 } else { 4 }, "{what}: {failure:?}");
+                assert_eq!(report.exit(), if erased { 5 } else { 4 }, "{what}: {failure:?}");
                 assert_eq!(bench.master.shared_numbers().len(), 1, "{what}");
                 for i in 0..2 {
                     assert!(!bench.board(i).status().has(Status::PROG), "{what}: board {i}");

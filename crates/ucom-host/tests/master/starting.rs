@@ -1,5 +1,6 @@
 //! A run that does not come about leaves every board as it was found.
 
+use crate::bench::Exit;
 use ucom::node::Phase;
 use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
@@ -41,7 +42,7 @@ fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
 fn p19_a_refusal_leaves_every_board_as_it_was() {
     let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
-    assert!(matches!(error, Error::Load(_)) && error.exit_code() == 4, "{error}");
+    assert!(matches!(error, Error::Load(_)) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
     // The boards have one program, whose description is known.
     assert_eq!(bench.count("301#"), 0, "nothing was started");

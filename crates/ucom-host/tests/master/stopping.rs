@@ -1,5 +1,6 @@
 //! What is to stop stops: on a bus that loses frames and reports errors, and when a board has only been told to start.
 
+use crate::bench::Exit;
 use ucom::node::Phase;
 use ucom::{ErrorCode, Profile};
 use ucom_host::master::{Error, Master, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel};
@@ -154,7 +155,7 @@ fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     bench.go(run(&[2]), 30).unwrap();
     bench.lose = vec![("> 382#", 100_000), ("> 142#4200", 1)];
     let report = update(&mut bench, options(&[1], 128));
-    assert_eq!(report.exit_code(), 4, "{report:?}");
+    assert_eq!(report.exit(), 4, "{report:?}");
     assert_eq!(bench.count("041#"), 0);
 }
 

@@ -1,5 +1,6 @@
 //! Firmware updates of real boards of this crate and of tables of frames.
 
+use crate::bench::Exit;
 use ucom::Memory;
 use ucom_host::master::update::{
     UpdateFailure, UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateTarget,
@@ -48,7 +49,7 @@ fn golden_update() {
     let before = bench.log.len();
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::Verified, "{report:?}");
-    assert_eq!((report.program_id, report.exit_code(), report.boards[0].attempts), (Some(0x4B3F), 0, 1));
+    assert_eq!((report.program_id, report.exit(), report.boards[0].attempts), (Some(0x4B3F), 0, 1));
     let sent: Vec<String> = bench.log[before..].iter().map(|(.., f)| f.to_string()).collect();
     let prog: Vec<&String> = sent.iter().filter(|t| t.starts_with("2C1#")).collect();
     assert_eq!(prog.len(), 2 * 136);
@@ -126,7 +127,7 @@ fn p10_success_must_be_read_back() {
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::Written);
     assert!(matches!(report.boards[0].failure, Some(UpdateFailure::NotVerified { program_id: 0x1234, .. })));
-    assert_eq!(report.exit_code(), 5);
+    assert_eq!(report.exit(), 5);
 }
 
 /// P-11, U-7: errors 2 and 5 make one attempt, the others three, each begun with XRESET.
@@ -145,7 +146,7 @@ fn p11_attempts_by_error() {
         let mut bench = loader(Loader { special, ..Loader::new(34) });
         let report = update(&mut bench, options(&[1], 1000));
         assert_eq!(bench.count("041#"), attempts, "case {i}");
-        assert_eq!(report.exit_code(), exit, "case {i}: {report:?}");
+        assert_eq!(report.exit(), exit, "case {i}: {report:?}");
         assert!(bench.count("1C1#0400") >= attempts, "case {i}: the transfer is cleared each time");
         let half = report.boards[0].outcome;
         assert_eq!(
@@ -166,7 +167,7 @@ fn p11_attempts_by_error() {
 fn errors_in_the_middle_of_a_block_count() {
     let mut bench = loader(Loader { refuses_at: Some(3), ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
-    assert_eq!((bench.count("041#"), report.exit_code()), (1, 1), "{report:?}");
+    assert_eq!((bench.count("041#"), report.exit()), (1, 1), "{report:?}");
     let code = |f: &UpdateFailure| matches!(f, UpdateFailure::Device { code, .. } if code.number() == 2);
     assert!(report.boards[0].failure.as_ref().is_some_and(code));
 }
@@ -195,12 +196,12 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
     let report = update(&mut bench, wanted);
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
     assert_eq!(**e, Error::WrongBoard { board: 1, wanted: 0x22, found: 0x21 });
-    assert_eq!((report.exit_code(), bench.count("041#")), (4, 0));
+    assert_eq!((report.exit(), bench.count("041#")), (4, 0));
     let mut bench = Bench::script(Script::default().on("201#", &["141#2100021934126E38", "141#0000"]));
     let report = update(&mut bench, options(&[1], 1000));
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
     assert_eq!(**e, Error::WrongSequence { board: 1, says: 2 });
-    assert_eq!((report.exit_code(), bench.count("041#")), (4, 0));
+    assert_eq!((report.exit(), bench.count("041#")), (4, 0));
 }
 
 /// Nobody there: exit code 3, and nothing intrusive was sent.
@@ -208,7 +209,7 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
 fn update_of_nobody() {
     let mut bench = Bench::script(Script::default());
     let report = update(&mut bench, options(&[1], 1000));
-    assert_eq!((report.exit_code(), bench.count("041#")), (3, 0));
+    assert_eq!((report.exit(), bench.count("041#")), (3, 0));
     assert!(report.boards[0].failure.as_ref().unwrap().to_string().contains("nothing heard from it at all"));
 }
 
@@ -227,7 +228,7 @@ fn p12_cancel() {
         let erased = erased || bench.board(0).record().is_none();
         let left = if erased { UpdateOutcome::Incomplete } else { UpdateOutcome::Cancelled };
         assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
-        assert_eq!((report.boards[0].outcome, report.exit_code()), (left, if erased { 5 } else { 4 }));
+        assert_eq!((report.boards[0].outcome, report.exit()), (left, if erased { 5 } else { 4 }));
         assert_eq!(bench.count("1C1#0400"), 1);
         let usable = update(&mut bench, options(&[1], 128));
         assert_eq!(usable.boards[0].outcome, UpdateOutcome::Verified, "{usable:?}");
@@ -268,7 +269,7 @@ fn u2_running_boards() {
     let report = update(&mut bench, options(&[1], 128));
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
     assert_eq!(**e, Error::Running { boards: vec![2] });
-    assert_eq!(report.exit_code(), 4);
+    assert_eq!(report.exit(), 4);
     let forced = UpdateOptions { force: true, ..options(&[1], 128) };
     assert_eq!(update(&mut bench, forced).boards[0].outcome, UpdateOutcome::Verified);
 }
@@ -282,7 +283,7 @@ fn campaign_skips_and_starts() {
     let report = update(&mut bench, all);
     let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
     assert_eq!(outcomes, ["running", "running", "running"]);
-    assert_eq!(report.exit_code(), 0);
+    assert_eq!(report.exit(), 0);
 }
 
 /// Group update by broadcast: selected boards finish, the other one keeps its program.
@@ -306,7 +307,7 @@ fn dry_run() {
     let before = bench.log.len();
     let report = update(&mut bench, UpdateOptions { dry_run: true, ..options(&[1], 1000) });
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
-    assert_eq!((report.exit_code(), report.bytes), (0, 2 * 17 * 64));
+    assert_eq!((report.exit(), report.bytes), (0, 2 * 17 * 64));
     let sent = bench.log[before..].iter().filter(|(_, f, _)| *f == crate::bench::From::Master);
     assert!(sent.map(|(.., f)| f.to_string()).all(|t| ["201#", "200#", "680#"].contains(&t.as_str())));
 }
@@ -363,7 +364,7 @@ fn every_frame_of_an_update_disturbed() {
                     // The next run recovers.
                     bench.fault = None;
                     let mut again = update(&mut bench, options(&[2], 128));
-                    if again.exit_code() == 3 {
+                    if again.exit() == 3 {
                         // The board lost its number.
                         bench.go(Request::Init(InitOptions::default()), 60).unwrap();
                         again = update(&mut bench, options(&[2], 128));

@@ -1,5 +1,6 @@
 //! Updates that do not go to their end: a bus that fails, a cancel, another board in the place of the one that is meant.
 
+use crate::bench::Exit;
 use ucom::{Frame, Status};
 use ucom_host::master::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateReport};
 use ucom_host::master::{Error, Event, Master, Outcome, Request};
@@ -66,7 +67,7 @@ fn d46_a_bus_that_fails_leaves_a_report() {
                 }
                 UpdateOutcome::Incomplete | UpdateOutcome::Written => {
                     assert_eq!(result.failure, Some(UpdateFailure::After(Box::new(bus))), "{at}");
-                    assert_eq!(report.exit_code(), 5, "{at}: {report:?}");
+                    assert_eq!(report.exit(), 5, "{at}: {report:?}");
                 }
                 UpdateOutcome::Verified => assert_eq!((holds.1, &result.failure), (DATE, &None), "{at}"),
                 other => panic!("{at}: {other:?}"),
@@ -86,7 +87,7 @@ fn d46_a_bus_that_fails_leaves_a_report() {
         } else {
             3
         };
-        assert_eq!(report.exit_code(), exit, "{at}: {report:?}");
+        assert_eq!(report.exit(), exit, "{at}: {report:?}");
     }
     let all = ["incomplete", "not-started", "verified", "written"];
     assert_eq!(seen.into_iter().collect::<Vec<_>>(), all);
@@ -108,7 +109,7 @@ fn an_abandoned_update_sends_nothing() {
         let sent = bench.sent().len();
         bench.master.abandon(id, "the adapter is gone");
         let Ok(Outcome::Update(report)) = bench.wait(id, 1) else { panic!() };
-        assert_eq!((report.exit_code(), report.boards[0].outcome), (5, UpdateOutcome::Incomplete));
+        assert_eq!((report.exit(), report.boards[0].outcome), (5, UpdateOutcome::Incomplete));
         bench.run(2000);
         assert!(bench.sent()[sent..].iter().all(|t| t == "680#"), "{:?}", &bench.sent()[sent..]);
         assert!(!bench.master.is_busy());
@@ -118,7 +119,7 @@ fn an_abandoned_update_sends_nothing() {
     let id = bench.master.start(bench.now, Request::Scan).unwrap();
     bench.master.abandon(id, "the adapter is gone");
     let error = bench.wait(id, 1).unwrap_err();
-    assert_eq!((error.exit_code(), error.code()), (3, "bus"));
+    assert_eq!((error.exit(), error.code()), (3, "bus"));
     assert!(error.to_string().contains("the adapter is gone"));
 }
 
@@ -129,7 +130,7 @@ fn p12_a_cancelled_campaign() {
     let begun = |b: &Bench| count(b, "2C2#") >= 3;
     let report = ended(&mut bench, options(&[1, 2, 3], 128), begun, |b, id| b.master.cancel(id));
     let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
-    assert_eq!((outcomes, report.exit_code()), (vec!["verified", "cancelled", "cancelled"], 4));
+    assert_eq!((outcomes, report.exit()), (vec!["verified", "cancelled", "cancelled"], 4));
     assert!(report.boards[1].failure.as_ref().unwrap().to_string().contains("nothing was erased"));
     assert_eq!((check_program(&mut bench, 1, 128), check_program(&mut bench, 2, 128)), (OLD, OLD));
 }
@@ -142,7 +143,7 @@ fn p12_cancelled_while_it_starts() {
     let report = ended(&mut bench, start, |b| count(b, "301#") >= 1, |b, id| b.master.cancel(id));
     let left = UpdateOutcome::Verified;
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
-    assert_eq!((report.boards[0].outcome, report.exit_code()), (left, 5));
+    assert_eq!((report.boards[0].outcome, report.exit()), (left, 5));
     assert_eq!(check_program(&mut bench, 0, 128).1, DATE);
     // It was stopped again; where its answers are lost nobody knows, and that is what is said.
     assert!(!bench.board(0).status().has(ucom::Status::MSTART));
@@ -155,7 +156,7 @@ fn p12_cancelled_while_it_starts() {
     });
     let left = UpdateOutcome::Running;
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
-    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Verified, 5));
+    assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 5));
     assert!(report.boards[0].failure.as_ref().unwrap().to_string().contains("may be started"));
 }
 
@@ -171,15 +172,15 @@ fn a_board_that_is_up_to_date_is_started() {
     let report = ended(&mut cancelled, start.clone(), begun, |b, id| b.master.cancel(id));
     let left = UpdateOutcome::UpToDate;
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
-    assert_eq!((report.exit_code(), count(&cancelled, "301#")), (4, 0));
+    assert_eq!((report.exit(), count(&cancelled, "301#")), (4, 0));
     let blocks = count(&bench, "2C1#");
     let report = update(&mut bench, start.clone());
     let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
-    assert_eq!((outcomes, report.exit_code()), (vec!["running", "running"], 0), "{report:?}");
+    assert_eq!((outcomes, report.exit()), (vec!["running", "running"], 0), "{report:?}");
     assert_eq!(count(&bench, "2C1#"), blocks);
     // All are up to date and run: nothing is left to do.
     let sent = count(&bench, "301#");
-    assert_eq!((update(&mut bench, start).exit_code(), count(&bench, "301#")), (0, sent));
+    assert_eq!((update(&mut bench, start).exit(), count(&bench, "301#")), (0, sent));
 }
 
 /// A board that answers and does not enable programming has reported, not gone silent: exit code 1.
@@ -190,7 +191,7 @@ fn a_board_that_does_not_enable_programming_answers() {
     let report = update(&mut bench, options(&[1], 128));
     let Some(UpdateFailure::Reported(e)) = &report.boards[0].failure else { panic!("{report:?}") };
     assert!(matches!(**e, Error::StatusNotTaken { board: 1, .. }), "{e}");
-    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::NotStarted, 1));
+    assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::NotStarted, 1));
 }
 
 /// U-1 before every attempt: a board that was swapped since the last one gets no XRESET and no program data.
@@ -202,12 +203,12 @@ fn u1_a_board_that_is_swapped_between_attempts() {
     let report = update(&mut bench, options(&[1], 1000));
     let wrong = Error::WrongBoard { board: 1, wanted: 0x21, found: 0x42 };
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::After(Box::new(wrong.clone()))));
-    assert_eq!((bench.count("041#"), report.exit_code()), (1, 5), "{report:?}");
+    assert_eq!((bench.count("041#"), report.exit()), (1, 5), "{report:?}");
     // In the very moment of XRESET: refused, taken out of programming, and nothing is written.
     let mut bench = loader(Loader { flash: |n, _| if n == 0 { "2100" } else { "4200" }, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
-    assert_eq!((count(&bench, "2C1#"), bench.count("1C1#0400"), report.exit_code()), (0, 1, 4));
+    assert_eq!((count(&bench, "2C1#"), bench.count("1C1#0400"), report.exit()), (0, 1, 4));
 }
 
 /// One damaged answer is not another board.
@@ -226,7 +227,7 @@ fn one_damaged_answer_is_no_swapped_board() {
     };
     bench.fault = Some((asked, crate::bench::Fault::Corrupted(1)));
     let report = update(&mut bench, options(&[1], 128));
-    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Verified, 0), "{report:?}");
+    assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 0), "{report:?}");
 }
 
 /// A board that goes silent at XRESET, and another one that takes its number when it is given back (5.4).
@@ -276,7 +277,7 @@ fn u4_repair_that_finds_another_board_is_refused() {
     let report = update(&mut bench, options(&[1], 1000));
     let wrong = Error::WrongBoard { board: 1, wanted: 0x21, found: 0x42 };
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
-    assert_eq!((report.exit_code(), count(&bench, "2C1#")), (4, 0));
+    assert_eq!((report.exit(), count(&bench, "2C1#")), (4, 0));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
     assert_eq!(bench.count("1C1#0800"), 3);
     // Pin off before the number is given (5.4).
@@ -296,12 +297,12 @@ fn d08_a_dry_run_looks_for_another_pc() {
     let report = update(&mut bench, dry.clone());
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
     assert!(matches!(**e, Error::ForeignMaster { .. }), "{e}");
-    assert_eq!(report.exit_code(), 4);
+    assert_eq!(report.exit(), 4);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
     assert!(!bench.master.is_master());
     // Without one: fine, and no life signs either.
     let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
-    assert_eq!(update(&mut bench, dry).exit_code(), 0);
+    assert_eq!(update(&mut bench, dry).exit(), 0);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
 }
 
@@ -321,13 +322,13 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
         let from = bench.log.len();
         let report = update(&mut bench, UpdateOptions { start, ..options(&[1], 128) });
         let wanted = if start { UpdateOutcome::Running } else { UpdateOutcome::UpToDate };
-        assert_eq!((report.boards[0].outcome, report.exit_code()), (wanted, 0), "{report:?}");
+        assert_eq!((report.boards[0].outcome, report.exit()), (wanted, 0), "{report:?}");
         assert!(!bench.board(0).status().has(Status::PROG));
         assert!(bench.log[from..].iter().all(|(.., f)| !f.to_string().starts_with("2C1#")), "not programmed");
     }
     let mut bench = left();
     let report = update(&mut bench, UpdateOptions { dry_run: true, ..options(&[1], 128) });
-    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::UpToDate, 0));
+    assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::UpToDate, 0));
     assert!(bench.board(0).status().has(Status::PROG));
     // It cannot be ended: that is said.
     let mut bench = left();
@@ -335,7 +336,7 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let report = update(&mut bench, options(&[1], 128));
     let code = report.boards[0].failure.as_ref().map(UpdateFailure::code);
     assert_eq!((code, report.boards[0].outcome), (Some("still-programming"), UpdateOutcome::UpToDate));
-    assert_ne!(report.exit_code(), 0);
+    assert_ne!(report.exit(), 0);
 }
 
 /// P-12: cancelled at any time while such boards are looked at and taken out of programming mode: none stays in it that is called

@@ -1,5 +1,6 @@
 //! Updates of several boards at once: who takes part, who must not, and what is said of those that fell behind.
 
+use crate::bench::Exit;
 use ucom::{Frame, Profile};
 use ucom_host::master::update::{UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome};
 use ucom_host::master::{Error, Request};
@@ -78,7 +79,7 @@ fn d46_a_group_is_refused_while_another_board_listens() {
         let Some(UpdateFailure::Refused(e)) = &result.failure else { panic!("{report:?}") };
         assert!(matches!(**e, Error::StatusNotTaken { board: 9, .. }), "{e}");
     }
-    assert_eq!((report.exit_code(), broadcasts(&bench), bench.count("041#")), (4, 0, 0));
+    assert_eq!((report.exit(), broadcasts(&bench), bench.count("041#")), (4, 0, 0));
     assert_eq!((check_program(&mut bench, 0, 128), check_program(&mut bench, 1, 128)), (OLD, OLD));
 }
 
@@ -89,7 +90,7 @@ fn d42_a_group_waits_for_every_board() {
     bench.board(2).flash.erase_us = 4_000_000;
     let before = bench.log.len();
     let report = update(&mut bench, group(&[1, 3]));
-    assert_eq!(report.exit_code(), 0, "{report:?}");
+    assert_eq!(report.exit(), 0, "{report:?}");
     let (mut in_block, mut answers) = (0, 2);
     for (_, _, frame) in &bench.log[before..] {
         match frame.to_string().get(..4) {
@@ -122,7 +123,7 @@ fn a_board_that_may_listen_unheard_ends_the_broadcast() {
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
     let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
     assert_eq!(outcomes, ["verified", "verified", "not-started"], "{report:?}");
-    assert_eq!((report.exit_code(), broadcasts(&bench)), (3, 0));
+    assert_eq!((report.exit(), broadcasts(&bench)), (3, 0));
     assert_eq!(check_program(&mut bench, 2, 128), OLD);
 }
 
@@ -138,7 +139,7 @@ fn a_board_that_fell_behind_is_asked() {
         }
         bench.lose = vec![("> 182#", 1), ("> 102#", 1)];
         let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
-        assert_eq!(report.exit_code(), 0, "block {block}: {report:?}");
+        assert_eq!(report.exit(), 0, "block {block}: {report:?}");
         assert_eq!((bench.count("042#"), check_program(&mut bench, 1, 128).1), (1, DATE), "block {block}");
     }
 }
@@ -154,7 +155,7 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     bench.lose = vec![("> 182#", u32::MAX), ("> 142#", u32::MAX), ("> 102#", u32::MAX), ("> 0C2#", u32::MAX)];
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
     assert_eq!(report.boards[0].outcome, UpdateOutcome::Verified, "{report:?}");
-    assert_eq!((report.boards[1].outcome, report.exit_code()), (UpdateOutcome::Unknown, 5));
+    assert_eq!((report.boards[1].outcome, report.exit()), (UpdateOutcome::Unknown, 5));
     let failure = report.boards[1].failure.as_ref().unwrap();
     assert!(matches!(failure, UpdateFailure::MayBeErased(_)), "{failure}");
     assert!(failure.to_string().contains("may be erased"));
@@ -172,7 +173,7 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     bench.cut.clear();
     bench.lose = vec![("> 182#", u32::MAX)];
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
-    assert_eq!((report.boards[1].outcome, report.exit_code()), (UpdateOutcome::NotStarted, 3), "{report:?}");
+    assert_eq!((report.boards[1].outcome, report.exit()), (UpdateOutcome::NotStarted, 3), "{report:?}");
     assert_eq!(check_program(&mut bench, 1, 128), OLD);
 }
 
@@ -195,7 +196,7 @@ fn d43_not_every_error_ends_a_transfer() {
             let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
             assert_ne!(check_program(&mut bench, 1, 128), OLD, "{code}: it was erased");
             let expected = if heard { (UpdateOutcome::Verified, 0) } else { (UpdateOutcome::Unknown, 5) };
-            assert_eq!((report.boards[1].outcome, report.exit_code()), expected, "{code}: {report:?}");
+            assert_eq!((report.boards[1].outcome, report.exit()), expected, "{code}: {report:?}");
         }
     }
 }
@@ -204,7 +205,7 @@ fn d43_not_every_error_ends_a_transfer() {
 #[test]
 fn u3_what_was_there_before_proves_nothing() {
     let mut bench = initialised(&[0x21, 0x42]);
-    assert_eq!(update(&mut bench, group(&[1, 2])).exit_code(), 0);
+    assert_eq!(update(&mut bench, group(&[1, 2])).exit(), 0);
     let forced = UpdateOptions { force: true, ..group(&[1, 2]) };
     let start = bench.log.len();
     let id = bench.master.start(bench.now, Request::Update(forced)).unwrap();
@@ -242,7 +243,7 @@ fn p12_a_cancel_reaches_every_board_of_the_group() {
     assert!(bench.board(1).status().has(ucom::Status::PROG));
     bench.master.cancel(id);
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 60) else { panic!() };
-    assert_ne!(report.exit_code(), 0);
+    assert_ne!(report.exit(), 0);
     assert!(!bench.board(1).status().has(ucom::Status::PROG), "{report:?}");
 }
 
@@ -253,5 +254,5 @@ fn d04_no_broadcast_no_group() {
     let mut bench = Bench::chain_with(&[0x21, 0x42], profile);
     assert!(bench.go(Request::Init(Default::default()), 60).is_ok());
     let report = update(&mut bench, group(&[1, 2]));
-    assert_eq!((report.exit_code(), broadcasts(&bench)), (0, 0), "{report:?}");
+    assert_eq!((report.exit(), broadcasts(&bench)), (0, 0), "{report:?}");
 }

@@ -1,6 +1,7 @@
 //! Updates by other plans and headers than the usual ones: what each cycle may destroy, what can be verified, and what the
 //! report says where nothing can.
 
+use crate::bench::Exit;
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{Checksum, Memory, Profile};
 use ucom_host::master::update::{
@@ -45,14 +46,14 @@ fn d40_what_the_first_cycle_may_have_erased() {
             let board = Loader { special, ..Loader::new(blocks) };
             let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
             let report = update(&mut bench, two(plan));
-            assert_eq!(report.exit_code(), if erased { 5 } else { before }, "{plan}: {report:?}");
+            assert_eq!(report.exit(), if erased { 5 } else { before }, "{plan}: {report:?}");
             assert_eq!(report.boards[0].outcome, left, "{plan}: {report:?}");
         }
         // The last block: erased by every plan.
         let board = Loader { special: |_, block| (block == 16).then_some("081#03"), ..Loader::new(blocks) };
         let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
         let expected = if plan == Plan::VerifyWrite { 1 } else { 5 };
-        assert_eq!(update(&mut bench, two(plan)).exit_code(), expected, "{plan}");
+        assert_eq!(update(&mut bench, two(plan)).exit(), expected, "{plan}");
     }
 }
 
@@ -63,11 +64,7 @@ fn d40_two_images_reach_two_memories() {
         let mut bench = Bench::chain_with(&[0x21], with_plan(plan));
         assert!(bench.go(Request::Init(InitOptions::default()), 60).is_ok());
         let report = update(&mut bench, two(plan));
-        assert_eq!(
-            (report.boards[0].outcome, report.exit_code()),
-            (UpdateOutcome::Verified, 0),
-            "{report:?}"
-        );
+        assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 0), "{report:?}");
         let flash = &bench.board(0).flash;
         assert_eq!(flash.bytes(Memory::Program)[..1000], image(1000));
         assert_eq!(flash.bytes(memory)[0x40..0x80], [9; 64], "{plan}");
@@ -94,9 +91,9 @@ fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> 
 fn u10_what_cannot_be_verified_says_so() {
     let report = raw("3F4BC13A", 0x1B, None);
     let board = &report.boards[0];
-    assert_eq!((board.outcome, &board.failure, report.exit_code()), (UpdateOutcome::Written, &None, 5));
+    assert_eq!((board.outcome, &board.failure, report.exit()), (UpdateOutcome::Written, &None, 5));
     // As good as verified to whoever says so.
-    assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit_code(), 0);
+    assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit(), 0);
     assert_eq!((report.unverifiable, report.program_id), (Some(Unverifiable::RawPlan), None));
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
     let shown = [board.before, board.after].map(|info| info.map(|i| (i.program_id, i.date)));
@@ -106,7 +103,7 @@ fn u10_what_cannot_be_verified_says_so() {
         let report = raw(after, status, None);
         let failure = report.boards[0].failure.clone();
         assert!(matches!(failure, Some(UpdateFailure::NotValid { .. })), "{report:?}");
-        assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Written, 5));
+        assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Written, 5));
     }
 }
 
@@ -114,14 +111,14 @@ fn u10_what_cannot_be_verified_says_so() {
 #[test]
 fn u10_a_named_program_id_is_verified() {
     let report = raw("3F4BC13A", 0x1B, Some(0x4B3F));
-    assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Verified, 0), "{report:?}");
+    assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 0), "{report:?}");
     assert_eq!((report.unverifiable, report.program_id), (None, Some(0x4B3F)));
     let report = raw("3F4BC13A", 0x1B, Some(0x4B40));
     assert!(matches!(
         report.boards[0].failure,
         Some(UpdateFailure::NotVerified { program_id: 0x4B3F, wanted_id: 0x4B40, wanted_date: None, .. })
     ));
-    assert_eq!(report.exit_code(), 5);
+    assert_eq!(report.exit(), 5);
     // There already (U-3).
     let report = raw("3F4BC13A", 0x1B, Some(OLD.0));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::UpToDate, 0));
@@ -130,7 +127,7 @@ fn u10_a_named_program_id_is_verified() {
     let other = UpdateOptions { expect_program_id: Some(0x4B40), ..options(&[1], 1000) };
     let error = bench.go(Request::Update(other), 60).unwrap_err();
     assert_eq!(error, Error::Plan(PlanError::OtherProgram { image: 0x4B3F, expected: 0x4B40 }));
-    assert_eq!((error.exit_code(), bench.sent().len()), (4, 0));
+    assert_eq!((error.exit(), bench.sent().len()), (4, 0));
     let same = UpdateOptions { expect_program_id: Some(0x4B3F), ..options(&[1], 1000) };
     assert_eq!(update(&mut bench, same).boards[0].outcome, UpdateOutcome::Verified);
 }
@@ -141,7 +138,7 @@ fn u9_not_where_nothing_is_expected() {
     let board = Loader { special: |_, block| (block == 31).then_some(""), ..Loader::new(32) };
     let mut bench = Bench::new(with_plan(Plan::Raw), vec![Box::new(board)]);
     let report = update(&mut bench, options(&[1], 1000));
-    assert_eq!((report.exit_code(), report.boards[0].attempts), (5, 3), "{report:?}");
+    assert_eq!((report.exit(), report.boards[0].attempts), (5, 3), "{report:?}");
 }
 
 /// Boards of this crate without checksums, or without headers: written, started, and said to be unverified.
@@ -156,7 +153,7 @@ fn boards_without_checksum_or_header() {
         assert!(bench.go(Request::Init(InitOptions::default()), 60).is_ok());
         let unverified = UpdateOptions { start: true, accept_unverified: true, ..options(&[1], bytes) };
         let report = update(&mut bench, unverified);
-        assert_eq!((report.boards[0].outcome, report.exit_code()), (UpdateOutcome::Running, 0), "{report:?}");
+        assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Running, 0), "{report:?}");
         assert_eq!(report.unverifiable, Some(why));
         assert_eq!(bench.board(0).flash.bytes(Memory::Program)[..bytes], image(bytes));
     }

@@ -12,6 +12,7 @@ mod order;
 mod program;
 mod restore;
 mod table;
+use crate::master::ErrorKind;
 use serde::Serialize;
 
 use super::holders::one_board_each;
@@ -118,12 +119,12 @@ impl ConformanceReport {
         self.tests.iter().filter(|t| t.verdict == Verdict::Pass).count()
     }
 
-    /// Exit code of the command: that of the error that ended the tests (5 cancelled, 3 no answer), 1 when a test failed or
-    /// a board is not as it was found, else 0.
-    pub fn exit_code(&self) -> u8 {
+    /// What kind of failure it is: that of the error that ended the tests; of the board when a test failed, or a board is not
+    /// as it was found. `None`: every test was passed.
+    pub fn failure(&self) -> Option<ErrorKind> {
         match &self.error {
-            Some(error) => error.exit_code(),
-            None => u8::from(self.failed() > 0 || !self.left.is_empty()),
+            Some(error) => Some(error.kind()),
+            None => (self.failed() > 0 || !self.left.is_empty()).then_some(ErrorKind::Device),
         }
     }
 }

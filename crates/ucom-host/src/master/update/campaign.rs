@@ -3,6 +3,7 @@
 use super::plan::UpdatePlan;
 use super::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateResult};
 use crate::master::Error;
+use crate::master::ErrorKind;
 use crate::master::link::Link;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Header};
@@ -102,12 +103,13 @@ impl Campaign {
 
     /// An error of a step, named by what it left behind.
     pub fn fail_with(&mut self, board: u8, error: Error) {
-        let refused = error.exit_code() == 4;
-        let error = Box::new(error);
+        let (kind, error) = (error.kind(), Box::new(error));
         let failure = match self.stage(board) {
-            Stage::Untouched if refused => UpdateFailure::Refused(error),
-            Stage::Untouched if error.exit_code() == 1 => UpdateFailure::Reported(error),
-            Stage::Untouched => UpdateFailure::NoAnswer(error),
+            Stage::Untouched => match kind {
+                ErrorKind::Refused => UpdateFailure::Refused(error),
+                ErrorKind::Device => UpdateFailure::Reported(error),
+                ErrorKind::Usage | ErrorKind::NoLink | ErrorKind::Fault => UpdateFailure::NoAnswer(error),
+            },
             Stage::MaybeErased => UpdateFailure::MayBeErased(error),
             _ => UpdateFailure::After(error),
         };

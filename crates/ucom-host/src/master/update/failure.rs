@@ -1,6 +1,7 @@
-//! Why a board was not updated, with the facts, the exit code and what helps.
+//! Why a board was not updated, with the facts, the kind and what helps.
 use super::UpdateOutcome;
 use crate::master::Error;
+use crate::master::ErrorKind;
 use ucom::{ErrorCode, Status};
 
 /// Why a board was not updated.
@@ -99,19 +100,19 @@ pub enum UpdateFailure {
 }
 
 impl UpdateFailure {
-    /// Exit code of the command: 1 the board reported an error before anything was erased, 3 no answer, 4 refused, or
-    /// cancelled before anything was erased, 5 failed or cancelled after that.
-    pub fn exit_code(&self) -> u8 {
+    /// What kind of failure it is: whatever fails or is cancelled once something may be erased is a fault.
+    pub fn kind(&self) -> ErrorKind {
         match self {
-            Self::Refused(e) | Self::StillProgramming(e) => match e.exit_code() {
-                2 => 2,
-                3 => 3,
-                _ => 4,
+            Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {
+                kind @ (ErrorKind::Usage | ErrorKind::NoLink) => kind,
+                ErrorKind::Refused | ErrorKind::Device | ErrorKind::Fault => ErrorKind::Refused,
             },
-            Self::NoAnswer(_) | Self::Timeout { erased: false, .. } => 3,
-            Self::Device { erased: false, .. } | Self::Reported(_) => 1,
+            Self::NoAnswer(_) | Self::Timeout { erased: false, .. } => ErrorKind::NoLink,
+            Self::Device { erased: false, .. } | Self::Reported(_) => ErrorKind::Device,
             Self::Skipped { .. }
-            | Self::Cancelled { left: UpdateOutcome::Cancelled | UpdateOutcome::UpToDate } => 4,
+            | Self::Cancelled { left: UpdateOutcome::Cancelled | UpdateOutcome::UpToDate } => {
+                ErrorKind::Refused
+            }
             Self::Device { .. }
             | Self::Timeout { .. }
             | Self::NotVerified { .. }
@@ -119,7 +120,7 @@ impl UpdateFailure {
             | Self::NotRunning(_)
             | Self::After(_)
             | Self::MayBeErased(_)
-            | Self::Cancelled { .. } => 5,
+            | Self::Cancelled { .. } => ErrorKind::Fault,
         }
     }
 

@@ -56,7 +56,7 @@ pub struct UpdateOptions {
     pub force: bool,
     /// Start the application at the end.
     pub start: bool,
-    /// An image that cannot be verified is as good as one that was: exit code 0 (plan `raw`, `prog.header` or
+    /// An image that cannot be verified is as good as one that was: no failure (plan `raw`, `prog.header` or
     /// `prog.checksum` `none`, without [`expect_program_id`](Self::expect_program_id)).
     pub accept_unverified: bool,
     /// Go on with the next board after one has failed.

@@ -1,4 +1,5 @@
 //! What goes over the wire: the blocks of both cycles (D-40, D-41).
+use crate::master::ErrorKind;
 use core::fmt;
 
 use super::UpdateOptions;
@@ -61,11 +62,11 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Exit code of the commands: 2 wrong usage, 4 refused by a check.
-    pub fn exit_code(&self) -> u8 {
+    /// What kind of failure it is.
+    pub fn kind(&self) -> ErrorKind {
         match self {
-            Self::OtherProgram { .. } => 4,
-            _ => 2,
+            Self::OtherProgram { .. } => ErrorKind::Refused,
+            _ => ErrorKind::Usage,
         }
     }
 

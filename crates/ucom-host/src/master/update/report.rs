@@ -1,5 +1,7 @@
-//! How an update ended, named, with the exit code of the command.
+//! How an update ended, named, with the kind of failure.
 use serde::Serialize;
+
+use crate::master::ErrorKind;
 
 use super::{PlannedImage, Unverifiable, UpdateFailure};
 use ucom::BoardInfo;
@@ -107,17 +109,15 @@ pub struct UpdateReport {
 }
 
 impl UpdateReport {
-    /// Exit code of the command: that of the worst board (5, then 3, 1, 4, 2).
-    pub fn exit_code(&self) -> u8 {
-        let codes = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::exit_code);
+    /// What kind of failure it is: the gravest of any board. `None`: all is done.
+    pub fn failure(&self) -> Option<ErrorKind> {
+        let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
         // Done, says the board, and nobody can tell.
         let trusted = |b: &&UpdateResult| {
             let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
             self.unverifiable.is_some() && !self.accept_unverified && done && b.failure.is_none()
         };
-        let codes = codes.chain(self.boards.iter().filter(trusted).map(|_| 5));
-        let rank = |code: &u8| [0, 2, 4, 1, 3, 5].iter().position(|c| c == code);
-        codes.max_by_key(rank).unwrap_or(0)
+        kinds.chain(self.boards.iter().filter(trusted).map(|_| ErrorKind::Fault)).max()
     }
 }
 

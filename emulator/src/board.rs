@@ -1,5 +1,5 @@
 //! The board in its world: firmware, simulated arm with drives and gripper on the joint bus, a host on a serial line.
-use std::cell::{Ref, RefCell, RefMut};
+use std::cell::{Ref, RefCell};
 use std::rc::Rc;
 
 use can_link::{CanFrame, Id};
@@ -117,25 +117,9 @@ impl Board {
         }
     }
 
-    /// Steps until `done` says so, at most `ms` milliseconds; whether it did.
-    pub fn run_while(&mut self, ms: u64, mut go_on: impl FnMut(&mut Self) -> bool) -> bool {
-        for _ in 0..ms {
-            if !go_on(self) {
-                return true;
-            }
-            self.step();
-        }
-        !go_on(self)
-    }
-
     /// The arm and its drives.
     pub fn plant(&self) -> Ref<'_, Plant> {
         self.plant.borrow()
-    }
-
-    /// The arm and its drives, to change something.
-    pub fn plant_mut(&mut self) -> RefMut<'_, Plant> {
-        self.plant.borrow_mut()
     }
 
     /// Begin a fault of a node, of the arm, of the safety input or of the bus; `FaultKind`s of the simulator's own serial

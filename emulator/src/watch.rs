@@ -25,19 +25,6 @@ impl Machine {
         self.uc.get_data().observers.probe(counter.0)
     }
 
-    /// Contents of a variable.
-    pub fn symbol_bytes(&self, name: &str) -> Result<Vec<u8>, ElfError> {
-        let symbol = self.elf().symbol(name)?;
-        Ok(self.memory(symbol.address, symbol.size as usize).unwrap_or_default())
-    }
-
-    /// Change a variable's first bytes from outside, as a debugger does.
-    pub fn set_symbol(&mut self, name: &str, bytes: &[u8]) -> Result<(), ElfError> {
-        let symbol = self.elf().symbol(name)?;
-        self.poke(symbol.address, &bytes[..bytes.len().min(symbol.size as usize)]);
-        Ok(())
-    }
-
     /// What the firmware has written into RTT's first channel since the last call, as a probe reads it: encoded by defmt.
     pub fn defmt(&mut self) -> Vec<u8> {
         let Ok(block) = self.elf().symbol("_SEGGER_RTT") else { return Vec::new() };

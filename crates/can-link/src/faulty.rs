@@ -165,11 +165,6 @@ impl<B: CanBus> Faulty<B> {
         Self { bus, out, heard, clock: Box::new(clock) }
     }
 
-    /// What happened so far to frames sent.
-    pub fn sent_counts(&self) -> Counts {
-        self.out.counts
-    }
-
     /// What happened so far to frames heard.
     pub fn received_counts(&self) -> Counts {
         self.heard.counts

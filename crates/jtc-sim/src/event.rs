@@ -57,8 +57,6 @@ pub enum Event {
     FaultEnds(FaultKind),
     /// The watchdog reset the controller.
     WatchdogReset,
-    /// The host switched the controller off and on.
-    PowerCycle,
 }
 
 impl fmt::Display for Event {
@@ -76,7 +74,6 @@ impl fmt::Display for Event {
             Self::FaultBegins(kind) => write!(f, "fault begins: {kind}"),
             Self::FaultEnds(kind) => write!(f, "fault ends: {kind}"),
             Self::WatchdogReset => f.write_str("the watchdog resets the controller"),
-            Self::PowerCycle => f.write_str("the controller's power is cycled"),
         }
     }
 }

@@ -10,7 +10,7 @@ use can_link::CanFrame;
 pub use bus::{BusEntry, CanPeers, Outcome, Wire, WireFault, frame_time};
 pub use ram::{MessageRam, Target};
 
-use crate::clock::{NEVER, SECOND, Time};
+use crate::clock::{NEVER, Time};
 use bus::NOMINAL_BIT;
 use ram::ELEMENT_SIZES;
 use transmit::Pending;
@@ -397,10 +397,5 @@ impl Fdcan {
     pub fn lines(&self) -> [bool; 2] {
         let active = self.ir & self.ie;
         [active & !self.ils != 0 && self.ile & 1 != 0, active & self.ils != 0 && self.ile & 2 != 0]
-    }
-
-    /// Nominal bit time that the registers give.
-    pub fn nominal_bit(&self) -> Time {
-        SECOND.checked_div(u64::from(self.rates().0)).unwrap_or(NEVER)
     }
 }

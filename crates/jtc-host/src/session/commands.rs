@@ -5,10 +5,10 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, ExecCommand, FrameType, Status, TrajectoryState, fixed};
 
 use super::{Session, not_allowed};
+use crate::Error;
 use crate::check::CheckedTrajectory;
 use crate::error::accepted;
 use crate::port::Port;
-use crate::{Error, words};
 
 /// Longest that a controller waits with teaching until the arm is held, and a little more.
 const TEACHING: Duration = Duration::from_secs(11);
@@ -245,14 +245,5 @@ impl<P: Port> Session<P> {
         } else {
             Ok(status)
         }
-    }
-
-    /// One line about where the controller is.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Session::next_status`].
-    pub fn where_now(&mut self) -> Result<String, Error> {
-        Ok(words::waiting_for(&self.fresh_status()?))
     }
 }

@@ -1,13 +1,13 @@
 //! What users of the world see and do.
 use jtc_bus::{Frame, NODES};
-use jtc_core::{BusState, Config, Telemetry};
+use jtc_core::{BusState, Telemetry};
 use jtc_dynamics::{ArmModel, JointVec};
 
 use super::{TICK_US, World};
 use crate::board::Worked;
 use crate::bus::{BusStatistics, TimedFrame};
 use crate::config::SimConfig;
-use crate::event::{Event, Log};
+use crate::event::Log;
 use crate::faults::{Fault, FaultKind, Trigger};
 use crate::hand::HandPath;
 use crate::invariants::Moment;
@@ -101,11 +101,6 @@ impl World {
         &self.config
     }
 
-    /// Settings of the controller.
-    pub fn controller_config(&self) -> &Config {
-        &self.config.controller
-    }
-
     /// The frame that the controller gave out in the last tick.
     pub fn sent(&self) -> Option<&Frame> {
         self.sent.as_ref()
@@ -174,13 +169,6 @@ impl World {
         self.hands.push(path);
         let trigger = Trigger::At(self.now_us() / TICK_US);
         self.inject(Fault { kind, trigger, duration_ms: None });
-    }
-
-    /// Switch the controller's board off and on.
-    pub fn power_cycle_controller(&mut self) {
-        self.log.push(self.now_us(), Event::PowerCycle);
-        self.board.reset();
-        self.restart();
     }
 
     /// The millisecond that has just passed, for the checker of invariants.

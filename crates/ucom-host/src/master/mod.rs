@@ -312,12 +312,6 @@ impl Master {
         }
     }
 
-    /// Snapshots of a board: whole ones, those with a gap, packages beyond the dimension.
-    pub fn snapshot_counts(&self, board: u8) -> (u64, u64, u64) {
-        let core = lock(&self.core);
-        core.data.get(&board).map_or((0, 0, 0), |d| (d.so.complete, d.so.incomplete, d.so.beyond))
-    }
-
     /// Makes this PC the master without a procedure: life signs from now on.
     pub fn begin_session(&mut self, now: u64) {
         let mut core = lock(&self.core);

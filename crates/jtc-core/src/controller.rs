@@ -371,4 +371,17 @@ mod tests {
         assert_eq!(size_of::<[RawPoint; POINTS_MAX]>(), 432_000);
         assert!(bytes <= 448 * 1024, "{bytes} bytes");
     }
+
+    /// An accepted teaching waits as long as enabling may take, and is over then: nobody expects the arm to go soft.
+    #[test]
+    fn j25_teaching_waits_for_a_while_only() {
+        let most = Config::avena().enable_timeout_ms;
+        for (waited_ms, waits) in [(0, true), (most - 2, true), (most - 1, false), (most, false)] {
+            let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+            (controller.state, controller.teaching) = (ControllerState::HoldPos, true);
+            controller.teaching_waits_ms = waited_ms;
+            controller.hold();
+            assert_eq!(controller.teaching, waits, "{waited_ms} ms");
+        }
+    }
 }

@@ -127,3 +127,40 @@ impl Errors {
 fn any(joints: &[u16; JOINTS]) -> bool {
     joints.iter().fold(0, |all, bits| all | bits) != 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INTERNAL: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
+
+    /// An error is in both words from when it is raised; in that of what has occurred until the host clears that, too.
+    #[test]
+    fn j21_what_is_raised_has_occurred_until_that_is_cleared() {
+        for (raise, word) in [
+            (Errors::raise_emergency_input as fn(&mut Errors), error::EMERGENCY_INPUT | error::EXTERNAL),
+            (Errors::raise_device, INTERNAL),
+            (Errors::raise_external_joints, error::EXTERNAL_JOINTS | error::EXTERNAL),
+            (|errors| errors.raise_joints(&[0, 0, 4, 0, 0, 0]), INTERNAL | error::INTERNAL_JOINTS),
+            (|errors| errors.raise_can(1), INTERNAL | error::INTERNAL_CAN),
+            (|errors| errors.raise_joints(&[0; JOINTS]), 0),
+            (|errors| errors.raise_can(0), 0),
+        ] {
+            let mut errors = Errors::default();
+            raise(&mut errors);
+            assert_eq!((errors.word(), errors.occurred(), errors.any()), (word, word, word != 0));
+            errors.clear_current();
+            assert_eq!((errors.word(), errors.occurred(), errors.any()), (0, word, false));
+            errors.clear_occurred();
+            assert_eq!(errors.occurred(), 0);
+        }
+    }
+
+    #[test]
+    fn j66_what_was_acted_upon_has_occurred_and_is_not_current() {
+        let mut errors = Errors::default();
+        errors.note_joints(&[0, 2, 0, 0, 0, 0]);
+        assert_eq!((errors.word(), errors.occurred()), (0, error::INTERNAL | error::INTERNAL_JOINTS));
+        assert_eq!((errors.joint(0), errors.joint(1)), ((0, 0), (0, 2)));
+    }
+}

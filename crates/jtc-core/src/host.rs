@@ -366,3 +366,6 @@ impl From<Result<(), DataStatus>> for Progress {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -178,4 +178,28 @@ mod tests {
         assert_eq!(records.lost(), 2);
         assert_eq!(all(&mut records), (0..64).map(|n| (0, good(n))).collect::<Vec<_>>());
     }
+
+    /// However long it runs: an index that grew without end would overflow.
+    #[test]
+    fn j04_the_ring_stays_a_ring() {
+        let mut queue = ResponseQueue::new();
+        for n in 0..200 {
+            assert!(queue.first < RECORDS_MAX, "{n}");
+            queue.push(good(n), false);
+            assert_eq!(queue.pop(), Some(good(n)));
+        }
+    }
+
+    /// The others move up, wherever that of noise was.
+    #[test]
+    fn j04_what_goes_for_another_leaves_the_others_in_order() {
+        for place in [0, 1, 30, 62, 63] {
+            let mut records = ResponseQueues::new();
+            (0..place).for_each(|n| records.push(0, good(n), false));
+            records.push(0, NOISE, true);
+            (place..64).for_each(|n| records.push(0, good(n), false));
+            assert_eq!(records.lost(), 1);
+            assert_eq!(all(&mut records), (0..64).map(|n| (0, good(n))).collect::<Vec<_>>(), "{place}");
+        }
+    }
 }

@@ -95,3 +95,28 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use crate::motion::JointTorque;
+    use crate::pid::PidTorque;
+
+    #[test]
+    fn j40_j41_j42_telemetry_tells_every_part_of_a_torque() {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        controller.motion.torque[2] = JointTorque {
+            model: 1.0,
+            pid: PidTorque { p: 2.0, i: 4.0, d: 8.0 },
+            friction: 16.0,
+            payload: 32.0,
+            brake: 64.0,
+            blend: 128.0,
+        };
+        controller.observe(&[0.0, 0.0, 250.0, 0.0, 0.0, 0.0]);
+        let joint = controller.telemetry.joints[2];
+        assert_eq!((joint.torque_model, joint.torque_friction, joint.torque_other), (1.0, 16.0, 224.0));
+        assert_eq!((joint.torque_p, joint.torque_i, joint.torque_d, joint.torque), (2.0, 4.0, 8.0, 250.0));
+    }
+}

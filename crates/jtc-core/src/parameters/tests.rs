@@ -1,6 +1,9 @@
 //! The bounds of parameters (J-06): each is reached, and nothing is beyond.
+extern crate std;
+use std::vec::Vec;
+
 use super::*;
-use crate::Config;
+use crate::{Config, ControllerState};
 
 const BOUNDS: ParameterBounds = ParameterBounds::known_drives();
 
@@ -121,4 +124,94 @@ fn j06_masses_and_inertias_reach_their_bounds() {
     assert!(with(|link| link.mass = 0.0) && !with(|link| link.mass = -0.01));
     assert!(with(|link| link.inertia[4] = 100.0) && !with(|link| link.inertia[4] = 100.1));
     assert!(with(|link| link.inertia[4] = -100.0) && !with(|link| link.inertia[4] = -100.1));
+}
+
+/// Friction against the motion is told as positive; at rest there is no motion, and it is told as it was given.
+#[test]
+fn j06_what_is_refused_is_told_with_its_value() {
+    for (velocity, torque, value) in
+        [(0.0, 26.0, 26.0), (0.0, -26.0, -26.0), (0.125, 101.0, 101.0), (-0.125, -101.0, 101.0)]
+    {
+        assert_eq!(one_torque(velocity, torque).map_err(|e| e.value), Err(value), "{torque} at {velocity}");
+    }
+}
+
+/// Between standstill and a sixteenth of the velocity limit are as many speeds as above.
+#[test]
+fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
+    let sixteenth = joint().velocity_max / 16.0;
+    for (reached, found) in [(0.5, 1.0), (2.5, 3.0), (14.5, 15.0)] {
+        // The bound of slow speeds, 100 N·m, is reached at so many steps, of which a sixteenth has sixteen.
+        let c1 = 100.0 / (sixteenth * reached / 16.0);
+        let refused = BOUNDS.check_polynomial(&[0.0, c1, 0.0, 0.0, 0.0, 0.0], &joint());
+        assert_eq!(refused.map_err(|e| e.velocity), Err(Some(sixteenth * found / 16.0)), "{reached}");
+    }
+}
+
+/// A row of a table is named before what follows from it at standstill.
+#[test]
+fn j06_of_a_table_the_first_row_in_motion_is_named() {
+    let table = TableOf {
+        velocity: core::array::from_fn(|i| (i as f32 - 10.0) * 0.125),
+        temperature: core::array::from_fn(|i| 20.0 + i as f32),
+        torque: core::array::from_fn(|i| [if i < 10 { 0.0 } else { 101.0 }; 20]),
+    };
+    assert_eq!(BOUNDS.check_table(&table, &joint()).map_err(|e| e.velocity), Err(Some(0.125)));
+}
+
+#[test]
+fn j06_a_model_may_need_the_whole_torque_limit() {
+    for (times, held) in [(1.0, true), (0.999, false), (1.001, true)] {
+        let mut controller = bench();
+        let dynamics = Dynamics::new(&crate::Parameters::avena().model, [9.81, 0.0, 0.0]);
+        let needed = dynamics.gravity_torque(controller.nodes.positions());
+        assert!(needed[1].abs() > 1.0, "{needed:?}");
+        for (joint, needed) in controller.config.joints.iter_mut().zip(needed) {
+            joint.torque_max = times * needed.abs();
+        }
+        assert_eq!(controller.holdable(&dynamics), held, "{times}");
+    }
+}
+
+fn bench() -> Controller<[RawPoint; 4]> {
+    let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+    controller.state = ControllerState::HoldPos;
+    controller
+}
+
+/// Gravity from the side, and limits that no arm keeps there.
+#[test]
+fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
+    for (known, torque_max, taken) in [(false, 0.01, true), (true, 0.01, false), (true, 500.0, true)] {
+        let mut controller = bench();
+        controller.config.gravity = [9.81, 0.0, 0.0];
+        controller.config.joints.iter_mut().for_each(|joint| joint.torque_max = torque_max);
+        if known {
+            controller.nodes = crate::nodes::Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        }
+        let verdict = controller.set_model(&crate::Parameters::avena().model);
+        assert_eq!(verdict.is_ok(), taken, "{known} {torque_max}");
+        assert_eq!(controller.given.missing() & Given::MODEL == 0, taken, "{known} {torque_max}");
+    }
+}
+
+/// A joint a tick: each is checked once and copied once.
+#[test]
+fn j06_a_table_takes_twelve_ticks() {
+    let crate::Friction::Table(tables) = crate::Parameters::avena_friction_table() else {
+        panic!("no table")
+    };
+    let numbers = tables.iter().flat_map(|table| {
+        table.velocity.into_iter().chain(table.temperature).chain(table.torque.into_iter().flatten())
+    });
+    let bytes: Vec<u8> = numbers.flat_map(f32::to_be_bytes).collect();
+    let mut controller = bench();
+    for tick in 1..=12 {
+        match controller.take_table(&Floats::new(&bytes)) {
+            Progress::Working(work) => controller.work = work,
+            Progress::Done => assert_eq!(tick, 12),
+            Progress::Refused(status) => panic!("{status:?} in tick {tick}"),
+        }
+        assert_eq!(controller.friction_is_table, tick == 12, "{tick}");
+    }
 }

@@ -1,0 +1,174 @@
+//! What single commands of the host do, and how much of a tick they take (J-04, J-21, J-23, J-36).
+extern crate std;
+use std::vec::Vec;
+
+use jtc_wire::{FrameRef, FrameStatus, FrameType, UrgentCommands};
+
+use super::*;
+use crate::{BusState, Config, HOST_LINES};
+
+type Bench = Controller<[RawPoint; 64]>;
+
+fn holding() -> Bench {
+    let mut controller = Bench::new(Config::avena(), [RawPoint::default(); 64]);
+    controller.state = ControllerState::HoldPos;
+    controller
+}
+
+/// How many of three frames like this are done in one tick.
+fn done_of_three(controller: &mut Bench, frame_type: FrameType, body: &[u8]) -> usize {
+    let bytes: Vec<u8> = [&[0; 4], body, &[0; 2]].concat();
+    let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
+    controller.serve_host(&Inputs {
+        bus: &[],
+        bus_state: BusState { acknowledged: true, bus_off: false },
+        safety_input: true,
+        missed_ticks: 0,
+        urgent: [UrgentCommands::NONE; HOST_LINES],
+        host: &[HostEvent { line: 0, overtaken: false, event }; 3],
+        status_free: true,
+    })
+}
+
+#[test]
+fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
+    use FrameType::*;
+    for (frame_type, body, done) in [
+        (TeachingModeDisable, &[][..], 3),
+        (GripperControl, &[1, 0, 0, 0], 3),
+        (GripperControl, &[0, 0, 0, 0], 3),
+        (ClearOccurredErrors, &[], 3),
+        (ClearCurrentErrors, &[1, 0x7F, 0, 0], 3),
+        (ResetCanDevices, &[0x40, 0, 0, 0], 1),
+        (PidParamUseDefault, &[], 1),
+        // What the state forbids has cost nothing.
+        (TrajSetExecStatus, &[3, 0, 0, 0], 3),
+    ] {
+        assert_eq!(done_of_three(&mut holding(), frame_type, body), done, "{frame_type:?} {body:?}");
+    }
+    // Where the state of the controller changes, the next command depends on it.
+    let mut teaching = holding();
+    teaching.teaching = true;
+    assert_eq!(done_of_three(&mut teaching, TeachingModeDisable, &[]), 1);
+    let mut error = holding();
+    error.state = ControllerState::Error;
+    assert_eq!(done_of_three(&mut error, ClearOccurredErrors, &[]), 1);
+}
+
+/// A Stop whose frame never came is not told as accepted to one that comes later.
+#[test]
+fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
+    let before = Overtaking { stops: 2, pauses: 1, cancelled: true };
+    for (overtaken, left) in [(true, before), (false, Overtaking::default())] {
+        let mut controller = holding();
+        controller.overtaking = [before; HOST_LINES];
+        let event = LinkEvent::Bad(Response::bad(0, FrameStatus::IncorrectHeader, 0));
+        controller.serve(&HostEvent { line: 1, overtaken, event });
+        assert_eq!(controller.overtaking, [before, left]);
+    }
+}
+
+#[test]
+fn j21_a_clear_of_nodes_alone_leaves_the_controller_its_own_errors() {
+    for (jtc, left) in [(true, false), (false, true)] {
+        let mut controller = holding();
+        controller.errors.raise_device();
+        controller.obey(Command::ClearCurrentErrors { jtc, nodes: 0x7F });
+        assert_eq!(controller.errors.any(), left, "{jtc}");
+    }
+}
+
+#[test]
+fn j23_a_reset_switches_the_pump_off_with_its_gripper_only() {
+    for (nodes, pump) in [(0x00, true), (0x3F, true), (0x40, false), (0x7F, false)] {
+        let mut controller = holding();
+        controller.pump = true;
+        assert!(matches!(controller.obey(Command::ResetCanDevices { nodes }), Progress::Done));
+        assert_eq!(controller.pump, pump, "{nodes:#x}");
+    }
+}
+
+#[test]
+fn j23_a_pump_is_switched_where_there_is_a_gripper_and_never_on_in_error() {
+    for (gripper, state, pump, done) in [
+        (true, ControllerState::HoldPos, true, true),
+        (true, ControllerState::HoldPos, false, true),
+        (true, ControllerState::Error, true, false),
+        (true, ControllerState::Error, false, true),
+        (false, ControllerState::HoldPos, true, false),
+        (false, ControllerState::HoldPos, false, false),
+        (false, ControllerState::Error, false, false),
+    ] {
+        let mut controller = holding();
+        (controller.config.gripper, controller.state, controller.pump) = (gripper, state, !pump);
+        let progress = controller.obey(Command::GripperControl { pump });
+        assert_eq!(matches!(progress, Progress::Done), done, "{gripper} {state:?} {pump}");
+        assert_eq!(controller.pump == pump, done, "{gripper} {state:?} {pump}");
+    }
+}
+
+/// Segment number `segment` of two, 10 ms a point, of an arm that stands.
+fn body(segment: u8, points: usize) -> Vec<u8> {
+    let mut body = [0, 1, 0, segment, 0, 2, 0, 10].to_vec();
+    body.resize(body.len() + 36 * points, 0);
+    body
+}
+
+/// Loads a segment; returns how many ticks checking it took.
+fn load(controller: &mut Bench, segment: u8, points: usize) -> usize {
+    let body = body(segment, points);
+    let (segment, mut checks) = (Segment::parse(&body).expect("a segment"), 0);
+    controller.work = Work::Begin;
+    loop {
+        checks += usize::from(!matches!(controller.work, Work::PointCopy(_)));
+        match controller.take_segment(&segment) {
+            Progress::Working(work) => controller.work = work,
+            Progress::Done => return checks,
+            Progress::Refused(status) => panic!("{status:?}"),
+        }
+    }
+}
+
+#[test]
+fn j36_a_segment_is_checked_with_its_last_point() {
+    for (points, checks) in [(1, 1), (15, 1), (16, 1), (17, 2), (32, 2), (33, 3), (48, 3)] {
+        assert_eq!(load(&mut holding(), 0, points), checks, "{points} points");
+    }
+}
+
+/// Segment 0 is checked against the friction in use; what comes later may be checked against another.
+#[test]
+fn j36_friction_given_between_two_segments_is_new_to_the_path() {
+    let mut controller = holding();
+    controller.friction_is_new = true;
+    load(&mut controller, 0, 4);
+    assert!(!controller.friction_is_new);
+    controller.friction_is_new = true;
+    load(&mut controller, 1, 4);
+    assert!(controller.friction_is_new);
+    assert_eq!(controller.trajectory, TrajectoryState::Stop);
+}
+
+/// The check of a segment is finer than that of the velocities as a whole, which is for friction that came later.
+#[test]
+fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
+    let body = body(0, 1);
+    let segment = Segment::parse(&body).expect("a segment");
+    for (table, new, refused) in
+        [(true, true, true), (true, false, false), (false, true, false), (false, false, false)]
+    {
+        let mut controller = holding();
+        (controller.friction_is_table, controller.friction_is_new) = (table, new);
+        for table in &mut controller.tables {
+            // Bearings of 0 °C.
+            table.temperature = core::array::from_fn(|i| i as f32);
+        }
+        let mut fast = TrajectoryCheck::new(&controller.config, 10, None);
+        let point = RawPoint { velocity: [0, 0, 0, i16::MAX, 0, 0], ..RawPoint::default() };
+        assert!(fast.take(&point).is_err(), "it is beyond every limit");
+        controller.store.commit(&segment, fast.speeds());
+        let verdict = controller.check_friction();
+        assert_eq!(verdict, if refused { Err(DataStatus::IncorrectValue) } else { Ok(()) }, "{table} {new}");
+        assert_eq!(controller.violation.map(|v| v.joint), refused.then_some(3), "{table} {new}");
+    }
+}

@@ -37,3 +37,45 @@ impl OverSpeed {
         errors
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether every joint is too fast after so many measurements of this multiple of its threshold.
+    fn found(measurements: u16, times: f64, config: &Config) -> bool {
+        let threshold = config.joints.map(|joint| config.overspeed_factor * joint.velocity_max);
+        let nodes = Nodes::enabled_at([0.0; JOINTS], threshold.map(|threshold| times * threshold));
+        let mut over_speed = OverSpeed::default();
+        let mut errors = [0; JOINTS];
+        (0..measurements).for_each(|_| errors = over_speed.watch(&nodes, config));
+        assert!(
+            errors.iter().all(|&error| error == errors[0]) && [0, joint_error::VELOCITY].contains(&errors[0])
+        );
+        errors[0] != 0
+    }
+
+    #[test]
+    fn j35_a_speed_at_the_threshold_is_not_above_it() {
+        let config = Config::avena();
+        for (measurements, times, too_fast) in [
+            (100, 1.0, false),
+            (100, -1.0, false),
+            (4, 1.001, false),
+            (5, 1.001, true),
+            (5, -1.001, true),
+            (5, f64::NAN, true),
+        ] {
+            assert_eq!(found(measurements, times, &config), too_fast, "{measurements} of {times}");
+        }
+    }
+
+    /// An over-speed that may not last is an error at once, but a joint that is slow has none.
+    #[test]
+    fn j35_no_time_at_all_is_a_setting_too() {
+        let config = Config { overspeed_ms: 0, ..Config::avena() };
+        for (times, too_fast) in [(0.0, false), (1.0, false), (1.001, true)] {
+            assert_eq!(found(1, times, &config), too_fast, "{times}");
+        }
+    }
+}

@@ -304,9 +304,9 @@ mod tests {
         assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < 1e-12);
     }
 
-    /// A joint at `rate` that reports another velocity, until an answer comes `off` the way and the next is missing: how much is
-    /// carried on.
-    fn carried_after(rate: f64, reported: f64, off: f64) -> f64 {
+    /// A joint at `rate` that reports another velocity, until an answer comes `off` the way, `since` more go on from there, and the
+    /// next is missing: how much is carried on.
+    fn carried_after(rate: f64, reported: f64, off: f64, since: u8) -> f64 {
         let mut joint = Measurement::default();
         let answer = |k: f64, off: f64| Tick {
             answer: Some(Reading { position: rate * k * DT + off, velocity: reported }),
@@ -315,7 +315,9 @@ mod tests {
         for k in -20..0 {
             assert!(joint.step(&answer(f64::from(k), 0.0), &Config::avena()));
         }
-        assert!(joint.step(&answer(0.0, off), &Config::avena()));
+        for k in 0..=since {
+            assert!(joint.step(&answer(f64::from(k), off), &Config::avena()));
+        }
         let before = joint.used().position;
         joint.step(&tick(None, 0.0), &Config::avena());
         (joint.used().position - before) / DT
@@ -324,16 +326,21 @@ mod tests {
     #[test]
     fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
         let unexpected = 0.1 * 3.0 * VELOCITY_MAX * DT;
-        for (rate, reported, off, carried) in [
-            (0.4, 0.5, 0.0, 0.4),
-            (0.4, 0.3, 0.0, 0.4),
+        for (rate, reported, off, since, carried) in [
+            (0.4, 0.5, 0.0, 0, 0.4),
+            (0.4, 0.3, 0.0, 0, 0.4),
             // What was a way of 5 ms is now longer by a tenth of what no joint does in one.
-            (0.0, 0.0, unexpected, unexpected / (5.0 * DT)),
-            (0.0, 0.0, 1.01 * unexpected, 0.0),
-            (0.0, 0.1, -1.01 * unexpected, 0.1),
+            (0.0, 0.0, unexpected, 0, unexpected / (5.0 * DT)),
+            (0.0, 0.0, 1.01 * unexpected, 0, 0.0),
+            (0.0, 0.1, -1.01 * unexpected, 0, 0.1),
+            // The reported velocity is carried on until the rate is one of answers behind the jump alone.
+            (0.4, 0.5, 2.0 * unexpected, 0, 0.5),
+            (0.4, 0.5, 2.0 * unexpected, 4, 0.5),
+            (0.4, 0.5, 2.0 * unexpected, 5, 0.4),
+            (0.4, 0.5, 2.0 * unexpected, 6, 0.4),
         ] {
-            let found = carried_after(rate, reported, off);
-            assert!((found - carried).abs() < 1e-9, "{rate} {reported} {off}: {found}");
+            let found = carried_after(rate, reported, off, since);
+            assert!((found - carried).abs() < 1e-9, "{rate} {reported} {off} {since}: {found}");
         }
     }
 
@@ -393,5 +400,17 @@ mod tests {
         let mut little = Fading { left: 1e-6, slope: 0.0 };
         little.step(1, &config);
         assert!(little.left > 0.9e-6, "{little:?}");
+        // In no time nothing fades; what is dropped is less than the bound, of the offset and of its slope.
+        for (left, slope, dropped) in [
+            (FADED, 0.0, false),
+            (0.0, -FADED, false),
+            (0.9 * FADED, 2.0 * FADED, false),
+            (0.9 * FADED, -0.9 * FADED, true),
+        ] {
+            let mut fading = Fading { left, slope };
+            fading.step(0, &config);
+            let kept = if dropped { (0.0, 0.0) } else { (left, slope) };
+            assert_eq!((fading.left, fading.slope), kept);
+        }
     }
 }

@@ -81,11 +81,21 @@ impl Nodes {
     pub fn enabled_at(position: [f64; JOINTS], velocity: [f64; JOINTS]) -> Self {
         let mut nodes = Self::new(&Config::avena());
         for node in &mut nodes.nodes {
-            *node = Node { seen: true, configured: true, valid: true, ..Node::default() };
+            *node = Node { seen: true, configured: true, valid: true, fresh: true, ..Node::default() };
             node.report.fsm = fsm::ENABLED;
+        }
+        for (node, (position, velocity)) in nodes.nodes.iter_mut().zip(position.into_iter().zip(velocity)) {
+            (node.report.position, node.report.velocity) = (position, velocity);
         }
         (nodes.position, nodes.velocity) = (position, velocity);
         nodes
+    }
+
+    /// The same, but the joint with this index is ready only.
+    #[cfg(test)]
+    pub fn with_limp(mut self, joint: usize) -> Self {
+        self.nodes[joint].report.fsm = fsm::READY;
+        self
     }
 
     /// Nodes that are there: the gripper can be configured as absent.

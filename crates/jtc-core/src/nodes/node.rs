@@ -125,3 +125,23 @@ pub(crate) fn starting(state: u8) -> bool {
     // 10 is the transition from Start to Init.
     matches!(state, fsm::START | fsm::INIT | 10)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that was enabled before the controller began keeps its state, but nothing is known of its configuration.
+    #[test]
+    fn j16_a_node_is_enabled_when_it_says_so_and_its_configuration_is_known() {
+        for (valid, state, enabled) in [
+            (true, fsm::ENABLED, true),
+            (false, fsm::ENABLED, false),
+            (true, fsm::READY, false),
+            (false, fsm::READY, false),
+        ] {
+            let mut node = Node { valid, ..Node::default() };
+            node.report.fsm = state;
+            assert_eq!(node.enabled(), enabled, "{valid} {state}");
+        }
+    }
+}

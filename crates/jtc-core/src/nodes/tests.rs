@@ -6,6 +6,8 @@ use super::*;
 use crate::io::BusState;
 use crate::records::HOST_LINES;
 
+mod frames;
+
 const SCALE: Scale = Scale { velocity: 2.0 };
 const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
 const START_TO_INIT: u8 = 10;
@@ -394,146 +396,51 @@ fn j20_the_word_of_missing_nodes_tells_what_keeps_the_controller_in_init() {
 }
 
 #[test]
-fn j16_j20_what_a_node_is_asked_for() {
-    use Target::{Enable, Init, NoChange, Ready};
-    let asked = |goal, state, configured, refused| {
-        let mut node = Node { seen: true, configured, refused, ..Node::default() };
-        node.report.fsm = state;
-        node.request(goal)
+fn j16_a_joint_at_the_speed_limit_of_enabling_is_not_slow() {
+    let moving = JointReport { fsm: fsm::READY, velocity: 0.125, ..JointReport::default() };
+    let bus: [Frame; JOINTS] =
+        core::array::from_fn(|n| Answer::Joint { node: n as u8, report: moving }.emit(SCALE));
+    let mut nodes = ready();
+    tick(&mut nodes, &bus, GOOD);
+    let speed = nodes.velocities()[0];
+    assert!(speed > 0.12, "as the drives report it: {speed}");
+    for (enable_speed_max, slow) in [(speed, false), (0.999 * speed, false), (1.001 * speed, true)] {
+        let (config, mut nodes) = (Config { enable_speed_max, ..Config::avena() }, nodes.clone());
+        let before = nodes.still_ms;
+        nodes.take(&inputs(&bus, GOOD), &config, Goal::Ready, &[0.0; JOINTS]);
+        assert_eq!(nodes.still_ms, if slow { before + 1 } else { 0 }, "{enable_speed_max}");
+    }
+}
+
+#[test]
+fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
+    for (unacknowledged, bus_off, flag) in
+        [(0, false, 0), (4, false, 0), (5, false, 1), (6, false, 1), (0, true, 1)]
+    {
+        let mut nodes = ready();
+        nodes.unacknowledged = unacknowledged;
+        let state = BusState { acknowledged: false, bus_off };
+        assert_eq!(
+            nodes.can_flags(&inputs(&[], state), &Config::avena()),
+            flag,
+            "{unacknowledged} {bus_off}"
+        );
+    }
+}
+
+#[test]
+fn j11_what_a_gripper_reports_is_known() {
+    let mut nodes = ready();
+    let report = GripperReport {
+        fsm: fsm::ENABLED,
+        errors: 0x21,
+        warnings: 0x42,
+        pump: true,
+        pressure1: false,
+        pressure2: true,
     };
-    for (state, unconfigured, configured) in [
-        (fsm::START, [Init, NoChange, NoChange], [Init, NoChange, NoChange]),
-        (START_TO_INIT, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
-        (fsm::INIT, [NoChange, NoChange, NoChange], [Ready, NoChange, Ready]),
-        (INIT_TO_READY, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
-        (fsm::READY, [NoChange, Enable, NoChange], [NoChange, Enable, NoChange]),
-        (fsm::ENABLED, [Ready, NoChange, Ready], [Ready, NoChange, Ready]),
-        (fsm::FAULT, [NoChange; 3], [NoChange; 3]),
-    ] {
-        for refused in [false, true] {
-            for (expected, is_configured) in [(unconfigured, false), (configured, true)] {
-                let mut expected = expected;
-                if refused && !is_configured && state == fsm::READY {
-                    // It takes its configuration in Init only.
-                    expected[0] = Init;
-                }
-                let got = [Goal::Ready, Goal::Enabled, Goal::Down]
-                    .map(|goal| asked(goal, state, is_configured, refused));
-                assert_eq!(got, expected, "in {state}, configured {is_configured}, refused {refused}");
-            }
-        }
-        let mut node = Node { seen: true, clear: true, ..Node::default() };
-        node.report.fsm = state;
-        for goal in [Goal::Ready, Goal::Enabled, Goal::Down] {
-            // A drive ignores Init while it is enabled.
-            assert_eq!(node.request(goal), if state == fsm::ENABLED { Ready } else { Init });
-            assert_eq!(Node { seen: false, ..node }.request(goal), NoChange);
-        }
-    }
-}
-
-#[test]
-fn j20_a_node_is_configured_in_init_and_ready_once() {
-    for state in [fsm::START, fsm::INIT, START_TO_INIT, fsm::READY, fsm::ENABLED, fsm::FAULT] {
-        let mut node = Node { seen: true, ..Node::default() };
-        node.report.fsm = state;
-        assert_eq!(node.wants_configuration(), matches!(state, fsm::INIT | fsm::READY), "{state}");
-        assert!(!Node { configured: true, ..node }.wants_configuration());
-        assert!(!Node { clear: true, ..node }.wants_configuration());
-        assert!(!Node { seen: false, ..node }.wants_configuration());
-    }
-}
-
-/// What the frame of a tick is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sent {
-    Move,
-    Mode,
-    ControllerState,
-    Reset,
-    ResetAll,
-}
-
-/// One frame to nodes that `change` made of ready ones, so many Moves after the last other frame.
-fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
-    let (config, mut nodes) = (Config::avena(), ready());
-    nodes.moves = moves;
-    change(&mut nodes);
-    let frame = nodes.frame(&config, goal, [0.0; JOINTS], false, false);
-    match Request::parse(&frame).unwrap() {
-        Request::Move { .. } => Sent::Move,
-        Request::ChangeMode { .. } => Sent::Mode,
-        Request::ChangeFsm { .. } => Sent::ControllerState,
-        Request::Reset(_) => Sent::Reset,
-        Request::ResetAll => Sent::ResetAll,
-    }
-}
-
-/// Node `n` waits for its configuration, in Init.
-fn waits(nodes: &mut Nodes, n: usize) {
-    (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.fsm) = (false, false, fsm::INIT);
-}
-
-#[test]
-fn j12_at_most_one_tick_of_four_sends_another_frame_than_move() {
-    for moves in 0..6 {
-        let frame = if moves < 3 { Sent::Move } else { Sent::Mode };
-        assert_eq!(sent(Goal::Ready, moves, |nodes| waits(nodes, 2)), frame, "{moves}");
-    }
-    assert_eq!(sent(Goal::Ready, 3, |_| ()), Sent::Move, "nobody is in want of anything");
-    assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x04)), Sent::Reset);
-    assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x7F)), Sent::ResetAll);
-}
-
-/// Under torque what the gripper alone is in want of comes in one tick of twenty.
-#[test]
-fn j23_a_gripper_is_brought_up_on_the_side() {
-    let (wait, many) = (|nodes: &mut Nodes| waits(nodes, GRIPPER), 19);
-    assert_eq!(sent(Goal::Ready, 3, wait), Sent::Mode);
-    assert_eq!(
-        sent(Goal::Enabled, 3, |nodes| {
-            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
-            wait(nodes);
-        }),
-        Sent::Move
-    );
-    assert_eq!(
-        sent(Goal::Enabled, many, |nodes| {
-            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
-            wait(nodes);
-        }),
-        Sent::Mode
-    );
-    assert_eq!(sent(Goal::Down, many, wait), Sent::Move, "nothing is configured in Error");
-    let silent = |nodes: &mut Nodes| {
-        waits(nodes, GRIPPER);
-        nodes.nodes[GRIPPER].silent = 5;
-    };
-    assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
-    // A joint that is to be enabled does not wait for that.
-    let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
-    assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
-    assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
-}
-
-/// Configurations and changes of state take turns, but a node that is enabled refuses the former.
-#[test]
-fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
-    for (state, seen, configured_last, frame) in [
-        (fsm::ENABLED, true, false, Sent::ControllerState),
-        (fsm::ENABLED, true, true, Sent::ControllerState),
-        // To be brought from Init to Ready, which can wait.
-        (fsm::INIT, true, false, Sent::Mode),
-        (fsm::INIT, true, true, Sent::ControllerState),
-        // Restarted: what it reported before means nothing.
-        (fsm::ENABLED, false, false, Sent::Mode),
-        (fsm::ENABLED, false, true, Sent::Mode),
-    ] {
-        let found = sent(Goal::Ready, 3, |nodes| {
-            waits(nodes, 2);
-            nodes.configured_last = configured_last;
-            (nodes.nodes[3].report.fsm, nodes.nodes[3].seen) = (state, seen);
-        });
-        assert_eq!(found, frame, "{state} {seen} {configured_last}");
-    }
+    tick(&mut nodes, &[Answer::Gripper(report).emit(SCALE)], GOOD);
+    let found = nodes.node(GRIPPER).report;
+    assert_eq!((found.fsm, found.errors, found.warnings), (fsm::ENABLED, 0x21, 0x42));
+    assert_eq!((nodes.pump, nodes.pressure), (true, [false, true]));
 }

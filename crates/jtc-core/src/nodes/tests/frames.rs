@@ -1,0 +1,239 @@
+//! What nodes are asked for, and which frame each tick sends (J-12, J-16, J-20, J-23).
+use super::*;
+
+#[test]
+fn j16_j20_what_a_node_is_asked_for() {
+    use Target::{Enable, Init, NoChange, Ready};
+    let asked = |goal, state, configured, refused| {
+        let mut node = Node { seen: true, configured, refused, ..Node::default() };
+        node.report.fsm = state;
+        node.request(goal)
+    };
+    for (state, unconfigured, configured) in [
+        (fsm::START, [Init, NoChange, NoChange], [Init, NoChange, NoChange]),
+        (START_TO_INIT, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
+        (fsm::INIT, [NoChange, NoChange, NoChange], [Ready, NoChange, Ready]),
+        (INIT_TO_READY, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
+        (fsm::READY, [NoChange, Enable, NoChange], [NoChange, Enable, NoChange]),
+        (fsm::ENABLED, [Ready, NoChange, Ready], [Ready, NoChange, Ready]),
+        (fsm::FAULT, [NoChange; 3], [NoChange; 3]),
+    ] {
+        for refused in [false, true] {
+            for (expected, is_configured) in [(unconfigured, false), (configured, true)] {
+                let mut expected = expected;
+                if refused && !is_configured && state == fsm::READY {
+                    // It takes its configuration in Init only.
+                    expected[0] = Init;
+                }
+                let got = [Goal::Ready, Goal::Enabled, Goal::Down]
+                    .map(|goal| asked(goal, state, is_configured, refused));
+                assert_eq!(got, expected, "in {state}, configured {is_configured}, refused {refused}");
+            }
+        }
+        let mut node = Node { seen: true, clear: true, ..Node::default() };
+        node.report.fsm = state;
+        for goal in [Goal::Ready, Goal::Enabled, Goal::Down] {
+            // A drive ignores Init while it is enabled.
+            assert_eq!(node.request(goal), if state == fsm::ENABLED { Ready } else { Init });
+            assert_eq!(Node { seen: false, ..node }.request(goal), NoChange);
+        }
+    }
+}
+
+#[test]
+fn j20_a_node_is_configured_in_init_and_ready_once() {
+    for state in [fsm::START, fsm::INIT, START_TO_INIT, fsm::READY, fsm::ENABLED, fsm::FAULT] {
+        let mut node = Node { seen: true, ..Node::default() };
+        node.report.fsm = state;
+        assert_eq!(node.wants_configuration(), matches!(state, fsm::INIT | fsm::READY), "{state}");
+        assert!(!Node { configured: true, ..node }.wants_configuration());
+        assert!(!Node { clear: true, ..node }.wants_configuration());
+        assert!(!Node { seen: false, ..node }.wants_configuration());
+    }
+}
+
+/// What the frame of a tick is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sent {
+    Move,
+    Mode,
+    ControllerState,
+    Reset,
+    ResetAll,
+}
+
+/// One frame to nodes that `change` made of ready ones, so many Moves after the last other frame.
+fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
+    let (config, mut nodes) = (Config::avena(), ready());
+    nodes.moves = moves;
+    change(&mut nodes);
+    let frame = nodes.frame(&config, goal, [0.0; JOINTS], false, false);
+    match Request::parse(&frame).unwrap() {
+        Request::Move { .. } => Sent::Move,
+        Request::ChangeMode { .. } => Sent::Mode,
+        Request::ChangeFsm { .. } => Sent::ControllerState,
+        Request::Reset(_) => Sent::Reset,
+        Request::ResetAll => Sent::ResetAll,
+    }
+}
+
+/// Node `n` waits for its configuration, in Init.
+fn waits(nodes: &mut Nodes, n: usize) {
+    (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.fsm) = (false, false, fsm::INIT);
+}
+
+#[test]
+fn j12_at_most_one_tick_of_four_sends_another_frame_than_move() {
+    for moves in 0..6 {
+        let frame = if moves < 3 { Sent::Move } else { Sent::Mode };
+        assert_eq!(sent(Goal::Ready, moves, |nodes| waits(nodes, 2)), frame, "{moves}");
+    }
+    assert_eq!(sent(Goal::Ready, 3, |_| ()), Sent::Move, "nobody is in want of anything");
+    assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x04)), Sent::Reset);
+    assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x7F)), Sent::ResetAll);
+}
+
+/// Without a gripper the joints are all there is.
+#[test]
+fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
+    for (gripper, mask, frame) in [
+        (true, 0x7F, Sent::ResetAll),
+        (true, 0x3F, Sent::Reset),
+        (true, 0x40, Sent::Reset),
+        (false, 0x7F, Sent::ResetAll),
+        (false, 0x3F, Sent::ResetAll),
+        (false, 0x40, Sent::Move),
+    ] {
+        let found = sent(Goal::Ready, 3, |nodes| {
+            nodes.gripper = gripper;
+            nodes.reset(mask);
+        });
+        assert_eq!(found, frame, "{gripper} {mask:#x}");
+        let mut nodes = ready();
+        (nodes.gripper, nodes.nodes[GRIPPER].report.errors) = (gripper, 1);
+        nodes.clear(mask, true);
+        assert_eq!(nodes.nodes[GRIPPER].clear, gripper && mask != 0x3F, "{gripper} {mask:#x}");
+    }
+}
+
+/// Under torque what the gripper alone is in want of comes in one tick of twenty.
+#[test]
+fn j23_a_gripper_is_brought_up_on_the_side() {
+    let (wait, many) = (|nodes: &mut Nodes| waits(nodes, GRIPPER), 19);
+    assert_eq!(sent(Goal::Ready, 3, wait), Sent::Mode);
+    assert_eq!(
+        sent(Goal::Enabled, 3, |nodes| {
+            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
+            wait(nodes);
+        }),
+        Sent::Move
+    );
+    assert_eq!(
+        sent(Goal::Enabled, many, |nodes| {
+            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
+            wait(nodes);
+        }),
+        Sent::Mode
+    );
+    assert_eq!(sent(Goal::Down, many, wait), Sent::Move, "nothing is configured in Error");
+    let silent = |nodes: &mut Nodes| {
+        waits(nodes, GRIPPER);
+        nodes.nodes[GRIPPER].silent = 5;
+    };
+    assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
+    // A joint that is to be enabled does not wait for that.
+    let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
+    assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
+    assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
+}
+
+/// Configurations and changes of state take turns, but a node that is enabled refuses the former.
+#[test]
+fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
+    for (state, seen, configured_last, frame) in [
+        (fsm::ENABLED, true, false, Sent::ControllerState),
+        (fsm::ENABLED, true, true, Sent::ControllerState),
+        // To be brought from Init to Ready, which can wait.
+        (fsm::INIT, true, false, Sent::Mode),
+        (fsm::INIT, true, true, Sent::ControllerState),
+        // Restarted: what it reported before means nothing.
+        (fsm::ENABLED, false, false, Sent::Mode),
+        (fsm::ENABLED, false, true, Sent::Mode),
+    ] {
+        let found = sent(Goal::Ready, 3, |nodes| {
+            waits(nodes, 2);
+            nodes.configured_last = configured_last;
+            (nodes.nodes[3].report.fsm, nodes.nodes[3].seen) = (state, seen);
+        });
+        assert_eq!(found, frame, "{state} {seen} {configured_last}");
+    }
+}
+
+/// Where nothing else is to be sent, one configuration may follow another; and a node that is to stay enabled has nothing to wait for.
+#[test]
+fn j20_configurations_and_changes_of_state_take_turns() {
+    let enabling = |nodes: &mut Nodes| {
+        nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
+        nodes.nodes[4].report.fsm = fsm::READY;
+        nodes.still_ms = Config::avena().enable_still_ms;
+        waits(nodes, GRIPPER);
+    };
+    for (configured_last, alone, with_a_change) in
+        [(false, Sent::Mode, Sent::Mode), (true, Sent::Mode, Sent::ControllerState)]
+    {
+        let found = sent(Goal::Ready, 3, |nodes| {
+            waits(nodes, 2);
+            nodes.configured_last = configured_last;
+        });
+        assert_eq!(found, alone, "{configured_last}");
+        let found = sent(Goal::Enabled, 19, |nodes| {
+            enabling(nodes);
+            nodes.configured_last = configured_last;
+        });
+        assert_eq!(found, with_a_change, "{configured_last}");
+    }
+}
+
+/// What a gripper in this state is asked for while the joints are where the goal has them; a frame that asks for no change of state
+/// asks for none of its own.
+fn gripper_asked(config: &Config, goal: Goal, state: u8, configured: bool, clear: bool) -> Target {
+    let mut nodes = ready();
+    if goal == Goal::Enabled {
+        nodes.nodes.iter_mut().for_each(|node| node.report.fsm = fsm::ENABLED);
+    }
+    let gripper = &mut nodes.nodes[GRIPPER];
+    (gripper.report.fsm, gripper.configured, gripper.clear) = (state, configured, clear);
+    (nodes.moves, nodes.configured_last) = (19, true);
+    match Request::parse(&nodes.frame(config, goal, [0.0; JOINTS], false, false)).unwrap() {
+        Request::ChangeFsm { target } => target[GRIPPER],
+        _ => Target::NoChange,
+    }
+}
+
+/// A gripper that keeps its part is left alone where the arm has no torque, but not against its own clear, nor for ever.
+#[test]
+fn j23_what_a_gripper_is_asked_for() {
+    use Target::{Enable, Init, NoChange, Ready};
+    for (goal, state, configured, clear, drops, keeps) in [
+        (Goal::Enabled, fsm::ENABLED, true, false, NoChange, NoChange),
+        (Goal::Down, fsm::ENABLED, true, false, Ready, NoChange),
+        (Goal::Ready, fsm::ENABLED, true, false, Ready, NoChange),
+        (Goal::Down, fsm::ENABLED, true, true, Ready, Ready),
+        (Goal::Ready, fsm::ENABLED, true, true, Ready, Ready),
+        // Enabled, but its configuration is lost: it takes one in Ready only.
+        (Goal::Enabled, fsm::ENABLED, false, false, Ready, Ready),
+        (Goal::Enabled, fsm::READY, true, false, Enable, Enable),
+        (Goal::Enabled, fsm::READY, false, false, NoChange, NoChange),
+        (Goal::Enabled, fsm::START, false, false, Init, Init),
+        (Goal::Enabled, fsm::INIT, true, false, Ready, Ready),
+        // In Error nothing is brought up.
+        (Goal::Ready, fsm::START, false, false, Init, Init),
+        (Goal::Down, fsm::START, false, false, NoChange, NoChange),
+    ] {
+        for (pump_off_on_error, expected) in [(true, drops), (false, keeps)] {
+            let config = Config { pump_off_on_error, ..Config::avena() };
+            let found = gripper_asked(&config, goal, state, configured, clear);
+            assert_eq!(found, expected, "{goal:?} {state} {configured} {clear} {pump_off_on_error}");
+        }
+    }
+}

@@ -184,6 +184,12 @@ mod tests {
         assert_eq!((taken(GAINS, 24.0), taken(GAINS, -24.0)), (10.0 * 0.003, 10.0 * -0.002));
         let none = PidGains { ki: 0.0, ..wide };
         assert_eq!((taken(none, 24.0), taken(none, 0.0)), (0.0, 0.0));
+        // Nor is there anything for gains that come later.
+        for torque in [24.0, -24.0, 0.0] {
+            let mut pid = Pid::default();
+            pid.take_over(&none, torque);
+            assert_eq!(pid.step(&wide, 0.0, true, None).i, 0.0, "{torque}");
+        }
     }
 
     #[test]

@@ -123,4 +123,15 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn j33_a_joint_that_hardly_moves_along_the_path_does_not_bound_its_slope() {
+        for (factor, bounds) in [(1e-9, (f64::NEG_INFINITY, f64::INFINITY)), (2e-9, (-1.0e9, 1.0e9))] {
+            for factor in [factor, -factor] {
+                let (low, high) = within(0.0, factor, 2.0);
+                assert!(low == bounds.0 || (low / bounds.0 - 1.0).abs() < 1e-9, "{factor}: {low}");
+                assert!(high == bounds.1 || (high / bounds.1 - 1.0).abs() < 1e-9, "{factor}: {high}");
+            }
+        }
+    }
 }

@@ -93,3 +93,37 @@ impl Transfer {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is blended out in a tick after a change of state in which the last torque was `last`.
+    fn blended(transfer: &mut Transfer, last: f64) -> [f64; JOINTS] {
+        let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);
+        let mut torque = [JointTorque::default(); JOINTS];
+        transfer.blend(before, &mut torque, &nodes, &Config::avena());
+        torque.map(|torque| torque.blend)
+    }
+
+    #[test]
+    fn j44_j66_an_arm_that_gives_way_continues_nothing_of_its_torque() {
+        for lets_go in [false, true] {
+            let mut transfer = Transfer::default();
+            transfer.change_law();
+            if lets_go {
+                transfer.let_go();
+            }
+            assert_eq!(blended(&mut transfer, 5.0), [if lets_go { 0.0 } else { 5.0 }; JOINTS]);
+            // Nor of a step that is being blended out.
+            let mut transfer = Transfer::default();
+            transfer.change_law();
+            assert_eq!(blended(&mut transfer, 5.0), [5.0; JOINTS]);
+            if lets_go {
+                transfer.let_go();
+            }
+            assert_eq!(blended(&mut transfer, 5.0) == [0.0; JOINTS], lets_go);
+        }
+    }
+}

@@ -61,7 +61,7 @@ fn all(errors: &[u16; JOINTS]) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Config;
+    use crate::{Config, error};
 
     type Bench = Controller<[RawPoint; 4]>;
 
@@ -126,5 +126,20 @@ mod tests {
         assert!(controller.gives_way(&[0, 0, joint_error::POSITION | joint_error::VELOCITY, 0, 0, 0]));
         assert_eq!((controller.trajectory, controller.errors.word()), (TrajectoryState::Pause, 0));
         assert!(!controller.gives_way(&[joint_error::POSITION_ERROR; JOINTS]), "it does already");
+    }
+
+    /// A Stop that is on its way stays a Stop; what comes when its time is over is an error, and not one that was acted upon.
+    #[test]
+    fn j33_j66_a_limit_found_during_a_stop_changes_nothing_about_it() {
+        for (braking_ms, stops, occurred) in
+            [(Some(5), true, error::INTERNAL | error::INTERNAL_JOINTS), (None, false, 0)]
+        {
+            let mut controller = running();
+            let stop = Path::Running { leave: Some(TrajectoryState::Stop) };
+            (controller.path, controller.braking_ms) = (stop, braking_ms);
+            assert_eq!(controller.stops_on_path(Law::Follow, &[0, joint_error::VELOCITY, 0, 0, 0, 0]), stops);
+            assert_eq!((controller.path, controller.braking_ms), (stop, braking_ms));
+            assert_eq!(controller.errors.occurred(), occurred, "{braking_ms:?}");
+        }
     }
 }

@@ -1,0 +1,193 @@
+//! The execution of a trajectory, tick by tick (section 5).
+use jtc_wire::Segment;
+
+use super::*;
+use crate::{Config, ControllerState};
+
+fn braking(state: ControllerState, trajectory: TrajectoryState) -> Controller<[RawPoint; 4]> {
+    let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+    (controller.state, controller.trajectory, controller.braking_ms) = (state, trajectory, Some(5));
+    controller
+}
+
+/// What braking excuses (J-43) it does not excuse for longer than the arm moves.
+#[test]
+fn j33_braking_ends_where_the_arm_stands() {
+    let mut stands = braking(ControllerState::HoldPos, TrajectoryState::Pause);
+    assert!(!stands.brake());
+    assert_eq!(stands.braking_ms, None);
+    let mut moves = braking(ControllerState::HoldPos, TrajectoryState::Pause);
+    moves.motion.set.velocity[2] = -0.03;
+    assert!(moves.brake());
+    assert_eq!(moves.braking_ms, Some(6));
+    let mut on_the_path = braking(ControllerState::Operate, TrajectoryState::Execute);
+    assert!(on_the_path.brake(), "path time still runs");
+}
+
+#[test]
+fn j33_braking_ends_with_the_states_that_hold_or_follow() {
+    for (next, goes_on) in
+        [(ControllerState::HoldPos, true), (ControllerState::Error, false), (ControllerState::Init, false)]
+    {
+        let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
+        controller.enter(next);
+        assert_eq!(controller.braking_ms.is_some(), goes_on, "{next:?}");
+    }
+}
+
+#[test]
+fn j34_after_a_stop_the_path_begins_anew() {
+    for (trajectory, time) in [
+        (TrajectoryState::Stop, 0.0),
+        (TrajectoryState::Null, 0.0),
+        (TrajectoryState::Pause, 250.0),
+        (TrajectoryState::Finish, 250.0),
+    ] {
+        let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
+        controller.clock.time = 250.0;
+        controller.set_trajectory(trajectory);
+        assert_eq!(controller.clock.time, time, "{trajectory:?}: this is the index that the status shows");
+    }
+}
+
+/// On the path, with a Pause accepted `ms` ago.
+fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
+    let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
+    controller.path = Path::Running { leave: Some(TrajectoryState::Pause) };
+    controller.braking_ms = Some(ms);
+    (controller.clock, controller.clock.time) = (PathClock::start(), 250.0);
+    controller
+}
+
+#[test]
+fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
+    let most = Config::avena().braking_ms_max;
+    for (trajectory, ms, goes_on, error) in [
+        (TrajectoryState::Execute, most - 1, true, 0),
+        (TrajectoryState::Execute, most, false, joint_error::TORQUE),
+        // An arm that is held, and moved by something else.
+        (TrajectoryState::Pause, most - 1, true, 0),
+        (TrajectoryState::Pause, most, false, 0),
+    ] {
+        let mut controller = pausing(ms);
+        (controller.trajectory, controller.motion.set.velocity[2]) = (trajectory, -0.03);
+        assert_eq!(controller.brake(), goes_on, "{trajectory:?} after {ms} ms");
+        let found: [u16; JOINTS] = core::array::from_fn(|j| controller.errors.joint(j).0);
+        assert_eq!(found, [0, 0, error, 0, 0, 0], "{trajectory:?} after {ms} ms");
+    }
+    let mut controller = pausing(most);
+    controller.brake();
+    assert!(!controller.errors.any(), "it stands");
+}
+
+/// The last of a motion may be too slow for torque to end it.
+#[test]
+fn j33_an_arm_that_stands_when_its_time_is_over_has_stopped() {
+    let most = Config::avena().stop_ms;
+    for (ms, velocity, trajectory) in [
+        (most - 1, 0.01, TrajectoryState::Execute),
+        (most, 0.01, TrajectoryState::Pause),
+        (most, -0.03, TrajectoryState::Execute),
+    ] {
+        let mut controller = pausing(ms);
+        controller.motion.set.velocity[4] = velocity;
+        controller.brake();
+        assert_eq!(
+            (controller.trajectory, controller.clock.standing()),
+            (trajectory, trajectory == TrajectoryState::Pause),
+            "{ms} {velocity}"
+        );
+        assert_eq!(controller.clock.time, 250.0);
+    }
+}
+
+#[test]
+fn j33_a_second_stop_gives_no_more_time_to_brake() {
+    let mut controller = pausing(700);
+    controller.leave_path(ExecCommand::Stop);
+    assert_eq!(controller.braking_ms, Some(700));
+    assert_eq!(
+        controller.path,
+        Path::Running { leave: Some(TrajectoryState::Stop) },
+        "the later command holds"
+    );
+}
+
+#[test]
+fn j34_an_arm_exactly_at_the_tolerance_is_at_the_point() {
+    let mut controller = braking(ControllerState::HoldPos, TrajectoryState::Stop);
+    controller.config.start_tolerance_rad = 0.25;
+    assert!(controller.near(&[0.0, 0.25, -0.25, 0.0, 0.1, 0.0]));
+    assert!(!controller.near(&[0.0, 0.25, -0.2501, 0.0, 0.1, 0.0]));
+    controller.config.start_tolerance_rad = 0.0;
+    assert!(controller.near(&[0.0; JOINTS]));
+}
+
+#[test]
+fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
+    let leave = Some(TrajectoryState::Stop);
+    assert_eq!(Path::Running { leave }.leave(), leave);
+    assert_eq!(Path::Gliding { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
+    assert_eq!((Path::BEGIN.leave(), Path::AtStart.leave()), (None, None));
+}
+
+/// On the path of four points that are 100 ms apart, at this time, slowing down.
+fn halting_at(time: f64) -> Controller<[RawPoint; 4]> {
+    let mut controller = pausing(5);
+    let mut body = [0; 8 + 4 * 36];
+    (body[5], body[7]) = (1, 100);
+    let segment = Segment::parse(&body).expect("four points");
+    controller.store.begin(&segment);
+    controller.store.copy(&segment, 0, 4);
+    controller.store.commit(&segment, *controller.store.speeds());
+    controller.clock.time = time;
+    controller.clock.halt();
+    controller
+}
+
+#[test]
+fn j33_a_stop_ends_at_the_last_point_whatever_the_ramp_says() {
+    for (time, trajectory) in [(100.0, TrajectoryState::Execute), (299.5, TrajectoryState::Pause)] {
+        let mut controller = halting_at(time);
+        controller.walk();
+        assert_eq!(controller.trajectory, trajectory, "{time}");
+        assert_eq!(controller.clock.standing(), trajectory == TrajectoryState::Pause, "{time}");
+    }
+}
+
+#[test]
+fn j16_an_execute_waits_for_the_joints_as_long_as_enabling_may_take() {
+    let most = Config::avena().enable_timeout_ms;
+    for (elapsed_ms, trajectory) in
+        [(0, TrajectoryState::Execute), (most - 1, TrajectoryState::Execute), (most, TrajectoryState::Stop)]
+    {
+        let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
+        controller.path = Path::Waiting { elapsed_ms };
+        controller.walk();
+        assert_eq!(controller.trajectory, trajectory, "after {elapsed_ms} ms");
+    }
+}
+
+#[test]
+fn j34_an_approach_takes_the_time_of_the_ramp() {
+    let length = f64::from(Config::avena().ramp_ms);
+    for (before, arrives) in [(0.0, false), (length - 2.0, false), (length - 1.0, true)] {
+        let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
+        controller.path = Path::Gliding { from: [0.0; JOINTS], elapsed_ms: before, leave: None };
+        controller.walk();
+        assert_eq!(controller.path == Path::AtStart, arrives, "{before} ms");
+    }
+}
+
+#[test]
+fn j66_an_arm_that_gave_way_goes_on_when_it_has_come_to_rest() {
+    for (held, verdict) in [(false, Err(DataStatus::NotAllowed)), (true, Ok(()))] {
+        let mut controller = braking(ControllerState::HoldPos, TrajectoryState::Pause);
+        if held {
+            controller.motion.hold_for_test();
+        }
+        controller.motion.give_way(&controller.nodes, &controller.config);
+        assert_eq!(controller.resume_path(), verdict);
+        assert_eq!(controller.motion.yielding(), !held, "it stands firm when it goes on");
+    }
+}

@@ -1,0 +1,273 @@
+//! Path time: what each tick does, and how long ramps take (J-33).
+use super::*;
+use proptest::prelude::*;
+
+const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
+
+/// One tick with bounds ±`easy` and ±`full`.
+fn tick(clock: &mut PathClock, easy: f64, full: f64) {
+    clock.advance(1e9);
+    if clock.halting() {
+        clock.slow_down(200.0, 500.0, &SlopeBounds { easy: (-easy, easy), full: (-full, full) });
+    } else if clock.ramping() {
+        clock.speed_up(200.0, (-easy, easy));
+    }
+}
+
+/// Ticks from full speed to standstill, in each of which the bounds are those of `bounds`.
+fn stop(mut bounds: impl FnMut(u32, &PathClock) -> SlopeBounds) -> u32 {
+    let mut clock = PathClock::start();
+    clock.halt();
+    for ms in 1..=2_000 {
+        clock.advance(1e9);
+        let now = bounds(ms, &clock);
+        clock.slow_down(200.0, 500.0, &now);
+        if clock.standing() {
+            return ms;
+        }
+    }
+    panic!("not within 2 s: {clock:?}");
+}
+
+#[test]
+fn j33_full_speed_counts_whole_milliseconds() {
+    let mut clock = PathClock::start();
+    for k in 1..100_000 {
+        tick(&mut clock, f64::INFINITY, f64::INFINITY);
+        assert_eq!(clock.time, f64::from(k));
+    }
+}
+
+#[test]
+fn j33_a_ramp_takes_its_length() {
+    let ticks = stop(|_, _| SlopeBounds { easy: FREE, full: FREE });
+    assert!((195..=206).contains(&ticks), "{ticks}");
+    let mut clock = PathClock::default();
+    clock.go();
+    let mut ticks = 0;
+    while clock.ramping() && ticks < 1_000 {
+        tick(&mut clock, f64::INFINITY, f64::INFINITY);
+        ticks += 1;
+    }
+    assert!((195..=206).contains(&ticks), "{ticks}");
+}
+
+#[test]
+fn j33_margins_give_way_before_a_stop_comes_late() {
+    // Nothing within the margins, all that it takes within the torque limits; then less and less of that.
+    for easy in [(0.0, 0.0), (1.0, -1.0), (0.5, 1.0), (-0.3, FREE.1)] {
+        for most in [2.6, 4.0, 10.0, f64::INFINITY] {
+            let ticks = stop(|_, _| SlopeBounds { easy, full: (-most, most) });
+            assert!(ticks <= 480, "{ticks} ms with {easy:?} and {most}");
+        }
+    }
+    // Also when they shrink after half of the ramp.
+    let ticks = stop(|ms, _| SlopeBounds { easy: if ms < 100 { FREE } else { (0.0, 0.0) }, full: FREE });
+    assert!(ticks <= 350, "{ticks}");
+    // Within its margins it is not in a hurry.
+    let ticks = stop(|_, clock| {
+        assert!(!clock.hurried);
+        SlopeBounds { easy: (-4.5, 4.5), full: FREE }
+    });
+    assert!((250..=300).contains(&ticks), "{ticks}");
+}
+
+#[test]
+fn j33_a_stop_uses_all_the_torque_but_no_more() {
+    let most = 1.1;
+    let ticks = stop(|_, clock| {
+        assert!(clock.slope >= -most);
+        SlopeBounds { easy: (0.0, 0.0), full: (-most, most) }
+    });
+    assert!((905..960).contains(&ticks), "{ticks}: 1/1.1 s");
+    // An arm that cannot even be kept from gaining speed for 100 ms.
+    let mut fastest: f64 = 0.0;
+    let ticks = stop(|ms, clock| {
+        fastest = fastest.max(clock.rate);
+        let full = if (50..150).contains(&ms) { (2.0, 5.0) } else { (-3.0, 3.0) };
+        SlopeBounds { easy: (0.0, 0.0), full }
+    });
+    assert!(ticks <= 500 && fastest > 0.9, "{ticks} {fastest}");
+}
+
+#[test]
+fn j33_time_for_a_stop_runs_from_the_first_one() {
+    let mut clock = PathClock::start();
+    for ms in 0..480 {
+        // Asked for again and again.
+        clock.halt();
+        tick(&mut clock, 0.0, 2.8);
+        if clock.standing() {
+            return;
+        }
+        assert!(ms < 479, "{clock:?}");
+    }
+}
+
+/// One tick of a stop along ramps of 200 ms, whose slope changes by at most 0.1125 1/s in a tick, or eight times that in a hurry.
+#[test]
+fn j33_each_tick_of_a_stop() {
+    let (rounded, hurried) = (4.5 / 0.04 * DT, 8.0 * (4.5 / 0.04 * DT));
+    let on_time = 0.001 * (PUNCTUAL * 500.0);
+    for (rate, slope, easy, full, expected) in [
+        (1.0, 0.0, FREE, FREE, -rounded),
+        // Margins that leave one slope only, and more than is wanted; that contradict each other; that leave nothing.
+        (1.0, 0.0, (-1.0, -1.0), FREE, -rounded),
+        (1.0, 0.0, (1.0, -1.0), FREE, -hurried),
+        (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
+        // Within its margins, and just in time: that is no hurry.
+        (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
+        // At full speed it does not get any faster, whatever the arm does.
+        (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
+        // The last step: it stands, and does not slow down any more.
+        (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),
+        // What is left is nothing, although the limits leave no slope for it.
+        (1e-10, -5.0, (0.0, 0.0), (0.0, 0.0), 0.0),
+    ] {
+        let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
+        clock.halt();
+        clock.slow_down(200.0, 500.0, &SlopeBounds { easy, full });
+        let what = (rate, slope, easy, full, clock);
+        assert!((clock.slope - expected).abs() < 1e-12, "{what:?}");
+        assert!((clock.rate - (rate + expected * DT)).abs() < 2e-4, "{what:?}");
+        assert_eq!(clock.standing(), rate < 0.001, "{what:?}");
+        assert_eq!(clock.hurried, matches!(easy, (1.0, -1.0) | (0.0, 0.0) | (2.0, 5.0)), "{what:?}");
+    }
+}
+
+/// Ramps are shortened to what a stop leaves them.
+#[test]
+fn j33_a_stop_sooner_than_the_ramp_shortens_the_ramp() {
+    let mut clock = PathClock::start();
+    clock.halt();
+    let free = SlopeBounds { easy: FREE, full: FREE };
+    clock.slow_down(1_000.0, 500.0, &free);
+    // An S of 400 ms.
+    assert!((clock.slope + 4.5 / 0.16 * DT).abs() < 1e-12, "{clock:?}");
+}
+
+#[test]
+fn roots() {
+    for x in [0.25, 1.0, 2.0, 1e3, 1e5, 1e6, 2e9] {
+        assert!((root(x) / x.sqrt() - 1.0).abs() < 1e-12, "{x}");
+    }
+}
+
+proptest! {
+    /// Pauses at any time, also during a resume: the rate stays within 0..1, never goes the wrong way for long, has no
+    /// step, and the slope is the derivative of it. Each pause ends in time.
+    #[test]
+    fn j33_the_ramp_is_smooth(
+        pauses in prop::collection::vec(1..400u32, 1..8),
+        easy in 0.5..20.0f64,
+        full in 6.0..40.0f64,
+    ) {
+        let mut clock = PathClock::start();
+        for ticks in pauses {
+            for ms in 0..ticks + 480 {
+                let before = clock;
+                if ms == ticks { clock.halt() }
+                tick(&mut clock, easy.min(full), full);
+                let change = clock.rate - before.rate;
+                prop_assert!((0.0..=1.0).contains(&clock.rate));
+                prop_assert!(change.abs() <= 0.04);
+                if clock.rate != 0.0 && clock.rate != 1.0 {
+                    prop_assert!((change - clock.slope * DT).abs() < 1e-12);
+                }
+                prop_assert!((clock.slope - before.slope).abs() < 1.7, "{:?} {:?}", before, clock);
+                prop_assert!(clock.time >= before.time);
+                if ms < ticks { prop_assert!(change >= 0.0) }
+            }
+            prop_assert!(clock.standing(), "{:?}", clock);
+            clock.go();
+        }
+    }
+}
+
+/// A clock on its way to full speed, after one tick.
+fn sped_up(rate: f64, slope: f64, bounds: Bounds) -> PathClock {
+    let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
+    clock.speed_up(200.0, bounds);
+    clock
+}
+
+#[test]
+fn j33_each_tick_of_a_resume() {
+    let rounded = 4.5 / 0.04 * DT;
+    for (rate, slope, bounds, expected) in [
+        (0.0, 0.0, FREE, rounded),
+        (0.5, -1.0, FREE, -1.0 + 8.0 * rounded),
+        // Bounds that leave one slope only, contradict each other, or leave the other direction only.
+        (0.5, 5.0, (2.0, 2.0), 2.0),
+        (0.5, 5.0, (2.0, 1.0), 0.0),
+        (0.5, 5.0, (-2.0, -1.0), 0.0),
+        (0.5, 5.0, (0.0, 0.0), 0.0),
+    ] {
+        let clock = sped_up(rate, slope, bounds);
+        assert!((clock.slope - expected.max(0.0)).abs() < 1e-12, "{rate} {slope} {bounds:?}: {clock:?}");
+        assert!(
+            (clock.rate - (rate + clock.slope * DT)).abs() < 1e-12,
+            "{rate} {slope} {bounds:?}: {clock:?}"
+        );
+    }
+}
+
+/// With the last tick of the way it is at full speed, and its slope is over.
+#[test]
+fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
+    // A rest that no rounding touches, and the slope that is just enough for it.
+    let rest = 1.0 / 16_384.0;
+    let enough = rest / DT;
+    assert_eq!(enough * DT, rest);
+    for (rest, high, full_speed) in [
+        (rest, enough, true),
+        (rest, 0.99 * enough, false),
+        (rest, FREE.1, true),
+        // Nothing that a bound could hold back.
+        (0.9e-9, 0.0, true),
+        (1.1e-9, 0.0, false),
+    ] {
+        let clock = sped_up(1.0 - rest, enough, (0.0, high));
+        assert_eq!(!clock.ramping(), full_speed, "{rest} {high}: {clock:?}");
+        assert!(!full_speed || clock.slope == 0.0, "{rest} {high}: {clock:?}");
+    }
+}
+
+#[test]
+fn j33_the_rest_of_the_way_flattens_the_slope_out() {
+    let ramp = Ramp::of(200.0);
+    for ticks in [1.0, 2.0, 7.0, 40.0] {
+        // From so many times the change of a tick on down to one: the sum of them.
+        let way = ramp.round * DT * ticks * (ticks + 1.0) / 2.0;
+        assert!((ramp.flatten(way) - ticks * ramp.round).abs() < 1e-9, "{ticks}");
+    }
+    assert_eq!(ramp.next(-1.0, 1.0), -1.0 + 8.0 * ramp.round);
+    assert_eq!(ramp.next(1.0, 1.0), 1.0 + ramp.round);
+}
+
+#[test]
+fn j33_a_clock_stands_halts_or_goes() {
+    let mut clock = PathClock::default();
+    let states = |clock: &PathClock| (clock.standing(), clock.halting(), clock.ramping());
+    assert_eq!(states(&clock), (true, false, false));
+    clock.go();
+    assert_eq!(states(&clock), (false, false, true), "about to go");
+    tick(&mut clock, FREE.1, FREE.1);
+    assert_eq!(states(&clock), (false, false, true));
+    clock.halt();
+    assert_eq!(states(&clock), (false, true, true));
+    clock.rest();
+    assert_eq!(states(&clock), (true, false, false));
+    assert_eq!(states(&PathClock::start()), (false, false, false));
+}
+
+#[test]
+fn j33_a_rate_below_a_billionth_is_standstill() {
+    for (rate, stands) in [(1.01e-9, false), (1e-9, false), (0.99e-9, true)] {
+        let mut clock = PathClock { rate, target: 1.0, ..PathClock::default() };
+        clock.halt();
+        // The limits leave no slope for it.
+        clock.slow_down(200.0, 500.0, &SlopeBounds { easy: (0.0, 0.0), full: (0.0, 0.0) });
+        assert_eq!(clock.standing(), stands, "{clock:?}");
+    }
+}

@@ -89,3 +89,49 @@ fn halve<const N: usize>(curve: [f64; N]) -> ([f64; N], [f64; N]) {
     }
     (front, rear)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parabola with its top, 0, at this place.
+    fn parabola(top: f64) -> [f64; 3] {
+        [-top * top, top - top * top, -(1.0 - top) * (1.0 - top)]
+    }
+
+    #[test]
+    fn j36_where_a_curve_leaves_its_bounds_is_where_it_is_halved() {
+        let high = -1e-6;
+        for top in [0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875] {
+            let found = leaves(parabola(top), -10.0, high, &mut 255);
+            assert_eq!(found, Some(Leaves { at: top, value: 0.0, bound: high }), "{top}");
+            let below = leaves(parabola(top).map(|value| -value), 1e-6, 10.0, &mut 255);
+            assert_eq!(below, Some(Leaves { at: top, value: 0.0, bound: 1e-6 }), "{top}");
+        }
+    }
+
+    /// Or a piece would be left out, and with it what it does.
+    #[test]
+    fn j36_at_the_full_depth_the_hull_decides() {
+        // Above 1 up to 0.006, less than half of the smallest piece.
+        let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 255).expect("it leaves its bounds");
+        assert_eq!((found.at, found.bound), (1.0 / 128.0, 1.0));
+        assert!(found.value > 1.0 && found.value < 1.0001, "{found:?}");
+        // The halvings of all curves together are used up before.
+        let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 2).expect("it may leave them");
+        assert_eq!((found.at, found.bound), (1.0 / 8.0, 1.0));
+    }
+
+    #[test]
+    fn j36_of_a_hull_that_is_outside_on_both_sides_the_further_one_is_named() {
+        for (curve, named) in [
+            ([0.0, 3.0, -2.0, 0.0], (3.0, 1.0)),
+            ([0.0, 2.0, -3.0, 0.0], (-3.0, -1.0)),
+            // Alike: the upper one.
+            ([0.0, 2.0, -2.0, 0.0], (2.0, 1.0)),
+        ] {
+            let found = leaves(curve, -1.0, 1.0, &mut 0);
+            assert_eq!(found, Some(Leaves { at: 0.5, value: named.0, bound: named.1 }));
+        }
+    }
+}

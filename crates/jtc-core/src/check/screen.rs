@@ -135,7 +135,7 @@ mod tests {
         for (speed, friction) in
             [(1.5, (-9.0, 9.0)), (3.0, (-0.7, 9.0)), (3.0, (-9.0, 0.7)), (0.01, (-9.0, 9.0))]
         {
-            for step in [0.001, 0.01, 0.1] {
+            for step in [0.001, 0.01, 0.1, 1.0, 10.0] {
                 let bounds = JointBounds { position: (-3.0, 2.0), speed, acceleration: 8.0, friction };
                 let screen = Screen::new(&[bounds; JOINTS], step);
                 let slowest = if speed > 1.5 { 0.7 } else { speed };

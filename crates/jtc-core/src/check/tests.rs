@@ -222,6 +222,13 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     }
     let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
+    // It is the first of the fastest points that is named, in both directions.
+    let mut check = TrajectoryCheck::new(&config(), 1000, None);
+    for v in [0.0, 0.4, high + 0.001, high + 0.001, 0.0] {
+        check.take(&point(3, 0.0, v, 0.0)).unwrap();
+    }
+    let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
+    assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, high)));
 }
 
 /// Between its points a path is faster than at them when it accelerates: then the hull of the velocities counts.
@@ -273,6 +280,22 @@ fn j36_a_table_that_leaves_standstill_out_is_no_table_for_a_path() {
     let refused = TrajectoryCheck::new(&config(), 10, Some(&tables)).take(&point(5, 0.0, 0.015, 0.0));
     let v = refused.unwrap_err();
     assert_eq!((v.joint, v.quantity, v.value), (5, Quantity::FrictionVelocity, 0.0));
+}
+
+/// Friction may be given between two segments. What was loaded before is asked again when it is executed, standstill with it.
+#[test]
+fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
+    let crate::Friction::Table(mut tables) = crate::Parameters::avena_friction_table() else {
+        panic!("no table")
+    };
+    tables[5].velocity = core::array::from_fn(|i| 0.01 + 0.1 * i as f32);
+    let moving = |q: f64| point(5, q, 0.2, 0.0);
+    let check = TrajectoryCheck::new(&config(), 10, Some(&tables));
+    // The screen takes velocities of both signs and passes nothing here: the exact check decides.
+    let mut check = check.behind(1, moving(0.0), [SpeedRange::default(); JOINTS]);
+    assert_eq!(check.take(&moving(0.002)), Ok(()));
+    let later = inside_tables(&check.speeds(), &tables).map_err(|v| (v.joint, v.value));
+    assert_eq!(later, Err((5, 0.0)));
 }
 
 #[test]

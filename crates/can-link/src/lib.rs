@@ -1,30 +1,4 @@
-//! One trait for a CAN bus, [`CanBus`], and its transports, opened by URL.
-//!
-//! | URL | what | CAN FD |
-//! |---|---|---|
-//! | `virtual:NAME` | a bus inside this process | yes |
-//! | `multicast:ADDR:PORT` | python-can's `udp_multicast`; stays on this host | yes |
-//! | `socketcand:HOST:PORT/can0` | a server of the socketcand protocol, such as [`SocketcandServer`] | no |
-//! | `slcan:/dev/ttyACM0@1000000` | an adapter at a serial port | CANable 2 |
-//! | `socketcan:can0` | an interface of the Linux kernel | yes |
-//!
-//! ```
-//! use std::time::Duration;
-//! use can_link::{CanBus, CanFrame, Id, open};
-//!
-//! let mut tool = open("virtual:readme")?;
-//! let mut node = open("virtual:readme")?;
-//! tool.send(&CanFrame::fd(Id::standard(0x123)?, &[1, 2, 3])?)?;
-//! let heard = node.receive(Duration::ZERO)?.expect("members hear each other");
-//! assert_eq!(heard.to_string(), "123 ## 01 02 03");
-//! assert_eq!(tool.receive(Duration::ZERO)?, None, "and not themselves");
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
-//!
-//! [`TimedBus`] is a classic bus in virtual time for simulators: arbitration, bit timing, error counters, collisions.
-//! [`SocketcandGateway`] lets clients of the socketcand protocol join such a bus.
-//!
-//! A bus that loses, corrupts, delays, doubles or reorders frames is any bus in a [`Faulty`] wrapper.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod bus;

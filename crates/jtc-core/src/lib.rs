@@ -1,4 +1,4 @@
-//! The joint trajectory controller: `tick(inputs) -> outputs`, sans-I/O, no clock, no heap.
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 

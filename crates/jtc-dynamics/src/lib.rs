@@ -1,4 +1,4 @@
-//! Arm model, kinematics and dynamics of a six-axis arm.
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,25 +1,4 @@
-//! The physical world around the controller, in virtual time: a six-axis arm with friction, drives, gripper,
-//! joint bus, serial line, and everything that can go wrong with them. The controller inside is the very code
-//! of the board.
-//!
-//! One [`World::step`] is one millisecond of everything, always in the same order: host bytes reach the
-//! parser, the controller ticks, its frame goes over the bus and is answered, drives do their millisecond,
-//! the arm moves. The same seed gives the same bytes.
-//!
-//! What is kinder than reality: by default each joint has a holding brake that is open only while its drive is
-//! enabled ([`Support`]), so that the arm can be used again after an error; the drives' motor alignment moves
-//! nothing; frames take their usual time on the bus, not their exact one.
-//!
-//! ```no_run
-//! use jtc_sim::{SimConfig, World};
-//!
-//! let mut world = World::new(SimConfig::default());
-//! world.host_write(&[0x9B, 0x02, 0x00, 0x06, 0xD6, 0x26]);
-//! for _ in 0..1000 {
-//!     world.step();
-//! }
-//! println!("{:?} after {} µs", world.telemetry().state, world.now_us());
-//! ```
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod arm;

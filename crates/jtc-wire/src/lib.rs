@@ -1,36 +1,4 @@
-//! Host link of the controller: frames both ways, CRC, stream parser. No I/O.
-//!
-//! A *frame* is `9B type length body crc`, described in `frame.rs` and, for the two long bodies, in `segment.rs` and
-//! `status.rs`; [`field`] names every byte once. Both ends are here:
-//!
-//! | | device | host |
-//! |---|---|---|
-//! | bytes → frames | [`Receiver`], ahead of it [`UrgentWatch`], behind it [`EventBatch`] | [`StatusReceiver`] |
-//! | frames → meaning | [`Command::parse`] | [`Status::parse`] |
-//! | meaning → frames | [`Status::emit`] | [`Command::emit`], [`trajectory`], [`pid_param`], …, constants in [`fixed`] |
-//! | in words | | `Display` of all of these, [`Described`], [`words`] |
-//!
-//! Time comes in as a number of µs, memory from the caller; nothing here allocates or panics on input.
-//!
-//! ```
-//! use jtc_wire::{Command, LinkEvent, RawPoint, Receiver, trajectory};
-//!
-//! // The host says something,
-//! let point = RawPoint::from_si(&[0.5; 6], &[0.0; 6], &[0.0; 6])?;
-//! let mut frame = [0; 100];
-//! let n = trajectory(&mut frame, (0, 0, 1), 10, [point])?;
-//!
-//! // the device understands it.
-//! let mut receiver = Receiver::new([0; jtc_wire::FRAME_MAX], 5000);
-//! assert_eq!(receiver.push(0, &frame[..n]), n);
-//! assert!(receiver.poll(0));
-//! if let Some(LinkEvent::Frame(frame)) = receiver.event() {
-//!     let Ok(Command::Trajectory(segment)) = Command::parse(frame) else { panic!() };
-//!     assert_eq!(segment.point(0), Some(point));
-//! }
-//! receiver.release();
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -2,7 +2,7 @@
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE, from_i16, from_i32, to_i16, to_i32};
-use crate::{GRIPPER, NODES, id};
+use crate::{GRIPPER, NODES, NodeState, id};
 
 /// Places in the payloads of answers to Move.
 mod field {
@@ -39,7 +39,7 @@ pub struct JointReport {
     /// Bearing temperature, °C.
     pub temperature: u8,
     /// Node FSM byte as sent.
-    pub fsm: u8,
+    pub state: NodeState,
     /// Motor-control faults now.
     pub mc_current: u8,
     /// Motor-control faults since acknowledged.
@@ -62,7 +62,7 @@ pub struct GripperReport {
     /// Second vacuum level reached.
     pub pressure2: bool,
     /// Node FSM byte as sent.
-    pub fsm: u8,
+    pub state: NodeState,
     /// Error bits.
     pub errors: u8,
     /// Warning bits.
@@ -82,11 +82,11 @@ pub enum Answer {
     /// 0x206.
     Gripper(GripperReport),
     /// 0x210+n.
-    Fsm {
+    State {
         /// 0..6.
         node: u8,
         /// FSM byte at reception of the request.
-        fsm: u8,
+        state: NodeState,
     },
     /// 0x2F0+n.
     Mode {
@@ -101,7 +101,7 @@ impl Answer {
     /// Node that answered, 0..6.
     pub const fn node(&self) -> u8 {
         match self {
-            Self::Joint { node, .. } | Self::Fsm { node, .. } | Self::Mode { node, .. } => *node,
+            Self::Joint { node, .. } | Self::State { node, .. } | Self::Mode { node, .. } => *node,
             Self::Gripper(_) => GRIPPER as u8,
         }
     }
@@ -122,7 +122,7 @@ impl Answer {
             }
             id::FSM_ANSWER => {
                 frame.need(1)?;
-                Ok(Self::Fsm { node, fsm: frame.byte(0) })
+                Ok(Self::State { node, state: NodeState::new(frame.byte(0)) })
             }
             id::MODE_ANSWER => {
                 frame.need(1)?;
@@ -139,9 +139,9 @@ impl Answer {
         match self {
             Self::Joint { node, report } => emit_joint(*node, report, scale),
             Self::Gripper(report) => emit_gripper(report),
-            Self::Fsm { node, fsm } => {
+            Self::State { node, state } => {
                 let mut frame = Frame::zeroed::<1>(id::answer(id::CHANGE_FSM, *node));
-                frame.put(0, [*fsm]);
+                frame.put(0, [state.code()]);
                 frame
             }
             Self::Mode { node, accepted } => {
@@ -160,7 +160,7 @@ fn joint(frame: &Frame, scale: Scale) -> JointReport {
         velocity: from_i16(frame.get(field::VELOCITY), scale.velocity),
         torque: from_i16(frame.get(field::TORQUE), TORQUE_FULL_SCALE),
         temperature: frame.byte(field::BEARING_TEMPERATURE),
-        fsm: frame.byte(field::FSM),
+        state: NodeState::new(frame.byte(field::FSM)),
         mc_current: frame.byte(field::MC_CURRENT),
         mc_occurred: frame.byte(field::MC_OCCURRED),
         errors: frame.byte(field::ERRORS),
@@ -185,7 +185,7 @@ fn emit_joint(node: u8, report: &JointReport, scale: Scale) -> Frame {
     frame.put(field::VELOCITY, to_i16(report.velocity, scale.velocity));
     frame.put(field::TORQUE, to_i16(report.torque, TORQUE_FULL_SCALE));
     frame.put(field::BEARING_TEMPERATURE, [report.temperature]);
-    frame.put(field::FSM, [report.fsm]);
+    frame.put(field::FSM, [report.state.code()]);
     frame.put(field::MC_CURRENT, [report.mc_current]);
     frame.put(field::MC_OCCURRED, [report.mc_occurred]);
     frame.put(field::ERRORS, [report.errors]);
@@ -198,7 +198,7 @@ fn gripper(frame: &Frame) -> GripperReport {
         pump: frame.byte(field::PUMP) != 0,
         pressure1: frame.byte(field::PRESSURE1) != 0,
         pressure2: frame.byte(field::PRESSURE2) != 0,
-        fsm: frame.byte(field::FSM),
+        state: NodeState::new(frame.byte(field::FSM)),
         errors: frame.byte(field::ERRORS),
         warnings: frame.byte(field::WARNINGS),
     }
@@ -209,7 +209,7 @@ fn emit_gripper(report: &GripperReport) -> Frame {
     frame.put(field::PUMP, [u8::from(report.pump)]);
     frame.put(field::PRESSURE1, [u8::from(report.pressure1)]);
     frame.put(field::PRESSURE2, [u8::from(report.pressure2)]);
-    frame.put(field::FSM, [report.fsm]);
+    frame.put(field::FSM, [report.state.code()]);
     frame.put(field::ERRORS, [report.errors]);
     frame.put(field::WARNINGS, [report.warnings]);
     frame

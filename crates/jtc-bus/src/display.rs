@@ -3,7 +3,7 @@
 use core::fmt::{Display, Formatter, Result};
 
 use crate::{Answer, Bits, Frame, GripperReport, JointReport, Request, Scale, Target};
-use crate::{config, error, fsm, id, motor_control, warning};
+use crate::{config, error, id, motor_control, warning};
 
 /// Any frame of the bus, decoded; one that is not understood is shown with the reason and its bytes.
 ///
@@ -121,7 +121,7 @@ impl Display for Answer {
         match self {
             Self::Joint { node, report } => write!(f, "{} {report}", Node(*node)),
             Self::Gripper(report) => write!(f, "gripper {report}"),
-            Self::Fsm { node, fsm } => write!(f, "{} state: {}", Node(*node), fsm::name(*fsm)),
+            Self::State { node, state } => write!(f, "{} state: {}", Node(*node), state.description()),
             Self::Mode { node, accepted: true } => write!(f, "{} configuration accepted", Node(*node)),
             Self::Mode { node, accepted: false } => write!(f, "{} configuration refused", Node(*node)),
         }
@@ -143,7 +143,7 @@ impl Display for JointReport {
         if let Some(motor) = self.motor_temperature {
             write!(f, ", motor {motor} °C")?;
         }
-        write!(f, ", {}", fsm::name(self.fsm))?;
+        write!(f, ", {}", self.state.description())?;
         report_bits(f, "motor control", self.mc_current, &motor_control::NAMES)?;
         report_bits(f, "motor control before", self.mc_occurred & !self.mc_current, &motor_control::NAMES)?;
         report_bits(f, "errors", self.errors, &error::NAMES)?;
@@ -156,7 +156,7 @@ impl Display for GripperReport {
         write!(f, "pump {}, ", on(self.pump))?;
         let level = |reached| if reached { "reached" } else { "not reached" };
         write!(f, "level 1 {}, level 2 {}, ", level(self.pressure1), level(self.pressure2))?;
-        f.write_str(fsm::name(self.fsm))?;
+        f.write_str(self.state.description())?;
         report_bits(f, "errors", self.errors, &error::NAMES)?;
         report_bits(f, "warnings", self.warnings, &warning::NAMES)
     }

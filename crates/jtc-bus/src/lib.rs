@@ -23,7 +23,7 @@ pub use duration::duration_ns;
 pub use frame::{Format, Frame, FrameError, MAX_LEN};
 pub use request::{Request, Target};
 pub use scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE};
-pub use state::fsm;
+pub use state::NodeState;
 
 /// Joints on the bus, nodes 0..5.
 pub const JOINTS: usize = 6;

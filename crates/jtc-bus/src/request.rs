@@ -2,7 +2,7 @@
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{TORQUE_FULL_SCALE, from_i16, to_i16};
-use crate::{GRIPPER, JOINTS, NODES, fsm, id};
+use crate::{GRIPPER, JOINTS, NODES, NodeState, id};
 
 /// Places in the payloads of requests.
 mod field {
@@ -28,21 +28,22 @@ pub enum Target {
     #[default]
     NoChange = 0,
     /// Init; from Fault this acknowledges the faults.
-    Init = fsm::INIT,
+    Init = NodeState::INIT.code(),
     /// Ready to operate, motor off.
-    Ready = fsm::READY,
+    Ready = NodeState::READY.code(),
     /// Operation enabled.
-    Enable = fsm::ENABLED,
+    Enable = NodeState::ENABLED.code(),
 }
 
 impl Target {
     /// The state asked for by a byte of the wire.
     pub const fn from_byte(byte: u8) -> Option<Self> {
-        match byte {
-            0 => Some(Self::NoChange),
-            fsm::INIT => Some(Self::Init),
-            fsm::READY => Some(Self::Ready),
-            fsm::ENABLED => Some(Self::Enable),
+        match NodeState::new(byte) {
+            // No node is asked for Start: that byte asks for nothing.
+            NodeState::START => Some(Self::NoChange),
+            NodeState::INIT => Some(Self::Init),
+            NodeState::READY => Some(Self::Ready),
+            NodeState::ENABLED => Some(Self::Enable),
             _ => None,
         }
     }

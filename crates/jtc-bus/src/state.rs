@@ -1,49 +1,105 @@
 //! States that nodes report.
+use core::fmt;
 
-/// Node FSM bytes.
-pub mod fsm {
+/// State of a node, one byte: generations of drives know different ones.
+///
+/// ```
+/// use jtc_bus::NodeState;
+///
+/// assert_eq!(NodeState::new(3), NodeState::ENABLED);
+/// assert_eq!(NodeState::ENABLED.name(), "OperationEnable");
+/// assert!(NodeState::new(12).is_transition() && NodeState::FAULT.is_fault());
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct NodeState(u8);
+
+impl NodeState {
     /// Start.
-    pub const START: u8 = 0;
+    pub const START: Self = Self(0);
     /// Init: motor off, waits for configuration.
-    pub const INIT: u8 = 1;
+    pub const INIT: Self = Self(1);
     /// Ready to operate: motor off, configured.
-    pub const READY: u8 = 2;
+    pub const READY: Self = Self(2);
     /// Operation enabled: follows its command.
-    pub const ENABLED: u8 = 3;
+    pub const ENABLED: Self = Self(3);
+    /// From Start to Init.
+    pub const START_TO_INIT: Self = Self(10);
+    /// From Init to ready.
+    pub const INIT_TO_READY: Self = Self(11);
+    /// From ready to enabled: the motor may be aligned on the way.
+    pub const READY_TO_ENABLED: Self = Self(12);
+    /// From enabled to ready.
+    pub const ENABLED_TO_READY: Self = Self(13);
     /// Fault reaction active.
-    pub const FAULT_REACTION: u8 = 254;
+    pub const FAULT_REACTION: Self = Self(254);
     /// Fault.
-    pub const FAULT: u8 = 255;
+    pub const FAULT: Self = Self(255);
 
-    /// The state in words. Generations of drives disagree about what 14, 15 and 16 mean, so these only say
-    /// that the node is between two states.
-    pub const fn name(fsm: u8) -> &'static str {
-        match fsm {
-            START => "start",
-            INIT => "init",
-            READY => "ready to operate",
-            ENABLED => "operation enabled",
-            10 => "start to init",
-            11 => "init to ready",
-            12 => "ready to enabled (motor alignment)",
-            13 => "enabled to ready",
-            14..=16 => "changing state",
+    /// The state of this byte.
+    pub const fn new(code: u8) -> Self {
+        Self(code)
+    }
+
+    /// The byte on the bus.
+    pub const fn code(self) -> u8 {
+        self.0
+    }
+
+    /// Name as manuals have it, and as a status shows it.
+    pub const fn name(self) -> &'static str {
+        self.texts().0
+    }
+
+    /// What the node does, for a log of the bus.
+    pub const fn description(self) -> &'static str {
+        self.texts().1
+    }
+
+    /// Generations of drives disagree about what 14, 15 and 16 mean, so these only say that the node is between two states.
+    const fn texts(self) -> (&'static str, &'static str) {
+        match self.0 {
+            0 => ("Start", "start"),
+            1 => ("Init", "init"),
+            2 => ("ReadyToOperate", "ready to operate"),
+            3 => ("OperationEnable", "operation enabled"),
+            10 => ("in transition", "start to init"),
+            11 => ("in transition", "init to ready"),
+            12 => ("in transition", "ready to enabled (motor alignment)"),
+            13 => ("in transition", "enabled to ready"),
+            14..=16 => ("in transition", "changing state"),
             100..=106 | 110..=117 | 131..=134 | 141..=144 | 161..=166 | 171 | 172 => {
-                "calibrating (the drive moves by itself)"
+                ("unknown state", "calibrating (the drive moves by itself)")
             }
-            FAULT_REACTION => "fault reaction",
-            FAULT => "fault",
-            _ => "unknown state",
+            254 => ("fault reaction", "fault reaction"),
+            255 => ("Fault", "fault"),
+            _ => ("unknown state", "unknown state"),
         }
     }
 
+    /// In Start, in Init, or between them.
+    pub const fn is_starting(self) -> bool {
+        matches!(self, Self::START | Self::INIT | Self::START_TO_INIT)
+    }
+
     /// Between two of its states (10..16).
-    pub const fn is_transition(fsm: u8) -> bool {
-        matches!(fsm, 10..=16)
+    pub const fn is_transition(self) -> bool {
+        matches!(self.0, 10..=16)
     }
 
     /// In fault, or on its way there.
-    pub const fn is_fault(fsm: u8) -> bool {
-        matches!(fsm, FAULT_REACTION | FAULT)
+    pub const fn is_fault(self) -> bool {
+        matches!(self, Self::FAULT_REACTION | Self::FAULT)
+    }
+}
+
+impl fmt::Display for NodeState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl fmt::Debug for NodeState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({})", self.0, self.description())
     }
 }

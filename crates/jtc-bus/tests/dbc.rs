@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 
 use can_dbc::{AttributeValue, ByteOrder, Dbc, MessageId, Signal, ValueType};
 use jtc_bus::{
-    Answer, Frame, GRIPPER, GripperReport, JOINTS, JointReport, NODES, Request, Scale, Target, config, error,
-    fsm, motor_control, warning,
+    Answer, Frame, GRIPPER, GripperReport, JOINTS, JointReport, NODES, NodeState, Request, Scale, Target,
+    config, error, motor_control, warning,
 };
 use proptest::prelude::*;
 
@@ -128,12 +128,12 @@ proptest! {
         motor_temperature: Option<u8>,
     ) {
         let scale = Scale::CURRENT;
-        let [temperature, fsm, mc_current, mc_occurred, errors, warnings, other] = bytes;
+        let [temperature, state, mc_current, mc_occurred, errors, warnings, other] = bytes;
         let report = JointReport {
-            position, velocity, torque, temperature, fsm, mc_current, mc_occurred, errors, warnings,
+            position, velocity, torque, temperature, state: NodeState::new(state), mc_current, mc_occurred, errors, warnings,
             motor_temperature,
         };
-        let mut status = BTreeMap::from([("fsm".to_owned(), f64::from(fsm))]);
+        let mut status = BTreeMap::from([("fsm".to_owned(), f64::from(state))]);
         flags(&mut status, "error_", "", errors, &ERRORS);
         flags(&mut status, "warning_", "", warnings, &WARNINGS);
 
@@ -150,14 +150,14 @@ proptest! {
         prop_assert!((found["velocity"] - velocity).abs() < 4e-5);
 
         let [pump, pressure1, pressure2] = [0, 1, 2].map(|bit| other >> bit & 1 == 1);
-        let report = GripperReport { pump, pressure1, pressure2, fsm, errors, warnings };
+        let report = GripperReport { pump, pressure1, pressure2, state: NodeState::new(state), errors, warnings };
         let levels = [("pump", pump), ("pressure1", pressure1), ("pressure2", pressure2)];
         status.extend(levels.map(|(name, on)| (name.to_owned(), f64::from(u8::from(on)))));
         same(&decoded(&Answer::Gripper(report).emit(scale)), &status, 0.0);
 
         for node in 0..NODES as u8 {
-            let expected = BTreeMap::from([("fsm".to_owned(), f64::from(fsm))]);
-            same(&decoded(&Answer::Fsm { node, fsm }.emit(scale)), &expected, 0.0);
+            let expected = BTreeMap::from([("fsm".to_owned(), f64::from(state))]);
+            same(&decoded(&Answer::State { node, state: NodeState::new(state) }.emit(scale)), &expected, 0.0);
             let expected = BTreeMap::from([("accepted".to_owned(), f64::from(u8::from(pump)))]);
             same(&decoded(&Answer::Mode { node, accepted: pump }.emit(scale)), &expected, 0.0);
         }
@@ -208,7 +208,7 @@ fn states_have_the_same_names() {
             continue;
         }
         for value in value_descriptions {
-            assert_eq!(value.description, fsm::name(u8::try_from(value.id).unwrap()));
+            assert_eq!(value.description, NodeState::new(u8::try_from(value.id).unwrap()).description());
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The frames on the wire, byte by byte and as properties.
 
 use jtc_bus::{
-    Answer, Bits, Frame, FrameError, GRIPPER, GripperReport, JOINTS, JointReport, NODES, POSITION_FULL_SCALE,
-    Request, Scale, TORQUE_FULL_SCALE, Target, config, error, fsm, warning,
+    Answer, Bits, Frame, FrameError, GRIPPER, GripperReport, JOINTS, JointReport, NODES, NodeState,
+    POSITION_FULL_SCALE, Request, Scale, TORQUE_FULL_SCALE, Target, config, error, warning,
 };
 use proptest::num::f64::ANY;
 use proptest::prelude::*;
@@ -69,7 +69,7 @@ fn j11_joint_answer_of_16_and_20_bytes() {
         velocity: -2.0,
         torque: 16384.0 * TORQUE_FULL_SCALE / 32767.0,
         temperature: 33,
-        fsm: fsm::ENABLED,
+        state: NodeState::ENABLED,
         mc_current: 0x40,
         mc_occurred: 0x42,
         errors: 0x02,
@@ -104,7 +104,7 @@ fn j11_gripper_answer() {
         pump: true,
         pressure1: false,
         pressure2: true,
-        fsm: fsm::READY,
+        state: NodeState::READY,
         errors: 4,
         warnings: 8,
     };
@@ -120,11 +120,14 @@ fn j11_state_and_mode_answers() {
         let id = u16::from(node);
         for byte in 0..=255 {
             let answer = Answer::parse(&frame(0x210 + id, &[byte]), SCALE);
-            assert_eq!(answer, Ok(Answer::Fsm { node, fsm: byte }));
+            assert_eq!(answer, Ok(Answer::State { node, state: NodeState::new(byte) }));
             let answer = Answer::parse(&frame(0x2F0 + id, &[byte, 9, 9]), SCALE);
             assert_eq!(answer, Ok(Answer::Mode { node, accepted: byte == 1 }));
         }
-        assert_eq!(Answer::Fsm { node, fsm: 254 }.emit(SCALE), frame(0x210 + id, &[254]));
+        assert_eq!(
+            Answer::State { node, state: NodeState::FAULT_REACTION }.emit(SCALE),
+            frame(0x210 + id, &[254])
+        );
         assert_eq!(Answer::Mode { node, accepted: true }.emit(SCALE), frame(0x2F0 + id, &[1]));
     }
 }
@@ -135,7 +138,7 @@ fn j11_a_joint_that_does_not_exist_is_never_somebody_else() {
         let answer = Answer::Joint { node, report: JointReport::default() };
         assert_eq!(answer.emit(SCALE).id, 0x20F, "the gripper is no joint");
         if usize::from(node) > GRIPPER {
-            assert_eq!(Answer::Fsm { node, fsm: 1 }.emit(SCALE).id, 0x21F);
+            assert_eq!(Answer::State { node, state: NodeState::INIT }.emit(SCALE).id, 0x21F);
             assert_eq!(Answer::Mode { node, accepted: true }.emit(SCALE).id, 0x2FF);
         }
     }
@@ -204,7 +207,7 @@ fn frames_read_as_words() {
     let report = JointReport {
         position: 0.5,
         temperature: 31,
-        fsm: fsm::FAULT,
+        state: NodeState::FAULT,
         mc_current: 0x40,
         mc_occurred: 0x42,
         errors: 0x02,
@@ -236,8 +239,13 @@ fn configurations_read_as_words() {
 #[test]
 fn what_a_gripper_says_reads_as_words() {
     assert_eq!(Request::Reset(6).emit().to_string(), "1A6 Reset gripper");
-    let report =
-        GripperReport { pump: true, pressure1: true, fsm: fsm::FAULT, errors: 0x06, ..Default::default() };
+    let report = GripperReport {
+        pump: true,
+        pressure1: true,
+        state: NodeState::FAULT,
+        errors: 0x06,
+        ..Default::default()
+    };
     assert_eq!(
         Answer::Gripper(report).emit(SCALE).to_string(),
         "206 gripper pump on, level 1 reached, level 2 not reached, fault, \

@@ -2,7 +2,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
+use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::{BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, POINTS_MAX};
 use jtc_wire::{FrameRef, FrameType, LinkEvent, RawPoint, UrgentCommands, crc16};
 
@@ -17,7 +17,7 @@ fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
 }
 
 /// Nodes that answer at once and are where they should be.
-fn answers(request: &Request, state: &mut [u8; 7], position: &[f64; 6]) -> Vec<Frame> {
+fn answers(request: &Request, state: &mut [NodeState; 7], position: &[f64; 6]) -> Vec<Frame> {
     let mut out = Vec::new();
     for n in 0..7u8 {
         let node = &mut state[usize::from(n)];
@@ -27,23 +27,25 @@ fn answers(request: &Request, state: &mut [u8; 7], position: &[f64; 6]) -> Vec<F
                 report: JointReport {
                     position: position[usize::from(n)],
                     temperature: 30,
-                    fsm: *node,
+                    state: *node,
                     motor_temperature: Some(30),
                     ..JointReport::default()
                 },
             },
-            Request::Move { .. } => Answer::Gripper(GripperReport { fsm: *node, ..GripperReport::default() }),
+            Request::Move { .. } => {
+                Answer::Gripper(GripperReport { state: *node, ..GripperReport::default() })
+            }
             Request::ChangeFsm { target } => {
                 let before = *node;
                 *node = match target[usize::from(n)] {
                     Target::NoChange => before,
-                    other => other as u8,
+                    other => NodeState::new(other as u8),
                 };
-                Answer::Fsm { node: n, fsm: before }
+                Answer::State { node: n, state: before }
             }
             Request::ChangeMode { .. } => Answer::Mode { node: n, accepted: true },
             Request::ResetAll | Request::Reset(_) => {
-                *node = fsm::INIT;
+                *node = NodeState::INIT;
                 continue;
             }
         };
@@ -82,7 +84,7 @@ fn main() {
     let mut queue: std::collections::VecDeque<_> = commands.iter().map(|(t, b)| (*t, frame(*t, b))).collect();
 
     let mut controller = Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX]);
-    let mut nodes = [fsm::INIT; 7];
+    let mut nodes = [NodeState::INIT; 7];
     let mut bus = Vec::new();
     let mut recorded: Vec<Vec<Frame>> = Vec::new();
     let mut start = None;

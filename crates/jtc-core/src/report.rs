@@ -33,7 +33,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 torque_friction: parts.friction,
                 torque_other: parts.payload + parts.brake + parts.blend,
                 torque: torque[j],
-                fsm: report.fsm,
+                state: report.state,
                 internal: self.errors.joint(j).0,
             };
         }
@@ -56,7 +56,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             let report = &self.nodes.node(j).report;
             let (internal, internal_occurred) = self.errors.joint(j);
             JointStatus {
-                fsm: report.fsm,
+                state: report.state,
                 mc_current: report.mc_current,
                 mc_occurred: report.mc_occurred,
                 errors: report.errors,
@@ -85,7 +85,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             can_occurred,
             joints,
             gripper: Some(GripperStatus {
-                fsm: gripper.fsm,
+                state: gripper.state,
                 pump: u8::from(self.nodes.pump),
                 pressure1: u8::from(self.nodes.pressure[0]),
                 pressure2: u8::from(self.nodes.pressure[1]),

@@ -1,4 +1,6 @@
 //! What a tick computed, for recordings and tests.
+use jtc_bus::NodeState;
+
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// One joint in one tick.
@@ -32,8 +34,8 @@ pub struct JointTelemetry {
     pub torque_other: f64,
     /// Torque commanded on the bus, N·m.
     pub torque: f64,
-    /// Node FSM byte.
-    pub fsm: u8,
+    /// State of the drive.
+    pub state: NodeState,
     /// Internal errors.
     pub internal: u16,
 }

@@ -1,7 +1,7 @@
 //! Order of the bring-up: what counts when, and who is asked for what (J-16, J-20, J-21).
 mod rig;
 
-use jtc_bus::{Answer, Frame, JointReport, Request, Target, fsm};
+use jtc_bus::{Answer, Frame, JointReport, NodeState, Request, Target};
 use jtc_core::{Config, ControllerState};
 use jtc_wire::{DataStatus, FrameType};
 use rig::{Rig, SCALE};
@@ -19,8 +19,8 @@ fn target_of(request: &Request) -> Target {
     }
 }
 
-fn joint_answer(position: f64, state: u8) -> Frame {
-    let report = JointReport { position, fsm: state, temperature: 25, ..JointReport::default() };
+fn joint_answer(position: f64, state: NodeState) -> Frame {
+    let report = JointReport { position, state, temperature: 25, ..JointReport::default() };
     Answer::Joint { node: JOINT as u8, report }.emit(SCALE)
 }
 
@@ -32,13 +32,13 @@ fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
         rig.follow = false;
         rig.until(300, |r| r.sent.last().is_some_and(configures));
         let mode = Answer::Mode { node: JOINT as u8, accepted: true }.emit(SCALE);
-        let moved = joint_answer(0.6, fsm::INIT);
+        let moved = joint_answer(0.6, NodeState::INIT);
         rig.inject = if move_first { vec![moved, mode] } else { vec![mode, moved] };
         rig.tick();
         let joint = rig.controller.telemetry().joints[JOINT];
-        assert_eq!((joint.position, joint.fsm), (0.0, fsm::INIT));
+        assert_eq!((joint.position, joint.state), (0.0, NodeState::INIT));
         assert_ne!(rig.status().node_init & 1 << JOINT, 1 << JOINT, "it counts from the next answer on");
-        rig.inject = vec![joint_answer(0.01, fsm::INIT)];
+        rig.inject = vec![joint_answer(0.01, NodeState::INIT)];
         rig.tick();
     }
 }
@@ -50,15 +50,15 @@ fn j20_late_answers_after_a_reset_do_not_count() {
     rig.ask(FrameType::ResetCanDevices, &[1 << JOINT, 0, 0, 0]);
     rig.until(20, |r| r.sent.last() == Some(&Request::Reset(JOINT as u8)));
     let late = [
-        joint_answer(0.6, fsm::ENABLED),
+        joint_answer(0.6, NodeState::ENABLED),
         Answer::Mode { node: JOINT as u8, accepted: true }.emit(SCALE),
-        joint_answer(0.6, fsm::READY),
+        joint_answer(0.6, NodeState::READY),
     ];
     let from = rig.sent.len();
     for tick in 0..15 {
         let mut answers = vec![late[tick % 3]];
         for node in (0..6).filter(|&node| node != JOINT) {
-            let report = JointReport { fsm: rig.nodes[node].report.fsm, ..rig.nodes[node].report };
+            let report = JointReport { state: rig.nodes[node].report.state, ..rig.nodes[node].report };
             answers.push(Answer::Joint { node: node as u8, report }.emit(SCALE));
         }
         rig.inject = answers;
@@ -80,7 +80,7 @@ fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     rig.defaults();
     rig.nodes[JOINT].refuses_when_ready = true;
     rig.until(300, |r| r.nodes[JOINT].booting == 0 && r.nodes[JOINT].resets == 1);
-    rig.nodes[JOINT].report.fsm = fsm::READY;
+    rig.nodes[JOINT].report.state = NodeState::READY;
     rig.run(400);
     let requests = &rig.sent;
     assert!(requests.iter().any(|r| target_of(r) == Target::Init));
@@ -113,16 +113,17 @@ fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     let mut rig = Rig::holding();
     rig.nodes[JOINT].fault();
     rig.run(3);
-    rig.nodes[JOINT].report.fsm = 254;
+    rig.nodes[JOINT].report.state = NodeState::FAULT_REACTION;
     assert_eq!(rig.clear(true, 1 << JOINT), DataStatus::NoError);
     rig.run(20);
-    rig.nodes[JOINT].report = JointReport { fsm: 10, temperature: 25, ..JointReport::default() };
+    rig.nodes[JOINT].report =
+        JointReport { state: NodeState::START_TO_INIT, temperature: 25, ..JointReport::default() };
     rig.run(3);
     let from = rig.sent.len();
     rig.run(100);
     assert_eq!(rig.state(), ControllerState::Error, "it is still being cleared");
     assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init), "the command stands");
-    rig.nodes[JOINT].report.fsm = fsm::INIT;
+    rig.nodes[JOINT].report.state = NodeState::INIT;
     rig.nodes[JOINT].configured = false;
     rig.run(800);
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
@@ -144,7 +145,7 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     // In Init: it waits in ReadyToOperate without configuration, and has something to clear.
     let mut rig = Rig::new(Config::avena());
     rig.until(300, |r| r.nodes[JOINT].booting == 0 && r.nodes[JOINT].resets == 1);
-    rig.nodes[JOINT].report.fsm = fsm::READY;
+    rig.nodes[JOINT].report.state = NodeState::READY;
     rig.nodes[JOINT].report.mc_occurred = 4;
     rig.nodes[JOINT].refuses_when_ready = true;
     rig.nodes[JOINT].stays_ready = true;

@@ -2,7 +2,7 @@
 mod plant;
 mod rig;
 
-use jtc_bus::fsm;
+use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{ExecCommand, RawPoint};
@@ -59,7 +59,7 @@ impl Let {
     }
 
     fn enabled(&self) -> bool {
-        self.rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED)
+        self.rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED)
     }
 
     fn run(&mut self, ticks: usize) {
@@ -185,7 +185,7 @@ fn j34_an_execute_waits_until_the_load_is_caught() {
     it.rig.send(jtc_wire::FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
     it.run(100);
     assert_eq!((it.rig.state(), it.rig.trajectory()), (ControllerState::Operate, TrajectoryState::Execute));
-    it.rig.nodes[1].report.fsm = fsm::ENABLED;
+    it.rig.nodes[1].report.state = NodeState::ENABLED;
     let mut left = 0;
     while it.rig.trajectory() == TrajectoryState::Execute {
         let before = it.saturated;

@@ -269,7 +269,7 @@ fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
             rig.tick();
         }
         rig.follow = true;
-        rig.nodes[5].report.fsm = jtc_bus::fsm::ENABLED;
+        rig.nodes[5].report.state = jtc_bus::NodeState::ENABLED;
         rig.until(1000, |r| r.trajectory() != TrajectoryState::Execute);
         assert_eq!((rig.trajectory(), rig.errors()), (trajectory, 0), "{away} rad away");
         if trajectory == TrajectoryState::Stop {

@@ -1,7 +1,7 @@
 //! Joints are enabled only in an arm that hardly moves, and come to rest without a torque step where one moves all the same (J-16).
 mod rig;
 
-use jtc_bus::{Request, Target, fsm};
+use jtc_bus::{NodeState, Request, Target};
 use jtc_core::{Config, ControllerState, error};
 use jtc_wire::FrameType;
 use rig::Rig;
@@ -36,7 +36,7 @@ fn asked_to_enable(requests: &[Request]) -> bool {
 fn stopped(config: Config) -> Rig {
     let mut rig = Rig::new(config);
     rig.defaults();
-    rig.until(500, |r| r.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+    rig.until(500, |r| r.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
     rig.run(3);
     rig.follow = false;
     rig.safety_input = false;
@@ -60,7 +60,10 @@ fn j16_no_joint_is_enabled_while_one_moves() {
             swing(&mut rig, 3000, speed, report);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{speed} rad/s");
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
-            assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY), "which the status shows");
+            assert!(
+                rig.nodes[..6].iter().all(|n| n.report.state == NodeState::READY),
+                "which the status shows"
+            );
             // It must have been slow for 50 ms.
             let from = rig.sent.len();
             swing(&mut rig, 49, 0.2, report);
@@ -68,7 +71,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
             swing(&mut rig, 30, 0.2, report);
             assert!(asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
             rig.run(100);
-            assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+            assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         }
     }
@@ -94,7 +97,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         let mut rig = stopped(Config::avena());
         rig.nodes[JOINT].slow_enable = true;
         rig.clear(true, 0x7F);
-        rig.until(500, |r| r.nodes[JOINT].report.fsm == 12);
+        rig.until(500, |r| r.nodes[JOINT].report.state == NodeState::new(12));
         let mut falling = 0.0;
         for _ in 0..100 {
             falling += velocity * 0.01;
@@ -102,7 +105,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
             rig.nodes[JOINT].report.position += falling * 0.001;
             rig.tick();
         }
-        rig.nodes[JOINT].report.fsm = fsm::ENABLED;
+        rig.nodes[JOINT].report.state = NodeState::ENABLED;
         let (start, mut last) = (rig.nodes[JOINT].report.position, 0.0);
         for tick in 0..900 {
             // An arm that goes where it is commanded to; what it reports now is seen two ticks after that command.
@@ -120,7 +123,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
                 f64::abs(correction - last) < 3.0,
                 "{velocity} rad/s, tick {tick}: {last} to {correction}"
             );
-            last = if t.fsm == fsm::ENABLED { correction } else { 0.0 };
+            last = if t.state == NodeState::ENABLED { correction } else { 0.0 };
         }
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         let t = rig.controller.telemetry().joints[JOINT];
@@ -157,7 +160,7 @@ fn j16_the_gate_hides_no_joint_that_leaves_operation_enable() {
     rig.follow = false;
     rig.nodes[JOINT].report.velocity = 1.0;
     rig.run(3);
-    rig.nodes[JOINT].report.fsm = fsm::READY;
+    rig.nodes[JOINT].report.state = NodeState::READY;
     rig.run(2);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
 }

@@ -1,7 +1,7 @@
 //! The gripper: it is brought up beside the arm, never takes its torque away, and never starts its pump by itself (J-14, J-23).
 mod rig;
 
-use jtc_bus::{Request, fsm};
+use jtc_bus::{NodeState, Request};
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, rest};
@@ -52,7 +52,7 @@ fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     }
     let others = rig.sent[from..].iter().filter(|r| !matches!(r, Request::Move { .. })).count();
     assert!(others <= ticks / 20 + 1, "{others} frames of {ticks} take the place of Move");
-    assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED && n.resets == 1));
+    assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED && n.resets == 1));
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn j23_a_gripper_that_falls_silent_is_shown_and_nothing_more() {
         undisturbed(&mut rig, 300, state);
         let status = rig.status();
         assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, 0, FLAG));
-        assert_eq!((status.node_init, rig.nodes[GRIPPER].report.fsm), (0, fsm::ENABLED));
+        assert_eq!((status.node_init, rig.nodes[GRIPPER].report.state), (0, NodeState::ENABLED));
         assert!(rig.pump);
     }
 }
@@ -84,7 +84,7 @@ fn j23_a_gripper_that_resets_is_configured_again_on_the_side() {
             rig.statuses.clear();
             undisturbed(&mut rig, boot_ticks as usize + 200, state);
             assert!(boot_ticks == 3 || rig.statuses.iter().any(|s| s.node_init == 1 << GRIPPER));
-            assert_eq!(rig.nodes[GRIPPER].report.fsm, fsm::ENABLED);
+            assert_eq!(rig.nodes[GRIPPER].report.state, NodeState::ENABLED);
             assert!(rig.nodes[GRIPPER].configured && rig.status().node_init == 0);
             assert!(!rig.pump, "J-23: the pump waits for a command");
             pump(&mut rig, true);
@@ -97,16 +97,16 @@ fn j23_a_gripper_that_resets_is_configured_again_on_the_side() {
 fn j23_a_gripper_that_leaves_operation_enable_is_enabled_again_without_its_pump() {
     for state in POWERED {
         let mut rig = powered(state);
-        rig.nodes[GRIPPER].report.fsm = fsm::READY;
+        rig.nodes[GRIPPER].report.state = NodeState::READY;
         undisturbed(&mut rig, 100, state);
-        assert_eq!((rig.nodes[GRIPPER].report.fsm, rig.pump), (fsm::ENABLED, false));
+        assert_eq!((rig.nodes[GRIPPER].report.state, rig.pump), (NodeState::ENABLED, false));
         // A fault of it is shown, and is cleared as any node's.
         rig.nodes[GRIPPER].fault();
         undisturbed(&mut rig, 100, state);
-        assert_eq!(rig.status().gripper.unwrap().fsm, fsm::FAULT);
+        assert_eq!(rig.status().gripper.unwrap().state, NodeState::FAULT);
         rig.clear(false, 1 << GRIPPER);
         undisturbed(&mut rig, 300, state);
-        assert_eq!((rig.nodes[GRIPPER].report.fsm, rig.pump), (fsm::ENABLED, false));
+        assert_eq!((rig.nodes[GRIPPER].report.state, rig.pump), (NodeState::ENABLED, false));
     }
 }
 
@@ -123,7 +123,7 @@ fn j23_joints_are_not_reset_while_the_arm_may_move() {
         // The gripper alone is another matter.
         assert_eq!(rig.ask(FrameType::ResetCanDevices, &[0x40, 0, 0, 0]), DataStatus::NoError);
         undisturbed(&mut rig, 400, state);
-        assert_eq!((rig.nodes[GRIPPER].resets, rig.nodes[GRIPPER].report.fsm), (2, fsm::ENABLED));
+        assert_eq!((rig.nodes[GRIPPER].resets, rig.nodes[GRIPPER].report.state), (2, NodeState::ENABLED));
         assert!(!rig.pump, "the pump does not start again by itself");
     }
 }
@@ -137,14 +137,17 @@ fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
         rig.run(800);
         assert!(rig.sent[from..].iter().all(|r| !matches!(r, Request::Move { pump: true, .. })));
         assert_eq!(rig.nodes[GRIPPER].resets, 2);
-        assert_eq!((rig.state(), rig.nodes[GRIPPER].report.fsm), (ControllerState::HoldPos, fsm::ENABLED));
+        assert_eq!(
+            (rig.state(), rig.nodes[GRIPPER].report.state),
+            (ControllerState::HoldPos, NodeState::ENABLED)
+        );
         pump(&mut rig, true);
         assert!(rig.pump);
     }
     // Nor after a joint took the controller back to Init.
     let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
-    rig.nodes[2].report.fsm = fsm::INIT;
+    rig.nodes[2].report.state = NodeState::INIT;
     rig.run(400);
     assert_eq!((rig.state(), rig.pump), (ControllerState::HoldPos, false));
 }
@@ -182,7 +185,7 @@ fn the_pump_is_switched_off_by_an_error_where_the_setting_says_so() {
         assert!(off, "in the tick of the error: {:?}", rig.sent.last());
         let mut rig = powered(state);
         error_and_clear(&mut rig);
-        assert_eq!((rig.nodes[GRIPPER].report.fsm, rig.pump), (fsm::READY, false));
+        assert_eq!((rig.nodes[GRIPPER].report.state, rig.pump), (NodeState::READY, false));
         assert_eq!(rig.ask(FrameType::GripperControl, &[1, 0, 0, 0]), DataStatus::NotAllowed);
         rig.clear(true, 0x7F);
         rig.run(400);
@@ -198,18 +201,18 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     let config = Config { pump_off_on_error: false, ..Config::avena() };
     for state in POWERED {
         let mut rig = powered_with(config.clone(), state);
-        let held = |rig: &Rig| rig.pump && rig.nodes[GRIPPER].report.fsm == fsm::ENABLED;
+        let held = |rig: &Rig| rig.pump && rig.nodes[GRIPPER].report.state == NodeState::ENABLED;
         let from = rig.sent.len();
         error_and_clear(&mut rig);
         assert!(held(&rig), "{:?}", rig.nodes[GRIPPER]);
-        assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY));
+        assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::READY));
         rig.clear(true, 0x7F);
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
         // Through Init as well.
         rig.nodes[2].configured = false;
-        rig.nodes[2].report.fsm = fsm::INIT;
+        rig.nodes[2].report.state = NodeState::INIT;
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
@@ -224,17 +227,17 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     }
     // A pump that did not run when the error came does not start after it.
     let mut rig = Rig::holding_with(config);
-    rig.nodes[GRIPPER].report.fsm = 12;
+    rig.nodes[GRIPPER].report.state = NodeState::new(12);
     rig.nodes[GRIPPER].slow_enable = true;
     pump(&mut rig, true);
     error_and_clear(&mut rig);
-    rig.nodes[GRIPPER].report.fsm = fsm::READY;
+    rig.nodes[GRIPPER].report.state = NodeState::READY;
     rig.nodes[GRIPPER].slow_enable = false;
     rig.clear(true, 0x7F);
     rig.run(400);
     assert_eq!(
-        (rig.state(), rig.nodes[GRIPPER].report.fsm, rig.pump),
-        (ControllerState::HoldPos, fsm::ENABLED, false)
+        (rig.state(), rig.nodes[GRIPPER].report.state, rig.pump),
+        (ControllerState::HoldPos, NodeState::ENABLED, false)
     );
 }
 
@@ -247,13 +250,13 @@ fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
     pump(&mut rig, true);
     rig.run(400);
     assert_eq!(
-        (rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm),
-        (ControllerState::Init, true, fsm::READY)
+        (rig.state(), rig.pump, rig.nodes[GRIPPER].report.state),
+        (ControllerState::Init, true, NodeState::READY)
     );
     rig.nodes[GRIPPER].restart();
     rig.run(400);
     assert_eq!(
-        (rig.state(), rig.pump, rig.nodes[GRIPPER].report.fsm),
-        (ControllerState::Init, false, fsm::READY)
+        (rig.state(), rig.pump, rig.nodes[GRIPPER].report.state),
+        (ControllerState::Init, false, NodeState::READY)
     );
 }

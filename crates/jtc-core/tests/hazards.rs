@@ -1,7 +1,7 @@
 //! Situations in which a controller that follows each rule by itself would still drop, jerk or misplace an arm.
 mod rig;
 
-use jtc_bus::{Request, fsm, warning};
+use jtc_bus::{NodeState, Request, warning};
 use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, pieces, rad, rest, segment_body};
@@ -24,7 +24,7 @@ fn j16_drives_that_lost_their_supply_are_configured_again() {
         node.report.position = 0.7;
     }
     rig.defaults();
-    rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.fsm == fsm::INIT);
+    rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.state == NodeState::INIT);
     rig.run(1);
     // An emergency stop that also cuts the drives' supply, while they are configured but still in Init.
     rig.safety_input = false;
@@ -151,7 +151,7 @@ fn j21_a_clear_does_not_drop_a_joint_whose_fault_is_history() {
         rig.ask(FrameType::ClearCurrentErrors, &[]);
         rig.run(50);
         assert_eq!(rig.errors(), 0);
-        assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+        assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
     }
 }
 
@@ -160,10 +160,10 @@ fn j21_a_clear_waits_as_long_as_the_node_takes() {
     let mut rig = Rig::holding();
     rig.nodes[1].fault();
     rig.run(3);
-    rig.nodes[1].report.fsm = 254;
+    rig.nodes[1].report.state = NodeState::FAULT_REACTION;
     rig.clear(true, 1 << 1);
     rig.run(6000);
-    rig.nodes[1].report.fsm = fsm::FAULT;
+    rig.nodes[1].report.state = NodeState::FAULT;
     rig.run(300);
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
@@ -172,12 +172,12 @@ fn j21_a_clear_waits_as_long_as_the_node_takes() {
 fn j21_healthy_joints_are_brought_to_ready_in_error() {
     let mut rig = Rig::new(Config::avena());
     rig.defaults();
-    rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.fsm == fsm::INIT);
+    rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.state == NodeState::INIT);
     rig.run(1);
     rig.safety_input = false;
     rig.run(50);
     assert_eq!(rig.state(), ControllerState::Error);
-    assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY));
+    assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::READY));
 }
 
 #[test]
@@ -219,11 +219,11 @@ fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
         rig.nodes[2].report.position += 0.00005;
         rig.tick();
     }
-    rig.nodes[2].report.fsm = fsm::ENABLED;
+    rig.nodes[2].report.state = NodeState::ENABLED;
     for _ in 0..20 {
         rig.tick();
         let t = rig.controller.telemetry().joints[2];
-        assert!((t.torque - t.torque_model).abs() < 1.0 || t.fsm != fsm::ENABLED, "{t:?}");
+        assert!((t.torque - t.torque_model).abs() < 1.0 || t.state != NodeState::ENABLED, "{t:?}");
     }
     // Bounds of the integral that do not contain zero.
     let mut rig = Rig::new(Config::avena());
@@ -259,7 +259,7 @@ fn j12_torque_is_taken_away_before_anything_else_is_sent() {
     rig.run(50);
     let from = rig.sent.len();
     rig.nodes[2].configured = false;
-    rig.nodes[2].report.fsm = fsm::INIT;
+    rig.nodes[2].report.state = NodeState::INIT;
     rig.run(9);
     assert_eq!(rig.state(), ControllerState::Init);
     let mut rest = rig.sent[from..]
@@ -301,7 +301,9 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
         rig.safety_input = true;
         rig.clear(true, 0x7F);
         rig.run(300);
-        assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::READY && n.configured && n.resets == 1));
+        assert!(
+            rig.nodes.iter().all(|n| n.report.state == NodeState::READY && n.configured && n.resets == 1)
+        );
     }
 }
 

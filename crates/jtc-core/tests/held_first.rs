@@ -2,7 +2,7 @@
 mod plant;
 mod rig;
 
-use jtc_bus::fsm;
+use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use plant::{LuGre, Plant, loaded};
@@ -51,7 +51,7 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     let mut rig = Rig::holding();
     let waiting = |rig: &mut Rig| {
         rig.nodes[2].slow_enable = true;
-        rig.nodes[2].report.fsm = fsm::READY;
+        rig.nodes[2].report.state = NodeState::READY;
         rig.safety_input = false;
         rig.run(50);
         rig.safety_input = true;
@@ -65,7 +65,7 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     assert_eq!(rig.state(), ControllerState::HoldPos, "joint 3 is not enabled");
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
-    rig.nodes[2].report.fsm = fsm::ENABLED;
+    rig.nodes[2].report.state = NodeState::ENABLED;
     rig.run(2_000);
     assert_eq!(
         (rig.state(), rig.trajectory()),
@@ -76,7 +76,7 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     waiting(&mut rig);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(10_100);
-    rig.nodes[2].report.fsm = fsm::ENABLED;
+    rig.nodes[2].report.state = NodeState::ENABLED;
     rig.run(2_000);
     assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
@@ -92,7 +92,7 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
                 arm.tick(&mut rig);
             }
             arm.run(&mut rig, 4_000);
-            rig.nodes[late].report.fsm = fsm::ENABLED;
+            rig.nodes[late].report.state = NodeState::ENABLED;
             arm.run(&mut rig, 3_000);
             let about = format!("joint {} late, friction times {factor}", late + 1);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{about}");

@@ -208,7 +208,7 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
                 rig.clear(true, 0);
             } else {
                 rig.nodes[2].configured = false;
-                rig.nodes[2].report.fsm = jtc_bus::fsm::INIT;
+                rig.nodes[2].report.state = jtc_bus::NodeState::INIT;
                 rig.run(2);
                 assert_eq!(rig.state(), ControllerState::Init);
             }
@@ -247,7 +247,7 @@ fn waiting_for_a_drive() -> Rig {
 fn j16_an_execute_waits_for_drives_that_are_being_enabled() {
     let mut rig = waiting_for_a_drive();
     rig.nodes[2].slow_enable = false;
-    rig.nodes[2].report.fsm = jtc_bus::fsm::ENABLED;
+    rig.nodes[2].report.state = jtc_bus::NodeState::ENABLED;
     rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }
@@ -267,7 +267,7 @@ fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
             }
             assert_eq!(rig.trajectory(), to, "at once");
             rig.nodes[2].slow_enable = false;
-            rig.nodes[2].report.fsm = jtc_bus::fsm::ENABLED;
+            rig.nodes[2].report.state = jtc_bus::NodeState::ENABLED;
             for _ in 0..3000 {
                 rig.tick();
                 let t = rig.controller.telemetry();

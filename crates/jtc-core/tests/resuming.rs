@@ -1,7 +1,7 @@
 //! What Execute after a Pause waits for and goes on from (J-16, J-33, J-34), and what holding does not wear out (J-25).
 mod rig;
 
-use jtc_bus::fsm;
+use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
 use rig::{Rig, pieces, rest};
@@ -28,7 +28,7 @@ fn j16_an_execute_after_a_pause_waits_for_drives_as_well() {
         );
     }
     rig.nodes[2].slow_enable = false;
-    rig.nodes[2].report.fsm = fsm::ENABLED;
+    rig.nodes[2].report.state = NodeState::ENABLED;
     rig.until(3_000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }

@@ -1,7 +1,7 @@
 //! Bring-up, errors and the way back (sections 3 and 4).
 mod rig;
 
-use jtc_bus::{Frame, Request, Target, fsm, warning};
+use jtc_bus::{Frame, NodeState, Request, Target, warning};
 use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, FrameStatus, FrameType, RawPoint, Response};
 use rig::{Rig, rest};
@@ -23,7 +23,7 @@ fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
     rig.run(500);
     // Without parameters it stays in Init, with no joint enabled.
     assert_eq!(rig.state(), ControllerState::Init);
-    assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.fsm == fsm::READY && n.configured));
+    assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.state == NodeState::READY && n.configured));
     let status = rig.status();
     assert_eq!((status.jtc_init, status.node_init), (0b111, 0));
     // Each parameter clears its bit; then Init ends.
@@ -37,14 +37,14 @@ fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
     }
     assert_eq!(rig.state(), ControllerState::HoldPos);
     rig.run(100);
-    assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::ENABLED && n.resets == 1));
+    assert!(rig.nodes.iter().all(|n| n.report.state == NodeState::ENABLED && n.resets == 1));
 }
 
 #[test]
 fn j20_no_node_is_enabled_before_the_reset_of_the_boot() {
     let mut rig = Rig::new(Config::avena());
     for node in &mut rig.nodes {
-        node.report.fsm = fsm::READY;
+        node.report.state = NodeState::READY;
         node.configured = true;
     }
     rig.defaults();
@@ -74,7 +74,7 @@ fn j20_waits_for_accurate_positions() {
 fn j20_a_node_that_falls_back_to_init_takes_the_controller_back() {
     let mut rig = Rig::holding();
     rig.nodes[2].configured = false;
-    rig.nodes[2].report.fsm = fsm::INIT;
+    rig.nodes[2].report.state = NodeState::INIT;
     rig.run(2);
     assert_eq!(rig.state(), ControllerState::Init);
     assert_eq!(rig.torque, [0.0; 6]);
@@ -107,7 +107,10 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     rig.safety_input = true;
     rig.run(200);
     assert_eq!(rig.state(), ControllerState::Error);
-    assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::READY), "joints are in ReadyToOperate");
+    assert!(
+        rig.nodes[..6].iter().all(|n| n.report.state == NodeState::READY),
+        "joints are in ReadyToOperate"
+    );
     rig.clear(true, 0);
     rig.run(100);
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
@@ -126,7 +129,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     rig.clear(true, 0);
     assert_eq!(rig.state(), ControllerState::Error, "the node's fault is still there");
     // The node does not listen for a while.
-    rig.nodes[1].report.fsm = 254;
+    rig.nodes[1].report.state = NodeState::FAULT_REACTION;
     rig.clear(true, 1 << 1);
     let from = rig.sent.len();
     rig.run(400);
@@ -135,7 +138,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
         .iter()
         .filter(|r| matches!(r, Request::ChangeFsm { target } if target[1] == Target::Init));
     assert!(asked.count() >= 90, "the command is repeated");
-    rig.nodes[1].report.fsm = fsm::FAULT;
+    rig.nodes[1].report.state = NodeState::FAULT;
     rig.run(300);
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     assert_eq!(rig.nodes[1].report.errors, 0);
@@ -148,8 +151,8 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     let faults: [(&str, Fault); 4] = [
         ("error bit", |rig| rig.nodes[1].report.errors = 8),
         ("motor control", |rig| rig.nodes[1].report.mc_current = 4),
-        ("fault state", |rig| rig.nodes[1].report.fsm = fsm::FAULT),
-        ("left OperationEnable", |rig| rig.nodes[1].report.fsm = fsm::READY),
+        ("fault state", |rig| rig.nodes[1].report.state = NodeState::FAULT),
+        ("left OperationEnable", |rig| rig.nodes[1].report.state = NodeState::READY),
     ];
     for (name, fault) in faults {
         for occurred in [false, true] {
@@ -197,7 +200,7 @@ fn j21_healthy_nodes_are_left_alone_by_a_clear() {
     rig.clear(true, 0x7F);
     rig.run(50);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    assert!(rig.nodes.iter().all(|n| n.report.fsm == fsm::ENABLED));
+    assert!(rig.nodes.iter().all(|n| n.report.state == NodeState::ENABLED));
 }
 
 #[test]
@@ -386,9 +389,9 @@ fn j15_frames_not_understood_are_counted_and_ignored() {
 
 #[test]
 fn j16_faults_show_even_without_error_bytes() {
-    for state in [254, 255] {
+    for state in [NodeState::FAULT_REACTION, NodeState::FAULT] {
         let mut rig = Rig::holding();
-        rig.nodes[0].report.fsm = state;
+        rig.nodes[0].report.state = state;
         rig.run(2);
         assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS, "state {state}");
     }
@@ -424,7 +427,7 @@ fn j16_the_safety_line_counts_once_a_joint_is_configured() {
 #[test]
 fn j16_leaving_operation_enable_unasked_is_an_error() {
     let mut rig = Rig::holding();
-    rig.nodes[3].report.fsm = fsm::READY;
+    rig.nodes[3].report.state = NodeState::READY;
     rig.run(2);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     assert_eq!(rig.torque, [0.0; 6]);
@@ -530,7 +533,7 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);
     assert!(rig.sent.iter().all(|request| torque_of(request) == [0.0; 6]));
-    assert!(rig.nodes.iter().all(|node| node.report.fsm != fsm::ENABLED));
+    assert!(rig.nodes.iter().all(|node| node.report.state != NodeState::ENABLED));
 
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     rig.run(200);

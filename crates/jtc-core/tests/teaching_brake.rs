@@ -2,7 +2,7 @@
 mod plant;
 mod rig;
 
-use jtc_bus::fsm;
+use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters};
 use jtc_dynamics::ArmModel;
 use jtc_wire::{DataStatus, FrameType};
@@ -64,7 +64,7 @@ fn braked_with(model: &ArmModel, given: f64, rotor: f64, joint: usize, push: f64
         DataStatus::NoError
     );
     assert_eq!(rig.ask(FrameType::ArmModel, &model_body(model)), DataStatus::NoError);
-    while !rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED) {
+    while !rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED) {
         arm.tick(&mut rig);
     }
     rig.send(FrameType::TeachingModeEnable, &[]);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jtc_wire::{ControllerState, Status};
+use jtc_wire::{ControllerState, NodeState, Status};
 
 use crate::port::Port;
 use crate::{Error, Session, words};
@@ -218,7 +218,7 @@ fn errors(s: &Status, all: &mut Vec<Finding>) {
             let severity = if joint.warnings & 8 != 0 { Problem } else { Warning };
             all.push(finding(severity, format!("{who}: {word}"), "reported by the drive", "`jtc explain`"));
         }
-        if joint.fsm >= 254 {
+        if joint.state.is_fault() {
             all.push(finding(Problem, format!("{who}: drive in its fault state"), "", "`jtc recover`"));
         }
     }
@@ -244,21 +244,21 @@ fn set_up(s: &Status, all: &mut Vec<Finding>) {
         ));
     }
     for n in (0..7).filter(|n| s.node_init >> n & 1 == 1) {
-        let (fsm, warnings) = match (s.joints.get(n), s.gripper) {
-            (Some(j), _) => (j.fsm, j.warnings),
-            (None, Some(g)) => (g.fsm, g.warnings),
-            (None, None) => (0, 0),
+        let (state, warnings) = match (s.joints.get(n), s.gripper) {
+            (Some(j), _) => (j.state, j.warnings),
+            (None, Some(g)) => (g.state, g.warnings),
+            (None, None) => (NodeState::START, 0),
         };
-        let why = match (fsm, warnings & 1) {
+        let why = match (state, warnings & 1) {
             _ if s.can_current >> (8 + n) & 1 == 1 => "it does not answer",
-            (0, _) => "it has not answered yet, or it starts",
+            (NodeState::START, _) => "it has not answered yet, or it starts",
             (_, 1) => "its position is not accurate yet",
-            (1, _) => "its configuration was not accepted yet",
-            (254 | 255, _) => "it is in its fault state",
-            (10..=16, _) => "it is changing its state (the first enable takes 4 s)",
+            (NodeState::INIT, _) => "its configuration was not accepted yet",
+            (state, _) if state.is_fault() => "it is in its fault state",
+            (state, _) if state.is_transition() => "it is changing its state (the first enable takes 4 s)",
             _ => "it is being brought up",
         };
-        let what = format!("{} is not ready ({})", words::node(n), words::node_state(fsm));
+        let what = format!("{} is not ready ({})", words::node(n), state.name());
         all.push(finding(
             if s.is_coming_up() { Problem } else { Warning },
             what,
@@ -331,7 +331,7 @@ mod tests {
             node_init: 0b10,
             ..Default::default()
         };
-        status.joints[1].fsm = 12;
+        status.joints[1].state = NodeState::READY_TO_ENABLED;
         let t = text(&seen(status));
         assert!(
             t.contains("friction, arm model") && t.contains("joint 2 is not ready") && t.contains("4 s"),

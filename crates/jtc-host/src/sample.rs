@@ -1,7 +1,7 @@
 //! One moment of a run, as recordings and reports hold it, from the controller itself or from a status.
 
 use jtc_core::{JOINTS, JointTelemetry, Telemetry};
-use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
+use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};
 
 use crate::trajectory::Trajectory;
 
@@ -32,8 +32,8 @@ pub struct JointSample {
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: f64,
-    /// Node FSM byte.
-    pub fsm: u8,
+    /// State of the drive.
+    pub state: NodeState,
     /// Internal errors of the joint.
     pub internal: u16,
 }
@@ -53,7 +53,7 @@ impl JointSample {
         torque_friction: f64::NAN,
         torque: f64::NAN,
         temperature: f64::NAN,
-        fsm: 0,
+        state: NodeState::START,
         internal: 0,
     };
 
@@ -90,7 +90,7 @@ impl From<&JointTelemetry> for JointSample {
             torque_friction: t.torque_friction,
             torque: t.torque,
             temperature: t.temperature,
-            fsm: t.fsm,
+            state: t.state,
             internal: t.internal,
         }
     }
@@ -163,7 +163,7 @@ impl Sample {
                     velocity: f64::from(s.velocity),
                     torque: f64::from(s.torque),
                     temperature: f64::from(s.temperature),
-                    fsm: s.fsm,
+                    state: s.state,
                     internal: s.internal,
                     ..JointSample::UNKNOWN
                 };

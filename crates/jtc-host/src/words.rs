@@ -2,11 +2,6 @@
 
 use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Status, TrajectoryState};
 
-/// State of a node; numbers from 10 to 16 are transitions.
-pub fn node_state(fsm: u8) -> &'static str {
-    jtc_wire::words::node_fsm(fsm)
-}
-
 /// Name of a node on the joint bus: joints count from 1, as people do.
 pub fn node(n: usize) -> String {
     if n == 6 { "gripper".into() } else { format!("joint {}", n + 1) }
@@ -122,7 +117,7 @@ pub fn causes(s: &Status) -> Vec<String> {
             .chain(node_errors(joint.errors))
             .chain(motor_faults(joint.mc_current))
             .chain((joint.warnings & SAFETY_LINE != 0 && is_ready(s, j)).then_some("safety line active"))
-            .chain((joint.fsm >= 254).then(|| node_state(joint.fsm)));
+            .chain(joint.state.is_fault().then(|| joint.state.name()));
         all.extend(words.map(|w| format!("joint {}: {w}", j + 1)));
     }
     if let Some(g) = s.gripper {

@@ -1,6 +1,6 @@
 //! Only what passed the check runs, and only what was uploaded.
 
-use jtc_wire::ControllerState;
+use jtc_wire::{ControllerState, NodeState};
 use std::time::Duration;
 
 use jtc_core::Config;
@@ -17,7 +17,7 @@ fn ready() -> Sim {
     let mut session = Session::new(SimPort::new(world));
     session.push(&Arm::avena().parameter_set(), |_| {}).unwrap();
     let status = session.wait_ready(Duration::from_secs(15)).unwrap();
-    assert!(status.joints.iter().all(|j| j.fsm == 3), "every drive is enabled");
+    assert!(status.joints.iter().all(|j| j.state == NodeState::ENABLED), "every drive is enabled");
     session
 }
 

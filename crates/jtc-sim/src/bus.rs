@@ -2,7 +2,7 @@
 //! and bus-off.
 use std::collections::VecDeque;
 
-use jtc_bus::{Answer, Frame, JOINTS, NODES, Scale};
+use jtc_bus::{Answer, Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
 
 use crate::drive::Drive;
@@ -106,9 +106,9 @@ impl Nodes {
         self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
     }
 
-    /// Node states as their bytes; 255 for no gripper.
-    pub fn states(&self) -> [u8; NODES] {
-        let gripper = self.gripper.as_ref().map_or(255, Gripper::state);
+    /// States of the nodes; Fault where there is no gripper.
+    pub fn states(&self) -> [NodeState; NODES] {
+        let gripper = self.gripper.as_ref().map_or(NodeState::FAULT, Gripper::state);
         core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
     }
 

@@ -1,6 +1,6 @@
 //! A joint's drive with the habits of the real ones: slow first enable, coarse encoder, late speed, torques
 //! that never time out.
-use jtc_bus::fsm;
+use jtc_bus::NodeState;
 
 use crate::inbox::Inbox;
 
@@ -11,7 +11,7 @@ mod states;
 
 pub use config::{DriveConfig, DriveFault};
 use encoders::Encoders;
-use states::{States, transition};
+use states::States;
 
 /// Configuration bits of ChangeMode.
 mod config_bit {
@@ -106,13 +106,13 @@ impl Drive {
 
     /// Go to the fault state with no error bit set, as a request of 254 makes it.
     pub fn force_fault(&mut self) {
-        if self.state() != fsm::START {
-            self.states.enter(fsm::FAULT, &self.config);
+        if self.state() != NodeState::START {
+            self.states.enter(NodeState::FAULT, &self.config);
         }
     }
 
     /// State byte.
-    pub fn state(&self) -> u8 {
+    pub fn state(&self) -> NodeState {
         self.states.state()
     }
 
@@ -145,8 +145,8 @@ impl Drive {
         self.temperature = temperature;
         self.states.begin_tick();
         self.check();
-        if self.safety_line() && self.state() == fsm::ENABLED {
-            self.states.enter(fsm::READY, &self.config);
+        if self.safety_line() && self.state() == NodeState::ENABLED {
+            self.states.enter(NodeState::READY, &self.config);
         } else {
             self.states.accept(&self.config);
         }
@@ -179,16 +179,16 @@ impl Drive {
         }
         if self.errors != 0 && !self.states.reacting() {
             // The rest of the reaction takes the following ticks.
-            self.states.enter(fsm::FAULT_REACTION, &self.config);
+            self.states.enter(NodeState::FAULT_REACTION, &self.config);
         }
     }
 
     fn act(&mut self) {
-        if matches!(self.state(), fsm::READY | transition::READY_TO_ENABLED) {
+        if matches!(self.state(), NodeState::READY | NodeState::READY_TO_ENABLED) {
             self.goal = 0.0;
         }
         let outward = self.outside() && self.goal * self.position > 0.0;
-        self.torque = if self.state() == fsm::ENABLED && !outward {
+        self.torque = if self.state() == NodeState::ENABLED && !outward {
             self.goal.clamp(-self.ceiling, self.ceiling)
         } else {
             0.0

@@ -4,9 +4,9 @@ use jtc_bus::{Answer, JointReport, Request, warning};
 use super::*;
 use crate::request::NodeRequest;
 
-fn change(drive: &mut Drive, target: u8) -> u8 {
+fn change(drive: &mut Drive, target: NodeState) -> NodeState {
     match drive.receive(0, &NodeRequest::ChangeFsm([target; 7])) {
-        Some(Answer::Fsm { fsm, .. }) => fsm,
+        Some(Answer::State { state, .. }) => state,
         answer => panic!("{answer:?}"),
     }
 }
@@ -32,7 +32,7 @@ fn run(drive: &mut Drive, ms: u32, q: f64) {
 fn booted_at(q: f64) -> Drive {
     let mut drive = Drive::new(0, DriveConfig::default(), 364.0);
     run(&mut drive, 253, q);
-    assert_eq!(drive.state(), fsm::INIT);
+    assert_eq!(drive.state(), NodeState::INIT);
     drive
 }
 
@@ -43,12 +43,12 @@ fn booted() -> Drive {
 fn enabled_at(q: f64) -> Drive {
     let mut drive = booted_at(q);
     assert!(configure(&mut drive, 0x17));
-    change(&mut drive, fsm::READY);
+    change(&mut drive, NodeState::READY);
     run(&mut drive, 2, q);
-    assert_eq!(drive.state(), fsm::READY);
-    change(&mut drive, fsm::ENABLED);
+    assert_eq!(drive.state(), NodeState::READY);
+    change(&mut drive, NodeState::ENABLED);
     run(&mut drive, 4010, q);
-    assert_eq!(drive.state(), fsm::ENABLED);
+    assert_eq!(drive.state(), NodeState::ENABLED);
     drive
 }
 
@@ -79,21 +79,25 @@ fn j16_position_is_zero_until_the_encoder_is_configured() {
 fn j16_first_enable_takes_four_seconds_later_ones_a_rest() {
     let mut drive = booted();
     configure(&mut drive, 0x17);
-    change(&mut drive, fsm::READY);
+    change(&mut drive, NodeState::READY);
     run(&mut drive, 2, 0.5);
-    assert_eq!(change(&mut drive, fsm::ENABLED), fsm::READY, "the answer is the state before the change");
+    assert_eq!(
+        change(&mut drive, NodeState::ENABLED),
+        NodeState::READY,
+        "the answer is the state before the change"
+    );
     run(&mut drive, 3999, 0.5);
-    assert_eq!(drive.state(), 12);
+    assert_eq!(drive.state(), NodeState::READY_TO_ENABLED);
     run(&mut drive, 3, 0.5);
-    assert_eq!(drive.state(), fsm::ENABLED);
-    change(&mut drive, fsm::READY);
+    assert_eq!(drive.state(), NodeState::ENABLED);
+    change(&mut drive, NodeState::READY);
     run(&mut drive, 2, 0.5);
-    assert_eq!(drive.state(), fsm::READY);
-    change(&mut drive, fsm::ENABLED);
+    assert_eq!(drive.state(), NodeState::READY);
+    change(&mut drive, NodeState::ENABLED);
     run(&mut drive, 390, 0.5);
-    assert_eq!(drive.state(), 12);
+    assert_eq!(drive.state(), NodeState::READY_TO_ENABLED);
     run(&mut drive, 20, 0.5);
-    assert_eq!(drive.state(), fsm::ENABLED);
+    assert_eq!(drive.state(), NodeState::ENABLED);
 }
 
 #[test]
@@ -118,7 +122,7 @@ fn torque_is_clamped_silently() {
     let mut drive = enabled();
     command(&mut drive, -1000.0);
     run(&mut drive, 1, 0.5);
-    assert_eq!((drive.torque(), drive.state()), (-364.0, fsm::ENABLED));
+    assert_eq!((drive.torque(), drive.state()), (-364.0, NodeState::ENABLED));
 }
 
 #[test]
@@ -137,13 +141,13 @@ fn speed_is_late_and_coarse() {
 
 #[test]
 fn over_speed_trips_either_way_and_only_when_configured() {
-    for (bits, state) in [(0x17, fsm::FAULT), (0x07, fsm::ENABLED)] {
+    for (bits, state) in [(0x17, NodeState::FAULT), (0x07, NodeState::ENABLED)] {
         for speed in [-2.0e-3, 2.0e-3] {
             let mut drive = enabled();
             drive.bits = bits;
             (0..30).for_each(|k| drive.tick(0.5 + speed * f64::from(k), 25.0));
             assert_eq!(drive.state(), state, "{speed} rad/ms");
-            assert_eq!(drive.errors, if state == fsm::FAULT { error_bit::OVER_SPEED } else { 0 });
+            assert_eq!(drive.errors, if state == NodeState::FAULT { error_bit::OVER_SPEED } else { 0 });
         }
     }
 }
@@ -153,7 +157,7 @@ fn outside_the_working_area_only_inward_torque_acts() {
     let mut drive = enabled_at(2.995);
     command(&mut drive, 5.0);
     run(&mut drive, 1, 2.995);
-    assert_eq!((drive.torque(), drive.state()), (0.0, fsm::ENABLED));
+    assert_eq!((drive.torque(), drive.state()), (0.0, NodeState::ENABLED));
     assert_eq!(command(&mut drive, -5.0).warnings, warning::OUTSIDE_WORKING_AREA);
     run(&mut drive, 1, 2.995);
     assert_eq!(drive.torque(), -5.0);
@@ -165,7 +169,7 @@ fn j16_safety_line_drops_to_ready_without_an_error() {
     drive.fault.safety_line = true;
     // In one tick, without a transition.
     run(&mut drive, 1, 0.5);
-    assert_eq!(drive.state(), fsm::READY);
+    assert_eq!(drive.state(), NodeState::READY);
     let report = command(&mut drive, 0.0);
     assert_eq!((report.errors, report.warnings), (0, warning::SAFETY_LINE));
 }
@@ -175,47 +179,47 @@ fn j21_fault_is_left_by_init_only_and_comes_back_while_the_cause_stands() {
     let mut drive = enabled();
     drive.fault.motor_control = 0x40;
     run(&mut drive, 1, 0.5);
-    assert_eq!(drive.state(), fsm::FAULT_REACTION);
+    assert_eq!(drive.state(), NodeState::FAULT_REACTION);
     assert_eq!(drive.torque(), 0.0);
     run(&mut drive, 2, 0.5);
-    assert_eq!(drive.state(), fsm::FAULT);
-    change(&mut drive, fsm::READY);
+    assert_eq!(drive.state(), NodeState::FAULT);
+    change(&mut drive, NodeState::READY);
     run(&mut drive, 5, 0.5);
-    assert_eq!(drive.state(), fsm::FAULT);
-    change(&mut drive, fsm::INIT);
+    assert_eq!(drive.state(), NodeState::FAULT);
+    change(&mut drive, NodeState::INIT);
     run(&mut drive, 10, 0.5);
-    assert_eq!(drive.state(), fsm::FAULT, "the cause stands");
+    assert_eq!(drive.state(), NodeState::FAULT, "the cause stands");
     drive.fault.motor_control = 0;
     assert_eq!(command(&mut drive, 0.0).mc_occurred, 0x40);
-    change(&mut drive, fsm::INIT);
+    change(&mut drive, NodeState::INIT);
     run(&mut drive, 3, 0.5);
     let report = command(&mut drive, 0.0);
-    assert_eq!((report.fsm, report.mc_occurred, report.errors), (fsm::INIT, 0, 0));
+    assert_eq!((report.state, report.mc_occurred, report.errors), (NodeState::INIT, 0, 0));
 }
 
 #[test]
 fn j16_an_echoed_fault_byte_is_a_command_to_move() {
     let mut drive = booted();
-    change(&mut drive, fsm::READY);
+    change(&mut drive, NodeState::READY);
     run(&mut drive, 2, 0.5);
-    change(&mut drive, fsm::FAULT);
+    change(&mut drive, NodeState::FAULT);
     run(&mut drive, 1, 0.5);
-    assert_eq!(drive.state(), 12);
+    assert_eq!(drive.state(), NodeState::READY_TO_ENABLED);
 }
 
 #[test]
 fn a_request_of_zero_cancels_a_pending_one() {
     let mut drive = booted();
-    change(&mut drive, fsm::READY);
-    change(&mut drive, 0);
+    change(&mut drive, NodeState::READY);
+    change(&mut drive, NodeState::START);
     run(&mut drive, 5, 0.5);
-    assert_eq!(drive.state(), fsm::INIT);
+    assert_eq!(drive.state(), NodeState::INIT);
     // A completed transition erases what is pending too.
-    change(&mut drive, fsm::READY);
+    change(&mut drive, NodeState::READY);
     run(&mut drive, 1, 0.5);
-    change(&mut drive, fsm::ENABLED);
+    change(&mut drive, NodeState::ENABLED);
     run(&mut drive, 5, 0.5);
-    assert_eq!(drive.state(), fsm::READY);
+    assert_eq!(drive.state(), NodeState::READY);
 }
 
 #[test]
@@ -223,7 +227,7 @@ fn configuration_is_refused_when_enabled_and_lost_by_a_reset() {
     let mut drive = enabled();
     assert!(!configure(&mut drive, 0x17));
     assert_eq!(drive.receive(0, &Request::Reset(1).into()), None);
-    assert_eq!(drive.state(), fsm::ENABLED);
+    assert_eq!(drive.state(), NodeState::ENABLED);
     assert_eq!(drive.receive(0, &Request::ResetAll.into()), None);
     run(&mut drive, 260, 0.5);
     assert_eq!(command(&mut drive, 0.0).position, 0.0);
@@ -248,15 +252,15 @@ fn j16_the_safety_line_warns_until_the_first_configuration() {
 #[test]
 fn j16_a_request_of_254_forces_the_fault_state_without_an_error_bit() {
     for mut drive in [booted(), enabled()] {
-        change(&mut drive, 254);
+        change(&mut drive, NodeState::FAULT_REACTION);
         run(&mut drive, 1, 0.5);
         let report = command(&mut drive, 5.0);
-        assert_eq!((report.fsm, report.errors, report.mc_occurred), (fsm::FAULT, 0, 0));
+        assert_eq!((report.state, report.errors, report.mc_occurred), (NodeState::FAULT, 0, 0));
         run(&mut drive, 5, 0.5);
-        assert_eq!((drive.state(), drive.torque()), (fsm::FAULT, 0.0));
-        change(&mut drive, fsm::INIT);
+        assert_eq!((drive.state(), drive.torque()), (NodeState::FAULT, 0.0));
+        change(&mut drive, NodeState::INIT);
         run(&mut drive, 3, 0.5);
-        assert_eq!(drive.state(), fsm::INIT);
+        assert_eq!(drive.state(), NodeState::INIT);
     }
 }
 
@@ -265,7 +269,7 @@ fn a_drive_that_ignores_its_state_command_answers_and_stays() {
     let mut drive = enabled();
     drive.fault.ignores_state = true;
     command(&mut drive, 5.0);
-    assert_eq!(change(&mut drive, fsm::READY), fsm::ENABLED);
+    assert_eq!(change(&mut drive, NodeState::READY), NodeState::ENABLED);
     run(&mut drive, 100, 0.5);
-    assert_eq!((drive.state(), drive.torque()), (fsm::ENABLED, 5.0));
+    assert_eq!((drive.state(), drive.torque()), (NodeState::ENABLED, 5.0));
 }

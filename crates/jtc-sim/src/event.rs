@@ -2,7 +2,7 @@
 use core::fmt;
 use std::collections::VecDeque;
 
-use jtc_bus::GRIPPER;
+use jtc_bus::{GRIPPER, NodeState};
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_wire::FrameStatus;
 
@@ -36,10 +36,10 @@ pub enum Event {
     Node {
         /// 0..5 joints, 6 gripper.
         node: u8,
-        /// State byte before.
-        from: u8,
-        /// State byte now.
-        to: u8,
+        /// State before.
+        from: NodeState,
+        /// State now.
+        to: NodeState,
     },
     /// A host frame was worked off.
     Frame {
@@ -66,8 +66,8 @@ impl fmt::Display for Event {
             Self::Execution { from, to } => write!(f, "trajectory: {from:?} → {to:?}"),
             Self::Errors { from, to } => write!(f, "errors: 0x{from:04X} → 0x{to:04X}"),
             Self::Node { node, from, to } => match usize::from(*node) {
-                GRIPPER => write!(f, "gripper: state {from} → {to}"),
-                joint => write!(f, "joint {}: state {from} → {to}", joint + 1),
+                GRIPPER => write!(f, "gripper: state {} → {}", from.code(), to.code()),
+                joint => write!(f, "joint {}: state {} → {}", joint + 1, from.code(), to.code()),
             },
             Self::Frame { frame_type } => write!(f, "host frame 0x{frame_type:02X}"),
             Self::BadFrame { status } => write!(f, "bad host frame: {status:?}"),

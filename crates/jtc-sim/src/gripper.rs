@@ -1,5 +1,5 @@
 //! The vacuum gripper, node 6: a pump, two vacuum switches and the habits of its firmware.
-use jtc_bus::{Answer, GRIPPER, GripperReport, Request, fsm};
+use jtc_bus::{Answer, GRIPPER, GripperReport, NodeState, Request};
 
 use crate::inbox::Inbox;
 use crate::request::NodeRequest;
@@ -8,13 +8,16 @@ use crate::request::NodeRequest;
 const PUMP_LAG: u32 = 100;
 /// Ticks of pumping until the first and second vacuum level are reached.
 const LEVELS: (u32, u32) = (300, 700);
+/// Its transitions to Init, numbered in its own way.
+const TO_INIT: NodeState = NodeState::new(14);
+const FAULT_TO_INIT: NodeState = NodeState::new(16);
 /// Ticks after power-up in which it is silent.
 const BOOT: u32 = 250;
 
 /// The gripper.
 #[derive(Clone, Debug)]
 pub struct Gripper {
-    state: u8,
+    state: NodeState,
     age: u32,
     booting: u32,
     command: bool,
@@ -38,7 +41,7 @@ impl Gripper {
     /// A gripper with power just switched on.
     pub fn new(one_message_per_interrupt: bool) -> Self {
         Self {
-            state: fsm::START,
+            state: NodeState::START,
             age: 0,
             booting: BOOT,
             command: false,
@@ -56,7 +59,7 @@ impl Gripper {
 
     /// The processor restarts.
     pub fn reset(&mut self) {
-        self.state = fsm::START;
+        self.state = NodeState::START;
         self.age = 0;
         self.booting = BOOT;
         self.command = false;
@@ -65,7 +68,7 @@ impl Gripper {
     }
 
     /// State byte.
-    pub fn state(&self) -> u8 {
+    pub fn state(&self) -> NodeState {
         self.state
     }
 
@@ -83,7 +86,7 @@ impl Gripper {
         let request = match self.inbox.take(now_us, request)? {
             NodeRequest::ChangeFsm(states) => {
                 self.change(states[GRIPPER]);
-                return Some(Answer::Fsm { node, fsm: self.state });
+                return Some(Answer::State { node, state: self.state });
             }
             NodeRequest::Other(request) => request,
         };
@@ -95,7 +98,7 @@ impl Gripper {
             // A `NodeRequest` carries it apart.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { gripper, .. } => {
-                let accepted = matches!(self.state, fsm::INIT | fsm::READY);
+                let accepted = matches!(self.state, NodeState::INIT | NodeState::READY);
                 if accepted {
                     self.reacts_to_safety = gripper & 0x04 != 0;
                 }
@@ -115,15 +118,15 @@ impl Gripper {
     }
 
     /// Its requests are executed in the interrupt: the answer is the transition's code already.
-    fn change(&mut self, request: u8) {
+    fn change(&mut self, request: NodeState) {
         self.state = match (request, self.state) {
-            (fsm::INIT, fsm::START) => 10,
-            (fsm::INIT, fsm::READY | fsm::ENABLED) => 14,
-            (fsm::INIT, fsm::FAULT) => 16,
-            (fsm::READY, fsm::INIT) => 11,
-            (fsm::READY, fsm::ENABLED) => 13,
-            (fsm::ENABLED, fsm::READY) => 12,
-            (fsm::FAULT_REACTION, state) if state != fsm::START => fsm::FAULT,
+            (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
+            (NodeState::INIT, NodeState::READY | NodeState::ENABLED) => TO_INIT,
+            (NodeState::INIT, NodeState::FAULT) => FAULT_TO_INIT,
+            (NodeState::READY, NodeState::INIT) => NodeState::INIT_TO_READY,
+            (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
+            (NodeState::ENABLED, NodeState::READY) => NodeState::READY_TO_ENABLED,
+            (NodeState::FAULT_REACTION, state) if state != NodeState::START => NodeState::FAULT,
             _ => return,
         };
         self.age = 0;
@@ -134,7 +137,7 @@ impl Gripper {
             pump: self.speed == PUMP_LAG,
             pressure1: self.vacuum >= LEVELS.0,
             pressure2: self.vacuum >= LEVELS.1,
-            fsm: self.state,
+            state: self.state,
             errors: 0,
             warnings: 0,
         }
@@ -150,19 +153,19 @@ impl Gripper {
         // Only the edge counts: enabled while the line is unsafe already, it stays enabled.
         let edge = self.safety_line && !self.line_before;
         self.line_before = self.safety_line;
-        if edge && self.reacts_to_safety && self.state == fsm::ENABLED {
-            self.state = fsm::READY;
+        if edge && self.reacts_to_safety && self.state == NodeState::ENABLED {
+            self.state = NodeState::READY;
         }
         self.state = match self.state {
-            fsm::START => 10,
-            10 | 14 | 16 => fsm::INIT,
-            11 | 13 => fsm::READY,
-            12 => fsm::ENABLED,
+            NodeState::START => NodeState::START_TO_INIT,
+            NodeState::START_TO_INIT | TO_INIT | FAULT_TO_INIT => NodeState::INIT,
+            NodeState::INIT_TO_READY | NodeState::ENABLED_TO_READY => NodeState::READY,
+            NodeState::READY_TO_ENABLED => NodeState::ENABLED,
             state => state,
         };
         match self.state {
-            fsm::ENABLED => self.pin = self.command,
-            fsm::READY => {
+            NodeState::ENABLED => self.pin = self.command,
+            NodeState::READY => {
                 self.command = false;
                 self.pin = false;
             }
@@ -183,9 +186,9 @@ mod tests {
         (0..ms).for_each(|_| gripper.tick());
     }
 
-    fn request(gripper: &mut Gripper, target: u8) -> u8 {
+    fn request(gripper: &mut Gripper, target: NodeState) -> NodeState {
         match gripper.receive(0, &NodeRequest::ChangeFsm([target; 7])) {
-            Some(Answer::Fsm { fsm, .. }) => fsm,
+            Some(Answer::State { state, .. }) => state,
             answer => panic!("{answer:?}"),
         }
     }
@@ -202,13 +205,13 @@ mod tests {
         let mut gripper = Gripper::new(false);
         assert!(!gripper.on_bus());
         run(&mut gripper, 260);
-        assert_eq!(gripper.state(), fsm::INIT);
-        assert_eq!(request(&mut gripper, fsm::READY), 11);
+        assert_eq!(gripper.state(), NodeState::INIT);
+        assert_eq!(request(&mut gripper, NodeState::READY), NodeState::INIT_TO_READY);
         run(&mut gripper, 1);
         pump(&mut gripper, true);
         run(&mut gripper, 200);
         assert!(!pump(&mut gripper, true).pump);
-        assert_eq!(request(&mut gripper, fsm::ENABLED), 12);
+        assert_eq!(request(&mut gripper, NodeState::ENABLED), NodeState::READY_TO_ENABLED);
         run(&mut gripper, 1);
         pump(&mut gripper, true);
         run(&mut gripper, 50);
@@ -219,10 +222,10 @@ mod tests {
         run(&mut gripper, 250);
         assert!(pump(&mut gripper, true).pressure1);
         // Back to INIT straight from ENABLED: the pump runs on until READY.
-        assert_eq!(request(&mut gripper, fsm::INIT), 14);
+        assert_eq!(request(&mut gripper, NodeState::INIT), TO_INIT);
         run(&mut gripper, 500);
         assert!(pump(&mut gripper, false).pressure2);
-        request(&mut gripper, fsm::READY);
+        request(&mut gripper, NodeState::READY);
         run(&mut gripper, 200);
         assert!(!pump(&mut gripper, false).pump);
     }

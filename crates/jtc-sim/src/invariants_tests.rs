@@ -269,7 +269,7 @@ fn j35_a_joint_that_races_is_found() {
     let fast = || {
         let mut script = Script::new();
         let joint = &mut script.telemetry.joints[3];
-        (joint.fsm, joint.fresh, joint.velocity) = (jtc_bus::fsm::ENABLED, true, -1.01 * limit);
+        (joint.state, joint.fresh, joint.velocity) = (jtc_bus::NodeState::ENABLED, true, -1.01 * limit);
         script
     };
     let mut script = fast();
@@ -321,7 +321,7 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
     for (state, last) in [(ControllerState::HoldPos, 1_000), (ControllerState::Teaching, 0)] {
         let mut script = Script::new();
         script.telemetry.joints[0].torque = limit;
-        script.telemetry.joints[0].fsm = jtc_bus::fsm::ENABLED;
+        script.telemetry.joints[0].state = jtc_bus::NodeState::ENABLED;
         script.command(FrameType::TeachingModeEnable);
         let found = (1..=2_000).find(|_| script.tick(state, TrajectoryState::Null).is_some());
         assert_eq!(found, Some(last + 11), "{state:?}");

@@ -277,7 +277,7 @@ fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -
         matches!(
             operator.state(),
             ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching
-        ) && operator.world.node_states()[..JOINTS] == [jtc_bus::fsm::ENABLED; JOINTS]
+        ) && operator.world.node_states()[..JOINTS] == [jtc_bus::NodeState::ENABLED; JOINTS]
     };
     for (back, send) in [
         (Back::ByItself, Vec::new()),

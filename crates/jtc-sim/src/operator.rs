@@ -1,7 +1,7 @@
 //! A patient operator at the small host: brings the world up, uploads, executes, and waits in virtual time.
 use core::fmt;
 
-use jtc_bus::{JOINTS, fsm};
+use jtc_bus::{JOINTS, NodeState};
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, FrameType, RawPoint, Response};
 
@@ -130,7 +130,7 @@ impl Operator {
     pub fn wait_for_hold(&mut self, ms: u64) -> Result<(), OperatorError> {
         self.wait("HoldPos with all joints enabled", ms, |world| {
             world.telemetry().state == ControllerState::HoldPos
-                && world.node_states()[..JOINTS] == [fsm::ENABLED; JOINTS]
+                && world.node_states()[..JOINTS] == [NodeState::ENABLED; JOINTS]
         })
     }
 

@@ -1,6 +1,6 @@
 //! What is behind the joint bus: drives, gripper and the arm that they move. It knows nothing of the controller, which may be
 //! the simulated one of [`World`](crate::World) or any other that sends frames.
-use jtc_bus::{Frame, JOINTS, NODES, Scale};
+use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_dynamics::{ArmModel, JointVec};
 
 use crate::arm::Arm;
@@ -113,7 +113,7 @@ impl Plant {
     }
 
     fn step_arm(&mut self) {
-        let enabled = |drive: &Drive| drive.state() == jtc_bus::fsm::ENABLED;
+        let enabled = |drive: &Drive| drive.state() == jtc_bus::NodeState::ENABLED;
         if self.stand && self.nodes.drives.iter().all(enabled) {
             self.stand = false;
         }
@@ -206,7 +206,7 @@ impl Plant {
     }
 
     /// State bytes of joints and gripper (255: no gripper).
-    pub fn node_states(&self) -> [u8; NODES] {
+    pub fn node_states(&self) -> [NodeState; NODES] {
         self.nodes.states()
     }
 

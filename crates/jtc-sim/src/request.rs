@@ -1,11 +1,11 @@
 //! Requests as nodes take them off the bus: with any state byte, of which the controller sends four only.
-use jtc_bus::{Frame, NODES, Request, id};
+use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
 /// A request that has reached a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeRequest {
     /// ChangeFsm: the state byte of each node as it is on the wire.
-    ChangeFsm([u8; NODES]),
+    ChangeFsm([NodeState; NODES]),
     /// Every other request.
     Other(Request),
 }
@@ -15,8 +15,8 @@ impl NodeRequest {
     pub fn parse(frame: &Frame) -> Option<Self> {
         if frame.id == id::CHANGE_FSM {
             // Bytes beyond a short frame read as 0, which asks for nothing.
-            let byte = |n| frame.data().get(n).copied().unwrap_or(0);
-            return Some(Self::ChangeFsm(core::array::from_fn(byte)));
+            let state = |n| NodeState::new(frame.data().get(n).copied().unwrap_or(0));
+            return Some(Self::ChangeFsm(core::array::from_fn(state)));
         }
         Request::parse(frame).ok().map(Self::Other)
     }
@@ -25,7 +25,9 @@ impl NodeRequest {
 impl From<Request> for NodeRequest {
     fn from(request: Request) -> Self {
         match request {
-            Request::ChangeFsm { target } => Self::ChangeFsm(target.map(|target| target as u8)),
+            Request::ChangeFsm { target } => {
+                Self::ChangeFsm(target.map(|target| NodeState::new(target as u8)))
+            }
             other => Self::Other(other),
         }
     }

@@ -1,5 +1,5 @@
 //! The whole world, one millisecond at a time: host line, controller, joint bus, drives, arm.
-use jtc_bus::{Frame, JOINTS, NODES, Scale, fsm};
+use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::{BusState, ControllerState};
 use jtc_wire::FrameType;
 
@@ -42,7 +42,7 @@ pub struct World {
     overrun: bool,
     input_fault: bool,
     line_rng: fastrand::Rng,
-    node_states: [u8; NODES],
+    node_states: [NodeState; NODES],
     seen: Seen,
     good_frames: u64,
     bad_frames: u64,
@@ -143,7 +143,7 @@ impl World {
     fn lead_by_hand(&mut self) {
         let Some(hand) = &mut self.hand else { return };
         // Closed brakes do not yield to a hand: it waits until every drive is enabled.
-        let free = self.plant.node_states()[..JOINTS] == [fsm::ENABLED; JOINTS];
+        let free = self.plant.node_states()[..JOINTS] == [NodeState::ENABLED; JOINTS];
         let teaching = free && self.board.telemetry().state == ControllerState::Teaching;
         let truth = self.plant.truth();
         let pull = hand.torque(teaching, &truth.q, &truth.qd);

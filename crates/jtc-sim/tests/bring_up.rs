@@ -13,7 +13,9 @@ fn j20_power_up_to_hold_position() {
     for _ in 0..6_000 {
         world.step();
         host.listen(&mut world);
-        if world.telemetry().state == ControllerState::HoldPos && world.node_states()[..6] == [3; 6] {
+        if world.telemetry().state == ControllerState::HoldPos
+            && world.node_states()[..6] == [jtc_bus::NodeState::ENABLED; 6]
+        {
             held_at.get_or_insert(world.now_us());
         }
     }

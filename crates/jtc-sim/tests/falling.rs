@@ -1,5 +1,5 @@
 //! An arm without brakes that falls, and what becomes of it when the errors are cleared meanwhile (J-16).
-use jtc_bus::{Request, Target, fsm};
+use jtc_bus::{NodeState, Request, Target};
 use jtc_core::{ControllerState, error};
 use jtc_sim::{Operator, SimConfig, Support, host};
 
@@ -50,7 +50,8 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
             assert!(speed < 0.3, "{after_ms} + {ms} ms: {speed} rad/s");
         }
         for (joint, last) in t.joints.iter().zip(&mut last) {
-            let correction = if joint.fsm == fsm::ENABLED { joint.torque - joint.torque_model } else { 0.0 };
+            let correction =
+                if joint.state == NodeState::ENABLED { joint.torque - joint.torque_model } else { 0.0 };
             let step = (correction - *last).abs();
             assert!(step < 12.0, "{after_ms} + {ms} ms: torque step of {step} N·m");
             *last = correction;
@@ -61,7 +62,7 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
 }
 
 fn enabled(operator: &Operator) -> bool {
-    operator.world.telemetry().joints.iter().all(|joint| joint.fsm == fsm::ENABLED)
+    operator.world.telemetry().joints.iter().all(|joint| joint.state == NodeState::ENABLED)
 }
 
 #[test]

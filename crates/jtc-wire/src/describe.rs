@@ -210,7 +210,7 @@ impl Lists<'_, '_> {
 
 impl Display for crate::JointStatus {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        write!(f, "{}, {:.6} rad, {:.6} rad/s, ", words::node_fsm(self.fsm), self.position, self.velocity)?;
+        write!(f, "{}, {:.6} rad, {:.6} rad/s, ", self.state.name(), self.position, self.velocity)?;
         write!(f, "{:.3} N·m, {} °C", self.torque, self.temperature)?;
         let mut lists = Lists { f };
         lists.add("found by the controller", self.internal.into(), &words::JOINT_INTERNAL)?;
@@ -225,7 +225,7 @@ impl Display for crate::JointStatus {
 impl Display for crate::GripperStatus {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         let pump = if self.pump == 0 { "off" } else { "on" };
-        write!(f, "{}, pump {pump}, ", words::node_fsm(self.fsm))?;
+        write!(f, "{}, pump {pump}, ", self.state.name())?;
         let level = |reached: u8| if reached == 0 { "not reached" } else { "reached" };
         write!(f, "pressure 1 {}, pressure 2 {}", level(self.pressure1), level(self.pressure2))?;
         let mut lists = Lists { f };

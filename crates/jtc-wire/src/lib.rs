@@ -35,6 +35,9 @@ pub use encode::{
     Channel, EncodeError, FloatName, FrictionTable, OutOfScale, arm_model, floats, friction_polynomial,
     friction_table, pid_param, trajectory,
 };
+/// States of drives and gripper in a status are those of the joint bus.
+pub use jtc_bus::NodeState;
+
 pub use frame::{
     FRAME_MAX, FRAME_MIN, FRAME_POINTS_MAX, FrameRef, FrameType, HEADER, JOINTS, Lengths, POINT_LEN,
     TRAJECTORY_OVERHEAD,

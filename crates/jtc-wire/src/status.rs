@@ -1,4 +1,6 @@
 //! JtcStatus: what the controller says about itself 25 times a second.
+use jtc_bus::NodeState;
+
 use crate::code::Code;
 use crate::crc16;
 use crate::frame::{FrameType, HEADER, JOINTS, field as frame_field};
@@ -123,8 +125,8 @@ pub struct Status {
 /// One joint in JtcStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct JointStatus {
-    /// State of the drive: see [`crate::words::node_fsm`].
-    pub fsm: u8,
+    /// State of the drive.
+    pub state: NodeState,
     /// Current motor-control faults: bits of [`crate::words::MC_FAULTS`].
     pub mc_current: u8,
     /// Occurred motor-control faults.
@@ -150,8 +152,8 @@ pub struct JointStatus {
 /// The gripper in JtcStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct GripperStatus {
-    /// State: see [`crate::words::node_fsm`].
-    pub fsm: u8,
+    /// State.
+    pub state: NodeState,
     /// Pump 0 off, 1 on.
     pub pump: u8,
     /// 1: first pressure level reached.
@@ -173,7 +175,7 @@ impl JointStatus {
     fn emit(&self) -> [u8; field::JOINT_LEN] {
         use field::joint::*;
         let mut b = [0; field::JOINT_LEN];
-        b[FSM] = self.fsm;
+        b[FSM] = self.state.code();
         b[MC_CURRENT] = self.mc_current;
         b[MC_OCCURRED] = self.mc_occurred;
         b[ERRORS] = self.errors;
@@ -190,7 +192,7 @@ impl JointStatus {
     fn parse(b: &[u8; field::JOINT_LEN]) -> Self {
         use field::joint::*;
         Self {
-            fsm: b[FSM],
+            state: NodeState::new(b[FSM]),
             mc_current: b[MC_CURRENT],
             mc_occurred: b[MC_OCCURRED],
             errors: b[ERRORS],
@@ -232,7 +234,14 @@ impl Status {
             to.copy_from_slice(&joint.emit());
         }
         let g = self.gripper.unwrap_or_default();
-        b[GRIPPER][..6].copy_from_slice(&[g.fsm, g.pump, g.pressure1, g.pressure2, g.errors, g.warnings]);
+        b[GRIPPER][..6].copy_from_slice(&[
+            g.state.code(),
+            g.pump,
+            g.pressure1,
+            g.pressure2,
+            g.errors,
+            g.warnings,
+        ]);
         let crc = crc16(&b[..CRC.start]);
         b[CRC].copy_from_slice(&crc.to_be_bytes());
         b
@@ -264,8 +273,9 @@ impl Status {
         };
         let point = field::POINT.start;
         let gripper = (bytes.len() != STATUS_LEN_NO_GRIPPER).then(|| {
-            let [fsm, pump, pressure1, pressure2, errors, warnings] = get(bytes, late(field::GRIPPER.start));
-            GripperStatus { fsm, pump, pressure1, pressure2, errors, warnings }
+            let [state, pump, pressure1, pressure2, errors, warnings] =
+                get(bytes, late(field::GRIPPER.start));
+            GripperStatus { state: NodeState::new(state), pump, pressure1, pressure2, errors, warnings }
         });
         Some(Status {
             response,

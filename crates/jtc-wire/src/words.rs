@@ -82,20 +82,6 @@ pub fn friction_type(code: u8) -> &'static str {
     }
 }
 
-/// State of a drive or the gripper.
-pub fn node_fsm(code: u8) -> &'static str {
-    match code {
-        0 => "Start",
-        1 => "Init",
-        2 => "ReadyToOperate",
-        3 => "OperationEnable",
-        10..=16 => "in transition",
-        254 => "fault reaction",
-        255 => "Fault",
-        _ => "unknown state",
-    }
-}
-
 /// Set bits in words, separated by commas; `-` when there is none.
 ///
 /// ```

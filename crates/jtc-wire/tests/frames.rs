@@ -1,4 +1,5 @@
 //! Frames byte by byte, scaling, and the numbers that the protocol's pages print.
+use jtc_bus::NodeState;
 use jtc_wire::{
     ACCELERATION_SCALE, Channel, Command, ControllerState, DataStatus, Described, EncodeError, ExecCommand,
     FRAME_MAX, FrameRef, FrameStatus, FrameType, FrictionTable, GripperStatus, JointStatus, OutOfScale,
@@ -225,7 +226,7 @@ fn status() -> Status {
         joints: core::array::from_fn(|j| {
             let n = 10 * j as u8;
             JointStatus {
-                fsm: n + 1,
+                state: NodeState::new(n + 1),
                 mc_current: n + 2,
                 mc_occurred: n + 3,
                 errors: n + 4,
@@ -238,7 +239,14 @@ fn status() -> Status {
                 temperature: n + 9,
             }
         }),
-        gripper: Some(GripperStatus { fsm: 3, pump: 1, pressure1: 1, pressure2: 0, errors: 8, warnings: 1 }),
+        gripper: Some(GripperStatus {
+            state: NodeState::ENABLED,
+            pump: 1,
+            pressure1: 1,
+            pressure2: 0,
+            errors: 8,
+            warnings: 1,
+        }),
     }
 }
 

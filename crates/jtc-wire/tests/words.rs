@@ -1,4 +1,5 @@
 //! Frames, states and codes in words.
+use jtc_bus::NodeState;
 use jtc_wire::words::{self, Bits};
 use jtc_wire::{
     Code, Command, ControllerState, Described, FRAME_MAX, Floats, FrameRef, FrameStatus, FrameType,
@@ -28,7 +29,7 @@ fn states_have_their_names_and_other_codes_have_none() {
         assert_eq!((state.byte(), execution.byte()), (byte, byte), "what is not known is kept");
         assert_eq!(state.known().map(Known::code), (at < controller.len()).then_some(byte));
         assert_eq!(words::friction_type(byte), ["polynomial", "table"].get(at).copied().unwrap_or("unknown"));
-        assert_eq!(words::node_fsm(byte), node(byte), "{byte}");
+        assert_eq!(NodeState::new(byte).name(), node(byte), "{byte}");
     }
     let held = Code::from(ControllerState::HoldPos);
     assert!(held == ControllerState::HoldPos && held != ControllerState::Init);
@@ -174,7 +175,7 @@ fn a_status_says_only_what_there_is() {
 #[test]
 fn a_node_says_all_that_is_wrong_with_it() {
     let joint = JointStatus {
-        fsm: 255,
+        state: NodeState::FAULT,
         mc_current: 0x02,
         mc_occurred: 0x06,
         errors: 0x04,
@@ -192,7 +193,14 @@ fn a_node_says_all_that_is_wrong_with_it() {
          occurred: torque over limit, position error over limit; motor control: over-voltage; \
          motor control occurred: over-voltage, under-voltage; errors: over-speed; warnings: safety line active"
     );
-    let gripper = GripperStatus { fsm: 3, pump: 1, pressure1: 1, pressure2: 0, errors: 1, warnings: 2 };
+    let gripper = GripperStatus {
+        state: NodeState::ENABLED,
+        pump: 1,
+        pressure1: 1,
+        pressure2: 0,
+        errors: 1,
+        warnings: 2,
+    };
     assert_eq!(
         gripper.to_string(),
         "OperationEnable, pump on, pressure 1 reached, pressure 2 not reached; errors: position encoder; \

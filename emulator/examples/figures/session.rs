@@ -109,7 +109,7 @@ impl Session {
         self.write(&frames::use_defaults());
         self.until("the arm is held", 20_000, |rig| {
             let nodes = rig.board.plant().node_states();
-            rig.state() == ControllerState::HoldPos && nodes[..6] == [jtc_bus::fsm::ENABLED; 6]
+            rig.state() == ControllerState::HoldPos && nodes[..6] == [jtc_bus::NodeState::ENABLED; 6]
         });
     }
 

@@ -255,7 +255,7 @@ impl Rig {
     pub fn wait_for_hold(&mut self, ms: u64) {
         self.wait("HoldPos with all joints enabled", ms, |rig| {
             rig.state() == ControllerState::HoldPos
-                && rig.board.plant().node_states()[..6] == [jtc_bus::fsm::ENABLED; 6]
+                && rig.board.plant().node_states()[..6] == [jtc_bus::NodeState::ENABLED; 6]
         });
     }
 

@@ -175,7 +175,7 @@ fn update(name: &str, profile: Profile) -> Result<()> {
     let options = UpdateOptions::new(vec![UpdateTarget { board: 1, flash_number: None }], image, 0x3AC1);
     let cost = bench.run(Request::Update(options))?;
     let Outcome::Update(report) = &cost.outcome else { return Err("update ended otherwise".into()) };
-    if report.exit_code() != 0 {
+    if report.failure().is_some() {
         return Err(format!("the update failed: {report:?}").into());
     }
     print(&format!("{name}_s"), cost.seconds);

@@ -13,7 +13,7 @@ use jtc_host::report::{self, ReportInput, RunFailure, Summary};
 use jtc_host::session::{Flow, Outcome, Run, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
 use jtc_host::{CheckOptions, CheckedTrajectory, Error, Sample, Session, words};
-use jtc_wire::{ControllerState, Status};
+use jtc_wire::{ControllerState, NodeState, Status};
 use serde_json::json;
 
 use super::run_report;
@@ -237,7 +237,7 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
             Failure { exit: 1, code: "not-ready".into(), ..Failure::usage(words::waiting_for(&status)) };
         return Err(failure.hint(words::next_step(&status)));
     }
-    let enabled = |s: &Status| s.joints.iter().all(|j| j.fsm == 3);
+    let enabled = |s: &Status| s.joints.iter().all(|j| j.state == NodeState::ENABLED);
     if !enabled(&status) {
         operator.out.note("waiting until all drives are enabled");
         let reached = |s: &Status| enabled(s) || operator.wants_the_end();

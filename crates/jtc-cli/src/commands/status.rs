@@ -3,7 +3,7 @@
 use cli_kit::{Output, figure, table};
 use jtc_host::sample::is_measured;
 use jtc_host::words;
-use jtc_wire::Status;
+use jtc_wire::{NodeState, Status};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
@@ -27,7 +27,7 @@ pub fn as_json(s: &Status) -> Value {
             json!({
                 "joint": i + 1,
                 "state": joint_state(s, i),
-                "fsm": j.fsm,
+                "fsm": j.state.code(),
                 "position_rad": measured.then_some(j.position + 0.0),
                 "velocity_rad_s": measured.then_some(j.velocity + 0.0),
                 "torque_nm": measured.then_some(j.torque + 0.0),
@@ -44,7 +44,7 @@ pub fn as_json(s: &Status) -> Value {
     let gripper = s.gripper.map(|g| {
         json!({
             "state": gripper_state(s),
-            "fsm": g.fsm,
+            "fsm": g.state.code(),
             "pump": gripper_answers(s).then_some(g.pump != 0),
             "pressure1": gripper_answers(s).then_some(g.pressure1 != 0),
             "pressure2": gripper_answers(s).then_some(g.pressure2 != 0),
@@ -76,10 +76,10 @@ pub fn as_json(s: &Status) -> Value {
 
 /// State of joint `j` (from 0): what it said last, unless it says nothing any more.
 pub fn joint_state(s: &Status, j: usize) -> &'static str {
-    let fsm = s.joints[j].fsm;
+    let state = s.joints[j].state;
     // A joint that is not ready may answer; one that is enabled and not measured does not.
-    let silent = !is_measured(s, j) && (s.can_current >> (8 + j) & 1 == 1 || fsm == 3);
-    if silent { "does not answer" } else { words::node_state(fsm) }
+    let silent = !is_measured(s, j) && (s.can_current >> (8 + j) & 1 == 1 || state == NodeState::ENABLED);
+    if silent { "does not answer" } else { state.name() }
 }
 
 /// What the status says of pump and vacuum is what the gripper sent.
@@ -90,7 +90,7 @@ pub fn gripper_answers(s: &Status) -> bool {
 /// State of the gripper: what it sent last, unless it sends nothing any more.
 pub fn gripper_state(s: &Status) -> &'static str {
     match s.gripper {
-        Some(g) if gripper_answers(s) => words::node_state(g.fsm),
+        Some(g) if gripper_answers(s) => g.state.name(),
         _ => "does not answer",
     }
 }
@@ -163,7 +163,7 @@ mod tests {
             ..Status::default()
         };
         for joint in &mut s.joints {
-            joint.fsm = 3;
+            joint.state = NodeState::ENABLED;
         }
         s.joints[1].position = 0.5;
         let json = as_json(&s);

@@ -1,5 +1,5 @@
 //! The frame of each tick: Move, or what brings a node up in its place (J-12, J-20).
-use jtc_bus::{Frame, Request, Target, fsm};
+use jtc_bus::{Frame, NodeState, Request, Target};
 
 use super::{GRIPPER, Goal, Node, Nodes};
 use crate::config::Config;
@@ -56,7 +56,7 @@ impl Nodes {
             .nodes
             .iter()
             .zip(&target)
-            .any(|(node, &target)| target == Target::Ready && node.report.fsm == fsm::ENABLED);
+            .any(|(node, &target)| target == Target::Ready && node.report.state == NodeState::ENABLED);
         if (joints_wait || gripper_waits) && !(change && (self.configured_last || to_disable)) {
             self.configured_last = true;
             return Some(Request::ChangeMode {

@@ -1,6 +1,6 @@
 //! The seven nodes on the joint bus: what they report, how they are brought up (J-20), what of them is an error (J-14, J-16), and
 //! which frame each tick sends (J-12).
-use jtc_bus::{Answer, JointReport, Scale, fsm, warning};
+use jtc_bus::{Answer, JointReport, NodeState, Scale, warning};
 
 use crate::config::Config;
 use crate::io::Inputs;
@@ -13,7 +13,6 @@ mod node;
 mod tests;
 
 use measure::{Reading, Tick};
-use node::starting;
 pub(crate) use node::{Goal, Node};
 
 /// Node number of the gripper.
@@ -82,7 +81,7 @@ impl Nodes {
         let mut nodes = Self::new(&Config::avena());
         for node in &mut nodes.nodes {
             *node = Node { seen: true, configured: true, valid: true, fresh: true, ..Node::default() };
-            node.report.fsm = fsm::ENABLED;
+            node.report.state = NodeState::ENABLED;
         }
         for (node, (position, velocity)) in nodes.nodes.iter_mut().zip(position.into_iter().zip(velocity)) {
             (node.report.position, node.report.velocity) = (position, velocity);
@@ -94,7 +93,7 @@ impl Nodes {
     /// The same, but the joint with this index is ready only.
     #[cfg(test)]
     pub fn with_limp(mut self, joint: usize) -> Self {
-        self.nodes[joint].report.fsm = fsm::READY;
+        self.nodes[joint].report.state = NodeState::READY;
         self
     }
 
@@ -123,7 +122,8 @@ impl Nodes {
 
     /// The gripper is enabled, and the configuration has it keep its part when the arm loses its torque.
     pub fn gripper_keeps_part(&self, config: &Config) -> bool {
-        !config.pump_off_on_error && self.gripper_node().is_some_and(|node| node.report.fsm == fsm::ENABLED)
+        !config.pump_off_on_error
+            && self.gripper_node().is_some_and(|node| node.report.state == NodeState::ENABLED)
     }
 
     /// The gripper left OperationEnable or lost its configuration in this tick: a pump that was commanded before does not
@@ -157,7 +157,7 @@ impl Nodes {
         // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         let gripper = &self.nodes[GRIPPER];
-        let (gripper_fsm, gripper_configured) = (gripper.report.fsm, gripper.configured);
+        let (gripper_state, gripper_configured) = (gripper.report.state, gripper.configured);
         for (n, node) in self.nodes.iter_mut().enumerate() {
             node.misbehaved = false;
             node.deaf_left = node.deaf_left.saturating_sub(1);
@@ -172,7 +172,7 @@ impl Nodes {
                 Ok(Answer::Gripper(g)) => {
                     (self.pump, self.pressure) = (g.pump, [g.pressure1, g.pressure2]);
                     let report = JointReport {
-                        fsm: g.fsm,
+                        state: g.state,
                         errors: g.errors,
                         warnings: g.warnings,
                         ..JointReport::default()
@@ -188,7 +188,7 @@ impl Nodes {
                     }
                 }
                 // The byte is the state before or after the change, depending on the drive: Move answers tell it surely.
-                Ok(Answer::Fsm { .. }) => {}
+                Ok(Answer::State { .. }) => {}
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
         }
@@ -197,7 +197,8 @@ impl Nodes {
         let usable = self.measure(answered, commanded, 1 + u32::from(inputs.missed_ticks), config);
         self.count_missing(inputs, config, answered, usable);
         let gripper = &self.nodes[GRIPPER];
-        self.gripper_lost = (gripper_fsm == fsm::ENABLED && gripper.report.fsm != fsm::ENABLED)
+        self.gripper_lost = (gripper_state == NodeState::ENABLED
+            && gripper.report.state != NodeState::ENABLED)
             || (gripper_configured && !gripper.configured);
         self.watch(config, goal);
     }
@@ -205,7 +206,7 @@ impl Nodes {
     fn report(&mut self, n: usize, report: &JointReport, configured_before: u8, answered: &mut u8) {
         let Some(node) = self.nodes.get_mut(n).filter(|node| node.deaf_left == 0) else { return };
         *answered |= 1 << n;
-        let before = node.report.fsm;
+        let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
             // It may go anywhere when it becomes accurate.
             node.measured.forget();
@@ -213,11 +214,11 @@ impl Nodes {
         node.report = *report;
         node.seen = true;
         if node.starting() {
-            if !starting(before) || report.fsm == fsm::START {
+            if !before.is_starting() || report.state == NodeState::START {
                 // Fallen back: the configuration is lost and has to be accepted again.
                 node.lose_configuration();
             }
-            if report.fsm != 10 {
+            if report.state != NodeState::START_TO_INIT {
                 node.clear = false;
             }
         }
@@ -284,7 +285,7 @@ impl Nodes {
             } else if answered || unanswered || predicted {
                 node.missed = more(node.missed);
             }
-            let enabled_gripper = n == GRIPPER && node.report.fsm == fsm::ENABLED;
+            let enabled_gripper = n == GRIPPER && node.report.state == NodeState::ENABLED;
             if node.silent == config.missed_moves_max && !enabled_gripper {
                 // It may have lost its supply, and its configuration with it, in any state. An enabled gripper shows that
                 // by its state when it answers again; if it is enabled still, it has held its part meanwhile.
@@ -310,7 +311,7 @@ impl Nodes {
             if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
                 node.misbehaved = true;
             }
-            if node.report.fsm == fsm::ENABLED {
+            if node.report.state == NodeState::ENABLED {
                 (node.enabled, node.enable_wait) = (true, 0);
                 continue;
             }
@@ -365,7 +366,7 @@ impl Nodes {
 
     /// Init is done: every node is initialised and reports ReadyToOperate. A gripper that keeps its part stays enabled.
     pub fn all_ready(&self, config: &Config) -> bool {
-        let ready = |node: &Node| node.report.fsm == fsm::READY;
+        let ready = |node: &Node| node.report.state == NodeState::READY;
         self.init_word(config) == 0
             && self.joints().iter().all(ready)
             && (self.gripper_keeps_part(config) || self.gripper_node().is_none_or(ready))

@@ -1,5 +1,5 @@
 //! One node: what it last reported, how far its bring-up is, and which state it is asked for (J-16, J-20).
-use jtc_bus::{JointReport, Target, fsm, warning};
+use jtc_bus::{JointReport, NodeState, Target, warning};
 
 use super::measure::Measurement;
 use crate::config::Config;
@@ -59,11 +59,11 @@ impl Node {
     }
 
     pub fn enabled(&self) -> bool {
-        self.valid && self.report.fsm == fsm::ENABLED
+        self.valid && self.report.state == NodeState::ENABLED
     }
 
     pub fn starting(&self) -> bool {
-        starting(self.report.fsm)
+        self.report.state.is_starting()
     }
 
     /// Lost its configuration, or back in Start or Init (J-20).
@@ -76,7 +76,7 @@ impl Node {
         let r = &self.report;
         // Drives set this warning also before they are configured, whatever the line is.
         let safety_line = if self.valid { r.warnings & warning::SAFETY_LINE } else { 0 };
-        self.seen && (fsm::is_fault(r.fsm) || (r.errors | r.mc_current | safety_line) != 0)
+        self.seen && (r.state.is_fault() || (r.errors | r.mc_current | safety_line) != 0)
     }
 
     /// The node has restarted: nothing of what was known of it holds.
@@ -92,38 +92,40 @@ impl Node {
 
     /// State that the node is asked for (J-16).
     pub fn request(&self, goal: Goal) -> Target {
-        let state = self.report.fsm;
+        let state = self.report.state;
         if !self.seen {
             return Target::NoChange;
         }
         if self.clear {
             // A drive ignores Init while it is enabled.
-            return if state == fsm::ENABLED { Target::Ready } else { Target::Init };
+            return if state == NodeState::ENABLED { Target::Ready } else { Target::Init };
         }
-        let moving = fsm::is_transition(state);
+        let moving = state.is_transition();
         match goal {
-            Goal::Down if state == fsm::ENABLED || moving || (state == fsm::INIT && self.configured) => {
+            Goal::Down
+                if state == NodeState::ENABLED || moving || (state == NodeState::INIT && self.configured) =>
+            {
                 Target::Ready
             }
-            Goal::Ready if state == fsm::START => Target::Init,
-            Goal::Ready if state == fsm::READY && !self.configured && self.refused => Target::Init,
-            Goal::Ready if state == fsm::ENABLED || ((state == fsm::INIT || moving) && self.configured) => {
+            Goal::Ready if state == NodeState::START => Target::Init,
+            Goal::Ready if state == NodeState::READY && !self.configured && self.refused => Target::Init,
+            Goal::Ready
+                if state == NodeState::ENABLED
+                    || ((state == NodeState::INIT || moving) && self.configured) =>
+            {
                 Target::Ready
             }
-            Goal::Enabled if state == fsm::READY || moving => Target::Enable,
+            Goal::Enabled if state == NodeState::READY || moving => Target::Enable,
             _ => Target::NoChange,
         }
     }
 
     pub fn wants_configuration(&self) -> bool {
-        self.seen && !self.configured && !self.clear && matches!(self.report.fsm, fsm::INIT | fsm::READY)
+        self.seen
+            && !self.configured
+            && !self.clear
+            && matches!(self.report.state, NodeState::INIT | NodeState::READY)
     }
-}
-
-/// The node is in Start, in Init, or between them.
-pub(crate) fn starting(state: u8) -> bool {
-    // 10 is the transition from Start to Init.
-    matches!(state, fsm::START | fsm::INIT | 10)
 }
 
 #[cfg(test)]
@@ -134,13 +136,13 @@ mod tests {
     #[test]
     fn j16_a_node_is_enabled_when_it_says_so_and_its_configuration_is_known() {
         for (valid, state, enabled) in [
-            (true, fsm::ENABLED, true),
-            (false, fsm::ENABLED, false),
-            (true, fsm::READY, false),
-            (false, fsm::READY, false),
+            (true, NodeState::ENABLED, true),
+            (false, NodeState::ENABLED, false),
+            (true, NodeState::READY, false),
+            (false, NodeState::READY, false),
         ] {
             let mut node = Node { valid, ..Node::default() };
-            node.report.fsm = state;
+            node.report.state = state;
             assert_eq!(node.enabled(), enabled, "{valid} {state}");
         }
     }

@@ -10,8 +10,8 @@ mod frames;
 
 const SCALE: Scale = Scale { velocity: 2.0 };
 const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
-const START_TO_INIT: u8 = 10;
-const INIT_TO_READY: u8 = 11;
+const START_TO_INIT: NodeState = NodeState::START_TO_INIT;
+const INIT_TO_READY: NodeState = NodeState::new(11);
 
 /// What a tick finds on the bus, and nothing else.
 fn inputs(bus: &[Frame], bus_state: BusState) -> Inputs<'_> {
@@ -35,21 +35,21 @@ fn ready() -> Nodes {
     let mut nodes = Nodes::new(&Config::avena());
     for node in &mut nodes.nodes {
         *node = Node { seen: true, configured: true, valid: true, ..Node::default() };
-        node.report.fsm = fsm::READY;
+        node.report.state = NodeState::READY;
     }
     nodes.sent_move = true;
     nodes
 }
 
-fn joint(node: u8, state: u8) -> Frame {
-    Answer::Joint { node, report: JointReport { fsm: state, ..JointReport::default() } }.emit(SCALE)
+fn joint(node: u8, state: NodeState) -> Frame {
+    Answer::Joint { node, report: JointReport { state, ..JointReport::default() } }.emit(SCALE)
 }
 
-fn gripper(state: u8) -> Frame {
-    Answer::Gripper(GripperReport { fsm: state, ..GripperReport::default() }).emit(SCALE)
+fn gripper(state: NodeState) -> Frame {
+    Answer::Gripper(GripperReport { state, ..GripperReport::default() }).emit(SCALE)
 }
 
-fn all(state: u8) -> [Frame; NODES] {
+fn all(state: NodeState) -> [Frame; NODES] {
     core::array::from_fn(|n| if n == GRIPPER { gripper(state) } else { joint(n as u8, state) })
 }
 
@@ -69,11 +69,11 @@ fn j16_joints_may_be_enabled_when_they_were_slow_and_rested_for_long_enough() {
 #[test]
 fn j16_an_arm_that_is_not_known_is_not_still() {
     let mut nodes = ready();
-    (0..7).for_each(|_| tick(&mut nodes, &all(fsm::READY), GOOD));
+    (0..7).for_each(|_| tick(&mut nodes, &all(NodeState::READY), GOOD));
     assert_eq!(nodes.still_ms, 7);
     nodes.nodes[3].configured = false;
     nodes.nodes[3].valid = false;
-    tick(&mut nodes, &all(fsm::READY), GOOD);
+    tick(&mut nodes, &all(NodeState::READY), GOOD);
     assert_eq!(nodes.still_ms, 0);
 }
 
@@ -101,7 +101,7 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
         }
         // What answers is there.
         nodes.sent_move = true;
-        tick(&mut nodes, &all(fsm::READY), GOOD);
+        tick(&mut nodes, &all(NodeState::READY), GOOD);
         assert_eq!((nodes.unacknowledged, nodes.nodes[4].boot_left), (0, 0));
         assert!(nodes.nodes.iter().all(|node| node.silent == 0));
     }
@@ -141,10 +141,10 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
 #[test]
 fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
     let mut nodes = ready();
-    tick(&mut nodes, &all(fsm::READY), GOOD);
-    let far = JointReport { fsm: fsm::READY, position: 1.0, ..JointReport::default() };
+    tick(&mut nodes, &all(NodeState::READY), GOOD);
+    let far = JointReport { state: NodeState::READY, position: 1.0, ..JointReport::default() };
     for ms in 1..=5 {
-        let mut bus = all(fsm::READY);
+        let mut bus = all(NodeState::READY);
         bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
         tick(&mut nodes, &bus, GOOD);
         assert_eq!(nodes.node(2).misbehaved, ms == 5, "after {ms}");
@@ -152,14 +152,14 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
     }
     // An answer without a Move before it is looked at as well.
     let mut nodes_without = ready();
-    tick(&mut nodes_without, &all(fsm::READY), GOOD);
+    tick(&mut nodes_without, &all(NodeState::READY), GOOD);
     nodes_without.sent_move = false;
-    let mut bus = all(fsm::READY);
+    let mut bus = all(NodeState::READY);
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes_without, &bus, GOOD);
     assert_eq!((nodes_without.node(2).missed, nodes_without.node(1).missed), (1, 0));
     // Then it is taken as it is.
-    let mut bus = all(fsm::READY);
+    let mut bus = all(NodeState::READY);
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes, &bus, GOOD);
     assert!(nodes.node(2).fresh() && !nodes.node(2).misbehaved);
@@ -169,27 +169,31 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
 #[test]
 fn j16_a_joint_that_leaves_operation_enable_or_does_not_reach_it_misbehaves() {
     let config = Config::avena();
-    let watched = |enabled: bool, state: u8, wait: u32, still: u16, goal: Goal| {
+    let watched = |enabled: bool, state: NodeState, wait: u32, still: u16, goal: Goal| {
         let mut nodes = ready();
         nodes.still_ms = still;
         let node = &mut nodes.nodes[2];
-        (node.enabled, node.report.fsm, node.enable_wait) = (enabled, state, wait);
+        (node.enabled, node.report.state, node.enable_wait) = (enabled, state, wait);
         nodes.watch(&config, goal);
         let node = nodes.node(2);
         (node.misbehaved, node.enabled, node.enable_wait)
     };
     let (most, still) = (config.enable_timeout_ms, config.enable_still_ms);
-    assert_eq!(watched(false, fsm::READY, 7, still, Goal::Enabled), (false, false, 8));
-    assert_eq!(watched(false, fsm::READY, 7, 0, Goal::Enabled), (false, false, 7), "nothing is asked for");
-    assert_eq!(watched(false, fsm::READY, most - 1, still, Goal::Enabled), (false, false, most));
-    assert_eq!(watched(false, fsm::READY, most, still, Goal::Enabled), (true, false, 0));
-    assert_eq!(watched(false, fsm::ENABLED, 7, still, Goal::Enabled), (false, true, 0));
-    assert_eq!(watched(true, fsm::ENABLED, 0, 0, Goal::Enabled), (false, true, 0));
-    assert_eq!(watched(true, fsm::READY, 0, 0, Goal::Enabled), (true, false, 0));
+    assert_eq!(watched(false, NodeState::READY, 7, still, Goal::Enabled), (false, false, 8));
+    assert_eq!(
+        watched(false, NodeState::READY, 7, 0, Goal::Enabled),
+        (false, false, 7),
+        "nothing is asked for"
+    );
+    assert_eq!(watched(false, NodeState::READY, most - 1, still, Goal::Enabled), (false, false, most));
+    assert_eq!(watched(false, NodeState::READY, most, still, Goal::Enabled), (true, false, 0));
+    assert_eq!(watched(false, NodeState::ENABLED, 7, still, Goal::Enabled), (false, true, 0));
+    assert_eq!(watched(true, NodeState::ENABLED, 0, 0, Goal::Enabled), (false, true, 0));
+    assert_eq!(watched(true, NodeState::READY, 0, 0, Goal::Enabled), (true, false, 0));
     // That is J-20.
-    assert_eq!(watched(true, fsm::INIT, 0, 0, Goal::Enabled), (false, false, 0));
+    assert_eq!(watched(true, NodeState::INIT, 0, 0, Goal::Enabled), (false, false, 0));
     for goal in [Goal::Ready, Goal::Down] {
-        assert_eq!(watched(true, fsm::READY, 7, still, goal), (false, false, 0), "it was asked to");
+        assert_eq!(watched(true, NodeState::READY, 7, still, goal), (false, false, 0), "it was asked to");
     }
     let mut nodes = ready();
     nodes.nodes[2].report.warnings = warning::POSITION_NOT_ACCURATE;
@@ -223,9 +227,9 @@ fn j21_a_clear_is_for_the_nodes_in_its_mask_that_have_something_to_clear() {
 fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
     let config = Config::avena();
     let mut nodes = ready();
-    nodes.nodes[GRIPPER].report.fsm = fsm::ENABLED;
+    nodes.nodes[GRIPPER].report.state = NodeState::ENABLED;
     for ms in 1..=6u8 {
-        let answers = [0, 1, 3, 4, 5].map(|n| joint(n, fsm::READY));
+        let answers = [0, 1, 3, 4, 5].map(|n| joint(n, NodeState::READY));
         tick(&mut nodes, &answers, GOOD);
         let (flags, shown) = if ms < 5 { (0, 0) } else { (1 << (8 + 2), GRIPPER_FLAG) };
         assert_eq!(nodes.can_flags(&inputs(&[], GOOD), &config), flags, "after {ms}");
@@ -242,15 +246,15 @@ fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
 #[test]
 fn j14_a_node_that_was_silent_has_lost_its_configuration_unless_it_is_an_enabled_gripper() {
     for (n, state, kept) in [
-        (GRIPPER, fsm::ENABLED, true),
-        (GRIPPER, fsm::READY, false),
-        (2, fsm::ENABLED, false),
-        (2, fsm::READY, false),
+        (GRIPPER, NodeState::ENABLED, true),
+        (GRIPPER, NodeState::READY, false),
+        (2, NodeState::ENABLED, false),
+        (2, NodeState::READY, false),
     ] {
         let mut nodes = ready();
-        nodes.nodes[n].report.fsm = state;
+        nodes.nodes[n].report.state = state;
         nodes.nodes[n].silent = 4;
-        let answers = all(fsm::READY);
+        let answers = all(NodeState::READY);
         let others: [Frame; NODES - 1] = core::array::from_fn(|i| answers[i + usize::from(i >= n)]);
         tick(&mut nodes, &others, GOOD);
         assert_eq!(nodes.nodes[n].configured, kept, "node {n} in {state}");
@@ -260,19 +264,19 @@ fn j14_a_node_that_was_silent_has_lost_its_configuration_unless_it_is_an_enabled
 #[test]
 fn j20_a_node_that_falls_back_has_lost_its_configuration_and_does_not_count() {
     for (before, now, kept) in [
-        (fsm::READY, fsm::READY, true),
-        (fsm::INIT, fsm::INIT, true),
-        (fsm::INIT, fsm::READY, true),
-        (START_TO_INIT, fsm::INIT, true),
-        (INIT_TO_READY, fsm::READY, true),
-        (fsm::READY, fsm::INIT, false),
-        (fsm::ENABLED, fsm::INIT, false),
-        (fsm::READY, START_TO_INIT, false),
-        (fsm::INIT, fsm::START, false),
-        (fsm::START, fsm::START, false),
+        (NodeState::READY, NodeState::READY, true),
+        (NodeState::INIT, NodeState::INIT, true),
+        (NodeState::INIT, NodeState::READY, true),
+        (START_TO_INIT, NodeState::INIT, true),
+        (INIT_TO_READY, NodeState::READY, true),
+        (NodeState::READY, NodeState::INIT, false),
+        (NodeState::ENABLED, NodeState::INIT, false),
+        (NodeState::READY, START_TO_INIT, false),
+        (NodeState::INIT, NodeState::START, false),
+        (NodeState::START, NodeState::START, false),
     ] {
         let mut nodes = ready();
-        nodes.nodes[2].report.fsm = before;
+        nodes.nodes[2].report.state = before;
         tick(&mut nodes, &[joint(2, now)], GOOD);
         let node = nodes.node(2);
         assert_eq!((node.configured, node.valid), (kept, kept), "{before} to {now}");
@@ -283,14 +287,14 @@ fn j20_a_node_that_falls_back_has_lost_its_configuration_and_does_not_count() {
 #[test]
 fn j21_a_node_is_cleared_when_it_is_in_init_and_not_on_the_way_there() {
     for (now, clearing) in [
-        (fsm::INIT, false),
-        (fsm::START, false),
+        (NodeState::INIT, false),
+        (NodeState::START, false),
         (START_TO_INIT, true),
-        (fsm::READY, true),
-        (fsm::FAULT, true),
+        (NodeState::READY, true),
+        (NodeState::FAULT, true),
     ] {
         let mut nodes = ready();
-        (nodes.nodes[2].report.fsm, nodes.nodes[2].clear) = (fsm::FAULT, true);
+        (nodes.nodes[2].report.state, nodes.nodes[2].clear) = (NodeState::FAULT, true);
         tick(&mut nodes, &[joint(2, now)], GOOD);
         assert_eq!(nodes.clearing(), clearing, "{now}");
     }
@@ -300,18 +304,18 @@ fn j21_a_node_is_cleared_when_it_is_in_init_and_not_on_the_way_there() {
 fn j16_a_configuration_accepted_in_this_tick_counts_from_the_next_answer() {
     let mut nodes = ready();
     (nodes.nodes[2].configured, nodes.nodes[2].valid) = (false, false);
-    nodes.nodes[2].report.fsm = fsm::INIT;
+    nodes.nodes[2].report.state = NodeState::INIT;
     let accepted = Answer::Mode { node: 2, accepted: true }.emit(SCALE);
-    tick(&mut nodes, &[accepted, joint(2, fsm::INIT)], GOOD);
+    tick(&mut nodes, &[accepted, joint(2, NodeState::INIT)], GOOD);
     assert!(nodes.node(2).configured && !nodes.node(2).valid);
-    tick(&mut nodes, &[joint(2, fsm::INIT)], GOOD);
+    tick(&mut nodes, &[joint(2, NodeState::INIT)], GOOD);
     assert!(nodes.node(2).valid);
     // A refusal afterwards does not take it back.
     tick(&mut nodes, &[Answer::Mode { node: 2, accepted: false }.emit(SCALE)], GOOD);
     assert!(nodes.node(2).configured && nodes.node(2).refused);
     // After a reset nothing that still arrives counts.
     nodes.nodes[2].restart(&Config::avena());
-    tick(&mut nodes, &[accepted, joint(2, fsm::READY)], GOOD);
+    tick(&mut nodes, &[accepted, joint(2, NodeState::READY)], GOOD);
     assert!(!nodes.node(2).configured && !nodes.node(2).seen);
 }
 
@@ -319,17 +323,17 @@ fn j16_a_configuration_accepted_in_this_tick_counts_from_the_next_answer() {
 #[test]
 fn j23_a_gripper_is_lost_when_it_leaves_what_it_was_in() {
     for (configured, before, now, lost) in [
-        (true, fsm::ENABLED, fsm::ENABLED, false),
-        (true, fsm::ENABLED, fsm::READY, true),
-        (true, fsm::ENABLED, fsm::FAULT, true),
-        (true, fsm::READY, fsm::READY, false),
-        (true, fsm::READY, fsm::ENABLED, false),
-        (true, fsm::READY, fsm::INIT, true),
-        (false, fsm::INIT, fsm::INIT, false),
-        (false, fsm::START, fsm::INIT, false),
+        (true, NodeState::ENABLED, NodeState::ENABLED, false),
+        (true, NodeState::ENABLED, NodeState::READY, true),
+        (true, NodeState::ENABLED, NodeState::FAULT, true),
+        (true, NodeState::READY, NodeState::READY, false),
+        (true, NodeState::READY, NodeState::ENABLED, false),
+        (true, NodeState::READY, NodeState::INIT, true),
+        (false, NodeState::INIT, NodeState::INIT, false),
+        (false, NodeState::START, NodeState::INIT, false),
     ] {
         let mut nodes = ready();
-        (nodes.nodes[GRIPPER].configured, nodes.nodes[GRIPPER].report.fsm) = (configured, before);
+        (nodes.nodes[GRIPPER].configured, nodes.nodes[GRIPPER].report.state) = (configured, before);
         tick(&mut nodes, &[gripper(now)], GOOD);
         assert_eq!(nodes.gripper_lost(), lost, "{configured} {before} to {now}");
     }
@@ -343,7 +347,10 @@ fn j16_a_node_is_an_error_by_its_state_its_errors_or_its_safety_line() {
         node.faulty()
     };
     assert!(!faulty(|_| {}));
-    assert!(faulty(|node| node.report.fsm = fsm::FAULT) && faulty(|node| node.report.fsm = 254));
+    assert!(
+        faulty(|node| node.report.state = NodeState::FAULT)
+            && faulty(|node| node.report.state = NodeState::FAULT_REACTION)
+    );
     assert!(faulty(|node| node.report.errors = 2) && faulty(|node| node.report.mc_current = 4));
     assert!(faulty(|node| node.report.warnings = warning::SAFETY_LINE));
     assert!(!faulty(|node| (node.report.warnings, node.valid) = (warning::SAFETY_LINE, false)));
@@ -370,7 +377,7 @@ fn j21_an_error_that_is_being_cleared_counts_only_while_torque_is_on() {
         assert_eq!(nodes.external_error(powered), error, "{misbehaved} {fault} {clear} {powered}");
     }
     let mut nodes = ready();
-    nodes.nodes[GRIPPER].report.fsm = fsm::FAULT;
+    nodes.nodes[GRIPPER].report.state = NodeState::FAULT;
     assert!(!nodes.external_error(true), "a gripper never takes the arm's torque away");
 }
 
@@ -384,20 +391,24 @@ fn j20_the_word_of_missing_nodes_tells_what_keeps_the_controller_in_init() {
     };
     assert_eq!(word(3, |_| {}), (0, false, true));
     assert_eq!(word(3, |node| node.valid = false), (1 << 3, true, false));
-    assert_eq!(word(3, |node| node.report.fsm = fsm::INIT), (1 << 3, true, false));
-    assert_eq!(word(3, |node| node.report.fsm = fsm::ENABLED), (0, false, false));
+    assert_eq!(word(3, |node| node.report.state = NodeState::INIT), (1 << 3, true, false));
+    assert_eq!(word(3, |node| node.report.state = NodeState::ENABLED), (0, false, false));
     assert_eq!(word(3, |node| node.report.warnings = warning::POSITION_NOT_ACCURATE), (1 << 3, false, false));
     assert_eq!(word(3, |node| node.report.warnings = !warning::POSITION_NOT_ACCURATE), (0, false, true));
     assert_eq!(word(6, |node| node.report.warnings = 0xFF), (0, false, true), "a gripper knows no warnings");
     assert_eq!(word(6, |node| node.silent = 4), (0, false, true));
     assert_eq!(word(6, |node| node.silent = 5), (1 << 6, false, false));
     assert_eq!(word(6, |node| node.valid = false), (1 << 6, false, false));
-    assert_eq!(word(6, |node| node.report.fsm = fsm::ENABLED), (0, false, false), "its part is dropped here");
+    assert_eq!(
+        word(6, |node| node.report.state = NodeState::ENABLED),
+        (0, false, false),
+        "its part is dropped here"
+    );
 }
 
 #[test]
 fn j16_a_joint_at_the_speed_limit_of_enabling_is_not_slow() {
-    let moving = JointReport { fsm: fsm::READY, velocity: 0.125, ..JointReport::default() };
+    let moving = JointReport { state: NodeState::READY, velocity: 0.125, ..JointReport::default() };
     let bus: [Frame; JOINTS] =
         core::array::from_fn(|n| Answer::Joint { node: n as u8, report: moving }.emit(SCALE));
     let mut nodes = ready();
@@ -432,7 +443,7 @@ fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
 fn j11_what_a_gripper_reports_is_known() {
     let mut nodes = ready();
     let report = GripperReport {
-        fsm: fsm::ENABLED,
+        state: NodeState::ENABLED,
         errors: 0x21,
         warnings: 0x42,
         pump: true,
@@ -441,6 +452,6 @@ fn j11_what_a_gripper_reports_is_known() {
     };
     tick(&mut nodes, &[Answer::Gripper(report).emit(SCALE)], GOOD);
     let found = nodes.node(GRIPPER).report;
-    assert_eq!((found.fsm, found.errors, found.warnings), (fsm::ENABLED, 0x21, 0x42));
+    assert_eq!((found.state, found.errors, found.warnings), (NodeState::ENABLED, 0x21, 0x42));
     assert_eq!((nodes.pump, nodes.pressure), (true, [false, true]));
 }

@@ -150,8 +150,9 @@ impl Plant {
         let before = self.q;
         let mut mass = self.dynamics.mass_matrix(&self.q);
         let bias = self.dynamics.inverse(&self.q, &self.v, &[0.0; 6]);
-        let free: [bool; 6] =
-            core::array::from_fn(|j| !self.brakes || rig.nodes[j].report.fsm == jtc_bus::fsm::ENABLED);
+        let free: [bool; 6] = core::array::from_fn(|j| {
+            !self.brakes || rig.nodes[j].report.state == jtc_bus::NodeState::ENABLED
+        });
         for j in 0..6 {
             mass[j][j] += if free[j] { self.rotor[j] } else { 1e9 };
             if !free[j] {
@@ -163,7 +164,8 @@ impl Plant {
         for _ in 0..SUBSTEPS {
             let mut torque = [0.0; 6];
             for j in 0..6 {
-                let on = if rig.nodes[j].report.fsm == jtc_bus::fsm::ENABLED { drive[j] } else { 0.0 };
+                let on =
+                    if rig.nodes[j].report.state == jtc_bus::NodeState::ENABLED { drive[j] } else { 0.0 };
                 torque[j] =
                     on + self.push[j] - bias[j] - self.friction[j].step(&mut self.bristles[j], self.v[j], DT);
             }

@@ -1,7 +1,7 @@
 //! A bench without physics: nodes that answer at once and joints that are where the test puts them.
 #![allow(dead_code, unused_imports)]
 
-use jtc_bus::{Answer, Frame, GripperReport, JointReport, Request, Scale, Target, fsm};
+use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::{
     BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX,
     TrajectoryState,
@@ -153,7 +153,7 @@ impl Rig {
         // Until what the arm carries is known: teaching waits for that.
         rig.run(700);
         assert_eq!(rig.state(), ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
-        assert!(rig.nodes[..6].iter().all(|n| n.report.fsm == fsm::ENABLED));
+        assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
         rig
     }
 
@@ -334,7 +334,7 @@ impl Rig {
                     } else {
                         let gripper = GripperReport {
                             pump,
-                            fsm: report.fsm,
+                            state: report.state,
                             errors: report.errors,
                             ..GripperReport::default()
                         };
@@ -342,29 +342,29 @@ impl Rig {
                     });
                 }
                 Request::ChangeFsm { target } => {
-                    self.answers.push(Answer::Fsm { node: number, fsm: node.report.fsm }.emit(SCALE));
-                    node.report.fsm = match (target[n], node.report.fsm) {
-                        (_, fsm::READY) if node.stays_ready => fsm::READY,
-                        (_, fsm::ENABLED) if node.stays_enabled => fsm::ENABLED,
-                        (Target::Init, fsm::START | fsm::READY) => fsm::INIT,
-                        (Target::Init, fsm::FAULT) => {
+                    self.answers.push(Answer::State { node: number, state: node.report.state }.emit(SCALE));
+                    node.report.state = match (target[n], node.report.state) {
+                        (_, NodeState::READY) if node.stays_ready => NodeState::READY,
+                        (_, NodeState::ENABLED) if node.stays_enabled => NodeState::ENABLED,
+                        (Target::Init, NodeState::START | NodeState::READY) => NodeState::INIT,
+                        (Target::Init, NodeState::FAULT) => {
                             (node.report.errors, node.report.mc_current, node.report.mc_occurred) = (0, 0, 0);
-                            fsm::INIT
+                            NodeState::INIT
                         }
-                        (Target::Ready, fsm::INIT | fsm::ENABLED) => fsm::READY,
-                        (Target::Enable, fsm::READY) => {
+                        (Target::Ready, NodeState::INIT | NodeState::ENABLED) => NodeState::READY,
+                        (Target::Enable, NodeState::READY) => {
                             if node.slow_enable {
-                                12
+                                NodeState::new(12)
                             } else {
-                                fsm::ENABLED
+                                NodeState::ENABLED
                             }
                         }
                         (_, state) => state,
                     };
                 }
                 Request::ChangeMode { .. } => {
-                    let accepted = node.report.fsm == fsm::INIT
-                        || node.report.fsm == fsm::READY && !node.refuses_when_ready;
+                    let accepted = node.report.state == NodeState::INIT
+                        || node.report.state == NodeState::READY && !node.refuses_when_ready;
                     node.configured |= accepted;
                     self.answers.push(Answer::Mode { node: number, accepted }.emit(SCALE));
                 }
@@ -382,7 +382,7 @@ impl Node {
         self.booting = 50;
         self.configured = false;
         self.report = JointReport {
-            fsm: fsm::INIT,
+            state: NodeState::INIT,
             temperature: 25,
             position: self.report.position,
             ..JointReport::default()
@@ -390,7 +390,7 @@ impl Node {
     }
 
     pub fn fault(&mut self) {
-        self.report.fsm = fsm::FAULT;
+        self.report.state = NodeState::FAULT;
         self.report.errors = 2;
         self.report.mc_current = 4;
         self.report.mc_occurred = 4;

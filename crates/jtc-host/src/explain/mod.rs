@@ -5,7 +5,7 @@ mod controller;
 mod link;
 mod nodes;
 
-use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, Known, TrajectoryState};
+use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, Known, NodeState, TrajectoryState};
 
 use crate::check::ProblemKind;
 use crate::words;
@@ -183,7 +183,7 @@ fn own_words(page: &Page) -> Option<String> {
         Family::Warning => at(&w::NODE_WARNINGS),
         Family::State => Code::<ControllerState>::new(code).known().map(|state| state.name().to_owned()),
         Family::Tes => Code::<TrajectoryState>::new(code).known().map(|state| state.name().to_owned()),
-        Family::NodeState => Some(w::node_fsm(code).to_owned()),
+        Family::NodeState => Some(NodeState::new(code).name().to_owned()),
         Family::Can => words::can_flags(page.number()).pop(),
         Family::Data => DataStatus::from_byte(code).map(|code| words::data_status(code).to_owned()),
         Family::Frame => FrameStatus::from_byte(code).map(|code| words::frame_status(code).to_owned()),
@@ -322,9 +322,9 @@ mod tests {
         for (bit, name) in w::CAN_FLAGS.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
             has(name, Family::Can, bit);
         }
-        has(w::node_fsm(99), Family::NodeState, 9);
+        has(NodeState::new(99).name(), Family::NodeState, 9);
         for code in [0, 1, 2, 3, 10, 254, 255] {
-            has(w::node_fsm(code), Family::NodeState, code.into());
+            has(NodeState::new(code).name(), Family::NodeState, code.into());
         }
         has("joint 3 does not answer", Family::Can, 10);
         has("gripper does not answer", Family::Can, 14);

@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use jtc_wire::Code;
+use jtc_wire::{Code, NodeState};
 
 use super::{Ending, Recording, RecordingError};
 use crate::sample::{JointSample, Sample};
@@ -70,7 +70,7 @@ impl<W: Write> CsvWriter<W> {
                 row.push(',');
                 number(row, *field(&mut joint));
             }
-            let _ = write!(row, ",{},{}", joint.fsm, joint.internal);
+            let _ = write!(row, ",{},{}", joint.state.code(), joint.internal);
         }
         row.push('\n');
         self.out.write_all(row.as_bytes())?;
@@ -171,7 +171,7 @@ fn put(sample: &mut Sample, name: &str, field: &str) -> Option<()> {
             let index = number.parse::<usize>().ok().and_then(|n| n.checked_sub(1));
             let Some(joint) = index.and_then(|i| sample.joints.get_mut(i)) else { return Some(()) };
             match column {
-                "fsm" => joint.fsm = field.parse().ok()?,
+                "fsm" => joint.state = NodeState::new(field.parse().ok()?),
                 "internal" => joint.internal = field.parse().ok()?,
                 _ => {
                     let Some((_, value)) = COLUMNS.iter().find(|(c, _)| *c == column) else {

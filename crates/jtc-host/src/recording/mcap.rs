@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Seek, Write};
 use std::path::PathBuf;
 
-use jtc_wire::Code;
+use jtc_wire::{Code, NodeState};
 use mcap::records::{self, MessageHeader, Metadata, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Compression, McapError, WriteOptions};
@@ -119,7 +119,7 @@ impl<W: Write + Seek> McapWriter<W> {
             .u16(s.errors)
             .u32(s.can_current);
         for joint in j {
-            self.cdr.u8(joint.fsm);
+            self.cdr.u8(joint.state.code());
         }
         for joint in j {
             self.cdr.u16(joint.internal);
@@ -286,7 +286,7 @@ fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {
             (sample.state, sample.trajectory) = (Code::new(cdr.u8()?), Code::new(cdr.u8()?));
             (sample.point, sample.errors, sample.can_current) = (cdr.u32()?, cdr.u16()?, cdr.u32()?);
             for joint in joints.iter_mut() {
-                joint.fsm = cdr.u8()?;
+                joint.state = NodeState::new(cdr.u8()?);
             }
             for joint in joints.iter_mut() {
                 joint.internal = cdr.u16()?;

@@ -1,6 +1,6 @@
 //! Round trips through both formats, and files that are no recordings.
 
-use jtc_wire::{ControllerState, TrajectoryState};
+use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 
 use super::*;
 use crate::sample::Sample;
@@ -17,7 +17,7 @@ fn samples(n: usize) -> Vec<Sample> {
                 joint.position = joint.set_position - 1e-3;
                 joint.torque = -12.5 * j as f64;
                 joint.temperature = 31.0;
-                (joint.fsm, joint.internal) = (3, 1 << j);
+                (joint.state, joint.internal) = (NodeState::ENABLED, 1 << j);
             }
             s
         })
@@ -64,7 +64,7 @@ fn check(name: &str) -> Recording {
             ] {
                 assert!(same(x, y), "{x} is not {y}");
             }
-            assert_eq!((a.fsm, a.internal), (b.fsm, b.internal));
+            assert_eq!((a.state, a.internal), (b.state, b.internal));
         }
     }
     if let Some(read) = &read.info {

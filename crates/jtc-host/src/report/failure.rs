@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use jtc_wire::{ControllerState, Status};
+use jtc_wire::{ControllerState, NodeState, Status};
 use serde::Serialize;
 
 use crate::recording::{Ending, RecordingInfo};
@@ -266,13 +266,13 @@ struct JointWords {
     internal: u16,
     node: u8,
     motor: u8,
-    fsm: u8,
+    state: NodeState,
 }
 
 impl Words {
     fn of_sample(s: &Sample) -> Self {
         let joints =
-            s.joints.map(|j| JointWords { internal: j.internal, fsm: j.fsm, ..JointWords::default() });
+            s.joints.map(|j| JointWords { internal: j.internal, state: j.state, ..JointWords::default() });
         Self { errors: s.errors, can: s.can_current, joints }
     }
 
@@ -281,7 +281,7 @@ impl Words {
             internal: j.internal,
             node: j.errors,
             motor: j.mc_current,
-            fsm: j.fsm,
+            state: j.state,
         });
         Self { errors: s.errors, can: s.can_current, joints }
     }
@@ -295,7 +295,7 @@ impl Words {
             .chain(words::motor_faults(own.motor))
             .chain(words::node_errors(own.node))
             .chain(words::joint_errors(own.internal))
-            .chain((own.fsm >= 254).then_some("drive in its fault state"));
+            .chain(own.state.is_fault().then_some("drive in its fault state"));
         all.map(String::from).collect()
     }
 }

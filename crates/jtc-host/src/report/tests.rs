@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::sample::JointSample;
-use jtc_wire::{ControllerState, TrajectoryState};
+use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 
 fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
     let mut info =
@@ -26,7 +26,7 @@ fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
             torque_friction: 4.0,
             torque: 25.0,
             temperature: 30.0,
-            fsm: 3,
+            state: NodeState::ENABLED,
             internal: 0,
         };
         let (state, trajectory) = if i < samples / 10 {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jtc_wire::{ControllerState, ExecCommand, FrameType, Status, TrajectoryState, fixed};
+use jtc_wire::{ControllerState, ExecCommand, FrameType, NodeState, Status, TrajectoryState, fixed};
 
 use super::{Session, not_allowed};
 use crate::Error;
@@ -12,9 +12,6 @@ use crate::port::Port;
 
 /// Longest that a controller waits with teaching until the arm is held, and a little more.
 const TEACHING: Duration = Duration::from_secs(11);
-
-/// Node state byte of an enabled drive.
-const ENABLED: u8 = 3;
 
 /// What the controller wants to be given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -235,8 +232,9 @@ impl<P: Port> Session<P> {
     /// [`Error::Device`] when the controller reports errors, [`Error::StateTimeout`] when it does not hold the arm in this time (it
     /// may still lack parameters), [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
-        let ready =
-            |s: &Status| s.state == ControllerState::HoldPos && s.joints.iter().all(|j| j.fsm == ENABLED);
+        let ready = |s: &Status| {
+            s.state == ControllerState::HoldPos && s.joints.iter().all(|j| j.state == NodeState::ENABLED)
+        };
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {
             s.state == ControllerState::Error || ready(s)
         })?;

@@ -383,9 +383,9 @@ fn faulty(s: &Status) -> u8 {
         .joints
         .iter()
         .enumerate()
-        .filter(|(_, j)| j.errors != 0 || j.mc_current != 0 || j.mc_occurred != 0 || j.fsm >= 254);
+        .filter(|(_, j)| j.errors != 0 || j.mc_current != 0 || j.mc_occurred != 0 || j.state.is_fault());
     let mut mask = joints.fold(0, |m, (i, _)| m | 1 << i);
-    if s.gripper.is_some_and(|g| g.errors != 0 || g.fsm >= 254) {
+    if s.gripper.is_some_and(|g| g.errors != 0 || g.state.is_fault()) {
         mask |= 1 << 6;
     }
     mask

@@ -1,5 +1,5 @@
 //! What a drive answers to requests.
-use jtc_bus::{Answer, JointReport, Request, fsm, warning};
+use jtc_bus::{Answer, JointReport, NodeState, Request, warning};
 
 use super::Drive;
 use super::encoders::floor;
@@ -18,16 +18,16 @@ impl Drive {
     }
 
     /// ChangeFsm: any byte is taken; what it means is decided by the tick.
-    fn change(&mut self, state: u8) -> Answer {
+    fn change(&mut self, state: NodeState) -> Answer {
         let before = self.states.state();
         if !self.fault.ignores_state {
             self.states.request(state);
         }
         if self.config.answers_transition {
             self.states.accept(&self.config);
-            return Answer::Fsm { node: self.node, fsm: self.states.state() };
+            return Answer::State { node: self.node, state: self.states.state() };
         }
-        Answer::Fsm { node: self.node, fsm: before }
+        Answer::State { node: self.node, state: before }
     }
 
     fn execute(&mut self, request: &Request) -> Option<Answer> {
@@ -40,7 +40,7 @@ impl Drive {
             // A `NodeRequest` carries it apart.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { mode, config, .. } => {
-                let accepted = matches!(self.states.state(), fsm::INIT | fsm::READY);
+                let accepted = matches!(self.states.state(), NodeState::INIT | NodeState::READY);
                 if accepted {
                     self.configured = true;
                     self.mode = mode[n];
@@ -79,7 +79,7 @@ impl Drive {
             // A magnitude with the sign of the last command: no measurement.
             torque: if self.goal < 0.0 { -self.torque.abs() } else { self.torque.abs() },
             temperature: byte(self.temperature),
-            fsm: self.states.state(),
+            state: self.states.state(),
             mc_current: self.mc_current,
             mc_occurred: self.mc_occurred,
             errors: self.errors,

@@ -1,29 +1,21 @@
 //! The state machine of a drive: requests stay pending until a transition erases them, and enabling takes its time.
-use jtc_bus::fsm;
+use jtc_bus::NodeState;
 
 use super::DriveConfig;
 
-/// States between the lasting ones.
-pub(super) mod transition {
-    pub const START_TO_INIT: u8 = 10;
-    pub const INIT_TO_READY: u8 = 11;
-    pub const READY_TO_ENABLED: u8 = 12;
-    pub const ENABLED_TO_READY: u8 = 13;
-    pub const READY_TO_INIT: u8 = 14;
-    pub const REACTION_TO_FAULT: u8 = 15;
-    pub const FAULT_TO_INIT: u8 = 16;
-}
-
-use transition::*;
+/// Transitions that generations of drives number differently, as this one does.
+const READY_TO_INIT: NodeState = NodeState::new(14);
+const REACTION_TO_FAULT: NodeState = NodeState::new(15);
+const FAULT_TO_INIT: NodeState = NodeState::new(16);
 
 /// State and what it remembers of the way there.
 #[derive(Clone, Debug)]
 pub(super) struct States {
-    state: u8,
+    state: NodeState,
     /// Ticks in `state`.
     age: u32,
-    /// State that was requested last; 0: none.
-    pending: u8,
+    /// State that was requested last; Start: none.
+    pending: NodeState,
     /// The motor was aligned since the last reset.
     aligned: bool,
     /// Ticks until the motor control may start.
@@ -33,15 +25,15 @@ pub(super) struct States {
 impl States {
     /// After a reset.
     pub fn new() -> Self {
-        Self { state: fsm::START, age: 0, pending: 0, aligned: false, rest: 0 }
+        Self { state: NodeState::START, age: 0, pending: NodeState::START, aligned: false, rest: 0 }
     }
 
-    pub fn state(&self) -> u8 {
+    pub fn state(&self) -> NodeState {
         self.state
     }
 
     /// Any byte is taken; what it means is decided by [`accept`](Self::accept).
-    pub fn request(&mut self, state: u8) {
+    pub fn request(&mut self, state: NodeState) {
         self.pending = state;
     }
 
@@ -54,24 +46,28 @@ impl States {
     pub fn reacting(&self) -> bool {
         matches!(
             self.state,
-            fsm::FAULT_REACTION | REACTION_TO_FAULT | fsm::FAULT | FAULT_TO_INIT | fsm::START
+            NodeState::FAULT_REACTION
+                | REACTION_TO_FAULT
+                | NodeState::FAULT
+                | FAULT_TO_INIT
+                | NodeState::START
         )
     }
 
     /// Begin the transition that is pending, if there is one from here.
     pub fn accept(&mut self, config: &DriveConfig) {
         let next = match (self.pending, self.state) {
-            (fsm::INIT, fsm::START) => START_TO_INIT,
-            (fsm::INIT, fsm::READY) => READY_TO_INIT,
-            (fsm::INIT, fsm::FAULT) => FAULT_TO_INIT,
-            (fsm::READY, fsm::INIT) => INIT_TO_READY,
-            (fsm::READY, fsm::ENABLED) => ENABLED_TO_READY,
+            (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
+            (NodeState::INIT, NodeState::READY) => READY_TO_INIT,
+            (NodeState::INIT, NodeState::FAULT) => FAULT_TO_INIT,
+            (NodeState::READY, NodeState::INIT) => NodeState::INIT_TO_READY,
+            (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
             // Some drives take an echoed fault byte as a command to move: this one does.
-            (fsm::ENABLED | fsm::FAULT, fsm::READY) => READY_TO_ENABLED,
+            (NodeState::ENABLED | NodeState::FAULT, NodeState::READY) => NodeState::READY_TO_ENABLED,
             // Its error byte stays 0.
-            (fsm::FAULT_REACTION, state) if state != fsm::START => {
-                self.pending = 0;
-                fsm::FAULT
+            (NodeState::FAULT_REACTION, state) if state != NodeState::START => {
+                self.pending = NodeState::START;
+                NodeState::FAULT
             }
             // Anything else stays pending until a transition erases it.
             _ => return,
@@ -79,8 +75,8 @@ impl States {
         self.enter(next, config);
     }
 
-    pub fn enter(&mut self, state: u8, config: &DriveConfig) {
-        if self.state == fsm::ENABLED && state != fsm::ENABLED {
+    pub fn enter(&mut self, state: NodeState, config: &DriveConfig) {
+        if self.state == NodeState::ENABLED && state != NodeState::ENABLED {
             self.rest = config.rest_ms;
         }
         self.state = state;
@@ -93,25 +89,25 @@ impl States {
         let start_time = if self.aligned { config.enable_ms } else { config.first_enable_ms };
         let mut acknowledged = false;
         let next = match self.state {
-            fsm::START => START_TO_INIT,
-            START_TO_INIT | READY_TO_INIT if self.age > 0 => fsm::INIT,
+            NodeState::START => NodeState::START_TO_INIT,
+            NodeState::START_TO_INIT | READY_TO_INIT if self.age > 0 => NodeState::INIT,
             FAULT_TO_INIT if self.age > 0 => {
                 acknowledged = true;
-                fsm::INIT
+                NodeState::INIT
             }
-            INIT_TO_READY | ENABLED_TO_READY if self.age > 0 => fsm::READY,
-            READY_TO_ENABLED if self.rest == 0 && self.age >= start_time => {
+            NodeState::INIT_TO_READY | NodeState::ENABLED_TO_READY if self.age > 0 => NodeState::READY,
+            NodeState::READY_TO_ENABLED if self.rest == 0 && self.age >= start_time => {
                 self.aligned = true;
-                fsm::ENABLED
+                NodeState::ENABLED
             }
             // Any stop on the way interrupts it.
-            fsm::FAULT_REACTION if self.age > 0 => REACTION_TO_FAULT,
-            REACTION_TO_FAULT if self.age > 0 => fsm::FAULT,
+            NodeState::FAULT_REACTION if self.age > 0 => REACTION_TO_FAULT,
+            REACTION_TO_FAULT if self.age > 0 => NodeState::FAULT,
             _ => return false,
         };
         self.enter(next, config);
-        if matches!(next, fsm::INIT | fsm::READY | fsm::ENABLED | fsm::FAULT) {
-            self.pending = 0;
+        if matches!(next, NodeState::INIT | NodeState::READY | NodeState::ENABLED | NodeState::FAULT) {
+            self.pending = NodeState::START;
         }
         acknowledged
     }

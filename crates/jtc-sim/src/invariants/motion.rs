@@ -1,5 +1,5 @@
 //! How the arm moves: a stop comes to its end, no joint races, and no torque stays at its limit.
-use jtc_bus::fsm;
+use jtc_bus::NodeState;
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
 
@@ -73,7 +73,7 @@ impl MotionWatch {
     fn speed(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let config = moment.config;
         for (joint, t) in moment.telemetry.joints.iter().enumerate() {
-            let powered = powered(moment.telemetry.state) && t.fsm == fsm::ENABLED;
+            let powered = powered(moment.telemetry.state) && t.state == NodeState::ENABLED;
             let within = t.velocity.abs() <= config.overspeed_factor * config.joints[joint].velocity_max;
             let ticks = self.fast[joint];
             self.fast[joint] = match (powered, t.fresh) {
@@ -93,7 +93,7 @@ impl MotionWatch {
     fn torque(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let t = moment.telemetry;
         for joint in 0..JOINTS {
-            let enabled = powered(t.state) && t.joints[joint].fsm == fsm::ENABLED;
+            let enabled = powered(t.state) && t.joints[joint].state == NodeState::ENABLED;
             self.enabled[joint] = if enabled { self.enabled[joint].saturating_add(1) } else { 0 };
             let caught = (1..=moment.config.catch_ms_max).contains(&self.enabled[joint]);
             let catching = caught && t.state != ControllerState::Teaching;

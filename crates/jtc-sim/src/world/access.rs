@@ -1,5 +1,5 @@
 //! What users of the world see and do.
-use jtc_bus::{Frame, NODES};
+use jtc_bus::{Frame, NODES, NodeState};
 use jtc_core::{BusState, Telemetry};
 use jtc_dynamics::{ArmModel, JointVec};
 
@@ -128,7 +128,7 @@ impl World {
     }
 
     /// State bytes of joints and gripper (255: no gripper).
-    pub fn node_states(&self) -> [u8; NODES] {
+    pub fn node_states(&self) -> [NodeState; NODES] {
         self.node_states
     }
 

@@ -44,7 +44,7 @@ pub fn count(s: &Status) -> usize {
 /// A joint that is measured reports an error.
 fn is_broken(s: &Status, j: usize) -> bool {
     let joint = &s.joints[j];
-    joint.fsm >= 254 || joint.errors != 0 || joint.internal != 0 || joint.mc_current != 0
+    joint.state.is_fault() || joint.errors != 0 || joint.internal != 0 || joint.mc_current != 0
 }
 
 /// As many of the words as fit, and how many more there are; the head of the view has them all.

@@ -1,5 +1,5 @@
 use cli_kit::Key;
-use jtc_wire::TrajectoryState;
+use jtc_wire::{NodeState, TrajectoryState};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
@@ -17,7 +17,7 @@ fn silent() -> Status {
         ..Status::default()
     };
     for (j, joint) in s.joints.iter_mut().enumerate() {
-        joint.fsm = 3;
+        joint.state = NodeState::ENABLED;
         joint.position = 0.1 + j as f32;
         joint.temperature = 30;
     }
@@ -92,7 +92,7 @@ fn no_cause_is_cut_and_none_vanishes() {
         ..Status::default()
     };
     for joint in &mut s.joints {
-        (joint.fsm, joint.internal, joint.mc_current, joint.warnings) = (255, 0x3F, 0x41, 7);
+        (joint.state, joint.internal, joint.mc_current, joint.warnings) = (NodeState::FAULT, 0x3F, 0x41, 7);
     }
     let causes = [words::causes(&s), words::warnings(&s)].concat();
     assert!(causes.len() > 60);
@@ -120,7 +120,7 @@ fn no_cause_is_cut_and_none_vanishes() {
 #[test]
 fn a_joint_with_a_fault_leads_the_table() {
     let mut s = Status { state: ControllerState::Error.into(), errors: 0x98, ..Status::default() };
-    (s.joints[3].fsm, s.joints[3].errors, s.joints[3].mc_current) = (255, 2, 0x40);
+    (s.joints[3].state, s.joints[3].errors, s.joints[3].mc_current) = (NodeState::FAULT, 2, 0x40);
     for size in SIZES {
         let rows = drawn(&mut of(s), size);
         let text = rows.join("\n");
@@ -149,7 +149,7 @@ fn every_cause_is_explained() {
     };
     s.gripper = Some(jtc_wire::GripperStatus { errors: 0x0F, warnings: 0x0F, ..Default::default() });
     for (n, joint) in s.joints.iter_mut().enumerate() {
-        (joint.fsm, joint.internal, joint.errors) = (254 + (n as u8 & 1), 0x3F, 0x0F);
+        (joint.state, joint.internal, joint.errors) = (NodeState::new(254 + (n as u8 & 1)), 0x3F, 0x0F);
         (joint.mc_current, joint.warnings) = (0xFF, 0x0F);
     }
     for words in [words::causes(&s), words::warnings(&s)].concat() {
@@ -201,7 +201,7 @@ fn a_terminal_that_is_too_small_says_the_size_that_is_needed() {
 fn a_silent_gripper_looks_so() {
     let mut s =
         Status { state: ControllerState::Error.into(), errors: 0x20, can_current: 1 << 14, ..silent() };
-    s.gripper = Some(jtc_wire::GripperStatus { fsm: 3, ..Default::default() });
+    s.gripper = Some(jtc_wire::GripperStatus { state: NodeState::ENABLED, ..Default::default() });
     for size in SIZES {
         let all = scrolled(&mut of(s), size);
         let row = all.iter().find(|row| row.contains("gripper does not answer  ")).expect("a row");

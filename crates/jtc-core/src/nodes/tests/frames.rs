@@ -6,22 +6,22 @@ fn j16_j20_what_a_node_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};
     let asked = |goal, state, configured, refused| {
         let mut node = Node { seen: true, configured, refused, ..Node::default() };
-        node.report.fsm = state;
+        node.report.state = state;
         node.request(goal)
     };
     for (state, unconfigured, configured) in [
-        (fsm::START, [Init, NoChange, NoChange], [Init, NoChange, NoChange]),
+        (NodeState::START, [Init, NoChange, NoChange], [Init, NoChange, NoChange]),
         (START_TO_INIT, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
-        (fsm::INIT, [NoChange, NoChange, NoChange], [Ready, NoChange, Ready]),
+        (NodeState::INIT, [NoChange, NoChange, NoChange], [Ready, NoChange, Ready]),
         (INIT_TO_READY, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
-        (fsm::READY, [NoChange, Enable, NoChange], [NoChange, Enable, NoChange]),
-        (fsm::ENABLED, [Ready, NoChange, Ready], [Ready, NoChange, Ready]),
-        (fsm::FAULT, [NoChange; 3], [NoChange; 3]),
+        (NodeState::READY, [NoChange, Enable, NoChange], [NoChange, Enable, NoChange]),
+        (NodeState::ENABLED, [Ready, NoChange, Ready], [Ready, NoChange, Ready]),
+        (NodeState::FAULT, [NoChange; 3], [NoChange; 3]),
     ] {
         for refused in [false, true] {
             for (expected, is_configured) in [(unconfigured, false), (configured, true)] {
                 let mut expected = expected;
-                if refused && !is_configured && state == fsm::READY {
+                if refused && !is_configured && state == NodeState::READY {
                     // It takes its configuration in Init only.
                     expected[0] = Init;
                 }
@@ -31,10 +31,10 @@ fn j16_j20_what_a_node_is_asked_for() {
             }
         }
         let mut node = Node { seen: true, clear: true, ..Node::default() };
-        node.report.fsm = state;
+        node.report.state = state;
         for goal in [Goal::Ready, Goal::Enabled, Goal::Down] {
             // A drive ignores Init while it is enabled.
-            assert_eq!(node.request(goal), if state == fsm::ENABLED { Ready } else { Init });
+            assert_eq!(node.request(goal), if state == NodeState::ENABLED { Ready } else { Init });
             assert_eq!(Node { seen: false, ..node }.request(goal), NoChange);
         }
     }
@@ -42,10 +42,21 @@ fn j16_j20_what_a_node_is_asked_for() {
 
 #[test]
 fn j20_a_node_is_configured_in_init_and_ready_once() {
-    for state in [fsm::START, fsm::INIT, START_TO_INIT, fsm::READY, fsm::ENABLED, fsm::FAULT] {
+    for state in [
+        NodeState::START,
+        NodeState::INIT,
+        START_TO_INIT,
+        NodeState::READY,
+        NodeState::ENABLED,
+        NodeState::FAULT,
+    ] {
         let mut node = Node { seen: true, ..Node::default() };
-        node.report.fsm = state;
-        assert_eq!(node.wants_configuration(), matches!(state, fsm::INIT | fsm::READY), "{state}");
+        node.report.state = state;
+        assert_eq!(
+            node.wants_configuration(),
+            matches!(state, NodeState::INIT | NodeState::READY),
+            "{state}"
+        );
         assert!(!Node { configured: true, ..node }.wants_configuration());
         assert!(!Node { clear: true, ..node }.wants_configuration());
         assert!(!Node { seen: false, ..node }.wants_configuration());
@@ -79,7 +90,8 @@ fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
 
 /// Node `n` waits for its configuration, in Init.
 fn waits(nodes: &mut Nodes, n: usize) {
-    (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.fsm) = (false, false, fsm::INIT);
+    (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.state) =
+        (false, false, NodeState::INIT);
 }
 
 #[test]
@@ -123,14 +135,14 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
     assert_eq!(sent(Goal::Ready, 3, wait), Sent::Mode);
     assert_eq!(
         sent(Goal::Enabled, 3, |nodes| {
-            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
+            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.state = NodeState::ENABLED);
             wait(nodes);
         }),
         Sent::Move
     );
     assert_eq!(
         sent(Goal::Enabled, many, |nodes| {
-            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
+            nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.state = NodeState::ENABLED);
             wait(nodes);
         }),
         Sent::Mode
@@ -151,19 +163,19 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
 #[test]
 fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     for (state, seen, configured_last, frame) in [
-        (fsm::ENABLED, true, false, Sent::ControllerState),
-        (fsm::ENABLED, true, true, Sent::ControllerState),
+        (NodeState::ENABLED, true, false, Sent::ControllerState),
+        (NodeState::ENABLED, true, true, Sent::ControllerState),
         // To be brought from Init to Ready, which can wait.
-        (fsm::INIT, true, false, Sent::Mode),
-        (fsm::INIT, true, true, Sent::ControllerState),
+        (NodeState::INIT, true, false, Sent::Mode),
+        (NodeState::INIT, true, true, Sent::ControllerState),
         // Restarted: what it reported before means nothing.
-        (fsm::ENABLED, false, false, Sent::Mode),
-        (fsm::ENABLED, false, true, Sent::Mode),
+        (NodeState::ENABLED, false, false, Sent::Mode),
+        (NodeState::ENABLED, false, true, Sent::Mode),
     ] {
         let found = sent(Goal::Ready, 3, |nodes| {
             waits(nodes, 2);
             nodes.configured_last = configured_last;
-            (nodes.nodes[3].report.fsm, nodes.nodes[3].seen) = (state, seen);
+            (nodes.nodes[3].report.state, nodes.nodes[3].seen) = (state, seen);
         });
         assert_eq!(found, frame, "{state} {seen} {configured_last}");
     }
@@ -173,8 +185,8 @@ fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
 #[test]
 fn j20_configurations_and_changes_of_state_take_turns() {
     let enabling = |nodes: &mut Nodes| {
-        nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.fsm = fsm::ENABLED);
-        nodes.nodes[4].report.fsm = fsm::READY;
+        nodes.nodes.iter_mut().take(JOINTS).for_each(|node| node.report.state = NodeState::ENABLED);
+        nodes.nodes[4].report.state = NodeState::READY;
         nodes.still_ms = Config::avena().enable_still_ms;
         waits(nodes, GRIPPER);
     };
@@ -196,13 +208,13 @@ fn j20_configurations_and_changes_of_state_take_turns() {
 
 /// What a gripper in this state is asked for while the joints are where the goal has them; a frame that asks for no change of state
 /// asks for none of its own.
-fn gripper_asked(config: &Config, goal: Goal, state: u8, configured: bool, clear: bool) -> Target {
+fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool, clear: bool) -> Target {
     let mut nodes = ready();
     if goal == Goal::Enabled {
-        nodes.nodes.iter_mut().for_each(|node| node.report.fsm = fsm::ENABLED);
+        nodes.nodes.iter_mut().for_each(|node| node.report.state = NodeState::ENABLED);
     }
     let gripper = &mut nodes.nodes[GRIPPER];
-    (gripper.report.fsm, gripper.configured, gripper.clear) = (state, configured, clear);
+    (gripper.report.state, gripper.configured, gripper.clear) = (state, configured, clear);
     (nodes.moves, nodes.configured_last) = (19, true);
     match Request::parse(&nodes.frame(config, goal, [0.0; JOINTS], false, false)).unwrap() {
         Request::ChangeFsm { target } => target[GRIPPER],
@@ -215,20 +227,20 @@ fn gripper_asked(config: &Config, goal: Goal, state: u8, configured: bool, clear
 fn j23_what_a_gripper_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};
     for (goal, state, configured, clear, drops, keeps) in [
-        (Goal::Enabled, fsm::ENABLED, true, false, NoChange, NoChange),
-        (Goal::Down, fsm::ENABLED, true, false, Ready, NoChange),
-        (Goal::Ready, fsm::ENABLED, true, false, Ready, NoChange),
-        (Goal::Down, fsm::ENABLED, true, true, Ready, Ready),
-        (Goal::Ready, fsm::ENABLED, true, true, Ready, Ready),
+        (Goal::Enabled, NodeState::ENABLED, true, false, NoChange, NoChange),
+        (Goal::Down, NodeState::ENABLED, true, false, Ready, NoChange),
+        (Goal::Ready, NodeState::ENABLED, true, false, Ready, NoChange),
+        (Goal::Down, NodeState::ENABLED, true, true, Ready, Ready),
+        (Goal::Ready, NodeState::ENABLED, true, true, Ready, Ready),
         // Enabled, but its configuration is lost: it takes one in Ready only.
-        (Goal::Enabled, fsm::ENABLED, false, false, Ready, Ready),
-        (Goal::Enabled, fsm::READY, true, false, Enable, Enable),
-        (Goal::Enabled, fsm::READY, false, false, NoChange, NoChange),
-        (Goal::Enabled, fsm::START, false, false, Init, Init),
-        (Goal::Enabled, fsm::INIT, true, false, Ready, Ready),
+        (Goal::Enabled, NodeState::ENABLED, false, false, Ready, Ready),
+        (Goal::Enabled, NodeState::READY, true, false, Enable, Enable),
+        (Goal::Enabled, NodeState::READY, false, false, NoChange, NoChange),
+        (Goal::Enabled, NodeState::START, false, false, Init, Init),
+        (Goal::Enabled, NodeState::INIT, true, false, Ready, Ready),
         // In Error nothing is brought up.
-        (Goal::Ready, fsm::START, false, false, Init, Init),
-        (Goal::Down, fsm::START, false, false, NoChange, NoChange),
+        (Goal::Ready, NodeState::START, false, false, Init, Init),
+        (Goal::Down, NodeState::START, false, false, NoChange, NoChange),
     ] {
         for (pump_off_on_error, expected) in [(true, drops), (false, keeps)] {
             let config = Config { pump_off_on_error, ..Config::avena() };

@@ -179,11 +179,9 @@ impl DateForm {
                 (year, month, days as u8 + 1)
             }
             Self::Bcd => {
-                let number = |byte: u16| {
-                    let (tens, ones) = (byte >> 4, byte & 15);
-                    (tens < 10 && ones < 10).then_some((10 * tens + ones) as u8)
-                };
-                (2000 + u16::from(number(date >> 8)?), number(date & 0xFF)?, 1)
+                // What are no decimal digits does not come back below.
+                let number = |byte: u16| 10 * (byte >> 4) + (byte & 15);
+                (2000 + number(date >> 8), number(date & 0xFF) as u8, 1)
             }
             Self::Raw => return None,
         };
@@ -256,6 +254,36 @@ mod tests {
         assert_eq!((DateForm::Fat.encode(1979, 12, 31), DateForm::Fat.encode(2108, 1, 1)), (None, None));
         assert_eq!((DateForm::Bcd.encode(1999, 12, 31), DateForm::Bcd.encode(2100, 1, 1)), (None, None));
         assert_eq!(DateForm::Days2000.encode(1999, 12, 31), None);
+    }
+
+    /// All four digits are decimal, and the last two a month.
+    #[test]
+    fn d45_bcd_takes_decimal_digits_only() {
+        for date in 0..=u16::MAX {
+            let text = std::format!("{date:04X}");
+            let number = |digits: &str| digits.parse::<u16>().ok();
+            let expected =
+                number(&text[..2]).zip(number(&text[2..])).filter(|(_, month)| (1..=12).contains(month));
+            let expected = expected.map(|(years, month)| (2000 + years, month as u8, 1));
+            assert_eq!(DateForm::Bcd.decode(date), expected, "{text}");
+        }
+    }
+
+    /// A calendar that counts day by day: each of the 16 bits is the day after the one before, and the last is 2179-06-05.
+    #[test]
+    fn d45_days_in_a_row() {
+        let (mut year, mut month, mut day) = (2000, 1, 1);
+        for date in 0..0xFFFF {
+            assert_eq!(DateForm::Days2000.decode(date), Some((year, month, day)), "{date}");
+            day += 1;
+            if day > month_days(year, month) {
+                (month, day) = (month + 1, 1);
+            }
+            if month > 12 {
+                (year, month) = (year + 1, 1);
+            }
+        }
+        assert_eq!((year, month, day), (2179, 6, 6));
     }
 
     proptest! {

@@ -35,6 +35,9 @@ fn d12_c6_lengths() {
         from("081#").map(|_| ()),
         Err(DecodeError::TooShort { function: Function::Error, len: 0, need: 1 })
     );
+    for (text, function) in [("141#", Function::DspInfo), ("641#", Function::Debug)] {
+        assert_eq!(from(text), Err(DecodeError::TooShort { function, len: 0, need: 1 }));
+    }
     assert_eq!(from("0C1#0155"), Ok(FromBoard::InitAck(1)));
     assert!(short(Function::Prog, 7, 8).unwrap_err().is_length());
     let strict = Profile { dlc_strict: true, ..Profile::default() };

@@ -206,7 +206,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             *place = self.application.initial_ci(index);
             package.count += 1;
         }
-        let done = package.count == 0 || offset / 3 + 1 >= package_count(dimension);
+        let done = offset / 3 + 1 >= package_count(dimension);
         let again = done && core::mem::take(&mut self.jobs.dump_ci_again) && dimension > 0;
         self.jobs.dump_ci = if again { Some(0) } else { offset.checked_add(3).filter(|_| !done) };
         (package.count > 0).then_some(FromBoard::Ci(package))

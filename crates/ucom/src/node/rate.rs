@@ -49,4 +49,23 @@ mod tests {
         assert!(taken.len() >= 45, "{}", taken.len());
         assert!(!RateLimit::<10>::new().allow(0, 0));
     }
+
+    /// Section 9: what was a whole second ago does not count, a microsecond less does; neither what is beyond the memory.
+    #[test]
+    fn a_second_is_a_second() {
+        let mut limit = RateLimit::<2>::new();
+        for (now, allowed) in [
+            (7, true),
+            (8, true),
+            (9, false),
+            (1_000_006, false),
+            (1_000_007, true),
+            (1_000_007, false),
+            (1_000_008, true),
+            (2_000_006, false),
+            (2_000_007, true),
+        ] {
+            assert_eq!(limit.allow(now, 3), allowed, "{now}");
+        }
+    }
 }

@@ -114,9 +114,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
                 self.programming.cancel(&self.config.profile);
             }
         }
-        if new.has(Status::OPINIT) != self.opinit {
-            self.drive_init_out(new.has(Status::OPINIT));
-        }
+        self.drive_init_out(new.has(Status::OPINIT));
     }
 
     /// PC_START, MSTART 0→1 or autostart: the exloader starts the application (D-30).

@@ -220,3 +220,25 @@ fn controller_troubles_are_told() {
     bus.run(5);
     assert_eq!(bus.take(), frames("0C1#01 081#06"), "INITACK is sent again");
 }
+
+/// Only the frame that is with the controller can leave it or be given up.
+#[test]
+fn other_frames_than_the_one_on_its_way_are_ignored() {
+    let mut bus = Bus::initialised();
+    let now = bus.now;
+    let [acknowledge, other] = ["0C1#01", "181#"].map(|text| text.parse::<Frame>().unwrap());
+    let board = &mut bus.boards[0];
+    board.receive(now, &"281#".parse().unwrap());
+    assert_eq!(board.poll(now), Some(acknowledge));
+    board.sent(now, &other);
+    board.not_sent(now, &other);
+    board.receive(now, &"1C1#00".parse().unwrap());
+    assert_eq!(board.poll(now), None, "the acknowledge is still on its way");
+    board.sent(now, &acknowledge);
+    assert_eq!(board.poll(now), Some("081#07".parse().unwrap()), "and no DSP_ERROR 6 before it");
+    assert_eq!(board.counters().not_sent, 0);
+    // Now it has left, and leaves no second time.
+    board.sent(now, &acknowledge);
+    board.not_sent(now, &acknowledge);
+    assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
+}

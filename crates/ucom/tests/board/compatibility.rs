@@ -162,3 +162,19 @@ fn d02_foreign_frames() {
     bus.run(1000);
     assert_eq!(bus.take(), []);
 }
+
+/// D-04: what boards say concerns no board, whatever its number; it is not even counted.
+#[test]
+fn d04_boards_do_not_listen_to_boards() {
+    let mut bus = Bus::initialised();
+    let now = bus.now;
+    let board = &mut bus.boards[0];
+    let one = Sequence::new(1).unwrap();
+    for function in ucom::Function::ALL.into_iter().filter(|function| !function.from_pc()) {
+        for len in [0, 8] {
+            board.receive(now, &ucom::Frame::new(function.id(one), &[0; 8][..len]).unwrap());
+        }
+    }
+    assert_eq!(*board.counters(), ucom::node::Counters::default());
+    assert_eq!((board.status(), board.poll(now)), (Status(0x1B), None));
+}

@@ -1,7 +1,7 @@
 //! The state table, row by row: each event in each state.
 
 use ucom::node::Phase;
-use ucom::{Frame, Profile, Status};
+use ucom::{Frame, Profile, Sequence, Status};
 
 use crate::bus::{Bus, blocks, frames, image};
 
@@ -187,6 +187,40 @@ fn d43_pc_prog_in_every_state() {
     row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
 }
 
+/// D-12, D-06: what is too short is told, but for what would be ignored anyway.
+#[test]
+fn d12_short_frames_in_every_state() {
+    row("1C1#02", |phase| (phase, if phase == Uninitialised { "" } else { "081#07" }));
+    row("2C1#00", |phase| match phase {
+        Programming => (Aborted, "081#07"),
+        Idle | Starting | Ready | Running => (phase, "081#07"),
+        other => (other, ""),
+    });
+    for text in ["341#0000", "3C1#0000", "601#010000"] {
+        row(text, |phase| (phase, if matches!(phase, Ready | Running) { "081#07" } else { "" }));
+    }
+}
+
+/// D-12: the same with `dlc.strict` for what has no data.
+#[test]
+fn d12_long_frames_when_lengths_are_strict() {
+    for (text, idle, ready) in [
+        ("281#00", "081#07", "081#07"),
+        ("282#00", "", ""),
+        ("301#00", "081#07", "081#07"),
+        ("541#00", "", "081#07"),
+        ("5C1#00", "", "081#07"),
+        ("680#00", "", "081#07"),
+    ] {
+        let mut bus = Bus::new(&[0x21], Profile { dlc_strict: true, ..Profile::default() });
+        assert_eq!(bus.ask(text, 9), [], "without a number");
+        bus.number(1);
+        assert_eq!(bus.ask(text, 9), frames(idle), "{text}");
+        bus.ask("301#", 50);
+        assert_eq!(bus.ask(text, 9), frames(ready), "{text}");
+    }
+}
+
 #[test]
 fn d30_pc_start_in_every_state() {
     row("301#", |phase| match phase {
@@ -327,4 +361,21 @@ fn d24_no_acknowledge_without_a_number() {
     assert_eq!(board.number(), None);
     assert_eq!(board.poll(now), None);
     assert!(board.next_deadline() > now, "nothing to do");
+}
+
+/// D-24: an acknowledge of before the number was forgotten does not give the board the number that is being taken.
+#[test]
+fn d24_acknowledge_of_a_forgotten_number() {
+    let mut bus = in_state(Idle);
+    let (now, board) = (bus.now, &mut bus.boards[0]);
+    let [first, second] = ["0C1#01", "0C2#02"].map(|text| text.parse::<Frame>().unwrap());
+    board.receive(now, &"281#".parse().unwrap());
+    assert_eq!(board.poll(now), Some(first));
+    board.receive(now, &"1C1#0800".parse().unwrap());
+    board.receive(now, &"282#".parse().unwrap());
+    board.sent(now, &first);
+    assert_eq!(board.number(), None);
+    assert_eq!(board.poll(now), Some(second));
+    board.sent(now, &second);
+    assert_eq!(board.number(), Sequence::new(2));
 }

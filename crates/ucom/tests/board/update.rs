@@ -7,12 +7,12 @@ use ucom::{Checksum, Memory, Profile, Status};
 use crate::bus::{Bus, GOLDEN, blocks, frames, header, image};
 
 /// 200 bytes: four data blocks, the last one short.
-fn small() -> Vec<u8> {
+pub fn small() -> Vec<u8> {
     (0..200u32).map(|i| (i * i % 251) as u8).collect()
 }
 
 /// Sends everything as a PC without eyes would, waiting for an answer to each block; `true` when FINISHED came.
-fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
+pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.send("041#");
     bus.run(1);
     let mut finished = false;
@@ -27,7 +27,7 @@ fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
 }
 
 /// Whether what the board calls valid is a whole image: the old one or the new one.
-fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
+pub fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     let board = &bus.boards[0];
     let stored = board.flash.bytes(Memory::Program);
     match board.record() {
@@ -218,7 +218,7 @@ fn d40_exloader_then_application() {
     assert_eq!(bus.block(&header(&image, 1, &profile).build(Endian::Little), 5), frames("081#02"));
 }
 
-fn data(image: &[u8]) -> Vec<[u8; 64]> {
+pub fn data(image: &[u8]) -> Vec<[u8; 64]> {
     (0..).map_while(|i| ucom::data_block(image, i)).collect()
 }
 

@@ -1,0 +1,144 @@
+//! Updates of boards that read the description differently, plan by plan.
+
+use ucom::node::{Node, NodeConfig};
+use ucom::profile::{HeaderForm, Plan};
+use ucom::{Checksum, Memory, Profile, checksum, data_block};
+
+use crate::bus::{Board, Bus, blocks, frames, header, image};
+use crate::update::{data as data_blocks, small, update};
+
+/// One board with number 1 whose images have no header blocks and are as long as `small`.
+fn headerless(plan: Plan) -> Bus {
+    let profile = Profile { prog_header: HeaderForm::None, prog_plan: plan, ..Profile::default() };
+    let mut bus = Bus::new(&[0x21], profile);
+    let Board { flash, pins, store, application, .. } = bus.boards.pop().unwrap();
+    let config = NodeConfig { profile, headerless_words: 100, ..NodeConfig::new(0x21) };
+    bus.boards.push(Node::new(config, flash, pins, store, application, bus.now));
+    bus.run(50);
+    bus.number(1);
+    bus
+}
+
+/// D-40, D-41: without header blocks each plan knows by itself where its cycles go, and whose Program ID counts.
+#[test]
+fn d41_no_header_in_every_plan() {
+    let (one, two) = ([0x5A; 200].to_vec(), small());
+    for (plan, memories, counts) in [
+        (Plan::Raw, [None, Some(Memory::Program)], &two),
+        (Plan::ExloaderApp, [Some(Memory::Ram), Some(Memory::Program)], &two),
+        (Plan::PmemXmem, [Some(Memory::Program), Some(Memory::Data)], &one),
+    ] {
+        let mut bus = headerless(plan);
+        bus.send("041#");
+        let heard: Vec<_> = [data_blocks(&one), data_blocks(&two)]
+            .concat()
+            .iter()
+            .flat_map(|block| bus.block(block, 200))
+            .collect();
+        assert_eq!(heard, frames("181# 181# 181# 181# 181# 181# 181# 101#"), "{plan}");
+        for (memory, image) in memories.into_iter().zip([&one, &two]) {
+            let Some(memory) = memory else { continue };
+            assert_eq!(bus.boards[0].flash.bytes(memory)[..200], image[..], "{plan} {memory:?}");
+        }
+        let profile = Profile::default();
+        let id = checksum(profile.prog_checksum, profile.prog_endian, counts);
+        assert_eq!(bus.boards[0].record().map(|record| record.program_id), Some(id), "{plan}");
+    }
+}
+
+/// D-44: with the checksum `none` the number in the header is taken as it is, and shown.
+#[test]
+fn d44_program_id_as_the_header_says() {
+    let profile = Profile { prog_checksum: Checksum::None, ..Profile::default() };
+    let image = image();
+    let mut all = Vec::new();
+    for cycle in 1..=2 {
+        let mut header = header(&image, cycle, &profile);
+        header.program_id = 0xC0DE;
+        all.push(header.build(profile.prog_endian));
+        all.extend((0..).map_while(|i| data_block(&image, i)));
+    }
+    let mut bus = Bus::new(&[0x21], profile);
+    bus.number(1);
+    assert!(update(&mut bus, &all));
+    assert_eq!(bus.errors, []);
+    assert_eq!(bus.info(1).map(|info| info.program_id), Some(0xC0DE));
+}
+
+/// D-43: PROG 1→0 ends a transfer, but not the silence after an error; PROG 0→1 does.
+#[test]
+fn d43_silence_lasts_until_programming_is_enabled_again() {
+    let mut bus = Bus::initialised();
+    bus.send("041#");
+    // No header.
+    assert_eq!(bus.block(&[0; 64], 5), frames("081#05"));
+    bus.send("1C1#0400");
+    assert_eq!(bus.ask("2C1#0011223344556677", 5), [], "silent although PROG is 0");
+    bus.send("1C1#0404");
+    let all = blocks(&small(), &Profile::default());
+    assert_eq!(bus.block(&all[0], 5), frames("181#"));
+}
+
+/// D-40, D-41: which headers a board takes in the first cycle, plan by plan, and with which error it refuses the others.
+#[test]
+fn d41_headers_of_the_first_cycle() {
+    let (program, data, ram) = (0, 1, 0x10);
+    for (plan, memory, address, length, target, answer) in [
+        (Plan::VerifyWrite, program, 0, 4, 0xFFFF, "181#"),
+        (Plan::VerifyWrite, program, 0, 4, 0x21, "181#"),
+        (Plan::VerifyWrite, program, 0, 4, 0x42, "081#02"),
+        (Plan::VerifyWrite, program, 0, 0, 0xFFFF, "081#05"),
+        (Plan::VerifyWrite, data, 0, 4, 0xFFFF, "181#"),
+        (Plan::VerifyWrite, ram, 0, 4, 0xFFFF, "081#02"),
+        (Plan::VerifyWrite, 2, 0, 4, 0xFFFF, "081#02"),
+        (Plan::VerifyWrite, program, 0, 0x8000, 0xFFFF, "181#"),
+        (Plan::VerifyWrite, program, 1, 0x7FFF, 0xFFFF, "181#"),
+        (Plan::VerifyWrite, program, 1, 0x8000, 0xFFFF, "081#02"),
+        (Plan::VerifyWrite, program, 0x8000, 1, 0xFFFF, "081#02"),
+        (Plan::Raw, data, 0, 4, 0xFFFF, "181#"),
+        (Plan::Raw, ram, 0, 4, 0xFFFF, "081#02"),
+        (Plan::ExloaderApp, ram, 0, 4, 0xFFFF, "181#"),
+        (Plan::ExloaderApp, program, 0, 4, 0xFFFF, "081#02"),
+        (Plan::PmemXmem, program, 0, 4, 0xFFFF, "181#"),
+        (Plan::PmemXmem, data, 0, 4, 0xFFFF, "081#02"),
+    ] {
+        let profile = Profile { prog_plan: plan, ..Profile::default() };
+        let mut bus = Bus::new(&[0x21], profile);
+        bus.number(1);
+        bus.send("041#");
+        let header = ucom::Header { memory, address, length, target, ..header(&[], 1, &profile) };
+        let heard = bus.block(&header.build(profile.prog_endian), 200);
+        assert_eq!(heard, frames(answer), "{plan}, {header:?}");
+    }
+}
+
+/// D-40, D-41: the same for the second cycle, after a good first one.
+#[test]
+fn d41_headers_of_the_second_cycle() {
+    let (program, data, ram) = (0, 1, 0x10);
+    let image = small();
+    for (plan, first, memory, address, length, program_id, answer) in [
+        (Plan::VerifyWrite, program, program, 0, 100, 0, "181#"),
+        (Plan::VerifyWrite, program, data, 0, 100, 0, "081#0A"),
+        (Plan::VerifyWrite, program, program, 1, 100, 0, "081#0A"),
+        (Plan::VerifyWrite, program, program, 0, 99, 0, "081#0A"),
+        (Plan::VerifyWrite, program, program, 0, 100, 1, "081#0A"),
+        (Plan::Raw, program, data, 1, 99, 1, "181#"),
+        (Plan::ExloaderApp, ram, program, 1, 99, 1, "181#"),
+        (Plan::ExloaderApp, ram, ram, 0, 100, 0, "081#02"),
+        (Plan::PmemXmem, program, data, 1, 99, 1, "181#"),
+        (Plan::PmemXmem, program, program, 0, 100, 0, "081#02"),
+    ] {
+        let profile = Profile { prog_plan: plan, ..Profile::default() };
+        let mut bus = Bus::new(&[0x21], profile);
+        bus.number(1);
+        bus.send("041#");
+        let one = ucom::Header { memory: first, ..header(&image, 1, &profile) };
+        for block in [vec![one.build(profile.prog_endian)], data_blocks(&image)].concat() {
+            assert_eq!(bus.block(&block, 200), frames("181#"), "{plan}");
+        }
+        let program_id = one.program_id ^ program_id;
+        let two = ucom::Header { cycle: 2, memory, address, length, program_id, ..one };
+        assert_eq!(bus.block(&two.build(profile.prog_endian), 200), frames(answer), "{plan}, {two:?}");
+    }
+}

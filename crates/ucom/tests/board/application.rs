@@ -242,3 +242,33 @@ fn other_frames_than_the_one_on_its_way_are_ignored() {
     board.not_sent(now, &acknowledge);
     assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
 }
+
+/// D-38: a program that is not up yet is not asked for texts; what it wants to say by then is not dropped.
+#[test]
+fn d38_texts_of_a_program_that_is_not_up() {
+    let mut bus = Bus::initialised();
+    bus.boards[0].application.start_us = 1000 * MS;
+    for text in ["680#", "301#"] {
+        bus.boards[0].application.debug = vec![b"early".to_vec()];
+        bus.ask(text, 100);
+        assert_eq!(bus.boards[0].application.debug.len(), 1, "{text}");
+        assert_eq!(bus.boards[0].counters().texts_dropped, 0, "{text}");
+    }
+    bus.run(1000);
+    assert_eq!(bus.boards[0].counters().texts_dropped, 1, "up, and nobody wants it");
+}
+
+/// D-37: outputs are enabled by the change of the flag: what the program has made safe by itself stays so when the PC
+/// repeats its flags.
+#[test]
+fn d37_repeated_flags_enable_nothing() {
+    let mut bus = Bus::started();
+    assert_eq!(bus.ask("601#01010000", 5), frames("601#01010000"));
+    assert!(bus.boards[0].application.active);
+    bus.boards[0].application.active = false;
+    assert_eq!(bus.ask("601#01010000", 3), frames("601#01010000"));
+    assert!(!bus.boards[0].application.active);
+    bus.send("601#01000000");
+    bus.send("601#01010000");
+    assert!(bus.boards[0].application.active, "0 and 1 again");
+}

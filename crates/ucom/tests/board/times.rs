@@ -116,6 +116,12 @@ fn d25_hold_off() {
         assert_eq!(board.phase(), phase, "{}", at - now);
     }
     assert_eq!(board.next_deadline(), start + MS, "the application is asked again");
+    // Without ASTART nothing starts by itself.
+    let (mut board, now) = self::board(Bus::one());
+    board.receive(now, &frame("281#"));
+    assert_eq!(flush(&mut board, now), frames("0C1#01"));
+    assert_eq!(board.next_deadline(), u64::MAX);
+    assert_eq!((flush(&mut board, start), board.phase()), (vec![], Phase::Idle));
 }
 
 /// D-33, D-35, D-50, D-51: the beats of a running board, and the end without the PC's life sign.
@@ -329,4 +335,32 @@ fn d44_steps_after_the_last_block() {
     assert_eq!(finished, frame("101#"));
     // Look at the block, its write, three pieces read back, and the record begun and done.
     assert_eq!(waits, [400, 500, 0, 0, 0, 500, 500]);
+}
+
+/// D-05: the random delays are those of Marsaglia's xorshift32, which has no short cycle; a seed that makes its state 0
+/// counts as 1.
+#[test]
+fn d05_random_delays() {
+    // The sequence from state 1, as published.
+    let expected = [270_369, 67_634_689, 2_647_435_461u32, 307_599_695, 2_398_689_233];
+    let mixed = 0x21u32.wrapping_mul(0x9E37_79B9);
+    for seed in [mixed ^ 1, mixed] {
+        let profile = ucom::Profile { shared_backoff: 50, ..ucom::Profile::default() };
+        let config = ucom::node::NodeConfig { seed, profile, ..ucom::node::NodeConfig::new(0x21) };
+        let Board { flash, pins, store, mut application, .. } = board(Bus::one()).0;
+        application.start_us = 0;
+        let mut board = ucom::node::Node::new(config, flash, pins, store, application, 0);
+        let mut now = config.boot_us;
+        board.receive(now, &frame("281#"));
+        assert_eq!(flush(&mut board, now), frames("0C1#01"));
+        for random in expected {
+            board.receive(now, &frame("301#"));
+            assert_eq!(flush(&mut board, now), frames("501# 681#"));
+            let due = now + u64::from(1 + random % 50) * MS;
+            assert_eq!(board.next_deadline(), due, "{random}");
+            assert_eq!(flush(&mut board, due), frames("601#00000000"));
+            board.receive(due, &frame("1C1#8000"));
+            now = due;
+        }
+    }
 }

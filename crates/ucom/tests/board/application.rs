@@ -1,7 +1,7 @@
 //! Times and rates of a running board, beyond the acceptance table.
 
 use ucom::profile::CiLatch;
-use ucom::{Frame, FromBoard, Profile, StringAssembler};
+use ucom::{Frame, FromBoard, Profile, Status, StringAssembler};
 
 use crate::bus::{Bus, MS, frames};
 
@@ -271,4 +271,33 @@ fn d37_repeated_flags_enable_nothing() {
     bus.send("601#01000000");
     bus.send("601#01010000");
     assert!(bus.boards[0].application.active, "0 and 1 again");
+}
+
+/// What [`ucom::node::Application`] promises: a program that was not started, or has been stopped, is not stopped again.
+#[test]
+fn a_program_is_stopped_once() {
+    for text in ["000#", "041#", "1C1#0800", "1C1#0404"] {
+        let mut bus = Bus::initialised();
+        // Only a stop would change it.
+        bus.boards[0].application.running = true;
+        bus.send(text);
+        assert!(bus.boards[0].application.running, "{text}");
+    }
+    let mut bus = Bus::running();
+    bus.send("1C1#8000");
+    assert!(!bus.boards[0].application.running);
+    assert_eq!(bus.boards[0].application.started_us, None);
+}
+
+/// D-50: a start while the loop runs is no life sign of the PC.
+#[test]
+fn d50_a_repeated_start_is_no_life_sign() {
+    let mut bus = Bus::running();
+    for _ in 0..3 {
+        bus.run(400);
+        bus.send("541#");
+    }
+    assert_eq!(bus.boards[0].status(), Status(0xAB));
+    bus.run(400);
+    assert_eq!(bus.boards[0].status(), Status(0x8B));
 }

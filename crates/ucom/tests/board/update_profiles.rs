@@ -142,3 +142,52 @@ fn d41_headers_of_the_second_cycle() {
         assert_eq!(bus.block(&two.build(profile.prog_endian), 200), frames(answer), "{plan}, {two:?}");
     }
 }
+
+/// D-43: a READY that the controller gave up is over, too: the block buffer is free, and the PC may send again.
+#[test]
+fn d43_ready_that_was_given_up() {
+    let all = blocks(&small(), &Profile::default());
+    let mut bus = Bus::initialised();
+    bus.send("041#");
+    bus.hold = |frame| frame.id() == 0x181;
+    bus.block(&all[0], 10);
+    let (_, ready) = bus.held.pop().unwrap();
+    bus.hold = |_| false;
+    let now = bus.now;
+    bus.boards[0].not_sent(now, &ready);
+    assert_eq!(bus.boards[0].counters().not_sent, 1);
+    // DSP_ERROR 6 follows the next frame that leaves.
+    assert_eq!(bus.block(&all[1], 10), frames("181# 081#06"));
+    assert_eq!(bus.block(&all[2], 10), frames("181#"));
+}
+
+/// D-43: the READY of a transfer that was given up leaves while the first block of the next is looked at, and takes nothing
+/// from it.
+#[test]
+fn d43_ready_of_the_transfer_before() {
+    let all = blocks(&small(), &Profile::default());
+    let mut bus = Bus::initialised();
+    bus.send("041#");
+    bus.hold = |frame| frame.id() == 0x181;
+    bus.block(&all[0], 10);
+    bus.send("041#");
+    let (now, ready) = (bus.now, bus.held.pop().unwrap().1);
+    let board = &mut bus.boards[0];
+    for data in all[0].chunks_exact(8) {
+        board.receive(now, &ucom::Frame::new(0x2C1, data).unwrap());
+    }
+    board.sent(now, &ready);
+    assert_eq!(board.poll(now + board.config().block_us), Some(ready), "the block is taken");
+}
+
+/// D-42: without header blocks, too, a block is taken as soon as its time is over.
+#[test]
+fn d42_block_time_without_header() {
+    let mut bus = headerless(Plan::VerifyWrite);
+    bus.send("041#");
+    let (now, board) = (bus.now, &mut bus.boards[0]);
+    for data in data_blocks(&small())[0].chunks_exact(8) {
+        board.receive(now, &ucom::Frame::new(0x2C1, data).unwrap());
+    }
+    assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
+}

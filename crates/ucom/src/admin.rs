@@ -73,4 +73,16 @@ mod tests {
             assert_eq!(Admin::from_bytes(bytes), None);
         }
     }
+
+    #[test]
+    fn flags_in_words() {
+        for (bytes, text) in [
+            ([0; 4], "-"),
+            ([1, 0, 0, 0], "run"),
+            ([0, 1, 0, 1], "active global-debug"),
+            ([1; 4], "run active debug global-debug"),
+        ] {
+            assert_eq!(std::format!("{}", Admin::from_bytes(bytes).unwrap()), text);
+        }
+    }
 }

@@ -147,7 +147,9 @@ mod tests {
         let mut full = vec![0; 65536];
         assert_eq!(last.apply(&mut full), Ok(1));
         assert_eq!((full[65534], full[65535]), (0, 1));
-        assert_eq!(last.apply(&mut full[..65535]), Err(BeyondBuffer { offset: 65535, dimension: 65535 }));
+        let beyond = BeyondBuffer { offset: 65535, dimension: 65535 };
+        assert_eq!(last.apply(&mut full[..65535]), Err(beyond));
+        assert_eq!(std::format!("{beyond}"), "offset 65535 in a buffer of 65535 words");
     }
 
     #[test]

@@ -258,6 +258,20 @@ mod tests {
     }
 
     #[test]
+    fn errors_in_words() {
+        for (error, text) in [
+            (Foreign::Extended, "29-bit identifier"),
+            (Foreign::Fd, "CAN FD frame"),
+            (Foreign::Bit5, "bit 5 of the identifier is set"),
+            (Foreign::NoFunction(28), "there is no function 28"),
+            (Foreign::Malformed, "identifier or data longer than classic CAN has"),
+        ] {
+            assert_eq!(error.to_string(), text);
+        }
+        assert!(NotAFrame.to_string().ends_with("1C1#0202"));
+    }
+
+    #[test]
     fn text_form_is_exact() {
         for bad in ["", "281", "28#", "0281#", "800#", "281#1", "281#gg", "281#112233445566778899", "+81#"] {
             assert_eq!(bad.parse::<Frame>(), Err(NotAFrame), "{bad}");

@@ -220,6 +220,7 @@ mod tests {
             }
         }
         assert_eq!(Function::DspCi.id(Sequence::MAX), 0x6DF);
+        assert_eq!(std::format!("{} to {:>3}", Function::DspCi, Sequence::MAX), "MCA_DSP_CI to  31");
     }
 
     #[test]

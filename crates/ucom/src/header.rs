@@ -184,6 +184,17 @@ mod tests {
         assert_eq!(Header::parse(&block, Endian::Little), Err(HeaderError::Version(2)));
     }
 
+    #[test]
+    fn errors_in_words() {
+        for (error, text) in [
+            (HeaderError::Magic(0x4355), "header starts with 4355, not 5543"),
+            (HeaderError::Version(2), "header version 2, only 1 is known"),
+            (HeaderError::Sum(0x10), "the words of the header add up to 0010, not 0"),
+        ] {
+            assert_eq!(std::format!("{error}"), text);
+        }
+    }
+
     proptest! {
         #[test]
         fn d41_round_trip(words: [u16; 5], address: u32, length: u32, big: bool, at in 0..64usize, flip in 1..=255u8) {

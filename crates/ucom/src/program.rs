@@ -230,6 +230,13 @@ mod tests {
     }
 
     #[test]
+    fn a_digest_shows_what_it_has() {
+        let mut digest = Digest::new(Checksum::Sum16, Endian::Big);
+        digest.update(&[0x01, 0x02]);
+        assert_eq!(std::format!("{digest:?}"), "Digest(sum16, 0102)");
+    }
+
+    #[test]
     fn d45_dates_golden() {
         assert_eq!(DateForm::Fat.encode(2009, 6, 1), Some(0x3AC1));
         assert_eq!(DateForm::Fat.encode(2008, 3, 14), Some(0x386E));

@@ -129,6 +129,12 @@ mod tests {
     }
 
     #[test]
+    fn bits_together() {
+        let (a, b) = (Status(0x1B), Status(0x82));
+        assert_eq!((a | b, a & b, !a), (Status(0x9B), Status(0x02), Status(0xE4)));
+    }
+
+    #[test]
     fn d22_formula_is_literal() {
         assert_eq!(Status(0x19).set(0x00, 0x40), Status(0x59));
         assert_eq!(Status(0x59).set(0x40, 0x00), Status(0x19));

@@ -250,6 +250,44 @@ mod tests {
         assert_eq!(assembler.missing(), 2);
     }
 
+    /// A data package without bytes, and one beyond the buffer: the string is dropped.
+    #[test]
+    fn d13_data_that_cannot_be_are_refused() {
+        let [profile, ..] = profiles();
+        let payload = |bytes| Payload::new(bytes).unwrap();
+        let mut assembler = StringAssembler::<9>::new();
+        assert_eq!(
+            assembler.push(0, &payload(&[3, 0]), &profile),
+            Assembled::Refused,
+            "nine characters fill two"
+        );
+        for (first, second) in [(&b""[..], None), (b"12345678", Some(&b"90"[..]))] {
+            assert_eq!(assembler.push(0, &payload(&[2, 0]), &profile), Assembled::Partial);
+            if let Some(bad) = second {
+                assert_eq!(assembler.push(0, &payload(first), &profile), Assembled::Partial);
+                assert_eq!(assembler.push(0, &payload(bad), &profile), Assembled::Refused);
+            } else {
+                assert_eq!(assembler.push(0, &payload(first), &profile), Assembled::Refused);
+            }
+            assert!(!assembler.is_open());
+        }
+        assert_eq!(assembler.push(0, &payload(&[2, 0]), &profile), Assembled::Partial);
+        assert_eq!(assembler.push(0, &payload(b"12345678"), &profile), Assembled::Partial);
+        assert_eq!(assembler.push(0, &payload(b"9"), &profile), Assembled::Complete(Latin1(b"123456789")));
+    }
+
+    /// `string.max` cuts a text in the middle of a package, too.
+    #[test]
+    fn d13_longest_string() {
+        let profile = Profile { string_max: 12, ..Profile::default() };
+        let mut assembler = StringAssembler::<512>::new();
+        assert_eq!(assembler.push(0, &Payload::new(&[3, 0]).unwrap(), &profile), Assembled::Refused);
+        assembler.push(0, &Payload::new(&[2, 0]).unwrap(), &profile);
+        assembler.push(0, &Payload::new(b"12345678").unwrap(), &profile);
+        let last = assembler.push(0, &Payload::new(b"9abcdefg").unwrap(), &profile);
+        assert_eq!(last, Assembled::Complete(Latin1(b"123456789abc")));
+    }
+
     proptest! {
         /// D-13: any text without trailing NUL arrives.
         #[test]

@@ -130,6 +130,20 @@ fn d15_d24_golden_frames() {
     }
 }
 
+#[test]
+fn errors_in_words() {
+    let function = Function::SetStatus;
+    for (error, text) in [
+        (DecodeError::Foreign(crate::frame::Foreign::Remote), "remote frame"),
+        (DecodeError::Direction(function), "PC_SETSTATUS of the other side"),
+        (DecodeError::TooShort { function, len: 1, need: 2 }, "PC_SETSTATUS with 1 of at least 2 bytes"),
+        (DecodeError::Length { function, len: 3 }, "PC_SETSTATUS cannot have 3 bytes"),
+        (DecodeError::Value(function), "PC_SETSTATUS with a flag that is neither 0 nor 1"),
+    ] {
+        assert_eq!(std::format!("{error}"), text);
+    }
+}
+
 fn packages() -> impl Strategy<Value = BufferPackage> {
     (any::<u16>(), any::<[u16; 3]>()).prop_map(|(offset, words)| BufferPackage { offset, count: 3, words })
 }

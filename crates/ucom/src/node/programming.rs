@@ -257,8 +257,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             0 => area.words,
             words => words.min(area.words),
         };
-        let first = self.programming.first.filter(|_| self.config.profile.prog_plan == Plan::VerifyWrite);
-        let program_id = first.map_or(0, |first| first.program_id);
+        // Where the second image is another one, its own Program ID takes the place of this.
+        let program_id = self.programming.first.map_or(0, |first| first.program_id);
         let (address, target) = (area.start, Header::ANY_BOARD);
         Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })
     }

@@ -127,6 +127,12 @@ mod tests {
         }
         assert_eq!(profile, Profile::default());
         assert_eq!(profile.set("prog.chksum", "crc16"), Err(ProfileError::UnknownKey));
+        assert_ne!(KEYS[0], KEYS[1]);
+        assert_eq!(ProfileError::UnknownKey.to_string(), "no such key");
+        let refused = profile.set("addr.first", "2").unwrap_err();
+        assert_eq!(refused.to_string(), "addr.first must be 0 or 1");
+        assert_eq!(std::format!("{refused:?}"), "Value(addr.first)");
+        assert_eq!(ProfileError::Contradiction("why").to_string(), "why");
         assert_eq!(profile.check(), Ok(()));
     }
 

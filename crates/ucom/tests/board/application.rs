@@ -301,3 +301,22 @@ fn d50_a_repeated_start_is_no_life_sign() {
     bus.run(400);
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
+
+/// D-14, D-36: the end of the application ends its dumps, not what the board tells about itself.
+#[test]
+fn d14_info_survives_the_application() {
+    let mut bus = Bus::started();
+    let (now, board) = (bus.now, &mut bus.boards[0]);
+    for text in ["201#", "5C1#", "581#"] {
+        board.receive(now, &text.parse().unwrap());
+    }
+    let first = board.poll(now).unwrap();
+    for text in ["201#", "1C1#8000"] {
+        board.receive(now, &text.parse().unwrap());
+    }
+    board.sent(now, &first);
+    bus.run(50);
+    let heard = bus.take();
+    assert_eq!(heard.len(), 3 + 4, "the rest, and the second answer");
+    assert!(heard.iter().all(|frame| frame.id() == first.id()));
+}

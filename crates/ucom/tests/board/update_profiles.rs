@@ -1,18 +1,23 @@
 //! Updates of boards that read the description differently, plan by plan.
 
-use ucom::node::{Node, NodeConfig};
+use ucom::node::{Area, Node, NodeConfig};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{Checksum, Memory, Profile, checksum, data_block};
+use ucom_sim::memory::MemoryFlash;
 
 use crate::bus::{Board, Bus, blocks, frames, header, image};
 use crate::update::{data as data_blocks, small, update};
 
 /// One board with number 1 whose images have no header blocks and are as long as `small`.
 fn headerless(plan: Plan) -> Bus {
+    headerless_in(MemoryFlash::default(), plan, 100)
+}
+
+fn headerless_in(flash: MemoryFlash, plan: Plan, headerless_words: u32) -> Bus {
     let profile = Profile { prog_header: HeaderForm::None, prog_plan: plan, ..Profile::default() };
     let mut bus = Bus::new(&[0x21], profile);
-    let Board { flash, pins, store, application, .. } = bus.boards.pop().unwrap();
-    let config = NodeConfig { profile, headerless_words: 100, ..NodeConfig::new(0x21) };
+    let Board { pins, store, application, .. } = bus.boards.pop().unwrap();
+    let config = NodeConfig { profile, headerless_words, ..NodeConfig::new(0x21) };
     bus.boards.push(Node::new(config, flash, pins, store, application, bus.now));
     bus.run(50);
     bus.number(1);
@@ -43,6 +48,24 @@ fn d41_no_header_in_every_plan() {
         let profile = Profile::default();
         let id = checksum(profile.prog_checksum, profile.prog_endian, counts);
         assert_eq!(bus.boards[0].record().map(|record| record.program_id), Some(id), "{plan}");
+    }
+}
+
+/// D-41: an image without header is as long as the board says, never longer than the area, and starts where that does.
+#[test]
+fn d41_no_header_fills_the_area() {
+    let image: Vec<u8> = (0..128).collect();
+    for (headerless_words, words) in [(0, 64), (63, 63), (64, 64), (65, 64)] {
+        let area = Area { start: 0x1000, words: 64 };
+        let mut bus = headerless_in(MemoryFlash::new(area, area, area), Plan::VerifyWrite, headerless_words);
+        bus.send("041#");
+        let cycle = data_blocks(&image);
+        let heard: Vec<_> = [cycle.clone(), cycle].concat().iter().flat_map(|b| bus.block(b, 200)).collect();
+        assert_eq!(heard, frames("181# 181# 181# 101#"), "{headerless_words}");
+        let record = bus.boards[0].record().unwrap();
+        assert_eq!((record.address, record.words), (0x1000, words), "{headerless_words}");
+        let bytes = 2 * words as usize;
+        assert_eq!(bus.boards[0].flash.bytes(Memory::Program)[..bytes], image[..bytes], "{headerless_words}");
     }
 }
 

@@ -156,3 +156,47 @@ pub trait Application {
     /// Forgets that text: it was sent, or nobody wants it.
     fn debug_done(&mut self) {}
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As little as a program can be.
+    struct Mute;
+
+    impl Application for Mute {
+        fn start(&mut self, _: u64) {}
+        fn stop(&mut self) {}
+        fn is_up(&mut self, _: u64) -> bool {
+            true
+        }
+        fn dimensions(&self) -> Dimensions {
+            Dimensions::default()
+        }
+        fn text(&self, _: Text) -> &[u8] {
+            &[]
+        }
+        fn initial_ci(&self, _: u16) -> u16 {
+            0
+        }
+        fn ci(&mut self) -> &mut [u16] {
+            &mut []
+        }
+        fn latch_ci(&mut self) {}
+        fn par(&mut self) -> &mut [u16] {
+            &mut []
+        }
+        fn sample_so(&mut self) {}
+        fn so(&self) -> &[u16] {
+            &[]
+        }
+        fn run(&mut self, _: u64, _: bool) {}
+        fn step(&mut self, _: u64) {}
+        fn outputs(&mut self, _: bool) {}
+    }
+
+    #[test]
+    fn d38_a_program_need_not_have_texts() {
+        assert_eq!(Mute.debug_text(), None);
+    }
+}

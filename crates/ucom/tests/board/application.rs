@@ -320,3 +320,26 @@ fn d14_info_survives_the_application() {
     assert_eq!(heard.len(), 3 + 4, "the rest, and the second answer");
     assert!(heard.iter().all(|frame| frame.id() == first.id()));
 }
+
+/// D-14, D-36: a second request during a dump of the inputs is served once, after it; without inputs there is nothing to serve.
+#[test]
+fn d14_dump_of_inputs_twice() {
+    for (dimension, packages) in [(0, 0), (3, 1), (7, 3)] {
+        let mut bus = Bus::initialised();
+        let names = vec!["x"; dimension];
+        bus.boards[0].application = ucom_sim::memory::MemoryApplication::new("x", &names, &[], &[]);
+        bus.ask("301#", 50);
+        let (now, board) = (bus.now, &mut bus.boards[0]);
+        board.receive(now, &"5C1#".parse().unwrap());
+        board.receive(now, &"5C1#".parse().unwrap());
+        let mut offsets = Vec::new();
+        while let Some(package) = board.poll(now) {
+            offsets.push(package.data()[0]);
+            board.sent(now, &package);
+            assert!(offsets.len() < 100, "packages without end");
+        }
+        let once: Vec<u8> = (0..packages).map(|i| 3 * i).collect();
+        assert_eq!(offsets, [once.clone(), once].concat(), "{dimension}");
+        assert!(board.next_deadline() > now, "{dimension}");
+    }
+}

@@ -214,3 +214,22 @@ fn d42_block_time_without_header() {
     }
     assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
 }
+
+/// D-23, D-42: a READY that still waits when its transfer is given up is not sent: it would be taken for one of the next.
+#[test]
+fn d42_no_ready_of_a_transfer_that_is_no_more() {
+    let all = blocks(&small(), &Profile::default());
+    for (text, heard) in
+        [("041#", "0C1#01"), ("1C1#0400", "0C1#01"), ("301#", "0C1#01 501# 681# 601#00000000")]
+    {
+        let mut bus = Bus::initialised();
+        bus.send("041#");
+        bus.hold = |_| true;
+        bus.send("281#");
+        bus.block(&all[0], 10);
+        bus.send(text);
+        bus.release();
+        bus.run(50);
+        assert_eq!(bus.take(), frames(heard), "{text}");
+    }
+}

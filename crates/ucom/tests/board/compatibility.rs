@@ -178,3 +178,13 @@ fn d04_boards_do_not_listen_to_boards() {
     assert_eq!(*board.counters(), ucom::node::Counters::default());
     assert_eq!((board.status(), board.poll(now)), (Status(0x1B), None));
 }
+
+/// What a board's state does not allow is met with silence, and counted.
+#[test]
+fn ignored_messages_are_counted() {
+    let mut bus = Bus::initialised();
+    for (i, text) in ["541#", "341#00000100", "601#02000000", "581#00"].into_iter().enumerate() {
+        assert_eq!(bus.ask(text, 5), [], "{text}");
+        assert_eq!(bus.boards[0].counters().ignored, i as u32 + 1, "{text}");
+    }
+}

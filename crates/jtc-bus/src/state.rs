@@ -57,21 +57,21 @@ impl NodeState {
 
     /// Generations of drives disagree about what 14, 15 and 16 mean, so these only say that the node is between two states.
     const fn texts(self) -> (&'static str, &'static str) {
-        match self.0 {
-            0 => ("Start", "start"),
-            1 => ("Init", "init"),
-            2 => ("ReadyToOperate", "ready to operate"),
-            3 => ("OperationEnable", "operation enabled"),
-            10 => ("in transition", "start to init"),
-            11 => ("in transition", "init to ready"),
-            12 => ("in transition", "ready to enabled (motor alignment)"),
-            13 => ("in transition", "enabled to ready"),
-            14..=16 => ("in transition", "changing state"),
-            100..=106 | 110..=117 | 131..=134 | 141..=144 | 161..=166 | 171 | 172 => {
+        match self {
+            Self::START => ("Start", "start"),
+            Self::INIT => ("Init", "init"),
+            Self::READY => ("ReadyToOperate", "ready to operate"),
+            Self::ENABLED => ("OperationEnable", "operation enabled"),
+            Self::START_TO_INIT => ("in transition", "start to init"),
+            Self::INIT_TO_READY => ("in transition", "init to ready"),
+            Self::READY_TO_ENABLED => ("in transition", "ready to enabled (motor alignment)"),
+            Self::ENABLED_TO_READY => ("in transition", "enabled to ready"),
+            Self(14..=16) => ("in transition", "changing state"),
+            Self(100..=106 | 110..=117 | 131..=134 | 141..=144 | 161..=166 | 171 | 172) => {
                 ("unknown state", "calibrating (the drive moves by itself)")
             }
-            254 => ("fault reaction", "fault reaction"),
-            255 => ("Fault", "fault"),
+            Self::FAULT_REACTION => ("fault reaction", "fault reaction"),
+            Self::FAULT => ("Fault", "fault"),
             _ => ("unknown state", "unknown state"),
         }
     }

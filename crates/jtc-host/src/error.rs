@@ -202,7 +202,7 @@ fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
             "The trajectory was paused at point {}: the arm should stand there, but nothing confirms it any more",
             s.point
         ),
-        Some(s) if s.trajectory == TrajectoryState::Execute => format!(
+        Some(s) if s.is_executing() => format!(
             "THE ARM MAY BE MOVING: at the last status it was at point {} ({:.3} s) of its trajectory, and {}",
             s.point,
             f64::from(s.point) * 1e-3,

@@ -1,6 +1,6 @@
 //! The controller's numbers in words.
 
-use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Status, TrajectoryState};
+use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Status};
 
 /// Name of a node on the joint bus: joints count from 1, as people do.
 pub fn node(n: usize) -> String {
@@ -194,7 +194,7 @@ pub fn next_step(s: &Status) -> &'static str {
         "`jtc doctor` looks at the nodes that are not ready"
     } else if s.state == ControllerState::Teaching {
         "`jtc teach off`"
-    } else if s.trajectory == TrajectoryState::Execute {
+    } else if s.is_executing() {
         "`jtc traj stop` ends the motion"
     } else {
         "`jtc status`"

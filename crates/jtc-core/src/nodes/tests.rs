@@ -10,8 +10,6 @@ mod frames;
 
 const SCALE: Scale = Scale { velocity: 2.0 };
 const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
-const START_TO_INIT: NodeState = NodeState::START_TO_INIT;
-const INIT_TO_READY: NodeState = NodeState::new(11);
 
 /// What a tick finds on the bus, and nothing else.
 fn inputs(bus: &[Frame], bus_state: BusState) -> Inputs<'_> {
@@ -267,11 +265,11 @@ fn j20_a_node_that_falls_back_has_lost_its_configuration_and_does_not_count() {
         (NodeState::READY, NodeState::READY, true),
         (NodeState::INIT, NodeState::INIT, true),
         (NodeState::INIT, NodeState::READY, true),
-        (START_TO_INIT, NodeState::INIT, true),
-        (INIT_TO_READY, NodeState::READY, true),
+        (NodeState::START_TO_INIT, NodeState::INIT, true),
+        (NodeState::INIT_TO_READY, NodeState::READY, true),
         (NodeState::READY, NodeState::INIT, false),
         (NodeState::ENABLED, NodeState::INIT, false),
-        (NodeState::READY, START_TO_INIT, false),
+        (NodeState::READY, NodeState::START_TO_INIT, false),
         (NodeState::INIT, NodeState::START, false),
         (NodeState::START, NodeState::START, false),
     ] {
@@ -289,7 +287,7 @@ fn j21_a_node_is_cleared_when_it_is_in_init_and_not_on_the_way_there() {
     for (now, clearing) in [
         (NodeState::INIT, false),
         (NodeState::START, false),
-        (START_TO_INIT, true),
+        (NodeState::START_TO_INIT, true),
         (NodeState::READY, true),
         (NodeState::FAULT, true),
     ] {

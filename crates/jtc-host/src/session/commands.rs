@@ -91,7 +91,7 @@ impl<P: Port> Session<P> {
         }
         self.command(&fixed::empty(FrameType::TeachingModeEnable))?;
         let taught = self.wait_for("teaching", TEACHING, |s| {
-            s.state == ControllerState::Teaching || s.state == ControllerState::Error
+            s.state.is_in(&[ControllerState::Teaching, ControllerState::Error])
         });
         taught.map(drop)
     }
@@ -144,7 +144,7 @@ impl<P: Port> Session<P> {
 
     /// Execute, whatever the controller holds.
     pub(super) fn go(&mut self) -> Result<(), Error> {
-        self.exec(ExecCommand::Execute, |s| s.trajectory == TrajectoryState::Execute)
+        self.exec(ExecCommand::Execute, Status::is_executing)
     }
 
     /// Goes on after a pause.
@@ -215,7 +215,7 @@ impl<P: Port> Session<P> {
     /// [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| {
-            s.state == ControllerState::HoldPos || s.state == ControllerState::Error
+            s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error])
         })?;
         if status.state == ControllerState::Error {
             Err(Error::Device { status: Box::new(status) })

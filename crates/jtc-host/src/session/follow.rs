@@ -57,7 +57,7 @@ impl<P: Port> Session<P> {
                 Ok(status) => status,
                 Err(e) => return Err(self.lost_in_motion(e)),
             };
-            begun |= status.trajectory == TrajectoryState::Execute || self.port.now() - start > SETTLE;
+            begun |= status.is_executing() || self.port.now() - start > SETTLE;
             if status.state == ControllerState::Operate {
                 point = status.point;
             }
@@ -83,7 +83,7 @@ impl<P: Port> Session<P> {
             }
             match flow {
                 Flow::Continue => {}
-                Flow::Pause if status.trajectory == TrajectoryState::Execute => unless_ended(self.pause())?,
+                Flow::Pause if status.is_executing() => unless_ended(self.pause())?,
                 Flow::Resume if status.trajectory == TrajectoryState::Pause => self.go()?,
                 // Once accepted it needs no repetition: the controller slows down to standstill by itself.
                 Flow::Stop if !stopping => {
@@ -98,8 +98,8 @@ impl<P: Port> Session<P> {
 
     /// Nothing comes back any more; what goes out may still arrive, and an arm that nobody follows had better stand.
     fn lost_in_motion(&mut self, error: Error) -> Error {
-        let sent = self.last.is_none_or(|s| s.trajectory == TrajectoryState::Execute)
-            && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
+        let sent =
+            self.last.is_none_or(|s| s.is_executing()) && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
         self.link_lost(error, sent)
     }
 }

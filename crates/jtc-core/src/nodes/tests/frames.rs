@@ -11,9 +11,9 @@ fn j16_j20_what_a_node_is_asked_for() {
     };
     for (state, unconfigured, configured) in [
         (NodeState::START, [Init, NoChange, NoChange], [Init, NoChange, NoChange]),
-        (START_TO_INIT, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
+        (NodeState::START_TO_INIT, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
         (NodeState::INIT, [NoChange, NoChange, NoChange], [Ready, NoChange, Ready]),
-        (INIT_TO_READY, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
+        (NodeState::INIT_TO_READY, [NoChange, Enable, Ready], [Ready, Enable, Ready]),
         (NodeState::READY, [NoChange, Enable, NoChange], [NoChange, Enable, NoChange]),
         (NodeState::ENABLED, [Ready, NoChange, Ready], [Ready, NoChange, Ready]),
         (NodeState::FAULT, [NoChange; 3], [NoChange; 3]),
@@ -45,7 +45,7 @@ fn j20_a_node_is_configured_in_init_and_ready_once() {
     for state in [
         NodeState::START,
         NodeState::INIT,
-        START_TO_INIT,
+        NodeState::START_TO_INIT,
         NodeState::READY,
         NodeState::ENABLED,
         NodeState::FAULT,

@@ -10,7 +10,7 @@ use core::pin::pin;
 use core::task::Poll;
 
 use super::request::numbers;
-use super::shared::{Core, Filter, Forget, Heard, Session};
+use super::shared::{Core, Filter, Forget, Heard, Inbox, Session};
 use super::times::{MS, Times};
 use super::{Error, Event, ProcedureId};
 use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
@@ -101,13 +101,18 @@ impl Link {
 
     /// The next frame of the inbox, or `None` when `until` has come first.
     pub(crate) async fn next(&self, until: u64) -> Option<Heard> {
+        self.next_of(until, |inbox| inbox.heard.pop_front()).await
+    }
+
+    /// What `take` finds in the inbox, or `None` when `until` has come first.
+    pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Inbox) -> Option<T>) -> Option<T> {
         poll_fn(|_| {
             self.with(|core| {
                 let fired = core.fired;
                 let Some(inbox) = core.inboxes.get_mut(&self.id) else { return Poll::Ready(None) };
-                if let Some(heard) = inbox.heard.pop_front() {
+                if let Some(found) = take(inbox) {
                     inbox.wake = None;
-                    return Poll::Ready(Some(heard));
+                    return Poll::Ready(Some(found));
                 }
                 if fired >= until {
                     inbox.wake = None;

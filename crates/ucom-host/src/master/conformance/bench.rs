@@ -1,6 +1,4 @@
 //! Frames out, frames in, and what was sent and came.
-use core::future::poll_fn;
-use core::task::Poll;
 
 use super::{NOISE, Verdict};
 use crate::master::Error;
@@ -33,23 +31,7 @@ impl Core {
 impl Link {
     /// The next frame as it is, or `None` when `until` has come first.
     async fn next_raw(&self, until: u64) -> Option<(u64, Frame)> {
-        poll_fn(|_| {
-            self.with(|core| {
-                let fired = core.fired;
-                let Some(inbox) = core.inboxes.get_mut(&self.id) else { return Poll::Ready(None) };
-                if let Some(heard) = inbox.raw.as_mut().and_then(|raw| raw.pop_front()) {
-                    inbox.wake = None;
-                    return Poll::Ready(Some(heard));
-                }
-                if fired >= until {
-                    inbox.wake = None;
-                    return Poll::Ready(None);
-                }
-                inbox.wake = Some(until);
-                Poll::Pending
-            })
-        })
-        .await
+        self.next_of(until, |inbox| inbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }
 }
 

@@ -35,27 +35,24 @@ pub fn trajectory_csv(data: &[u8]) {
     sound(Loaded::parse(text, None));
 }
 
-/// The header-less 19 columns; `data` also as numbers of such a file.
+/// The header-less 19 columns; `data` also as numbers of such a file, whole or with decimals.
 pub fn trajectory_table(data: &[u8]) {
     if let Some(text) = text(data) {
         sound(Loaded::parse(text, None));
     }
-    let (mut whole, mut float) = (String::new(), String::new());
+    let whole = data.len().is_multiple_of(2);
+    let mut table = String::new();
     for (i, row) in data.chunks(36).take(50).enumerate() {
         let time = i * (1 + usize::from(row[0]));
-        whole += &time.to_string();
-        float += &format!("{:.3}", time as f64 * 1e-3);
+        table += &if whole { time.to_string() } else { format!("{:.3}", time as f64 * 1e-3) };
         for c in 0..18 {
             let byte = |k: usize| row.get(k).copied().unwrap_or(0);
             let v = i16::from_be_bytes([byte(2 * c), byte(2 * c + 1)]);
-            whole += &format!(",{v}");
-            float += &format!(",{:.6}", f64::from(v) / 1e4);
+            table += &if whole { format!(",{v}") } else { format!(",{:.6}", f64::from(v) / 1e4) };
         }
-        whole.push('\n');
-        float.push('\n');
+        table.push('\n');
     }
-    sound(Loaded::parse(&whole, None));
-    sound(Loaded::parse(&float, None));
+    sound(Loaded::parse(&table, None));
 }
 
 /// JSON of both forms.

@@ -1,7 +1,12 @@
 //! Whether boards send the bytes of a word in the other order than the profile has (D-10): what shows without asking more.
-use super::BoardSeen;
-use super::scan::Reports;
+use super::link::Link;
+use super::scan::{Reports, ask_reports};
+use super::{BoardSeen, Error};
 use ucom::profile::Endian;
+
+/// What helps against it.
+pub(crate) const MEASURE_ORDER: &str =
+    "`ucom probe --out FILE` measures it and writes a profile for --profile";
 
 /// Words for boards that send the bytes of a word in the other order than the profile has.
 pub(crate) fn other_order(endian: Endian) -> String {
@@ -11,14 +16,33 @@ pub(crate) fn other_order(endian: Endian) -> String {
     };
     format!(
         "wrong byte order: the flash numbers fit the reports only with their bytes exchanged, so the boards send words as \
-         {there}-endian, and the profile has `endian = \"{here}\"`: `ucom probe --out FILE` measures it and writes a profile"
+         {there}-endian, and the profile has `endian = \"{here}\"`"
     )
 }
 
-/// Whether the boards' flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
-pub(crate) fn exchanged(reports: &Reports, boards: &[BoardSeen]) -> bool {
+/// Whether flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
+pub(crate) fn exchanged(reports: &Reports, flash_numbers: &[u16]) -> bool {
     let fits = |byte: u16| reports.ids.contains(&(byte as u8));
-    let only_exchanged = |b: &BoardSeen| !fits(b.info.flash_number) && fits(b.info.flash_number >> 8);
-    let [high, low] = [|b: &BoardSeen| b.info.flash_number >> 8, |b: &BoardSeen| b.info.flash_number & 0xFF];
-    boards.iter().any(only_exchanged) && boards.iter().all(|b| only_exchanged(b) || high(b) == low(b))
+    let only_exchanged = |number: u16| !fits(number) && fits(number >> 8);
+    flash_numbers.iter().any(|number| only_exchanged(*number))
+        && flash_numbers.iter().all(|number| only_exchanged(*number) || number >> 8 == number & 0xFF)
+}
+
+/// Refuses boards whose words come in the other order. Boards are asked for reports only where a flash number has a high byte,
+/// which most have not.
+pub(crate) async fn right_order(link: &Link, flash_numbers: &[u16]) -> Result<(), Error> {
+    if flash_numbers.iter().all(|number| *number < 0x100) {
+        return Ok(());
+    }
+    let mut reports = Reports::default();
+    ask_reports(link, &mut reports).await;
+    if exchanged(&reports, flash_numbers) {
+        return Err(Error::ByteOrder { endian: link.profile().endian });
+    }
+    Ok(())
+}
+
+/// Flash numbers of boards.
+pub(crate) fn flash_numbers(boards: &[BoardSeen]) -> Vec<u16> {
+    boards.iter().map(|board| board.info.flash_number).collect()
 }

@@ -1,4 +1,5 @@
 //! Single acts: status, resets, start, stop, flags.
+use super::byte_order::{MEASURE_ORDER, right_order};
 use super::holders::{one_board_each, one_board_for_each_number};
 use super::link::Link;
 use super::raw_status::expected_status;
@@ -44,6 +45,9 @@ impl AdminChange {
 pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Error> {
     let seen = info(&link, board).await?;
     one_board_each(&link, &[board]).await?;
+    if let Err(error) = right_order(&link, &[seen.info.flash_number]).await {
+        link.note(format!("{error}: {MEASURE_ORDER}"));
+    }
     Ok(Outcome::Info(seen))
 }
 

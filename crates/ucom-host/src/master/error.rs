@@ -1,7 +1,9 @@
 //! What can go wrong in a procedure, with the facts in it, the kind of failure and the command that helps.
 use core::fmt;
 
+use super::byte_order::other_order;
 use super::load::LoadForecast;
+use ucom::profile::Endian;
 use ucom::{ErrorCode, Function, Status};
 
 /// The last frame that was heard from a board.
@@ -103,6 +105,12 @@ pub enum Error {
         wanted: u16,
         /// The one it has.
         found: u16,
+    },
+    /// The flash numbers of boards fit their reports only with their bytes exchanged (D-10).
+    #[error("{}", other_order(*endian))]
+    ByteOrder {
+        /// The order that the profile has.
+        endian: Endian,
     },
     /// Two boards have one number: whatever it is told, both do.
     #[error(

@@ -1,4 +1,5 @@
 //! What there is to know of an error beside its words: kind, short name, next command.
+use super::byte_order::MEASURE_ORDER;
 use super::error::{Incomplete, SHARED_CAUSE};
 use super::{Error, ErrorKind};
 
@@ -18,6 +19,7 @@ impl Error {
             | Self::AckMismatch { .. }
             | Self::WrongSequence { .. }
             | Self::WrongBoard { .. }
+            | Self::ByteOrder { .. }
             | Self::NumberShared { .. }
             | Self::MayTakeNumber { .. }
             | Self::ForeignMaster { .. }
@@ -43,6 +45,7 @@ impl Error {
             Self::AckMismatch { .. } => "ack-mismatch",
             Self::WrongSequence { .. } => "wrong-sequence",
             Self::WrongBoard { .. } => "wrong-board",
+            Self::ByteOrder { .. } => "byte-order",
             Self::NumberShared { .. } => "number-shared",
             Self::MayTakeNumber { .. } => "may-take-number",
             Self::StatusNotTaken { .. } => "status-not-taken",
@@ -74,8 +77,8 @@ impl Error {
             Self::NoAnswer { board, .. } => {
                 format!("board {board} talks but does not answer this: `ucom info {board}`, then `ucom doctor`")
             }
-            Self::Incomplete { problem: Incomplete::ByteOrder { .. }, .. } => {
-                "`ucom probe --out FILE` measures the order and writes a profile for --profile".into()
+            Self::ByteOrder { .. } | Self::Incomplete { problem: Incomplete::ByteOrder { .. }, .. } => {
+                MEASURE_ORDER.into()
             }
             Self::Incomplete { problem: Incomplete::TooMany { .. } | Incomplete::Start { .. }, .. } => {
                 "the board may read the protocol otherwise: `ucom probe` measures it".into()

@@ -4,7 +4,7 @@
 //! PC after the number is confirmed, enables the next board. PC_INIT is never repeated without asking PC_INFO first:
 //! a board that raises its pin by itself would otherwise let its neighbour take the same number.
 
-use super::byte_order::{exchanged, other_order};
+use super::byte_order::{MEASURE_ORDER, exchanged, flash_numbers, other_order};
 use super::holders::one_board_each;
 use super::link::Link;
 use super::repair::given_back;
@@ -75,7 +75,7 @@ pub enum InitFinding {
         ids: Vec<u8>,
     },
     /// The flash numbers fit the reports only with their bytes exchanged (D-10).
-    #[error("{}", other_order(*endian))]
+    #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
         /// The order that the profile has.
         endian: Endian,
@@ -262,7 +262,7 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
         // A report may have been lost.
         ask_reports(link, &mut report.reports).await;
     }
-    if exchanged(&report.reports, &report.boards) {
+    if exchanged(&report.reports, &flash_numbers(&report.boards)) {
         // Everything else would compare numbers that are read wrong.
         report.findings.push(InitFinding::ByteOrder { endian: link.profile().endian });
         return;

@@ -1,6 +1,6 @@
 //! Who is there, without changing anything: PC_REPORT to all and PC_INFO to each number, no reset (5.4).
 
-use super::byte_order::{exchanged, other_order};
+use super::byte_order::{MEASURE_ORDER, exchanged, flash_numbers, other_order};
 use super::holders::one_board_each;
 use super::link::Link;
 use super::request::{Answer, InfoCollector, TRIES, identity, remember};
@@ -97,7 +97,7 @@ pub enum ScanFinding {
         ucom_id: u8,
     },
     /// The flash numbers fit the reports only with their bytes exchanged (D-10).
-    #[error("{}", other_order(*endian))]
+    #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
         /// The order that the profile has.
         endian: Endian,
@@ -321,7 +321,7 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
 }
 
 fn judge(report: &mut ScanReport, endian: Endian) {
-    if exchanged(&report.reports, &report.boards) {
+    if exchanged(&report.reports, &flash_numbers(&report.boards)) {
         // What would follow from it is none of the chain's faults.
         report.findings.retain(|finding| !matches!(finding, ScanFinding::NoDescription { .. }));
         report.findings.push(ScanFinding::ByteOrder { endian });

@@ -4,7 +4,8 @@ use ucom::profile::{AliveMode, Endian, ReportMode};
 use ucom::{Checksum, Profile};
 use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
 use ucom_host::master::probe::ProbeOptions;
-use ucom_host::master::{InitFinding, InitOptions, Outcome, Request, ScanFinding};
+use ucom_host::master::update::UpdateFailure;
+use ucom_host::master::{Error, Event, InitFinding, InitOptions, Outcome, Request, ScanFinding};
 
 use crate::bench::{Bench, image};
 use crate::chain::initialised;
@@ -69,6 +70,19 @@ fn d10_a_wrong_byte_order_is_named() {
             problems[0].what.contains("byte order") && problems[0].next.contains("ucom probe"),
             "{problems:?}"
         );
+        // `update` is refused while the board has its old program; `info` shows the numbers, and says that they are wrong.
+        let before = bench.log.len();
+        let Ok(Outcome::Update(report)) = bench.go(Request::Update(options(&[1], 128)), 60) else { panic!() };
+        let Some(UpdateFailure::Refused(error)) = &report.boards[0].failure else { panic!("{report:?}") };
+        assert_eq!(**error, Error::ByteOrder { endian: here });
+        assert!(error.hint().contains("ucom probe"));
+        assert!(bench.log[before..].iter().all(|(_, from, frame)| {
+            *from != crate::bench::From::Master || matches!(frame.id() >> 6, 8 | 9 | 26)
+        }));
+        let heard = bench.events.len();
+        bench.go(Request::Info { board: 1 }, 60).unwrap();
+        let noted = |(_, event): &(_, Event)| matches!(event, Event::Note { text, .. } if text.contains("wrong byte order"));
+        assert!(bench.events[heard..].iter().any(noted));
         // `io`: an application that runs is needed to describe itself.
         bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
         let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();

@@ -4,6 +4,7 @@ use super::board::{has, one, start};
 use super::campaign::{Campaign, Stage};
 use super::group::group;
 use super::{PlanError, UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
+use crate::master::byte_order::right_order;
 use crate::master::holders::one_board_each;
 use crate::master::link::Link;
 use crate::master::request::{confirmed, numbers, set_status};
@@ -146,6 +147,14 @@ async fn all(link: &Link, run: &mut Campaign) -> Result<(), Error> {
         }
         link.become_master(run.options.force).await?;
         return start_rest(link, run).await;
+    }
+    // D-10: the numbers of the header would come out with their bytes exchanged.
+    let flash_numbers: Vec<u16> = run.results.iter().filter_map(|result| result.flash_number).collect();
+    if !run.options.force
+        && let Err(error) = right_order(link, &flash_numbers).await
+    {
+        refuse(run, &error);
+        return Ok(());
     }
     // U-2: program data outrank the process data of a running board.
     let states = board_states(link).await;

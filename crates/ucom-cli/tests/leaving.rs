@@ -43,8 +43,13 @@ impl Running {
         }
     }
 
-    fn end(mut self) -> (i32, String) {
+    fn end(self) -> (i32, String) {
         signal(&self.child, "-INT");
+        self.ended()
+    }
+
+    /// It ends by itself.
+    fn ended(mut self) -> (i32, String) {
         let mut err = String::new();
         self.child.stderr.take().unwrap().read_to_string(&mut err).unwrap();
         (self.child.wait().unwrap().code().unwrap_or(-1), err)
@@ -105,6 +110,20 @@ fn d37_boards_that_another_pc_stops_are_named() {
     assert!(child.try_wait().unwrap().is_none());
     signal(&child, "-INT");
     assert_eq!(child.wait().unwrap().code(), Some(5));
+}
+
+/// Boards that fall silent for good are stopped by policy, and nothing is left to supervise: the run ends by itself.
+#[test]
+fn d51_a_run_without_boards_ends_by_itself() {
+    let mut sim = Sim::start(&["--boards", "2"]);
+    sim.ucom(&["init"]).ends(0);
+    let mut run = Running::start(&sim, &["all"]);
+    sim.fault("silent board=2 for_s=60");
+    sim.fault("silent board=1 for_s=60");
+    run.until(of(1, "lost"));
+    let (code, err) = run.ended();
+    assert_eq!(code, 5, "{err}");
+    assert!(err.contains("no board is in its control loop any more: the run ends"), "{err}");
 }
 
 /// Section 8: a board whose heartbeats are late, lost and back again makes an event each.

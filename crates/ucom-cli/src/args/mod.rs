@@ -164,7 +164,8 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  ucom run all\n  ucom run 1,2 --active --ci 1.set_position=1500\n  ucom run all --params head.yaml --active\n\n\
                             On stdin: `ci 1 set_position=-500`, `par 1 kp=80`, `active on`, `active off`, `stop`.\n\
-                            Ctrl-C stops control, then applications, in reverse order."
+                            Ctrl-C stops control, then applications, in reverse order. A run of which no board is left in its control loop\n\
+                            ends after 3 s with exit code 5; with --on-lost report a lost board is waited for."
     )]
     Run(RunArgs),
     /// Live view of boards, bus load and foreign frames; asks once, then listens

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use ucom::Status;
+use ucom::profile::OnLost;
 use ucom_host::master::io::Snapshot;
 use ucom_host::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
 
@@ -16,6 +17,8 @@ use crate::failure::{FAULT, Failure};
 const OLD_US: u64 = 500_000;
 /// A board that sends no outputs and lives is not asked more often than this, µs.
 const ASK_US: u64 = 1_000_000;
+/// A run of which no board has been in its loop for so long has nothing left to supervise, µs.
+const OVER_US: u64 = 3_000_000;
 
 /// Something to say at once, for programs and for people.
 pub struct Said {
@@ -32,6 +35,8 @@ pub struct Followed {
     asking: Option<ProcedureId>,
     /// A board was lost, or has rebooted: by `on_lost` others may have been stopped for it.
     lost: bool,
+    /// Since when no board is in its loop.
+    nobody_since: Option<u64>,
 }
 
 #[derive(Default)]
@@ -108,6 +113,22 @@ impl Followed {
             self.boards.entry(board).or_default().asked_us = now_us;
         }
         said
+    }
+
+    /// Whether the run is over: every board has left its loop, or was lost and, by `on_lost`, stopped. Nothing leads a board
+    /// back into its loop but a new run; only with `report` a lost one is waited for, which may still be in it.
+    pub fn is_over(&mut self, master: &Master, now_us: u64) -> bool {
+        let boards = master.boards();
+        let waits_for_lost = master.profile().on_lost == OnLost::Report;
+        let ended = |(number, one): (&u8, &One)| {
+            let gone = |board: &Board| board.rebooted || (board.life == Life::Lost && !waits_for_lost);
+            one.out || boards.get(*number).is_some_and(gone)
+        };
+        if !self.boards.iter().all(ended) {
+            self.nobody_since = None;
+            return false;
+        }
+        now_us.saturating_sub(*self.nobody_since.get_or_insert(now_us)) >= OVER_US
     }
 
     /// Nothing is asked any more: what comes now must not find a board busy.
@@ -200,7 +221,12 @@ mod tests {
 
     /// It runs and has sent its outputs.
     fn running() -> (Master, Followed) {
-        let (mut master, mut followed) = (Master::new(Profile::default()), Followed::new([1].into_iter(), 0));
+        running_with(Profile::default().on_lost)
+    }
+
+    fn running_with(on_lost: OnLost) -> (Master, Followed) {
+        let profile = Profile { on_lost, ..Profile::default() };
+        let (mut master, mut followed) = (Master::new(profile), Followed::new([1].into_iter(), 0));
         master.watch(1, Some(3), true);
         let first = ["681#", "601#01000000", "381#0000640065006600"];
         assert!(hear(&mut master, &mut followed, 0, &first).is_empty());
@@ -249,5 +275,31 @@ mod tests {
         assert_eq!(hear(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         assert_eq!(hear(&mut master, &mut followed, 3_110_000, &["601#00000000"]), ["stopped-by-policy"]);
         assert!(followed.nobody_left().is_ok(), "the loss is what failed");
+    }
+
+    #[test]
+    fn d37_a_run_is_over_some_time_after_its_last_board_has_left() {
+        let (mut master, mut followed) = running();
+        assert!(!followed.is_over(&master, 10_000));
+        hear(&mut master, &mut followed, 20_000, &["601#00000000"]);
+        assert!(!followed.is_over(&master, 20_000), "it may be in it again at once");
+        hear(&mut master, &mut followed, 2_000_000, &["681#", "601#01000000", "381#0000640065006600"]);
+        assert!(!followed.is_over(&master, 2_000_000));
+        hear(&mut master, &mut followed, 2_100_000, &["601#00000000"]);
+        assert!(!followed.is_over(&master, 2_100_000) && !followed.is_over(&master, 5_000_000));
+        assert!(followed.is_over(&master, 5_100_000));
+    }
+
+    /// A board that is silent has been stopped by policy, and the run ends; with `report` it is waited for.
+    #[test]
+    fn d51_a_lost_board_is_waited_for_only_where_nobody_stops_it() {
+        for on_lost in [OnLost::StopAll, OnLost::StopBoard, OnLost::Report] {
+            let (mut master, mut followed) = running_with(on_lost);
+            for now_us in [1_600_000, 3_100_000] {
+                hear(&mut master, &mut followed, now_us, &[]);
+                assert!(!followed.is_over(&master, now_us), "{on_lost:?}");
+            }
+            assert_eq!(followed.is_over(&master, 6_100_000), on_lost != OnLost::Report, "{on_lost:?}");
+        }
     }
 }

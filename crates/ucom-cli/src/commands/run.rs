@@ -128,7 +128,7 @@ fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), 
     Ok(())
 }
 
-/// Supervision until Ctrl-C, `stop`, or the end of the time.
+/// Supervision until Ctrl-C, `stop`, the end of the time, or of the last board's loop.
 fn supervise(
     driver: &mut Driver,
     args: &RunArgs,
@@ -170,6 +170,10 @@ fn supervise(
             if let Err(e) = obey(driver, args, line.trim(), prepared) {
                 driver.note(e.message);
             }
+        }
+        if followed.is_over(&driver.master, driver.now_us()) {
+            driver.note("no board is in its control loop any more: the run ends".into());
+            return Ok(());
         }
         if driver.stop_asked() || args.duration.is_some_and(|d| start.elapsed() >= d) {
             return Ok(());

@@ -30,7 +30,7 @@ pub use sim::{DemoArgs, SimArgs, SimSpeed};
                   jtc sim --serial /tmp/jtc             a simulated controller behind a serial port\n  \
                   jtc --json status --port /tmp/jtc     one status, for programs\n  \
                   jtc traj run motion.csv --approach    check, upload, execute, report\n\n\
-                  With --json, commands that take their time print events, the result last: `jtc help events`.\n\
+                  With --json the result is on stdout; commands that take their time send events to stderr: `jtc help events`.\n\
                   --json, --port and --baud may stand before or after the command.\n\
                   Every option can be set by an environment variable, see `jtc COMMAND --help`.\n\
                   Exit codes: 0 done, 1 the controller reported an error, 2 wrong usage or unreadable input,\n\

@@ -196,8 +196,10 @@ pub fn next_step(s: &Status) -> &'static str {
         "`jtc teach off`"
     } else if s.is_executing() {
         "`jtc traj stop` ends the motion"
+    } else if s.state == ControllerState::HoldPos {
+        "`jtc traj run FILE` moves the arm"
     } else {
-        "`jtc status`"
+        "`jtc monitor` shows how it goes on"
     }
 }
 

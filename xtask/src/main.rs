@@ -30,11 +30,12 @@ Usage: cargo xtask COMMAND
   bench [--json FILE] [--quick]
                                performance and tracking figures beside their anchors, all measured in this run
   soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)
-  prove mutants [--package NAME] [--survivors] [--resume] [--report]
+  prove mutants [--package NAME] [--survivors|--changed|--resume] [--report]
                                mutation testing of the crates that run on a board (hours); fails when a survivor has no
                                sentence in docs/evidence.md or more than 3 % of a crate survive
-                               --survivors: only those of the last run; --resume: go on with the crate that was
-                               interrupted; --report: judge the results that are there
+                               --survivors: only those of the last run; --changed: only those on lines that have
+                               changed since; --resume: go on with the crate that was interrupted; --report: judge
+                               the results that are there
   prove fuzz [TARGET] [--runs N] [--keep]
                                run one fuzz target, or each of them, up to 20000000 executions each, counted by commit
                                in docs/evidence.md

@@ -48,23 +48,46 @@ impl Tally {
     }
 }
 
-/// `arguments`: `--package NAME`, `--survivors`, `--resume`, `--report`.
+/// Which mutants of a crate are run.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Which {
+    /// All of them.
+    All,
+    /// Those that survived the last run.
+    Survivors,
+    /// Those on lines that have changed since the last run.
+    Changed,
+    /// Those that an interrupted run has left.
+    Left,
+}
+
+/// `arguments`: `--package NAME`, `--survivors`, `--changed`, `--resume`, `--report`.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let package = shell::option(&mut arguments, "--package")?;
-    let survivors = shell::flag(&mut arguments, "--survivors");
-    let resume = shell::flag(&mut arguments, "--resume");
+    let mut which = Which::All;
+    for (flag, meaning) in
+        [("--survivors", Which::Survivors), ("--changed", Which::Changed), ("--resume", Which::Left)]
+    {
+        if shell::flag(&mut arguments, flag) {
+            ensure!(which == Which::All, "{flag} does not go with another choice of mutants");
+            which = meaning;
+        }
+    }
     let report_only = shell::flag(&mut arguments, "--report");
     shell::nothing_left(&arguments)?;
     let chosen: Vec<&str> =
         PACKAGES.into_iter().filter(|name| package.as_deref().is_none_or(|wanted| wanted == *name)).collect();
     ensure!(!chosen.is_empty(), "--package needs one of {}", PACKAGES.join(", "));
-    ensure!(!resume || chosen.len() == 1, "--resume needs --package: the one that was interrupted");
+    ensure!(
+        which != Which::Left || chosen.len() == 1,
+        "--resume needs --package: the one that was interrupted"
+    );
 
     if !report_only {
         install()?;
         for package in chosen {
-            campaign(package, survivors, resume)?;
+            campaign(package, which)?;
         }
     }
     let page = evidence::read()?;
@@ -111,17 +134,18 @@ fn results(package: &str) -> PathBuf {
 }
 
 /// Run cargo-gamma for one crate; what it ends with depends on the mutants and is judged from its report.
-fn campaign(package: &str, survivors: bool, resume: bool) -> Result<()> {
+fn campaign(package: &str, which: Which) -> Result<()> {
     let results = results(package);
     create_dir_all(&results).with_context(|| format!("cannot create {}", results.display()))?;
     // Its report is of the mutants that were run only: the whole report is kept, and brought up to date.
     let whole = results.join(REPORT);
-    let before = if survivors { Some(read_report(&whole)?) } else { None };
+    let in_part = matches!(which, Which::Survivors | Which::Changed);
+    let before = if in_part { Some(read_report(&whole)?) } else { None };
     let commit = commit()?;
     let mut gamma: Command = command(program());
     gamma.args(["gamma", "run", "--color", "never", "--progress", "never"]);
     gamma.arg("--artifact-dir").arg(&results);
-    if resume {
+    if which == Which::Left {
         gamma.arg("--resume-testing");
     } else {
         gamma.args(["--package", package]);
@@ -129,8 +153,11 @@ fn campaign(package: &str, survivors: bool, resume: bool) -> Result<()> {
             gamma.args(JUDGES_OF_UCOM.iter().flat_map(|judge| ["--test-package", judge]));
         }
     }
-    if survivors {
+    if which == Which::Survivors {
         gamma.arg("--only-survivors");
+    }
+    if which == Which::Changed {
+        gamma.arg("--in-diff").arg(changes(package)?);
     }
     println!("== {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
@@ -140,11 +167,49 @@ fn campaign(package: &str, survivors: bool, resume: bool) -> Result<()> {
         "cargo-gamma ended with {status}; go on with `cargo xtask prove mutants --package {package} --resume`"
     );
     if let Some(mut before) = before {
-        update(&mut before, &read_report(&whole)?);
-        write(&whole, before.to_string()).with_context(|| format!("cannot write {}", whole.display()))?;
+        let mut part = read_report(&whole)?;
+        let report = if which == Which::Changed {
+            complete(&mut part, &before);
+            part
+        } else {
+            update(&mut before, &part);
+            before
+        };
+        write(&whole, report.to_string()).with_context(|| format!("cannot write {}", whole.display()))?;
     }
     let path = results.join(COMMIT);
     write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// A file with what has changed in the sources of a crate since its last run.
+fn changes(package: &str) -> Result<PathBuf> {
+    let since = read_to_string(results(package).join(COMMIT))
+        .with_context(|| format!("{package} has no run yet, and what has changed since"))?;
+    let sources = format!("crates/{package}/src");
+    let diff = shell::read(command("git").args(["diff", "-U0", since.trim(), "--", &sources]))?;
+    let path = results(package).join("changes.diff");
+    write(&path, diff).with_context(|| format!("cannot write {}", path.display()))?;
+    Ok(path)
+}
+
+/// Fill in, from a report of before, what became of the mutants that were not run again.
+fn complete(part: &mut Value, before: &Value) {
+    let mut known = BTreeMap::new();
+    for mutant in before["files"].as_object().into_iter().flatten().flat_map(|(_, file)| mutants(file)) {
+        if let Some(id) = mutant["id"].as_str() {
+            known.insert(id, mutant);
+        }
+    }
+    for file in part["files"].as_object_mut().into_iter().flat_map(|files| files.values_mut()) {
+        for mutant in file["mutants"].as_array_mut().into_iter().flatten() {
+            let waits = mutant["status"] == "Pending";
+            let Some(was) = mutant["id"].as_str().filter(|_| waits).and_then(|id| known.get(id)) else {
+                continue;
+            };
+            mutant["status"] = was["status"].clone();
+            mutant["statusReason"] = was["statusReason"].clone();
+        }
+    }
 }
 
 /// Take over what became of the mutants that were run again.
@@ -282,5 +347,12 @@ mod tests {
         let mut whole = report(&[("a", "Killed"), ("b", "Survived"), ("c", "Survived")]);
         update(&mut whole, &report(&[("a", "Pending"), ("b", "Killed"), ("c", "Survived")]));
         assert_eq!(whole, report(&[("a", "Killed"), ("b", "Killed"), ("c", "Survived")]));
+
+        // Of a run of what has changed: `c` is gone with its line, `d` is new, `a` is as it was.
+        let mut part = report(&[("a", "Pending"), ("b", "Survived"), ("d", "Killed"), ("e", "Pending")]);
+        complete(&mut part, &whole);
+        let reason = part["files"]["a.rs"]["mutants"][0].as_object_mut().unwrap().remove("statusReason");
+        assert_eq!(reason, Some(Value::Null));
+        assert_eq!(part, report(&[("a", "Killed"), ("b", "Survived"), ("d", "Killed"), ("e", "Pending")]));
     }
 }

@@ -272,6 +272,12 @@ mod tests {
     }
 
     #[test]
+    fn eight_bytes_are_a_payload() {
+        let payload = Payload::from([1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(payload.bytes(), [1, 2, 3, 4, 5, 6, 7, 8]);
+    }
+
+    #[test]
     fn text_form_is_exact() {
         for bad in ["", "281", "28#", "0281#", "800#", "281#1", "281#gg", "281#112233445566778899", "+81#"] {
             assert_eq!(bad.parse::<Frame>(), Err(NotAFrame), "{bad}");

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use super::evidence::{self, Named};
-use crate::shell::{self, cargo, command, run, target, works};
+use crate::shell::{self, cargo, command, root, run, target, works};
 
 /// Reports of another version may differ.
 const VERSION: &str = "0.4.0";
@@ -156,8 +156,8 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     if which == Which::Survivors {
         gamma.arg("--only-survivors");
     }
-    if which == Which::Changed {
-        gamma.arg("--in-diff").arg(changes(package)?);
+    if let Some(before) = before.as_ref().filter(|_| which == Which::Changed) {
+        gamma.arg("--in-diff").arg(changes(package, before)?);
     }
     println!("== {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
@@ -181,13 +181,21 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// A file with what has changed in the sources of a crate since its last run.
-fn changes(package: &str) -> Result<PathBuf> {
-    let since = read_to_string(results(package).join(COMMIT))
-        .with_context(|| format!("{package} has no run yet, and what has changed since"))?;
-    let sources = format!("crates/{package}/src");
-    let diff = shell::read(command("git").args(["diff", "-U0", since.trim(), "--", &sources]))?;
-    let path = results(package).join("changes.diff");
+/// A file with what has changed in the sources of a crate since its report, whose sources are in the report.
+fn changes(package: &str, report: &Value) -> Result<PathBuf> {
+    let results = results(package);
+    let (old, path) = (results.join("old.rs"), results.join("changes.diff"));
+    let mut diff = String::new();
+    for (file, content) in report["files"].as_object().into_iter().flatten() {
+        let source = content["source"].as_str().unwrap_or_default();
+        if root().join(file).is_file() {
+            write(&old, source).with_context(|| format!("cannot write {}", old.display()))?;
+            let mut git = command("git");
+            git.args(["diff", "--no-index", "-U0"]).arg(&old).arg(file);
+            // It ends with 1 where there is a difference.
+            diff += &String::from_utf8_lossy(&git.output().context("cannot start git")?.stdout);
+        }
+    }
     write(&path, diff).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(path)
 }

@@ -18,8 +18,8 @@ const COMPARING: u64 = 1_000_000;
 /// Name of the table in docs/evidence.md.
 const TABLE: &str = "fuzz";
 
-/// Kept inputs are short, so that a person can read them and git need not carry them.
-const KEPT_LENGTH: &str = "-max_len=4096";
+/// Longer inputs only repeat what shorter ones have, and are slow; what is kept a person can read and git can carry.
+const LENGTH: &str = "-max_len=4096";
 
 /// A command of the nightly toolchain; the pinned toolchain's variables are taken away.
 fn nightly(arguments: &[&str]) -> Command {
@@ -54,13 +54,13 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             // In portions, so that what was done counts when the run is interrupted.
             let portion = (wanted - done).min(PORTION);
             let build = if done < COMPARING { &COMPARISONS[..] } else { &COVERAGE[..] };
-            run(&mut fuzz(&target, build, &directories, &[&format!("-runs={portion}"), "-max_len=16384"]))?;
+            run(&mut fuzz(&target, build, &directories, &[&format!("-runs={portion}"), LENGTH]))?;
             count(&target, portion)?;
             done += portion;
         }
         if keep {
             // What code is reached, not how often, and by few inputs.
-            let merge = ["-set_cover_merge=1", "-use_counters=0", KEPT_LENGTH];
+            let merge = ["-set_cover_merge=1", "-use_counters=0", LENGTH];
             run(&mut fuzz(&target, &COMPARISONS, &[directories[1], directories[0]], &merge))?;
         }
     }

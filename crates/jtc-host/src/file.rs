@@ -45,6 +45,16 @@ pub enum FileError {
         /// Six that could be the arm, with commas between them.
         six: String,
     },
+    /// The joints or the flange that were named are not those of an arm of the robot description.
+    #[error("{}{place}: {problem}", path.display())]
+    Choice {
+        /// The file.
+        path: PathBuf,
+        /// The joint, where there is one.
+        place: Place,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A robot description without six rotary joints in a chain: no option makes an arm for this controller of it.
     #[error("{}: {problem}", path.display())]
     FewJoints {
@@ -118,6 +128,11 @@ impl FileError {
                 "say which six are the arm, the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
                 path.display()
             ),
+            FileError::Choice { .. } => {
+                "--joints takes the names of six joints from the base to the wrist, with commas between them; --tip the link that is \
+                 the flange, which the sixth joint carries: `jtc arm import --help`"
+                    .into()
+            }
             FileError::FewJoints { .. } => {
                 "this controller drives arms of six revolute or continuous joints, no arms with fewer axes and no prismatic ones; \
                  `jtc example arm` writes one that it drives"
@@ -135,6 +150,7 @@ impl FileError {
         | FileError::TooLarge { path, .. }
         | FileError::At { path, .. }
         | FileError::Joints { path, .. }
+        | FileError::Choice { path, .. }
         | FileError::FewJoints { path, .. }
         | FileError::Form { path, .. }) = &mut self;
         *path = file.to_owned();
@@ -143,6 +159,10 @@ impl FileError {
 
     pub(crate) fn at(place: Place, problem: impl Into<String>) -> Self {
         FileError::At { path: PathBuf::new(), place, problem: problem.into() }
+    }
+
+    pub(crate) fn choice(place: Place, problem: impl Into<String>) -> Self {
+        FileError::Choice { path: PathBuf::new(), place, problem: problem.into() }
     }
 
     pub(crate) fn form(problem: impl Into<String>) -> Self {

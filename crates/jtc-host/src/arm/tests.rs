@@ -224,6 +224,12 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     assert!(refused("j1,j2,j3,j4,j5,base", None).contains("joint base: is fixed, not rotary"));
     assert!(refused("j1,j2,j3,j4,j5,j6", Some("l2")).contains("link l2 is not carried by joint j6"));
     assert!(import(&seven, None, Some("tool")).unwrap_err().to_string().contains("there is no link tool"));
+    assert!(
+        import(&seven, names("j1,j2,j3,j4,j5,x"), None)
+            .unwrap_err()
+            .hint()
+            .contains("--joints takes the names")
+    );
     assert!(import(&seven, None, Some("l5")).unwrap_err().to_string().contains("is --tip the last link"));
 }
 

@@ -37,9 +37,7 @@ pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Jo
         && !way_to(robot, tip)?.iter().any(|j| j.name == six[JOINTS - 1].name)
     {
         let last = &six[JOINTS - 1].name;
-        return Err(FileError::form(format!(
-            "link {tip} is not carried by joint {last}, the last of the six"
-        )));
+        return Err(unfit(format!("link {tip} is not carried by joint {last}, the last of the six")));
     }
     Ok(six)
 }
@@ -47,6 +45,15 @@ pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Jo
 /// An error about a joint.
 pub(super) fn about(joint: &Joint, problem: impl Into<String>) -> FileError {
     FileError::at(Place::name(format!("joint {}", joint.name)), problem)
+}
+
+/// An error about what the user named.
+fn unfit(problem: impl Into<String>) -> FileError {
+    FileError::choice(Place::default(), problem)
+}
+
+fn unfit_joint(joint: &Joint, problem: impl Into<String>) -> FileError {
+    FileError::choice(Place::name(format!("joint {}", joint.name)), problem)
 }
 
 fn rotary(joint: &Joint) -> bool {
@@ -81,7 +88,7 @@ fn no_loops(robot: &Robot) -> Result<(), FileError> {
 fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError> {
     if !robot.links.iter().any(|l| l.name == link) {
         let links: Vec<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
-        return Err(FileError::form(format!("there is no link {link}; there are {}", links.join(", "))));
+        return Err(unfit(format!("there is no link {link}; there are {}", links.join(", "))));
     }
     let mut way: Vec<&Joint> = way_down(robot, link).collect();
     way.reverse();
@@ -100,19 +107,19 @@ fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, File
     let find = |name: &String| -> Result<&'a Joint, FileError> {
         let joint = robot.joints.iter().find(|j| &j.name == name).ok_or_else(|| {
             let others = names(&moving(robot, robot.joints.iter().collect())).join(", ");
-            FileError::form(format!("there is no joint {name}; those that move are {others}"))
+            unfit(format!("there is no joint {name}; those that move are {others}"))
         })?;
-        if rotary(joint) { Ok(joint) } else { Err(about(joint, format!("is {}, not rotary", kind(joint)))) }
+        match rotary(joint) {
+            true => Ok(joint),
+            false => Err(unfit_joint(joint, format!("is {}, not rotary", kind(joint)))),
+        }
     };
     let joints = wanted.iter().map(find).collect::<Result<Vec<_>, _>>()?;
     if joints.len() != JOINTS {
-        return Err(FileError::form(format!("{} joints are named, the controller drives six", joints.len())));
+        return Err(unfit(format!("{} joints are named, the controller drives six", joints.len())));
     }
     if let Some(joint) = first_branch(robot, &joints) {
-        return Err(about(
-            joint,
-            "is not carried by the one named before it: name them from the base to the wrist",
-        ));
+        return Err(unfit_joint(joint, "is not carried by the one named before it"));
     }
     Ok(joints)
 }
@@ -156,7 +163,7 @@ fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileErro
     if longest.len() < JOINTS {
         if choice.tip.is_some() {
             text += "; is --tip the last link of the arm?";
-            return FileError::form(text);
+            return unfit(text);
         }
         return FileError::FewJoints { path: PathBuf::new(), problem: text };
     }

@@ -1,33 +1,36 @@
-//! The arm made ready to compute with: link frames and inertial parameters chosen so that little work is left
-//! per call.
+//! The arm prepared for the recursions: modified Denavit-Hartenberg frames and base inertial parameters.
 //!
-//! Two choices of ours, neither of which changes a joint torque:
+//! Neither changes a joint torque, and both leave fewer multiplications per call:
 //!
-//! * **Frames.** Each constant rotation between joints is Rz(a)·Rx(α)·Rz(b). Rz(b) is added to the joint's
-//!   position and Rz(a) is given to the frame before, so Rx(α)·Rz(q + offset) is left: two plane rotations. A
-//!   frame's origin may sit anywhere on its joint axis; it sits where the vector to the next origin is
+//! * **Frames** (modified Denavit-Hartenberg: Craig, Introduction to Robotics). Each constant rotation between joints is
+//!   Rz(a)·Rx(α)·Rz(b). Rz(b) is added to the joint's position and Rz(a) to the frame before, so that Rx(α)·Rz(q + offset) is
+//!   left: two plane rotations. The origin of a frame is the point of its joint axis from which the vector to the next origin is
 //!   perpendicular to the axis.
-//! * **Inertia.** What of a link is symmetric about its joint axis (its mass, the first and second moment along the
-//!   axis) moves in the same way whether it turns with the link or not, so it is carried by the link before. Going from the wrist to the base, every link keeps seven numbers and no mass at all.
+//! * **Base (minimal) inertial parameters** (Gautier and Khalil, Direct calculation of minimum set of inertial parameters of
+//!   serial robots, 1990). The part of a link's inertia that is symmetric about its joint axis (the mass, the first and the
+//!   second moment along the axis) moves in the same way whether it rotates with the link or not. It is regrouped to the link
+//!   before, from the wrist to the base. Each link keeps seven parameters, and none of them is a mass.
 
 use crate::model::{ArmModel, JOINTS, Link, symmetric};
 use crate::rotation::{Mat3, about_x, about_z, apply, congruent, from_rpy, product, unit};
 use crate::trig::angle;
 
-/// A joint: frame k in frame k−1 is a shift by `p`, Rx(α), Rz(q + offset).
+/// The modified Denavit-Hartenberg transform of a joint: frame k in frame k−1 is a shift by `p`, Rx(α), Rz(q + offset).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Twist {
+pub(crate) struct JointTransform {
+    /// sin α and cos α.
     pub sin: f64,
     pub cos: f64,
+    /// Added to the joint's position, rad.
     pub offset: f64,
     /// Origin of frame k in frame k−1, m; its z is 0 by choice of the origin of frame k−1.
     pub p: [f64; 2],
 }
 
-/// A link: what is left of its inertia in its own frame (mass, first moment along z and the integral of z²
-/// are zero).
+/// The base inertial parameters of a link, in its own frame: mass, first moment along z and the integral of z² are
+/// regrouped to the link before and are zero.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Body {
+pub(crate) struct BaseInertialParameters {
     /// First moment of mass: integrals of x and y over the mass, kg·m.
     pub hx: f64,
     pub hy: f64,
@@ -40,7 +43,7 @@ pub(crate) struct Body {
     pub yz: f64,
 }
 
-/// A joint frame as the model has it: for kinematics.
+/// A joint frame of the model in the frame before, for kinematics.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
     pub rotation: Mat3,
@@ -56,7 +59,7 @@ struct Inertia {
 }
 
 impl Inertia {
-    /// Seen from a frame in which the present one stands at `p`, turned by `r`.
+    /// The same in a frame in which the present one has the origin `p` (m) and the rotation `r`.
     fn placed(&self, r: &Mat3, p: &[f64; 3]) -> Self {
         let h = apply(r, &self.h);
         let mut j = congruent(r, &self.j);
@@ -82,13 +85,13 @@ impl Inertia {
         }
     }
 
-    /// Splits off what is symmetric about z.
-    fn split(&self) -> (Body, Self) {
+    /// The base inertial parameters, and the part that is symmetric about z.
+    fn split(&self) -> (BaseInertialParameters, Self) {
         let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = self.j;
         // Integral of z²: what x² + z² and y² + z² share.
         let z2 = 0.5 * (xx + yy - zz);
         let [hx, hy, hz] = self.h;
-        let rest = Body { hx, hy, xx: yy - z2, yy: xx - z2, xy: -xy, xz: -xz, yz: -yz };
+        let rest = BaseInertialParameters { hx, hy, xx: yy - z2, yy: xx - z2, xy: -xy, xz: -xz, yz: -yz };
         let j = [[z2, 0.0, 0.0], [0.0, z2, 0.0], [0.0; 3]];
         (rest, Self { mass: self.mass, h: [0.0, 0.0, hz], j })
     }
@@ -101,23 +104,23 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 /// The chain of the six moving links.
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
-    pub twists: [Twist; JOINTS],
-    pub bodies: [Body; JOINTS],
-    /// Minus gravity, seen after the first joint's Rx(α), m/s²: the base is taken to accelerate upwards.
-    pub lift: [f64; 3],
+    pub transforms: [JointTransform; JOINTS],
+    pub base_parameters: [BaseInertialParameters; JOINTS],
+    /// Minus gravity, after the first joint's Rx(α), m/s²: gravity acts as an acceleration of the base upwards.
+    pub base_acceleration: [f64; 3],
     pub placements: [Placement; 7],
-    /// First moments (`hx`, `hy`) of the bodies of an arm that is nothing but 1 kg at the flange, kg·m.
+    /// First moments (`hx`, `hy`) of a massless arm with 1 kg at the flange, kg·m.
     pub flange: [[f64; 2]; JOINTS],
 }
 
 impl Chain {
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
         let placements = model.joints.map(|o| Placement { rotation: from_rpy(&o.rpy), xyz: o.xyz });
-        let mut twists = [Twist { sin: 0.0, cos: 1.0, offset: 0.0, p: [0.0; 2] }; JOINTS];
-        // Sine and cosine of the turn about z, and the shift along it, of our frame k from the model's.
-        let mut turns = [(0.0, 1.0); JOINTS];
-        let mut shifts = [0.0; JOINTS];
-        let mut lift = gravity.map(|g| -g);
+        let mut transforms = [JointTransform { sin: 0.0, cos: 1.0, offset: 0.0, p: [0.0; 2] }; JOINTS];
+        // Frame k from the model's frame k: sine and cosine of the rotation about z, and the shift along z.
+        let mut z_rotations = [(0.0, 1.0); JOINTS];
+        let mut z_shifts = [0.0; JOINTS];
+        let mut base_acceleration = gravity.map(|g| -g);
         let mut origins = [[0.0; 3]; JOINTS];
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
@@ -129,22 +132,22 @@ impl Chain {
             let (cos_b, sin_b) = unit(rest[0][0], -rest[0][1]);
             origins[k] = apply(&back, &placements[k].xyz);
             if k == 0 {
-                lift = apply(&about_x(-sin, cos), &apply(&back, &lift));
+                base_acceleration = apply(&about_x(-sin, cos), &apply(&back, &base_acceleration));
             } else {
-                turns[k - 1] = (sin_a, cos_a);
-                twists[k - 1].offset += angle(sin_a, cos_a);
+                z_rotations[k - 1] = (sin_a, cos_a);
+                transforms[k - 1].offset += angle(sin_a, cos_a);
             }
-            (twists[k].sin, twists[k].cos) = (sin, cos);
-            twists[k].offset += angle(sin_b, cos_b);
+            (transforms[k].sin, transforms[k].cos) = (sin, cos);
+            transforms[k].offset += angle(sin_b, cos_b);
         }
         for k in (1..JOINTS).rev() {
             let [x, y, z] = origins[k];
-            shifts[k - 1] = z + shifts[k] * twists[k].cos;
-            twists[k].p = [x, y - shifts[k] * twists[k].sin];
+            z_shifts[k - 1] = z + z_shifts[k] * transforms[k].cos;
+            transforms[k].p = [x, y - z_shifts[k] * transforms[k].sin];
         }
-        let bodies = regroup(&model.links, &twists, &turns, &shifts);
-        let flange = regroup(&flange_mass(model), &twists, &turns, &shifts).map(|b| [b.hx, b.hy]);
-        Self { twists, bodies, lift, placements, flange }
+        let base_parameters = regroup(&model.links, &transforms, &z_rotations, &z_shifts);
+        let flange = regroup(&flange_mass(model), &transforms, &z_rotations, &z_shifts).map(|b| [b.hx, b.hy]);
+        Self { transforms, base_parameters, base_acceleration, placements, flange }
     }
 }
 
@@ -155,27 +158,28 @@ fn flange_mass(model: &ArmModel) -> [Link; 7] {
     links
 }
 
-/// Inertia of the links in our frames, with the part symmetric about each joint axis handed inwards.
+/// Base inertial parameters: the inertia of the links in the frames of the chain, the part symmetric about each joint axis
+/// regrouped to the link before (Gautier and Khalil 1990).
 fn regroup(
     links: &[Link; 7],
-    twists: &[Twist; JOINTS],
-    turns: &[(f64, f64); JOINTS],
-    shifts: &[f64; JOINTS],
-) -> [Body; JOINTS] {
+    transforms: &[JointTransform; JOINTS],
+    z_rotations: &[(f64, f64); JOINTS],
+    z_shifts: &[f64; JOINTS],
+) -> [BaseInertialParameters; JOINTS] {
     let none = Inertia { mass: 0.0, h: [0.0; 3], j: [[0.0; 3]; 3] };
-    let mut bodies = [none.split().0; JOINTS];
-    let mut handed = none;
+    let mut parameters = [none.split().0; JOINTS];
+    let mut moved = none;
     for k in (0..JOINTS).rev() {
         let link = &links[k + 1];
         let about_com = Inertia { mass: link.mass, h: [0.0; 3], j: symmetric(&link.inertia) };
-        let (s, c) = turns[k];
+        let (s, c) = z_rotations[k];
         let in_link = about_com.placed(&from_rpy(&link.origin.rpy), &link.origin.xyz);
-        let mut total = in_link.placed(&about_z(-s, c), &[0.0, 0.0, -shifts[k]]);
-        total.add(&handed);
+        let mut total = in_link.placed(&about_z(-s, c), &[0.0, 0.0, -z_shifts[k]]);
+        total.add(&moved);
         let (rest, symmetric) = total.split();
-        bodies[k] = rest;
-        let [x, y] = twists[k].p;
-        handed = symmetric.placed(&about_x(twists[k].sin, twists[k].cos), &[x, y, 0.0]);
+        parameters[k] = rest;
+        let [x, y] = transforms[k].p;
+        moved = symmetric.placed(&about_x(transforms[k].sin, transforms[k].cos), &[x, y, 0.0]);
     }
-    bodies
+    parameters
 }

@@ -1,18 +1,19 @@
-//! Mass matrix by composite rigid bodies, and forward dynamics by its LDLᵀ factors.
+//! The mass matrix by the composite-rigid-body algorithm, and the forward dynamics by its LDLᵀ factors (Featherstone, Rigid
+//! Body Dynamics Algorithms, 2008, chapter 6: the mass matrix, and the bias torques by recursive Newton-Euler).
 
 // Matrix elements are named by their indices, as in the formulas; written-out triangles have empty corners.
 #![allow(clippy::needless_range_loop, clippy::absurd_extreme_comparisons)]
 
-use crate::chain::{Body, Chain, Twist};
-use crate::inverse::{Turns, Wrench, inverse, inwards, rx, rz};
+use crate::chain::{BaseInertialParameters, Chain, JointTransform};
+use crate::inverse::{JointSinesCosines, Wrench, inverse, inwards, rx, rz};
 use crate::model::{JOINTS, JointVec};
 use crate::unroll::unroll;
 
 /// A square matrix over the joints.
 pub(crate) type JointMat = [[f64; JOINTS]; JOINTS];
 
-/// A link and all that it carries: first and second moments of mass about the link's origin. There is no
-/// mass: see [`crate::chain`].
+/// A composite rigid body: a link and all links after it, as first and second moments of mass about the link's origin. Base
+/// inertial parameters have no mass: see [`crate::chain`].
 #[derive(Clone, Copy)]
 struct Composite {
     h: [f64; 3],
@@ -24,10 +25,10 @@ struct Composite {
     yz: f64,
 }
 
-/// The plane part of a symmetric matrix turned by (s, c): its two diagonal entries and the product between
+/// The plane part of a symmetric matrix rotated by (s, c): its two diagonal entries and the product between
 /// them.
 #[inline(always)]
-fn turn(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
+fn rotate_plane(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
     let w = s * (a - b) + (c + c) * ab;
     let d = s * w;
     (a - d, b + d, c * w - ab)
@@ -35,17 +36,17 @@ fn turn(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
 
 impl Composite {
     #[inline(always)]
-    fn of(b: &Body) -> Self {
+    fn of(b: &BaseInertialParameters) -> Self {
         Self { h: [b.hx, b.hy, 0.0], xx: b.xx, yy: b.yy, zz: 0.0, xy: b.xy, xz: b.xz, yz: b.yz }
     }
 
-    /// What frame k carries, as frame k−1 sees it.
+    /// The composite of frame k in frame k−1.
     #[inline(always)]
-    fn inwards(&self, t: &Twist, (s, c): (f64, f64)) -> Self {
-        let (xx, yy, xy) = turn(s, c, self.xx, self.yy, self.xy);
+    fn inwards(&self, t: &JointTransform, (s, c): (f64, f64)) -> Self {
+        let (xx, yy, xy) = rotate_plane(s, c, self.xx, self.yy, self.xy);
         let [xz, yz, _] = rz(s, c, [self.xz, self.yz, 0.0]);
         let h = rz(s, c, self.h);
-        let (yy, zz, yz) = turn(t.sin, t.cos, yy, self.zz, yz);
+        let (yy, zz, yz) = rotate_plane(t.sin, t.cos, yy, self.zz, yz);
         let [_, xy, xz] = rx(t, [0.0, xy, xz]);
         let h = rx(t, h);
         let [x, y] = t.p;
@@ -55,7 +56,7 @@ impl Composite {
     }
 
     #[inline(always)]
-    fn add(&mut self, b: &Body) {
+    fn add(&mut self, b: &BaseInertialParameters) {
         self.h[0] += b.hx;
         self.h[1] += b.hy;
         self.xx += b.xx;
@@ -74,22 +75,22 @@ impl Composite {
 
 /// Lower triangle of the mass matrix; the upper one stays zero.
 #[inline(always)]
-fn lower(chain: &Chain, turns: &Turns) -> JointMat {
+fn lower(chain: &Chain, trig: &JointSinesCosines) -> JointMat {
     let mut m = [[0.0; JOINTS]; JOINTS];
     let mut columns = [[[0.0; 2]; 3]; JOINTS];
-    let mut composite = Composite::of(&chain.bodies[5]);
+    let mut composite = Composite::of(&chain.base_parameters[5]);
     unroll!(K in [5, 4, 3, 2, 1] {
         columns[K] = composite.column();
-        let t = &chain.twists[K];
-        let turn = (turns.sin[K], turns.cos[K]);
+        let t = &chain.transforms[K];
+        let rotation = (trig.sin[K], trig.cos[K]);
         unroll!(I in [1, 2, 3, 4, 5] {
             if I >= K {
                 m[I][K] = columns[I][2][1];
-                columns[I] = inwards(t, turn, &columns[I]);
+                columns[I] = inwards(t, rotation, &columns[I]);
             }
         });
-        composite = composite.inwards(t, turn);
-        composite.add(&chain.bodies[K - 1]);
+        composite = composite.inwards(t, rotation);
+        composite.add(&chain.base_parameters[K - 1]);
     });
     m[0][0] = composite.column()[2][1];
     unroll!(I in [1, 2, 3, 4, 5] {
@@ -101,7 +102,7 @@ fn lower(chain: &Chain, turns: &Turns) -> JointMat {
 /// Joint-space mass matrix, kg·m².
 #[inline(always)]
 pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
-    let mut m = lower(chain, &Turns::new(chain, q));
+    let mut m = lower(chain, &JointSinesCosines::new(chain, q));
     for i in 0..JOINTS {
         for k in 0..i {
             m[k][i] = m[i][k];
@@ -120,7 +121,7 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     let mut inverse = [0.0; JOINTS];
     unroll!(K in [0, 1, 2, 3, 4, 5] {
         let floor = m[K][K] * PIVOT_MIN;
-        // Rows above are done: m[K][I] holds L·D, and becomes L.
+        // The rows above are done: m[K][I] holds L·D and becomes L.
         unroll!(I in [0, 1, 2, 3, 4] {
             if I < K {
                 let scaled = m[K][I];
@@ -151,7 +152,7 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     x
 }
 
-/// Joint accelerations, rad/s².
+/// Joint accelerations, rad/s²: the solution of M·qdd = tau − bias torques.
 #[inline(always)]
 pub(crate) fn forward(
     chain: &Chain,
@@ -160,9 +161,9 @@ pub(crate) fn forward(
     tau: &JointVec,
     rotor: &JointVec,
 ) -> JointVec {
-    let turns = Turns::new(chain, q);
-    let mut m = lower(chain, &turns);
-    let mut rest = inverse(chain, &turns, qd, &[0.0; JOINTS]);
+    let trig = JointSinesCosines::new(chain, q);
+    let mut m = lower(chain, &trig);
+    let mut rest = inverse(chain, &trig, qd, &[0.0; JOINTS]);
     for k in 0..JOINTS {
         m[k][k] += rotor[k];
         rest[k] = tau[k] - rest[k];

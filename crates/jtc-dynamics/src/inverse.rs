@@ -1,30 +1,31 @@
-//! Inverse dynamics: recursive Newton-Euler in the frames and with the parameters of [`crate::chain`].
+//! Inverse dynamics: recursive Newton-Euler (Luh, Walker and Paul, On-line computational scheme for mechanical
+//! manipulators, 1980) in the frames and with the base inertial parameters of [`crate::chain`].
 
 // The indices are those of the formulas.
 #![allow(clippy::needless_range_loop)]
 
-use crate::chain::{Body, Chain, Twist};
+use crate::chain::{BaseInertialParameters, Chain, JointTransform};
 use crate::model::{JOINTS, JointVec};
 use crate::trig::sin_cos;
 use crate::unroll::unroll;
 
 type Vec3 = [f64; 3];
 
-/// Sine and cosine of every joint angle of the chain.
+/// Sines and cosines of the joint angles of the chain (position plus offset).
 #[derive(Clone, Copy)]
-pub(crate) struct Turns {
+pub(crate) struct JointSinesCosines {
     pub sin: JointVec,
     pub cos: JointVec,
 }
 
-impl Turns {
+impl JointSinesCosines {
     #[inline(always)]
     pub fn new(chain: &Chain, q: &JointVec) -> Self {
         let mut angle = *q;
         for k in 0..JOINTS {
-            angle[k] += chain.twists[k].offset;
+            angle[k] += chain.transforms[k].offset;
         }
-        // One loop over all six: it becomes SIMD code where there is SIMD.
+        // One loop over all six joints, which a compiler for a processor with SIMD vectorises.
         let (mut sin, mut cos) = (angle, angle);
         for k in 0..JOINTS {
             (sin[k], cos[k]) = sin_cos(angle[k]);
@@ -35,13 +36,13 @@ impl Turns {
 
 /// Rx(α)·v.
 #[inline(always)]
-pub(crate) fn rx(t: &Twist, v: Vec3) -> Vec3 {
+pub(crate) fn rx(t: &JointTransform, v: Vec3) -> Vec3 {
     [v[0], t.cos * v[1] - t.sin * v[2], t.sin * v[1] + t.cos * v[2]]
 }
 
 /// Rx(α)ᵀ·v.
 #[inline(always)]
-fn rx_back(t: &Twist, v: Vec3) -> Vec3 {
+fn rx_back(t: &JointTransform, v: Vec3) -> Vec3 {
     [v[0], t.cos * v[1] + t.sin * v[2], t.cos * v[2] - t.sin * v[1]]
 }
 
@@ -57,12 +58,12 @@ fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
     [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]
 }
 
-/// Two vectors side by side: they are turned together.
+/// Two vectors side by side: they are rotated together.
 pub(crate) type Pair3 = [[f64; 2]; 3];
 
 /// Rx(α) of both vectors.
 #[inline(always)]
-fn rx_pair(t: &Twist, v: &Pair3) -> Pair3 {
+fn rx_pair(t: &JointTransform, v: &Pair3) -> Pair3 {
     let mut out = *v;
     for i in 0..2 {
         out[1][i] = t.cos * v[1][i] - t.sin * v[2][i];
@@ -73,7 +74,7 @@ fn rx_pair(t: &Twist, v: &Pair3) -> Pair3 {
 
 /// Rx(α)ᵀ of both vectors.
 #[inline(always)]
-fn rx_pair_back(t: &Twist, v: &Pair3) -> Pair3 {
+fn rx_pair_back(t: &JointTransform, v: &Pair3) -> Pair3 {
     let mut out = *v;
     for i in 0..2 {
         out[1][i] = t.cos * v[1][i] + t.sin * v[2][i];
@@ -107,22 +108,23 @@ fn rz_pair_back(s: f64, c: f64, v: &Pair3) -> Pair3 {
 /// Motion of a link in its own frame.
 #[derive(Clone, Copy)]
 struct Motion {
-    /// Angular velocity and angular acceleration.
-    turn: Pair3,
-    /// Acceleration of the origin.
+    /// Angular velocity (rad/s) and angular acceleration (rad/s²).
+    angular: Pair3,
+    /// Acceleration of the origin, m/s².
     acc: Vec3,
 }
 
-/// Force and moment that a link asks for, in its own frame and about its origin.
+/// Force (N) and moment (N·m) that a link needs, in its own frame and about its origin.
 pub(crate) type Wrench = Pair3;
 
-/// U = [dw]× + [w]×[w]×, which takes a point to its acceleration relative to the origin.
-type Swing = [Vec3; 3];
+/// U = [dw]× + [w]×[w]× (Khalil and Dombre, Modeling, Identification and Control of Robots): maps the position of a point to
+/// its acceleration relative to the origin.
+type AccelerationMatrix = [Vec3; 3];
 
 impl Motion {
     #[inline(always)]
-    fn swing(&self) -> Swing {
-        let [[x, ax], [y, ay], [z, az]] = self.turn;
+    fn acceleration_matrix(&self) -> AccelerationMatrix {
+        let [[x, ax], [y, ay], [z, az]] = self.angular;
         let (xx, yy, zz) = (x * x, y * y, z * z);
         let (yz, zx, xy) = (y * z, z * x, x * y);
         [[-(yy + zz), xy - az, zx + ay], [xy + az, -(zz + xx), yz - ax], [zx - ay, yz + ax, -(xx + yy)]]
@@ -130,23 +132,30 @@ impl Motion {
 
     /// Motion of the link after joint `t`.
     #[inline(always)]
-    fn next(&self, u: &Swing, t: &Twist, (s, c): (f64, f64), qd: f64, qdd: f64) -> Self {
+    fn next(
+        &self,
+        u: &AccelerationMatrix,
+        t: &JointTransform,
+        (s, c): (f64, f64),
+        qd: f64,
+        qdd: f64,
+    ) -> Self {
         let p = &t.p;
         let reach = |k: usize| self.acc[k] + (u[k][0] * p[0] + u[k][1] * p[1]);
         let acc = rz_back(s, c, rx_back(t, [reach(0), reach(1), reach(2)]));
-        let mut turn = rz_pair_back(s, c, &rx_pair_back(t, &self.turn));
-        let (wx, wy) = (turn[0][0], turn[1][0]);
-        turn[0][1] += wy * qd;
-        turn[1][1] -= wx * qd;
-        turn[2][0] += qd;
-        turn[2][1] += qdd;
-        Self { turn, acc }
+        let mut angular = rz_pair_back(s, c, &rx_pair_back(t, &self.angular));
+        let (wx, wy) = (angular[0][0], angular[1][0]);
+        angular[0][1] += wy * qd;
+        angular[1][1] -= wx * qd;
+        angular[2][0] += qd;
+        angular[2][1] += qdd;
+        Self { angular, acc }
     }
 }
 
-impl Body {
+impl BaseInertialParameters {
     #[inline(always)]
-    fn wrench(&self, m: &Motion, [ux, uy, uz]: &Swing) -> Wrench {
+    fn wrench(&self, m: &Motion, [ux, uy, uz]: &AccelerationMatrix) -> Wrench {
         let b = self;
         let force = |u: &Vec3| u[0] * b.hx + u[1] * b.hy;
         // The integral of r × (acc + U·r) over the mass.
@@ -158,9 +167,9 @@ impl Body {
     }
 }
 
-/// A wrench on frame k as the frame k−1 sees it.
+/// A wrench on frame k, in frame k−1.
 #[inline(always)]
-pub(crate) fn inwards(t: &Twist, (s, c): (f64, f64), wrench: &Wrench) -> Wrench {
+pub(crate) fn inwards(t: &JointTransform, (s, c): (f64, f64), wrench: &Wrench) -> Wrench {
     let mut v = rx_pair(t, &rz_pair(s, c, wrench));
     let [x, y] = t.p;
     v[0][1] += y * v[2][0];
@@ -170,31 +179,31 @@ pub(crate) fn inwards(t: &Twist, (s, c): (f64, f64), wrench: &Wrench) -> Wrench 
 }
 
 /// The wrench of each link alone, under the motion `qd`, `qdd`. Of the first only the moment about its axis
-/// is filled in: the rest goes into the base.
+/// is computed: the base carries the rest.
 #[inline(always)]
-fn wrenches(chain: &Chain, turns: &Turns, qd: &JointVec, qdd: &JointVec) -> [Wrench; JOINTS] {
+fn wrenches(chain: &Chain, trig: &JointSinesCosines, qd: &JointVec, qdd: &JointVec) -> [Wrench; JOINTS] {
     let mut out = [[[0.0; 2]; 3]; JOINTS];
-    let acc = rz_back(turns.sin[0], turns.cos[0], chain.lift);
-    let first = &chain.bodies[0];
+    let acc = rz_back(trig.sin[0], trig.cos[0], chain.base_acceleration);
+    let first = &chain.base_parameters[0];
     out[0][2][1] = qdd[0] * (first.xx + first.yy) + (acc[1] * first.hx - acc[0] * first.hy);
-    // The first link only turns about its axis, so most of U and of the motion of the second is zero.
-    let t = &chain.twists[1];
-    let (s, c) = (turns.sin[1], turns.cos[1]);
+    // The first link only rotates about its axis, so that most of U and of the motion of the second is zero.
+    let t = &chain.transforms[1];
+    let (s, c) = (trig.sin[1], trig.cos[1]);
     let square = qd[0] * qd[0];
     let reach =
         [acc[0] - (square * t.p[0] + qdd[0] * t.p[1]), acc[1] + (qdd[0] * t.p[0] - square * t.p[1]), acc[2]];
     let (y, z) = ([t.sin * qd[0], t.sin * qdd[0]], [t.cos * qd[0], t.cos * qdd[0]]);
     let (wx, wy) = (s * y[0], c * y[0]);
     let mut motion = Motion {
-        turn: [[wx, s * y[1] + wy * qd[1]], [wy, c * y[1] - wx * qd[1]], [z[0] + qd[1], z[1] + qdd[1]]],
+        angular: [[wx, s * y[1] + wy * qd[1]], [wy, c * y[1] - wx * qd[1]], [z[0] + qd[1], z[1] + qdd[1]]],
         acc: rz_back(s, c, rx_back(t, reach)),
     };
-    let mut swing = motion.swing();
-    out[1] = chain.bodies[1].wrench(&motion, &swing);
+    let mut u = motion.acceleration_matrix();
+    out[1] = chain.base_parameters[1].wrench(&motion, &u);
     unroll!(K in [2, 3, 4, 5] {
-        motion = motion.next(&swing, &chain.twists[K], (turns.sin[K], turns.cos[K]), qd[K], qdd[K]);
-        swing = motion.swing();
-        out[K] = chain.bodies[K].wrench(&motion, &swing);
+        motion = motion.next(&u, &chain.transforms[K], (trig.sin[K], trig.cos[K]), qd[K], qdd[K]);
+        u = motion.acceleration_matrix();
+        out[K] = chain.base_parameters[K].wrench(&motion, &u);
     });
     out
 }
@@ -206,39 +215,43 @@ fn sum(a: &Wrench, b: &Wrench) -> Wrench {
 
 /// Joint torques, N·m.
 #[inline(always)]
-pub(crate) fn inverse(chain: &Chain, turns: &Turns, qd: &JointVec, qdd: &JointVec) -> JointVec {
-    let links = wrenches(chain, turns, qd, qdd);
+pub(crate) fn inverse(chain: &Chain, trig: &JointSinesCosines, qd: &JointVec, qdd: &JointVec) -> JointVec {
+    let links = wrenches(chain, trig, qd, qdd);
     let mut torque = [0.0; JOINTS];
     let mut total = links[5];
     torque[5] = total[2][1];
     unroll!(K in [4, 3, 2, 1, 0] {
-        let v = inwards(&chain.twists[K + 1], (turns.sin[K + 1], turns.cos[K + 1]), &total);
+        let v = inwards(&chain.transforms[K + 1], (trig.sin[K + 1], trig.cos[K + 1]), &total);
         total = sum(&links[K], &v);
         torque[K] = total[2][1];
     });
     torque
 }
 
-/// Joint torques at rest, N·m: with no mass left in the links there are no forces, only moments.
+/// Joint torques at rest, N·m: without mass in the base inertial parameters there are no forces, only moments.
 #[inline(always)]
-pub(crate) fn gravity_torque(chain: &Chain, turns: &Turns) -> JointVec {
-    static_torque(chain, turns, |k| [chain.bodies[k].hx, chain.bodies[k].hy])
+pub(crate) fn gravity_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec {
+    static_torque(chain, trig, |k| [chain.base_parameters[k].hx, chain.base_parameters[k].hy])
 }
 
 /// Joint torques that hold 1 kg at the flange, N·m.
 #[inline(always)]
-pub(crate) fn flange_torque(chain: &Chain, turns: &Turns) -> JointVec {
-    static_torque(chain, turns, |k| chain.flange[k])
+pub(crate) fn flange_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec {
+    static_torque(chain, trig, |k| chain.flange[k])
 }
 
 /// Joint torques at rest of bodies with these first moments (kg·m).
 #[inline(always)]
-fn static_torque(chain: &Chain, turns: &Turns, first_moment: impl Fn(usize) -> [f64; 2]) -> JointVec {
-    let mut acc = chain.lift;
+fn static_torque(
+    chain: &Chain,
+    trig: &JointSinesCosines,
+    first_moment: impl Fn(usize) -> [f64; 2],
+) -> JointVec {
+    let mut acc = chain.base_acceleration;
     let mut moments = [[0.0; 3]; JOINTS];
     unroll!(K in [0, 1, 2, 3, 4, 5] {
-        let along = if K == 0 { acc } else { rx_back(&chain.twists[K], acc) };
-        acc = rz_back(turns.sin[K], turns.cos[K], along);
+        let along = if K == 0 { acc } else { rx_back(&chain.transforms[K], acc) };
+        acc = rz_back(trig.sin[K], trig.cos[K], along);
         let [hx, hy] = first_moment(K);
         moments[K] = [hy * acc[2], -hx * acc[2], hx * acc[1] - hy * acc[0]];
     });
@@ -246,7 +259,7 @@ fn static_torque(chain: &Chain, turns: &Turns, first_moment: impl Fn(usize) -> [
     let mut n = moments[5];
     torque[5] = n[2];
     unroll!(K in [4, 3, 2, 1, 0] {
-        let inner = rx(&chain.twists[K + 1], rz(turns.sin[K + 1], turns.cos[K + 1], n));
+        let inner = rx(&chain.transforms[K + 1], rz(trig.sin[K + 1], trig.cos[K + 1], n));
         n = [moments[K][0] + inner[0], moments[K][1] + inner[1], moments[K][2] + inner[2]];
         torque[K] = n[2];
     });

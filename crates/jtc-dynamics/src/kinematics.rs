@@ -22,10 +22,10 @@ pub(crate) fn forward_kinematics(chain: &Chain, q: &JointVec) -> [Pose; 7] {
         for (x, d) in pose.position.iter_mut().zip(step) {
             *x += d;
         }
-        // The flange is the seventh frame: it does not turn.
+        // The seventh frame is the flange, which has no joint.
         let (s, c) = q.get(k).map_or((0.0, 1.0), |&q| sin_cos(q));
         pose.rotation = pose.rotation.map(|row| {
-            let r = turned(&row, &place.rotation);
+            let r = row_product(&row, &place.rotation);
             [c * r[0] + s * r[1], c * r[1] - s * r[0], r[2]]
         });
         *out = pose;
@@ -34,7 +34,7 @@ pub(crate) fn forward_kinematics(chain: &Chain, q: &JointVec) -> [Pose; 7] {
 }
 
 /// A row of a rotation times a rotation.
-fn turned(row: &[f64; 3], m: &Mat3) -> [f64; 3] {
+fn row_product(row: &[f64; 3], m: &Mat3) -> [f64; 3] {
     let column = |k: usize| row[0] * m[0][k] + row[1] * m[1][k] + row[2] * m[2][k];
     [column(0), column(1), column(2)]
 }

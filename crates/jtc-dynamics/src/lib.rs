@@ -14,7 +14,7 @@ mod rotation;
 mod trig;
 mod unroll;
 
-use inverse::Turns;
+use inverse::JointSinesCosines;
 
 pub use kinematics::Pose;
 pub use model::{ArmModel, Field, JOINTS, JointVec, Link, ModelError, Origin};
@@ -38,18 +38,18 @@ impl Dynamics {
     /// Joint torques (N·m) for positions (rad), velocities (rad/s) and accelerations (rad/s²); recursive
     /// Newton-Euler.
     pub fn inverse(&self, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
-        inverse::inverse(&self.chain, &Turns::new(&self.chain, q), qd, qdd)
+        inverse::inverse(&self.chain, &JointSinesCosines::new(&self.chain, q), qd, qdd)
     }
 
     /// Joint torques that hold the arm still at `q`, N·m.
     pub fn gravity_torque(&self, q: &JointVec) -> JointVec {
-        inverse::gravity_torque(&self.chain, &Turns::new(&self.chain, q))
+        inverse::gravity_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
     /// Joint torques that hold 1 kg at the origin of the flange still at `q`, without the arm itself, N·m: gravity through the
     /// transposed Jacobian of the flange.
     pub fn flange_torque(&self, q: &JointVec) -> JointVec {
-        inverse::flange_torque(&self.chain, &Turns::new(&self.chain, q))
+        inverse::flange_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
     /// Joint-space mass matrix, kg·m², symmetric, without rotors.

@@ -38,7 +38,7 @@ pub const SIN_COS_MAX: f64 = 1.0e9;
 pub fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * FRAC_2_PI + ROUND;
     let quadrant = rounded.to_bits();
-    // NaN rather than rubbish where the reduction has no digits left (and for infinities).
+    // NaN where the reduction has no digits left, and for infinities.
     let k = if x.abs() <= SIN_COS_MAX { rounded - ROUND } else { f64::NAN };
     let r = ((x - k * HALF_PI[0]) - k * HALF_PI[1]) - k * HALF_PI[2];
     // The polynomials in pairs of terms: shorter to wait for than one term after the other.

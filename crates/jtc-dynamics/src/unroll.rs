@@ -1,7 +1,7 @@
-//! Loops written out: with constant indices the compiler keeps the recursion in registers and drops unused
+//! Unrolled loops: with constant indices the compiler keeps the recursion in registers and drops unused
 //! parts.
 
-/// Repeats the block with the name standing for each of the numbers in turn.
+/// Repeats the block once for each of the numbers, with the name as a constant of that value.
 macro_rules! unroll {
     ($k:ident in [$($n:literal),+] $body:block) => {
         $({

@@ -20,52 +20,55 @@ pub use kinematics::Pose;
 pub use model::{ArmModel, Field, JOINTS, JointVec, Link, ModelError, Origin};
 pub use trig::{SIN_COS_MAX, sin_cos};
 
-/// A model made ready to compute with: all that does not depend on the joint positions is precomputed.
+/// An arm prepared for kinematics and dynamics: what does not depend on the joint positions is precomputed.
+///
+/// No function fails or panics. Results for a NaN, an infinite argument or a position beyond [`SIN_COS_MAX`] are
+/// meaningless, mostly NaN.
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     chain: chain::Chain,
 }
 
 impl Dynamics {
-    /// Prepares `model`; `gravity`: acceleration of gravity in the base frame, m/s².
+    /// Prepares `model`; `gravity`: acceleration of gravity in the base frame, m/s², (0, 0, −9.81) for an arm that stands upright.
     ///
-    /// The model should have passed [`ArmModel::check`]; one that has not leads to useless numbers, never to
-    /// a panic.
+    /// The model must have passed [`ArmModel::check`]: the results of one that has not are meaningless.
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
         Self { chain: chain::Chain::new(model, gravity) }
     }
 
-    /// Joint torques (N·m) for positions (rad), velocities (rad/s) and accelerations (rad/s²); recursive
-    /// Newton-Euler.
+    /// Joint torques (N·m) for positions `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s²), without
+    /// friction and rotors; recursive Newton-Euler.
     pub fn inverse(&self, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
         inverse::inverse(&self.chain, &JointSinesCosines::new(&self.chain, q), qd, qdd)
     }
 
-    /// Joint torques that hold the arm still at `q`, N·m.
+    /// Joint torques (N·m) that hold the arm at rest at the positions `q` (rad).
     pub fn gravity_torque(&self, q: &JointVec) -> JointVec {
         inverse::gravity_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
-    /// Joint torques that hold 1 kg at the origin of the flange still at `q`, without the arm itself, N·m: gravity through the
-    /// transposed Jacobian of the flange.
+    /// Joint torques (N·m) that hold 1 kg at the origin of the flange at rest at the positions `q` (rad), without the arm
+    /// itself: gravity through the transposed Jacobian of the flange.
     pub fn flange_torque(&self, q: &JointVec) -> JointVec {
         inverse::flange_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
-    /// Joint-space mass matrix, kg·m², symmetric, without rotors.
+    /// Joint-space mass matrix (kg·m²) at the positions `q` (rad), symmetric, without rotors; composite-rigid-body algorithm.
     pub fn mass_matrix(&self, q: &JointVec) -> [[f64; JOINTS]; JOINTS] {
         forward::mass_matrix(&self.chain, q)
     }
 
-    /// Joint accelerations (rad/s²) under torques `tau` (N·m); `rotor` is added to the diagonal of the mass
-    /// matrix (kg·m²).
+    /// Joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m); `rotor`, the
+    /// inertias of the rotors about their joint axes (kg·m²), is added to the diagonal of the mass matrix.
     ///
     /// A joint without any inertia (its row of the mass matrix is lost in rounding) gets the acceleration 0.
     pub fn forward(&self, q: &JointVec, qd: &JointVec, tau: &JointVec, rotor: &JointVec) -> JointVec {
         forward::forward(&self.chain, q, qd, tau, rotor)
     }
 
-    /// Poses of the six joint frames and of the flange in the base frame.
+    /// Poses in the base frame (m) of the joint frames, base to wrist, and of the flange, at the positions `q` (rad). Joint frames
+    /// are those of the model, after the rotation of the joint.
     pub fn forward_kinematics(&self, q: &JointVec) -> [Pose; 7] {
         kinematics::forward_kinematics(&self.chain, q)
     }

@@ -1,14 +1,13 @@
-//! The arm as it is described from outside (joint origins, link masses and inertias), and what makes it
-//! physical.
+//! The model of an arm (joint origins, link masses and inertias), and the check that it is physical.
 
 use core::fmt;
 
 use crate::rotation::{Mat3, principal_moments};
 
-/// Number of actuated joints.
+/// Number of actuated joints, all revolute.
 pub const JOINTS: usize = 6;
 
-/// One value per joint, base to wrist.
+/// One value per joint, base to wrist; the unit is that of the quantity.
 pub type JointVec = [f64; JOINTS];
 
 /// A frame placed in its parent as URDF does: translate by `xyz` (m), then rotate by
@@ -21,10 +20,10 @@ pub struct Origin {
     pub rpy: [f64; 3],
 }
 
-/// A rigid link: mass, centre of mass and inertia about it.
+/// A rigid link: mass, centre of mass and inertia about it. The link frame is the frame of the joint that moves the link.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Link {
-    /// Centre of mass (xyz) and orientation of the inertia frame (rpy) in the link frame.
+    /// Centre of mass (xyz, m) and orientation of the inertia frame (rpy, rad) in the link frame.
     pub origin: Origin,
     /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass in the frame of `origin`, kg·m².
     pub inertia: [f64; 6],
@@ -32,30 +31,31 @@ pub struct Link {
     pub mass: f64,
 }
 
-/// The arm as rule J-40 and the ArmModel frame describe it.
+/// The arm as rule J-40 and the ArmModel frame define it. Every joint rotates about the z axis of its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ArmModel {
-    /// Joint i places link i+1 on link i; joint 6 is the fixed flange.
+    /// `joints[i]`: the frame of link i+1 in the frame of link i, at the joint's position 0; `joints[6]` is the fixed flange in
+    /// the frame of link 6.
     pub joints: [Origin; 7],
-    /// Link 0 is the base.
+    /// `links[0]` is the base, which does not move.
     pub links: [Link; 7],
 }
 
-/// Where a number stands in an [`ArmModel`].
+/// A number of an [`ArmModel`], within a joint or a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Field {
-    /// Joint origin, translation, 0..3.
+    /// Joint origin, translation (m): x, y, z, 0..3.
     JointXyz(usize),
-    /// Joint origin, roll, pitch, yaw, 0..3.
+    /// Joint origin, roll, pitch, yaw (rad), 0..3.
     JointRpy(usize),
-    /// Centre of mass of a link, 0..3.
+    /// Centre of mass of a link (m): x, y, z, 0..3.
     LinkXyz(usize),
-    /// Orientation of a link's inertia frame, 0..3.
+    /// Orientation of a link's inertia frame: roll, pitch, yaw (rad), 0..3.
     LinkRpy(usize),
-    /// Inertia of a link: Ixx, Ixy, Ixz, Iyy, Iyz, Izz, 0..6.
+    /// Inertia of a link (kg·m²): Ixx, Ixy, Ixz, Iyy, Iyz, Izz, 0..6.
     Inertia(usize),
-    /// Mass of a link.
+    /// Mass of a link (kg).
     Mass,
 }
 
@@ -65,20 +65,20 @@ pub enum Field {
 pub enum ModelError {
     /// A number is NaN or infinite.
     NotFinite {
-        /// Joint or link (as `field` says), 0..7.
+        /// Joint or link (of which `field` is), 0..7.
         index: usize,
-        /// Which number of it.
+        /// The number.
         field: Field,
-        /// What stands there.
+        /// Its value, in the unit of `field`.
         value: f64,
     },
     /// An angle is too large to have a meaning.
     AngleTooLarge {
-        /// Joint or link (as `field` says), 0..7.
+        /// Joint or link (of which `field` is), 0..7.
         index: usize,
-        /// Which number of it.
+        /// The number.
         field: Field,
-        /// What stands there, rad.
+        /// Its value, rad.
         value: f64,
         /// Largest magnitude, rad.
         limit: f64,
@@ -99,16 +99,16 @@ pub enum ModelError {
     InertiaNegative {
         /// Link, 0..7.
         link: usize,
-        /// The smallest principal moment, kg·m²; at least 0 is asked for.
+        /// The smallest principal moment, kg·m²; the limit is 0.
         moment: f64,
     },
-    /// A principal moment of a link with mass is larger than the two others together: no body has that.
+    /// A principal moment of a link with mass is larger than the two others together, which is impossible.
     InertiaTriangle {
         /// Link, 0..7.
         link: usize,
         /// The largest principal moment, kg·m².
         moment: f64,
-        /// The sum of the others, kg·m²: the limit.
+        /// The sum of the others, kg·m², which is the limit.
         limit: f64,
     },
 }
@@ -167,14 +167,18 @@ impl fmt::Display for ModelError {
 
 impl core::error::Error for ModelError {}
 
-/// Largest angle of a model, rad: far beyond any sense, and well inside what the sine takes.
+/// Largest angle of a model, rad: far beyond a meaningful angle, and below [`crate::SIN_COS_MAX`].
 const ANGLE_MAX: f64 = 1.0e6;
-/// How far beyond the limit an inertia may be, relative to its largest moment: models come rounded to f32.
+/// Tolerance of the inertia limits, relative to the largest moment: models are rounded to f32.
 const INERTIA_TOLERANCE: f64 = 1.0e-6;
 
 impl ArmModel {
     /// Physical checks of rule J-06: all numbers finite, no negative mass, links 1 to 5 have a mass, and the
-    /// inertia of every link with mass is one that a body can have (up to the rounding of f32).
+    /// inertia of every link with mass is that of a possible body (up to the rounding of f32).
+    ///
+    /// # Errors
+    ///
+    /// The first number that fails, joints before links: see [`ModelError`].
     pub fn check(&self) -> Result<(), ModelError> {
         for (index, joint) in self.joints.iter().enumerate() {
             finite(index, &joint.xyz, Field::JointXyz)?;
@@ -211,7 +215,7 @@ impl Link {
     }
 }
 
-/// The inertia as a matrix.
+/// The matrix of Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
 pub(crate) fn symmetric(&[xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> Mat3 {
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
 }

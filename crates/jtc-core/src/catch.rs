@@ -1,12 +1,12 @@
 //! Catching a load that the model lacks, when the joints are enabled (J-43).
 //!
 //! Such a load begins to fall when its joint is enabled. The joint then swings around where it will be held, and at the end of the
-//! first swing the law asks for up to 1.7 times what the model lacks. Where that is beyond the torque limit, the limit is
+//! first swing the control law needs up to 1.7 times what the model lacks. Where that is beyond the torque limit, the limit is
 //! commanded, which stops every load that it can hold, and the set position *sags* behind the joint: by as much as the computed
 //! torque exceeds the limit. So the joint comes to rest where the limit has stopped it. Held at its old position instead, it
 //! would be thrown upwards and fall again, for ever when there is little friction.
-use crate::coast::moves;
 use crate::config::{Config, JointConfig};
+use crate::deceleration::moves;
 
 /// How long a joint has to have been at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a
 /// swing.

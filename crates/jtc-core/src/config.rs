@@ -80,7 +80,7 @@ pub struct Config {
     pub stop_ms: u16,
     /// How long a pause or stop may brake with all the torque there is, ms; an arm that still moves then is an error (J-33).
     pub braking_ms_max: u16,
-    /// After a position error: what the law may add to the torque of the model, as a share of the joint's torque limit (J-66).
+    /// After a position error: what the control law may add to the torque of the model, as a share of the joint's torque limit (J-66).
     pub yield_torque_share: f64,
     /// In how many of any 100 ms a computed torque may ask for more than its limit before it is an error (J-43). Meanwhile the
     /// limit is commanded and the integral held; 0: an error in the tick that finds it. A single point missing in a recorded

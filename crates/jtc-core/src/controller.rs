@@ -7,22 +7,22 @@ use crate::config::{Config, PidGains, TableOf};
 use crate::defaults;
 use crate::errors::Errors;
 use crate::execution::Path;
-use crate::host::{Overtaking, Work};
+use crate::host::{Overtaking, SliceProgress};
 use crate::io::{Inputs, Outputs};
 use crate::late::LateTicks;
-use crate::motion::{ControlParameters, Law, Motion};
+use crate::motion::{ControlMode, ControlParameters, Motion};
 use crate::nodes::{Goal, Nodes};
 use crate::path::PathClock;
-use crate::records::{HOST_LINES, ResponseQueues};
+use crate::response_queue::{HOST_LINES, ResponseQueues};
 use crate::store::Store;
 use crate::telemetry::Telemetry;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
-/// Which parameters the host has given.
+/// The parameters received from the host: one bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Given(u8);
+pub(crate) struct ReceivedParameters(u8);
 
-impl Given {
+impl ReceivedParameters {
     pub const FRICTION: u8 = 1 << 0;
     pub const PID: u8 = 1 << 1;
     pub const MODEL: u8 = 1 << 2;
@@ -31,8 +31,8 @@ impl Given {
         self.0 |= bit;
     }
 
-    /// It has to be given again.
-    pub fn take_back(&mut self, bit: u8) {
+    /// The host has to send it again.
+    pub fn withdraw(&mut self, bit: u8) {
         self.0 &= !bit;
     }
 
@@ -52,8 +52,8 @@ pub struct Controller<M> {
     pub(crate) state: ControllerState,
     pub(crate) errors: Errors,
     pub(crate) nodes: Nodes,
-    // What the host gave.
-    pub(crate) given: Given,
+    // Parameters received from the host.
+    pub(crate) received: ReceivedParameters,
     pub(crate) dynamics: Dynamics,
     pub(crate) pid: [PidGains; JOINTS],
     pub(crate) polynomial: [[f64; 6]; JOINTS],
@@ -67,7 +67,7 @@ pub struct Controller<M> {
     pub(crate) store: Store<M>,
     pub(crate) check: TrajectoryCheck,
     pub(crate) violation: Option<Violation>,
-    /// Friction was given since the trajectory was checked.
+    /// Friction was received since the trajectory was checked.
     pub(crate) friction_is_new: bool,
     pub(crate) trajectory: TrajectoryState,
     pub(crate) clock: PathClock,
@@ -76,7 +76,7 @@ pub struct Controller<M> {
     pub(crate) braking_ms: Option<u16>,
     pub(crate) motion: Motion,
     // The link to the host.
-    pub(crate) work: Work,
+    pub(crate) slice_progress: SliceProgress,
     pub(crate) overtaking: [Overtaking; HOST_LINES],
     pub(crate) records: ResponseQueues,
     pub(crate) since_status_ms: u16,
@@ -92,7 +92,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             state: ControllerState::Start,
             errors: Errors::default(),
             nodes: Nodes::new(&config),
-            given: Given::default(),
+            received: ReceivedParameters::default(),
             dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
             pid: defaults::PID,
             polynomial: defaults::POLYNOMIAL,
@@ -110,7 +110,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             path: Path::BEGIN,
             braking_ms: None,
             motion: Motion::default(),
-            work: Work::Begin,
+            slice_progress: SliceProgress::Begin,
             overtaking: [Overtaking::default(); HOST_LINES],
             records: ResponseQueues::new(),
             since_status_ms: 0,
@@ -239,12 +239,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Priority: Error, Init, Teaching, HoldPos, Operate.
     fn select_state(&mut self) {
         // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
-        let initialised = self.given.missing() == 0
+        let initialised = self.received.missing() == 0
             && !self.nodes.clearing()
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
         if initialised && !self.powered() && !self.holdable(&self.dynamics) {
             // Sent before the positions were known: it is asked for again.
-            self.given.take_back(Given::MODEL);
+            self.received.withdraw(ReceivedParameters::MODEL);
             return self.enter(if self.errors.any() {
                 ControllerState::Error
             } else {
@@ -296,7 +296,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
-        self.motion.change_law();
+        self.motion.change_mode();
     }
 
     pub(crate) fn set_trajectory(&mut self, trajectory: TrajectoryState) {
@@ -312,12 +312,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         self.motion.latch(&self.nodes, &self.config);
         self.motion.hold(&self.config);
-        self.control(Law::Hold)
+        self.control(ControlMode::Hold)
     }
 
     fn teach(&mut self) -> [f64; JOINTS] {
         self.motion.set = crate::SetPoint::still(*self.nodes.positions());
-        self.control(Law::Teach)
+        self.control(ControlMode::Teach)
     }
 
     /// The control step in Operate: a function of its own, so that its instructions can be counted. On the path they are the
@@ -325,20 +325,20 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     #[inline(never)]
     fn operate(&mut self) -> [f64; JOINTS] {
         self.motion.latch(&self.nodes, &self.config);
-        let law = self.path.law();
+        let mode = self.path.mode();
         self.walk();
-        self.control(law)
+        self.control(mode)
     }
 
     /// The control law; returns the torque to command. Errors of the joints are acted upon, or raised.
-    pub(crate) fn control(&mut self, law: Law) -> [f64; JOINTS] {
+    pub(crate) fn control(&mut self, mode: ControlMode) -> [f64; JOINTS] {
         // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
         self.errors.raise_joints(&self.motion.too_fast(&self.nodes, &self.config));
-        let (mut torque, mut errors) = self.compute(law);
+        let (mut torque, mut errors) = self.compute(mode);
         if errors != [0; JOINTS] {
             if self.gives_way(&errors) {
-                (torque, errors) = self.compute(Law::Hold);
-            } else if self.stops_on_path(law, &errors) {
+                (torque, errors) = self.compute(ControlMode::Hold);
+            } else if self.stops_on_path(mode, &errors) {
                 errors = [0; JOINTS];
             }
             self.errors.raise_joints(&errors);
@@ -347,7 +347,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Torques of the control law, and the joint errors found on the way.
-    fn compute(&mut self, law: Law) -> ([f64; JOINTS], [u16; JOINTS]) {
+    fn compute(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
         let braking = self.brake();
         let parameters = ControlParameters {
             dynamics: &self.dynamics,
@@ -355,7 +355,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             polynomial: &self.polynomial,
             table: self.friction_is_table.then_some(&self.tables),
         };
-        self.motion.control(law, braking, &self.nodes, &self.config, &parameters)
+        self.motion.control(mode, braking, &self.nodes, &self.config, &parameters)
     }
 }
 

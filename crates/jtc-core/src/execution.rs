@@ -2,7 +2,7 @@
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
 use crate::controller::Controller;
-use crate::motion::Law;
+use crate::motion::ControlMode;
 use crate::path::PathClock;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
@@ -11,11 +11,11 @@ use crate::{JOINTS, TrajectoryState, joint_error};
 pub(crate) enum Path {
     /// Waits until every joint is enabled, and for how long it has, ms.
     Waiting { elapsed_ms: u32 },
-    /// On the way from where the arm is held to the first point, or to the one where the path was paused.
-    Gliding { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<TrajectoryState> },
+    /// The approach: from where the arm is held to the first point, or to the one where the path was paused.
+    Approaching { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<TrajectoryState> },
     /// At point 0, which the next tick commands.
     AtStart,
-    /// On the path; `leave` says where to when it stands.
+    /// On the path; `leave`: the state that follows at standstill.
     Running { leave: Option<TrajectoryState> },
 }
 
@@ -23,19 +23,19 @@ impl Path {
     /// Nothing was waited for yet.
     pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
 
-    /// The part of the control law that acts here.
-    pub fn law(&self) -> Law {
+    /// The control mode.
+    pub fn mode(&self) -> ControlMode {
         match self {
-            Self::Waiting { .. } => Law::Hold,
-            Self::Gliding { .. } => Law::Approach,
-            Self::AtStart | Self::Running { .. } => Law::Follow,
+            Self::Waiting { .. } => ControlMode::Hold,
+            Self::Approaching { .. } => ControlMode::Approach,
+            Self::AtStart | Self::Running { .. } => ControlMode::Follow,
         }
     }
 
     /// The state that an accepted Pause or Stop leads to.
     pub fn leave(&self) -> Option<TrajectoryState> {
         match self {
-            Self::Gliding { leave, .. } | Self::Running { leave } => *leave,
+            Self::Approaching { leave, .. } | Self::Running { leave } => *leave,
             Self::Waiting { .. } | Self::AtStart => None,
         }
     }
@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.go_on();
             Path::Running { leave: None }
         } else {
-            Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None }
+            Path::Approaching { from: self.motion.set.position, elapsed_ms: 0.0, leave: None }
         };
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
@@ -108,7 +108,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
             }
             // It comes to rest at point 0 by itself.
-            Path::Gliding { leave, .. } => *leave = Some(to),
+            Path::Approaching { leave, .. } => *leave = Some(to),
             Path::Waiting { .. } | Path::AtStart => self.set_trajectory(to),
         }
     }
@@ -127,21 +127,21 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     }
                 } else if self.near(&self.path_point()) {
                     self.path =
-                        Path::Gliding { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
+                        Path::Approaching { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
                 } else {
                     self.set_trajectory(TrajectoryState::Stop);
                 }
             }
-            Path::Gliding { from, elapsed_ms, leave } => {
+            Path::Approaching { from, elapsed_ms, leave } => {
                 if elapsed_ms == 0.0 {
                     // The arm was held until now, without friction compensation.
-                    self.motion.change_law();
+                    self.motion.change_mode();
                 }
                 let length = f64::from(self.config.ramp_ms.max(1));
                 let elapsed_ms = elapsed_ms + 1.0;
-                self.motion.glide(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
+                self.motion.approach(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
                 if elapsed_ms < length {
-                    self.path = Path::Gliding { from, elapsed_ms, leave };
+                    self.path = Path::Approaching { from, elapsed_ms, leave };
                 } else if let Some(trajectory) = leave {
                     self.set_trajectory(trajectory);
                 } else if self.clock.time == 0.0 {

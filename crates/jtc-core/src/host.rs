@@ -22,9 +22,9 @@ const COPIED_PER_TICK: usize = 64;
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
-/// How far a long frame is executed.
+/// How far a long frame has been executed, a slice in each tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Work {
+pub(crate) enum SliceProgress {
     #[default]
     Begin,
     /// Points checked.
@@ -60,14 +60,14 @@ impl Overtaking {
 enum Served {
     /// With a few instructions: there is time for another.
     Quickly,
-    /// With as much work as a tick should have.
+    /// With the full budget of a tick.
     Fully,
     /// In part; the rest takes more ticks.
     Partly,
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Urgent commands first, then the oldest events of the host link: short ones up to the first that is work, or a slice
+    /// Urgent commands first, then the oldest events of the host link: short ones up to the first long one, or a slice
     /// of it. Returns how many are done.
     pub(crate) fn serve_host(&mut self, inputs: &Inputs<'_>) -> usize {
         for (line, commands) in inputs.urgent.iter().enumerate() {
@@ -117,14 +117,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             command => (self.obey(command), served),
                         };
                         match progress {
-                            Progress::Done => (DataStatus::NoError, served),
+                            SliceOutcome::Done => (DataStatus::NoError, served),
                             // What the state forbids has cost nothing.
-                            Progress::Refused(DataStatus::NotAllowed) => {
+                            SliceOutcome::Refused(DataStatus::NotAllowed) => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }
-                            Progress::Refused(status) => (status, served),
-                            Progress::Working(work) => {
-                                self.work = work;
+                            SliceOutcome::Refused(status) => (status, served),
+                            SliceOutcome::Unfinished(next) => {
+                                self.slice_progress = next;
                                 return Served::Partly;
                             }
                         }
@@ -133,7 +133,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 (Response::good(frame.frame_type, data, frame.bytes.len() as u16), false, served)
             }
         };
-        self.work = Work::Begin;
+        self.slice_progress = SliceProgress::Begin;
         self.records.push(received.line, response, noise);
         served
     }
@@ -169,7 +169,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    fn obey(&mut self, command: Command<'_>) -> Progress {
+    fn obey(&mut self, command: Command<'_>) -> SliceOutcome {
         // Parameters would change the torque under a moving arm.
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);
@@ -179,44 +179,44 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     self.errors.clear_current();
                 }
                 self.nodes.clear(nodes, !self.powered());
-                Progress::Done
+                SliceOutcome::Done
             }
             Command::ClearOccurredErrors => {
                 self.errors.clear_occurred();
-                Progress::Done
+                SliceOutcome::Done
             }
             Command::Trajectory(segment) => self.take_segment(&segment),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
             Command::TeachingModeEnable if self.state == ControllerState::HoldPos => {
                 self.teaching = true;
-                Progress::Done
+                SliceOutcome::Done
             }
-            Command::TeachingModeEnable => Progress::Refused(DataStatus::NotAllowed),
+            Command::TeachingModeEnable => SliceOutcome::Refused(DataStatus::NotAllowed),
             Command::TeachingModeDisable => {
                 self.teaching = false;
-                Progress::Done
+                SliceOutcome::Done
             }
             // J-23: torque would be taken from a moving arm.
             Command::ResetCanDevices { nodes }
                 if nodes & JOINTS_MASK != 0
                     && matches!(self.state, ControllerState::Operate | ControllerState::Teaching) =>
             {
-                Progress::Refused(DataStatus::NotAllowed)
+                SliceOutcome::Refused(DataStatus::NotAllowed)
             }
             Command::ResetCanDevices { nodes } => {
                 self.nodes.reset(nodes);
                 // It is not to start by itself when the gripper is back.
                 self.pump &= nodes & GRIPPER_MASK == 0;
-                Progress::Done
+                SliceOutcome::Done
             }
             Command::GripperControl { pump }
                 if self.config.gripper && (self.state != ControllerState::Error || !pump) =>
             {
                 self.pump = pump;
-                Progress::Done
+                SliceOutcome::Done
             }
-            Command::GripperControl { .. } => Progress::Refused(DataStatus::NotAllowed),
-            _ if !settable => Progress::Refused(DataStatus::NotAllowed),
+            Command::GripperControl { .. } => SliceOutcome::Refused(DataStatus::NotAllowed),
+            _ if !settable => SliceOutcome::Refused(DataStatus::NotAllowed),
             Command::PidParam(floats) => self.take_pid(&floats).into(),
             Command::PidParamUseDefault => self.set_pid(defaults::PID).into(),
             Command::ArmModel(floats) => self.take_model(&floats).into(),
@@ -224,29 +224,29 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Command::FrictionPolynomial(floats) => self.take_polynomial(&floats).into(),
             Command::FrictionPolynomialUseDefault => {
                 self.polynomial = defaults::POLYNOMIAL;
-                self.friction_given(false);
-                Progress::Done
+                self.friction_received(false);
+                SliceOutcome::Done
             }
             Command::FrictionTable(floats) => self.take_table(&floats),
             Command::FrictionTableUseDefault => {
                 self.tables = core::array::from_fn(|j| *defaults::friction_table(j));
-                self.friction_given(true);
-                Progress::Done
+                self.friction_received(true);
+                SliceOutcome::Done
             }
         }
     }
 
     /// J-30, J-36: all points are checked before the first is copied, so that a refused segment changes nothing.
-    fn take_segment(&mut self, segment: &Segment<'_>) -> Progress {
+    fn take_segment(&mut self, segment: &Segment<'_>) -> SliceOutcome {
         if self.state != ControllerState::HoldPos {
             // Also in the middle of a segment: the change of state has cleared the trajectory.
-            return Progress::Refused(DataStatus::NotAllowed);
+            return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        match self.work {
-            Work::PointCopy(from) => self.copy_points(segment, from),
-            Work::PointCheck(from) => self.check_points(segment, from),
+        match self.slice_progress {
+            SliceProgress::PointCopy(from) => self.copy_points(segment, from),
+            SliceProgress::PointCheck(from) => self.check_points(segment, from),
             _ => match self.store.check(segment) {
-                Err(status) => Progress::Refused(status),
+                Err(status) => SliceOutcome::Refused(status),
                 Ok(()) => {
                     self.begin_check(segment);
                     self.check_points(segment, 0)
@@ -266,7 +266,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.violation = None;
     }
 
-    fn check_points(&mut self, segment: &Segment<'_>, from: usize) -> Progress {
+    fn check_points(&mut self, segment: &Segment<'_>, from: usize) -> SliceOutcome {
         let slice = segment.len().div_ceil(CHECK_TICKS).max(CHECKED_PER_TICK);
         for point in segment.points_from(from).take(slice) {
             if let Err(violation) = self.check.take(&point) {
@@ -274,7 +274,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
         }
         if from + slice < segment.len() {
-            return Progress::Working(Work::PointCheck(from + slice));
+            return SliceOutcome::Unfinished(SliceProgress::PointCheck(from + slice));
         }
         if segment.segment + 1 == segment.segments
             && let Err(violation) = self.check.end()
@@ -286,26 +286,26 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.set_trajectory(TrajectoryState::Null);
             self.friction_is_new = false;
         }
-        Progress::Working(Work::PointCopy(0))
+        SliceOutcome::Unfinished(SliceProgress::PointCopy(0))
     }
 
-    fn copy_points(&mut self, segment: &Segment<'_>, from: usize) -> Progress {
+    fn copy_points(&mut self, segment: &Segment<'_>, from: usize) -> SliceOutcome {
         let slice = segment.len().div_ceil(COPY_TICKS).max(COPIED_PER_TICK);
         let to = (from + slice).min(segment.len());
         self.store.copy(segment, from, to);
         if to < segment.len() {
-            return Progress::Working(Work::PointCopy(to));
+            return SliceOutcome::Unfinished(SliceProgress::PointCopy(to));
         }
         self.store.commit(segment, self.check.speeds());
         if self.store.complete() {
             self.set_trajectory(TrajectoryState::Stop);
         }
-        Progress::Done
+        SliceOutcome::Done
     }
 
-    fn refuse_path(&mut self, violation: Violation) -> Progress {
+    fn refuse_path(&mut self, violation: Violation) -> SliceOutcome {
         self.violation = Some(violation);
-        Progress::Refused(DataStatus::IncorrectValue)
+        SliceOutcome::Refused(DataStatus::IncorrectValue)
     }
 
     /// J-34.
@@ -333,8 +333,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// J-36: bearings inside the temperatures of the friction table and, if friction was given since the trajectory was
-    /// loaded, the path inside its velocities. Nothing else that can be given in HoldPos bears on that check.
+    /// J-36: bearings inside the temperatures of the friction table and, if friction was received since the trajectory was
+    /// loaded, the path inside its velocities. No other parameter that is accepted in HoldPos bears on that check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
         if !self.friction_is_table {
             return Ok(());
@@ -351,14 +351,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 }
 
-/// Outcome of a slice of work.
-pub(crate) enum Progress {
+/// Outcome of a slice.
+pub(crate) enum SliceOutcome {
     Done,
     Refused(DataStatus),
-    Working(Work),
+    Unfinished(SliceProgress),
 }
 
-impl From<Result<(), DataStatus>> for Progress {
+impl From<Result<(), DataStatus>> for SliceOutcome {
     fn from(result: Result<(), DataStatus>) -> Self {
         match result {
             Ok(()) => Self::Done,

@@ -4,9 +4,9 @@
 
 mod catch;
 pub mod check;
-mod coast;
 mod config;
 mod controller;
+mod deceleration;
 mod defaults;
 mod errors;
 mod execution;
@@ -23,8 +23,8 @@ mod parameters;
 mod path;
 mod pid;
 mod reaction;
-mod records;
 mod report;
+mod response_queue;
 mod store;
 mod teach;
 mod telemetry;
@@ -36,7 +36,7 @@ pub use interpolation::{SetPoint, interpolate, position_speed};
 pub use io::{BusState, HostEvent, Inputs, Outputs};
 pub use jtc_wire::{ControllerState, TrajectoryState};
 pub use parameters::{OutOfBounds, ParameterBounds};
-pub use records::{HOST_LINES, RECORDS_MAX};
+pub use response_queue::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};
 
 /// Joints of the arm.

@@ -1,4 +1,4 @@
-//! The motion of the arm: the set values of each state, and what the control law remembers (section 6).
+//! The motion of the arm: the set values of each state, and the state of the control law (section 6).
 mod law;
 mod ramp;
 mod transfer;
@@ -7,21 +7,21 @@ use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
 use crate::catch::Catch;
-use crate::coast::{Coast, moves};
 use crate::config::{Config, PidGains};
+use crate::deceleration::{Deceleration, moves};
 use crate::interpolation::SetPoint;
 use crate::limits::Saturation;
 use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
 use crate::pid::Pid;
 use crate::teach::Payload;
-pub(crate) use law::{ControlParameters, JointTorque, Law};
+pub(crate) use law::{ControlMode, ControlParameters, JointTorque};
 use transfer::Transfer;
 
 /// Length of a tick, s.
 const DT: f64 = 0.001;
 
-/// What the control law remembers.
+/// The state of the control law.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Motion {
     /// Set values.
@@ -37,9 +37,9 @@ pub(crate) struct Motion {
     over_speed: OverSpeed,
     payload: Payload,
     transfer: Transfer,
-    /// Joints on their way to rest.
-    coast: [Option<Coast>; JOINTS],
-    /// The arm gives way: the law adds only so much to the torque of the model (J-66).
+    /// Joints that decelerate to rest.
+    deceleration: [Option<Deceleration>; JOINTS],
+    /// The arm gives way: the control law adds only so much to the torque of the model (J-66).
     yielding: bool,
     /// Mass matrix with rotors at the start of a ramp of path time.
     inertia: [[f64; JOINTS]; JOINTS],
@@ -52,17 +52,17 @@ pub(crate) fn smooth(u: f64) -> f64 {
 }
 
 impl Motion {
-    /// Limp: nothing is held, no torque is remembered.
+    /// Torque off: nothing is held, no torque is remembered.
     pub fn release(&mut self, nodes: &Nodes) {
         *self = Self { set: SetPoint::still(*nodes.positions()), ..Self::default() };
     }
 
-    /// The state changes among HoldPos, Operate and Teaching: continue without a step but that of the model (J-44).
-    pub fn change_law(&mut self) {
-        self.transfer.change_law();
+    /// The control mode changes among HoldPos, Operate and Teaching: bumpless transfer, with no step but that of the model (J-44).
+    pub fn change_mode(&mut self) {
+        self.transfer.change_mode();
     }
 
-    /// The model changes under the holding arm: continue without any step.
+    /// The model changes under the holding arm: bumpless transfer without any step.
     pub fn change_model(&mut self) {
         self.transfer.change_model();
     }
@@ -74,8 +74,9 @@ impl Motion {
         let moving = velocity.iter().any(|&v| moves(v));
         for j in 0..JOINTS {
             // Joints that are enabled later begin on their own.
-            let coasts = moving && self.holding[j];
-            self.coast[j] = coasts.then_some(Coast::led(from[j], velocity[j], config, &config.joints[j]));
+            let decelerates = moving && self.holding[j];
+            self.deceleration[j] =
+                decelerates.then_some(Deceleration::led(from[j], velocity[j], config, &config.joints[j]));
         }
     }
 
@@ -85,13 +86,13 @@ impl Motion {
         for pid in &mut self.pid {
             pid.reset(0.0);
         }
-        self.coast = [None; JOINTS];
+        self.deceleration = [None; JOINTS];
     }
 
     /// Hold where the arm is, and give way to what moves it from there (J-66).
     pub fn give_way(&mut self, nodes: &Nodes, config: &Config) {
         self.hold_measured(nodes, config);
-        // What the law had added is what it is to let go of.
+        // The torque that the control law had added is the torque that it has to let go of.
         self.transfer.let_go();
         self.yielding = true;
     }
@@ -119,7 +120,7 @@ impl Motion {
 
     /// Every joint is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
-        self.coast.iter().all(Option::is_none)
+        self.deceleration.iter().all(Option::is_none)
             && self.holding.iter().all(|&h| h)
             && !self.catch.iter().any(Catch::busy)
     }
@@ -142,8 +143,12 @@ impl Motion {
                 self.pid[j].reset(0.0);
                 self.catch[j] = if just_enabled[j] { Catch::begin(config) } else { Catch::default() };
                 let falls = just_enabled[j] && moves(velocity[j]);
-                self.coast[j] =
-                    falls.then_some(Coast::falling(measured[j], velocity[j], config, &config.joints[j]));
+                self.deceleration[j] = falls.then_some(Deceleration::falling(
+                    measured[j],
+                    velocity[j],
+                    config,
+                    &config.joints[j],
+                ));
             } else if another {
                 // Its load moves when that of another joint does.
                 self.catch[j] = Catch::begin(config);
@@ -157,11 +162,11 @@ impl Motion {
     pub fn hold(&mut self, config: &Config) {
         (self.set.velocity, self.set.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
         for j in 0..JOINTS {
-            let Some(coast) = &mut self.coast[j] else { continue };
-            let (position, velocity, rests) = coast.step(&config.joints[j]);
+            let Some(deceleration) = &mut self.deceleration[j] else { continue };
+            let (position, velocity, rests) = deceleration.step(&config.joints[j]);
             (self.set.position[j], self.set.velocity[j]) = (position, velocity);
             if rests {
-                self.coast[j] = None;
+                self.deceleration[j] = None;
             }
         }
     }
@@ -179,13 +184,14 @@ impl Motion {
         let step = self.catch[j].sag(excess, parameters.pid[j].kp, error, &config.joints[j]);
         self.set.position[j] += step;
         self.pid[j].shift(step);
-        if let Some(coast) = &mut self.coast[j] {
-            coast.shift(step);
+        if let Some(deceleration) = &mut self.deceleration[j] {
+            deceleration.shift(step);
         }
     }
 
-    /// Set values on the way from a held position to the first point, at `u` (0..1) of `length_ms`.
-    pub fn glide(&mut self, from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) {
+    /// Set values of the approach from a held position to the first point, at `u` (0..1) of `length_ms`: a minimum-jerk
+    /// (fifth-order) polynomial.
+    pub fn approach(&mut self, from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) {
         let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
         let speed = 30.0 * u * u * (1.0 - u) * (1.0 - u) / (length_ms * DT);
         for j in 0..JOINTS {
@@ -219,9 +225,9 @@ impl Motion {
     /// Teaching ends: hold where the arm is, and let the integral take over what teaching carried.
     pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         self.hold_measured(nodes, config);
-        for (catch, coast) in self.catch.iter_mut().zip(&self.coast) {
-            // What a hand has led is stopped as a load is.
-            *catch = if coast.is_some() { Catch::begin(config) } else { *catch };
+        for (catch, deceleration) in self.catch.iter_mut().zip(&self.deceleration) {
+            // A joint that a hand has led is stopped like one with a falling load.
+            *catch = if deceleration.is_some() { Catch::begin(config) } else { *catch };
         }
         for ((pid, gains), torque) in self.pid.iter_mut().zip(gains).zip(&self.torque) {
             pid.take_over(gains, torque.payload);

@@ -1,12 +1,12 @@
-//! The parameters that the host gives: gains, model and friction, taken whole or not at all (J-06).
+//! The parameters received from the host: gains, model and friction, taken whole or not at all (J-06).
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 use jtc_wire::{DataStatus, Floats, RawPoint};
 
 use crate::JOINTS;
 use crate::config::{JointConfig, PidGains, TableOf};
-use crate::controller::{Controller, Given};
+use crate::controller::{Controller, ReceivedParameters};
 use crate::friction;
-use crate::host::{Progress, Work};
+use crate::host::{SliceOutcome, SliceProgress};
 
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
@@ -197,8 +197,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             bounds.check_gains(gains, joint)?;
         }
         self.pid = gains;
-        self.given.set(Given::PID);
-        self.motion.change_law();
+        self.received.set(ReceivedParameters::PID);
+        self.motion.change_mode();
         Ok(())
     }
 
@@ -223,7 +223,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Err(DataStatus::IncorrectValue);
         }
         self.dynamics = dynamics;
-        self.given.set(Given::MODEL);
+        self.received.set(ReceivedParameters::MODEL);
         self.motion.change_model();
         Ok(())
     }
@@ -249,42 +249,42 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.config.parameter_bounds.check_polynomial(coefficients, joint)?;
         }
         self.polynomial = polynomial;
-        self.friction_given(false);
+        self.friction_received(false);
         Ok(())
     }
 
     /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
-    pub(crate) fn take_table(&mut self, floats: &Floats<'_>) -> Progress {
-        match self.work {
-            Work::TableCopy(j) => {
+    pub(crate) fn take_table(&mut self, floats: &Floats<'_>) -> SliceOutcome {
+        match self.slice_progress {
+            SliceProgress::TableCopy(j) => {
                 if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), read_table(floats, j)) {
                     *slot = table;
                 }
                 if j + 1 < JOINTS {
-                    return Progress::Working(Work::TableCopy(j + 1));
+                    return SliceOutcome::Unfinished(SliceProgress::TableCopy(j + 1));
                 }
-                self.friction_given(true);
-                Progress::Done
+                self.friction_received(true);
+                SliceOutcome::Done
             }
-            work => {
-                let j = if let Work::TableCheck(j) = work { j } else { 0 };
+            progress => {
+                let j = if let SliceProgress::TableCheck(j) = progress { j } else { 0 };
                 let table = read_table(floats, j).and_then(|table| {
                     let joint = self.config.joints.get(j).ok_or(DataStatus::IncorrectValue)?;
                     self.config.parameter_bounds.check_table(&table, joint).map_err(DataStatus::from)
                 });
                 match table {
-                    Err(status) => Progress::Refused(status),
-                    Ok(()) if j + 1 < JOINTS => Progress::Working(Work::TableCheck(j + 1)),
-                    Ok(()) => Progress::Working(Work::TableCopy(0)),
+                    Err(status) => SliceOutcome::Refused(status),
+                    Ok(()) if j + 1 < JOINTS => SliceOutcome::Unfinished(SliceProgress::TableCheck(j + 1)),
+                    Ok(()) => SliceOutcome::Unfinished(SliceProgress::TableCopy(0)),
                 }
             }
         }
     }
 
-    pub(crate) fn friction_given(&mut self, table: bool) {
+    pub(crate) fn friction_received(&mut self, table: bool) {
         self.friction_is_table = table;
         self.friction_is_new = true;
-        self.given.set(Given::FRICTION);
+        self.received.set(ReceivedParameters::FRICTION);
     }
 }
 

@@ -1,4 +1,5 @@
-//! Time along the path: pause, stop and resume without leaving it (J-33).
+//! Time along the path: pause, stop and resume without leaving it (J-33). A trajectory is a path with a parameterisation by time
+//! (Bobrow, Dubowsky and Gibson 1985; Pham and Pham 2018), of which only the rate changes here.
 //!
 //! The *rate* is path seconds per second; its change is the *slope* (1/s). Resuming takes as long as the limits ask. A pause or
 //! a stop comes to its end within a set time: first along an S and with a margin to the limits; when that would take too long,

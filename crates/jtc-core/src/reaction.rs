@@ -7,7 +7,7 @@ use jtc_wire::{ExecCommand, RawPoint};
 
 use crate::controller::Controller;
 use crate::execution::Path;
-use crate::motion::Law;
+use crate::motion::ControlMode;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
 /// Errors that stop the arm on its path.
@@ -37,9 +37,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// The arm stops on its path because of these errors, or is about to. False when it is on none, or when the time for it is
     /// over.
-    pub(crate) fn stops_on_path(&mut self, law: Law, errors: &[u16; JOINTS]) -> bool {
+    pub(crate) fn stops_on_path(&mut self, mode: ControlMode, errors: &[u16; JOINTS]) -> bool {
         let Path::Running { leave } = self.path else { return false };
-        if law != Law::Follow || all(errors) & !STOP != 0 {
+        if mode != ControlMode::Follow || all(errors) & !STOP != 0 {
             return false;
         }
         if leave.is_none() {
@@ -77,15 +77,15 @@ mod tests {
     fn j66_a_limit_of_the_path_found_in_motion_pauses_on_the_path() {
         for bit in [joint_error::VELOCITY, joint_error::ACCELERATION, joint_error::FRICTION_TABLE] {
             let (mut controller, errors) = (running(), [0, bit, 0, 0, 0, 0]);
-            assert!(controller.stops_on_path(Law::Follow, &errors));
+            assert!(controller.stops_on_path(ControlMode::Follow, &errors));
             assert_eq!(controller.path, Path::Running { leave: Some(TrajectoryState::Pause) });
             assert_eq!((controller.errors.word(), controller.errors.joint(1)), (0, (0, bit)));
             // Still outside while it brakes; when the time for that is over, it is an error.
             controller.braking_ms = Some(700);
-            assert!(controller.stops_on_path(Law::Follow, &errors));
+            assert!(controller.stops_on_path(ControlMode::Follow, &errors));
             assert_eq!(controller.braking_ms, Some(700));
             controller.braking_ms = None;
-            assert!(!controller.stops_on_path(Law::Follow, &errors));
+            assert!(!controller.stops_on_path(ControlMode::Follow, &errors));
         }
     }
 
@@ -96,7 +96,7 @@ mod tests {
             controller.motion.hold_for_test();
             controller.motion.set.velocity[1] = velocity;
             controller.motion.set.position[1] = controller.nodes.positions()[1] + offset;
-            controller.control(Law::Follow);
+            controller.control(ControlMode::Follow);
             (controller.path, controller.trajectory, controller.errors.word(), controller.errors.joint(1))
         };
         let limits = Config::avena().joints[1];
@@ -110,11 +110,13 @@ mod tests {
     #[test]
     fn j66_other_errors_and_other_states_do_not_stop_on_the_path() {
         for bit in [joint_error::TORQUE, joint_error::POSITION_ERROR, joint_error::POSITION] {
-            assert!(!running().stops_on_path(Law::Follow, &[0, bit | joint_error::VELOCITY, 0, 0, 0, 0]));
+            assert!(
+                !running().stops_on_path(ControlMode::Follow, &[0, bit | joint_error::VELOCITY, 0, 0, 0, 0])
+            );
         }
         let mut held = Bench::new(Config::avena(), [RawPoint::default(); 4]);
-        assert!(!held.stops_on_path(Law::Hold, &[joint_error::VELOCITY; JOINTS]));
-        assert!(!running().stops_on_path(Law::Hold, &[joint_error::VELOCITY; JOINTS]));
+        assert!(!held.stops_on_path(ControlMode::Hold, &[joint_error::VELOCITY; JOINTS]));
+        assert!(!running().stops_on_path(ControlMode::Hold, &[joint_error::VELOCITY; JOINTS]));
     }
 
     #[test]
@@ -137,7 +139,10 @@ mod tests {
             let mut controller = running();
             let stop = Path::Running { leave: Some(TrajectoryState::Stop) };
             (controller.path, controller.braking_ms) = (stop, braking_ms);
-            assert_eq!(controller.stops_on_path(Law::Follow, &[0, joint_error::VELOCITY, 0, 0, 0, 0]), stops);
+            assert_eq!(
+                controller.stops_on_path(ControlMode::Follow, &[0, joint_error::VELOCITY, 0, 0, 0, 0]),
+                stops
+            );
             assert_eq!((controller.path, controller.braking_ms), (stop, braking_ms));
             assert_eq!(controller.errors.occurred(), occurred, "{braking_ms:?}");
         }

@@ -75,7 +75,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             state: self.state.into(),
             errors: self.errors.word(),
             occurred: self.errors.occurred(),
-            jtc_init: self.given.missing(),
+            jtc_init: self.received.missing(),
             node_init: self.nodes.init_word(&self.config),
             trajectory: self.trajectory.into(),
             point: self.telemetry.point,

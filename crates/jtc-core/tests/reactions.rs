@@ -56,7 +56,7 @@ fn j66_a_position_error_lets_the_arm_give_way_and_the_path_can_go_on() {
     rig.run(2);
     let t = *rig.controller.telemetry();
     assert_eq!((t.state, t.trajectory, t.errors), (ControllerState::HoldPos, TrajectoryState::Pause, 0));
-    // Held where it is measured, to within what it went on coasting.
+    // Held where it is measured, to within the way of its deceleration.
     assert!((t.joints[3].set_position - rig.nodes[3].report.position).abs() < 0.04, "{:?}", t.joints[3]);
     assert!(t.joints[3].torque_i.abs() < 2.0, "the integral is cleared: {:?}", t.joints[3]);
     assert!(rig.last.safety_output, "no error, so none is shown");
@@ -67,7 +67,7 @@ fn j66_a_position_error_lets_the_arm_give_way_and_the_path_can_go_on() {
     assert_eq!(status.occurred & jtc_core::error::EMERGENCY_OUTPUT, 0);
     rig.run(400);
 
-    // Beside the paused point it does not go on; back there it does, and glides onto the path.
+    // Beside the paused point it does not go on; back there it does, and approaches the path.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     push(&mut rig, 0.012);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);

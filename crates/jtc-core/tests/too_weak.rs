@@ -36,7 +36,7 @@ fn j43_an_arm_that_is_led_to_where_it_cannot_be_held_is_an_error_of_that_joint()
     }
     assert_eq!(last, ControllerState::Error);
     assert_eq!(rig.status().joints[1].internal, joint_error::TORQUE);
-    // It is limp now: its model is asked for again, and does not go while the error is latched.
+    // Its torque is off now: its model is asked for again, and does not go while the error is latched.
     assert_eq!(rig.status().jtc_init, 0b100);
     rig.clear(true, 0x7F);
     rig.run(50);

@@ -50,11 +50,11 @@ impl ModelError {
     }
 }
 
-/// What carries the arm while drives are not enabled.
+/// What supports the arm while drives are not enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {
-    /// Nothing: a joint without torque is limp and the arm falls.
-    Limp,
+    /// Nothing: a joint without torque falls.
+    None,
     /// A stand, until every joint has been enabled once; afterwards nothing.
     Stand,
     /// Holding brakes, open only while their drive is enabled. The known drives have none; with brakes the
@@ -73,7 +73,7 @@ pub struct SimConfig {
     pub model_error: ModelError,
     /// Pose at the start, rad.
     pub start: JointVec,
-    /// What carries the arm while drives are not enabled.
+    /// What supports the arm while drives are not enabled.
     pub support: Support,
     /// Habits of the drives.
     pub drives: [DriveConfig; JOINTS],

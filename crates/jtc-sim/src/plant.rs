@@ -120,7 +120,7 @@ impl Plant {
         for (j, drive) in self.nodes.drives.iter().enumerate() {
             self.truth.torque[j] = drive.torque();
             self.arm.braked[j] = match self.support {
-                Support::Limp => false,
+                Support::None => false,
                 Support::Stand => self.stand,
                 Support::Brakes => !enabled(drive),
             };

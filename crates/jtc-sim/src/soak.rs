@@ -101,7 +101,7 @@ impl Soak {
         let mut config = SimConfig { seed, log_entries: 200, ..SimConfig::default() };
         config.start = core::array::from_fn(|_| 1.6 * (rng.f64() - 0.5));
         config.baud = [Some(115_200), Some(921_600), Some(3_000_000), None][rng.usize(0..4)];
-        config.support = if rng.u8(0..8) == 0 { Support::Limp } else { Support::Brakes };
+        config.support = if rng.u8(0..8) == 0 { Support::None } else { Support::Brakes };
         config.gripper = true;
         // Alignment times that leave time for other things.
         let quick = rng.bool();

@@ -59,7 +59,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     let name = pty.name().display().to_string();
     let (brakes, words) = match support {
         Support::Brakes => (true, BRAKES),
-        Support::Limp | Support::Stand => (false, NO_BRAKES),
+        Support::None | Support::Stand => (false, NO_BRAKES),
     };
     out.note(words);
     let ready = || {

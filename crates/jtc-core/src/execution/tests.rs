@@ -127,7 +127,7 @@ fn j34_an_arm_exactly_at_the_tolerance_is_at_the_point() {
 fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     let leave = Some(TrajectoryState::Stop);
     assert_eq!(Path::Running { leave }.leave(), leave);
-    assert_eq!(Path::Gliding { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
+    assert_eq!(Path::Approaching { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
     assert_eq!((Path::BEGIN.leave(), Path::AtStart.leave()), (None, None));
 }
 
@@ -173,7 +173,7 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     let length = f64::from(Config::avena().ramp_ms);
     for (before, arrives) in [(0.0, false), (length - 2.0, false), (length - 1.0, true)] {
         let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
-        controller.path = Path::Gliding { from: [0.0; JOINTS], elapsed_ms: before, leave: None };
+        controller.path = Path::Approaching { from: [0.0; JOINTS], elapsed_ms: before, leave: None };
         controller.walk();
         assert_eq!(controller.path == Path::AtStart, arrives, "{before} ms");
     }

@@ -83,7 +83,7 @@ fn j23_a_reset_switches_the_pump_off_with_its_gripper_only() {
     for (nodes, pump) in [(0x00, true), (0x3F, true), (0x40, false), (0x7F, false)] {
         let mut controller = holding();
         controller.pump = true;
-        assert!(matches!(controller.obey(Command::ResetCanDevices { nodes }), Progress::Done));
+        assert!(matches!(controller.obey(Command::ResetCanDevices { nodes }), SliceOutcome::Done));
         assert_eq!(controller.pump, pump, "{nodes:#x}");
     }
 }
@@ -102,7 +102,7 @@ fn j23_a_pump_is_switched_where_there_is_a_gripper_and_never_on_in_error() {
         let mut controller = holding();
         (controller.config.gripper, controller.state, controller.pump) = (gripper, state, !pump);
         let progress = controller.obey(Command::GripperControl { pump });
-        assert_eq!(matches!(progress, Progress::Done), done, "{gripper} {state:?} {pump}");
+        assert_eq!(matches!(progress, SliceOutcome::Done), done, "{gripper} {state:?} {pump}");
         assert_eq!(controller.pump == pump, done, "{gripper} {state:?} {pump}");
     }
 }
@@ -118,13 +118,13 @@ fn body(segment: u8, points: usize) -> Vec<u8> {
 fn load(controller: &mut Bench, segment: u8, points: usize) -> usize {
     let body = body(segment, points);
     let (segment, mut checks) = (Segment::parse(&body).expect("a segment"), 0);
-    controller.work = Work::Begin;
+    controller.slice_progress = SliceProgress::Begin;
     loop {
-        checks += usize::from(!matches!(controller.work, Work::PointCopy(_)));
+        checks += usize::from(!matches!(controller.slice_progress, SliceProgress::PointCopy(_)));
         match controller.take_segment(&segment) {
-            Progress::Working(work) => controller.work = work,
-            Progress::Done => return checks,
-            Progress::Refused(status) => panic!("{status:?}"),
+            SliceOutcome::Unfinished(next) => controller.slice_progress = next,
+            SliceOutcome::Done => return checks,
+            SliceOutcome::Refused(status) => panic!("{status:?}"),
         }
     }
 }

@@ -16,27 +16,28 @@ const UNKNOWN_ROTOR: f64 = 0.7;
 /// Speed above which torque at its limit that drives the joint on catches nothing, rad/s.
 const DRIVEN: f64 = 0.05;
 
-/// Which parts of the control law act.
+/// Which parts of the control law act: the control mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Law {
+pub(crate) enum ControlMode {
     /// Gravity and PID.
     Hold,
-    /// Everything, with commanded velocity and acceleration.
+    /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration.
     Follow,
-    /// The same on the way to the path. Limits of the path do not bear on it: it begins where the arm was found.
+    /// The same while the arm approaches the path. The limits of the path do not apply: the approach begins at the measured
+    /// position.
     Approach,
     /// Gravity and a brake above the speed limit.
     Teach,
 }
 
-impl Law {
-    /// Commanded velocity and acceleration are part of it.
+impl ControlMode {
+    /// The commanded velocity and acceleration act.
     fn moves(self) -> bool {
         matches!(self, Self::Follow | Self::Approach)
     }
 }
 
-/// Parameters that the law uses.
+/// Parameters of the control law: model, gains and friction.
 pub(crate) struct ControlParameters<'a> {
     pub dynamics: &'a Dynamics,
     pub pid: &'a [PidGains; JOINTS],
@@ -74,17 +75,17 @@ impl Motion {
     /// there is, so that what this does to the torque, and on the path to position error and acceleration, is none (J-33).
     pub fn control(
         &mut self,
-        law: Law,
+        mode: ControlMode,
         braking: bool,
         nodes: &Nodes,
         config: &Config,
         parameters: &ControlParameters<'_>,
     ) -> ([f64; JOINTS], [u16; JOINTS]) {
-        let missing = self.compute(law, nodes, config, parameters);
+        let missing = self.compute(mode, nodes, config, parameters);
         if self.yielding {
             self.soften(config);
         }
-        let (torque, mut errors) = self.limit(law, braking, nodes, config, parameters);
+        let (torque, mut errors) = self.limit(mode, braking, nodes, config, parameters);
         for (j, error) in errors.iter_mut().enumerate() {
             if nodes.node(j).enabled() {
                 *error |= missing[j];
@@ -96,7 +97,7 @@ impl Motion {
     /// Computes the torque of this tick into `self.torque`; returns joint errors found on the way (friction table).
     fn compute(
         &mut self,
-        law: Law,
+        mode: ControlMode,
         nodes: &Nodes,
         config: &Config,
         parameters: &ControlParameters<'_>,
@@ -107,9 +108,9 @@ impl Motion {
         let v = nodes.velocities();
         // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere.
         let zero = [0.0; JOINTS];
-        let (qd, qdd) = if law.moves() { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
+        let (qd, qdd) = if mode.moves() { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
         let model = parameters.dynamics.inverse(q, &qd, &qdd);
-        let payload = if law == Law::Teach {
+        let payload = if mode == ControlMode::Teach {
             self.payload.torque(parameters.dynamics, q, v, config)
         } else {
             [0.0; JOINTS]
@@ -121,14 +122,14 @@ impl Motion {
                 payload: payload[j],
                 ..JointTorque::default()
             };
-            if law != Law::Teach {
+            if mode != ControlMode::Teach {
                 let error = self.set.position[j] - q[j];
                 let at_rest = self.set.velocity[j] == 0.0 && self.set.acceleration[j] == 0.0;
                 let encoder_step = at_rest.then_some(config.encoder_step);
                 let saturated = self.saturation[j].saturated;
                 torque.pid = self.pid[j].step(&parameters.pid[j], error, saturated, encoder_step);
             }
-            if law.moves() {
+            if mode.moves() {
                 let t = friction::celsius(nodes.node(j).report.temperature);
                 torque.friction = match parameters.table {
                     None => {
@@ -137,7 +138,7 @@ impl Motion {
                     Some(tables) => {
                         let (slowest, fastest) = friction::velocities(&tables[j]);
                         let nearest = qd[j].max(slowest).min(fastest);
-                        let v = if law == Law::Approach { nearest } else { qd[j] };
+                        let v = if mode == ControlMode::Approach { nearest } else { qd[j] };
                         friction::table(&tables[j], v, t).unwrap_or_else(|| {
                             errors[j] |= joint_error::FRICTION_TABLE;
                             0.0
@@ -148,12 +149,12 @@ impl Motion {
             self.torque[j] = torque;
         }
         self.transfer.blend(before, &mut self.torque, nodes, config);
-        if law == Law::Hold && !self.yielding && self.all_holding() {
+        if mode == ControlMode::Hold && !self.yielding && self.all_holding() {
             self.payload.observe(&self.torque.map(|t| t.correction()));
         } else {
             self.payload.forget();
         }
-        if law == Law::Teach {
+        if mode == ControlMode::Teach {
             self.brake(nodes, config, parameters);
         }
         errors
@@ -178,7 +179,7 @@ impl Motion {
         }
     }
 
-    /// Bounds what the law adds to the torque of the model (J-66).
+    /// Bounds what the control law adds to the torque of the model (J-66).
     fn soften(&mut self, config: &Config) {
         for (torque, joint) in self.torque.iter_mut().zip(&config.joints) {
             let most = config.yield_torque_share * joint.torque_max;
@@ -190,7 +191,7 @@ impl Motion {
     /// The torques to command and the joint errors found, both per joint (J-43).
     fn limit(
         &mut self,
-        law: Law,
+        mode: ControlMode,
         braking: bool,
         nodes: &Nodes,
         config: &Config,
@@ -198,25 +199,26 @@ impl Motion {
     ) -> ([f64; JOINTS], [u16; JOINTS]) {
         let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
         // Only while path time runs: an arm that is pushed away from where the path stands is not to be fought (J-66).
-        let on_path = braking && law == Law::Follow;
+        let on_path = braking && mode == ControlMode::Follow;
         let excused = if on_path { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
         for j in 0..JOINTS {
             let limits = &config.joints[j];
             let computed = self.torque[j].sum();
-            let catching = self.catch[j].step(nodes.velocities()[j]) && law == Law::Hold;
+            let catching = self.catch[j].step(nodes.velocities()[j]) && mode == ControlMode::Hold;
             // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
             let driven = computed.signum() * nodes.velocities()[j] > DRIVEN;
-            let stopping = (catching || self.coast[j].is_some()) && !driven;
+            let stopping = (catching || self.deceleration[j].is_some()) && !driven;
             let (limited, torque_error) =
                 self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || stopping);
             let joint = (self.set.position[j], self.set.velocity[j], self.set.acceleration[j]);
-            let set_error = limits::check_set(joint, nodes.positions()[j], limits, law == Law::Follow);
+            let set_error =
+                limits::check_set(joint, nodes.positions()[j], limits, mode == ControlMode::Follow);
             torque[j] = limited;
             if catching && self.saturation[j].saturated {
                 self.sag(j, computed - limited, nodes, config, parameters);
             }
-            errors[j] =
-                torque_error | if law != Law::Teach && self.holding[j] { set_error & !excused } else { 0 };
+            errors[j] = torque_error
+                | if mode != ControlMode::Teach && self.holding[j] { set_error & !excused } else { 0 };
         }
         (torque, errors)
     }

@@ -3,8 +3,8 @@ use jtc_dynamics::Dynamics;
 
 use super::Motion;
 use crate::JOINTS;
-use crate::coast::moves;
 use crate::config::Config;
+use crate::deceleration::moves;
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
 use crate::path::{Bounds, SlopeBounds};

@@ -6,7 +6,7 @@ fn j34_on_the_approach_the_velocity_is_the_derivative_of_the_position() {
     let (from, to) = ([0.1, -0.2, 0.3, 0.0, 1.0, -1.0], [0.13, -0.2, 0.28, 0.05, 1.0, -0.96]);
     let at = |ms: f64| {
         let mut motion = Motion::default();
-        motion.glide(&from, &to, ms / 200.0, 200.0);
+        motion.approach(&from, &to, ms / 200.0, 200.0);
         motion.set
     };
     for ms in 1..200 {
@@ -61,13 +61,13 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     assert!(motion.all_holding());
     let config = Config::avena();
     for j in 0..JOINTS {
-        let mut coasts = motion.clone();
-        coasts.coast[j] = Some(Coast::led(0.0, 0.3, &config, &config.joints[j]));
+        let mut decelerates = motion.clone();
+        decelerates.deceleration[j] = Some(Deceleration::led(0.0, 0.3, &config, &config.joints[j]));
         let mut catches = motion.clone();
         catches.catch[j] = Catch::begin(&config);
-        let mut limp = motion.clone();
-        limp.holding[j] = false;
-        assert!([coasts, catches, limp].iter().all(|motion| !motion.all_holding()), "joint {}", j + 1);
+        let mut off = motion.clone();
+        off.holding[j] = false;
+        assert!([decelerates, catches, off].iter().all(|motion| !motion.all_holding()), "joint {}", j + 1);
     }
 }
 
@@ -92,14 +92,14 @@ fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
 
 /// Joint 4 is found at this velocity (rad/s), enabled or not, by an arm that holds the others.
 fn latched(held: bool, enabled: bool, velocity: f64) -> Motion {
-    let (config, at, limp) = (Config::avena(), [0.3; JOINTS], 3);
+    let (config, at, off) = (Config::avena(), [0.3; JOINTS], 3);
     let mut velocities = [0.0; JOINTS];
-    velocities[limp] = velocity;
+    velocities[off] = velocity;
     let nodes = Nodes::enabled_at(at, velocities);
-    let nodes = if enabled { nodes } else { nodes.with_limp(limp) };
+    let nodes = if enabled { nodes } else { nodes.with_torque_off(off) };
     let mut motion = Motion { set: SetPoint::still([0.1; JOINTS]), ..Motion::default() };
     motion.hold_for_test();
-    motion.holding[limp] = held;
+    motion.holding[off] = held;
     motion.latch(&nodes, &config);
     motion
 }
@@ -123,7 +123,7 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
         assert_eq!(motion.set.position, position, "{what:?}");
         assert_eq!(motion.catch.map(|catch| catch.busy()), [catches; JOINTS], "{what:?}");
         assert_eq!(
-            core::array::from_fn::<bool, JOINTS, _>(|j| motion.coast[j].is_some()),
+            core::array::from_fn::<bool, JOINTS, _>(|j| motion.deceleration[j].is_some()),
             core::array::from_fn(|j| falls && j == 3),
             "{what:?}"
         );
@@ -133,14 +133,14 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
 
 #[test]
 fn j16_j25_what_moves_and_was_held_comes_to_rest() {
-    for (velocity, coasts) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
+    for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
         // One that moves is enough for all.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
         let mut motion = Motion { holding: [true, true, true, false, true, true], ..Motion::default() };
         motion.hold_measured(&nodes, &Config::avena());
         assert_eq!(motion.set, SetPoint::still([0.3; JOINTS]));
-        let found: [bool; JOINTS] = core::array::from_fn(|j| motion.coast[j].is_some());
-        assert_eq!(found, core::array::from_fn(|j| coasts && j != 3), "{velocity}");
+        let found: [bool; JOINTS] = core::array::from_fn(|j| motion.deceleration[j].is_some());
+        assert_eq!(found, core::array::from_fn(|j| decelerates && j != 3), "{velocity}");
     }
 }
 

@@ -39,8 +39,8 @@ pub(super) struct Transfer {
 }
 
 impl Transfer {
-    /// The state changes: no step but that of the model.
-    pub fn change_law(&mut self) {
+    /// The control mode changes: no step but that of the model.
+    pub fn change_mode(&mut self) {
         self.next = Some(Continued::Correction);
     }
 
@@ -111,14 +111,14 @@ mod tests {
     fn j44_j66_an_arm_that_gives_way_continues_nothing_of_its_torque() {
         for lets_go in [false, true] {
             let mut transfer = Transfer::default();
-            transfer.change_law();
+            transfer.change_mode();
             if lets_go {
                 transfer.let_go();
             }
             assert_eq!(blended(&mut transfer, 5.0), [if lets_go { 0.0 } else { 5.0 }; JOINTS]);
             // Nor of a step that is being blended out.
             let mut transfer = Transfer::default();
-            transfer.change_law();
+            transfer.change_mode();
             assert_eq!(blended(&mut transfer, 5.0), [5.0; JOINTS]);
             if lets_go {
                 transfer.let_go();

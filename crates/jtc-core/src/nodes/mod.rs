@@ -92,7 +92,7 @@ impl Nodes {
 
     /// The same, but the joint with this index is ready only.
     #[cfg(test)]
-    pub fn with_limp(mut self, joint: usize) -> Self {
+    pub fn with_torque_off(mut self, joint: usize) -> Self {
         self.nodes[joint].report.state = NodeState::READY;
         self
     }
@@ -373,12 +373,12 @@ impl Nodes {
     }
 
     /// ClearCurrentErrors for the nodes in `mask`: those that have something to clear are commanded to Init until they follow.
-    /// What has merely occurred is cleared only while the arm is `limp`: it is no reason to drop it.
-    pub fn clear(&mut self, mask: u8, limp: bool) {
+    /// An error that has merely occurred is cleared only while the torque is off: it is no reason to drop the arm.
+    pub fn clear(&mut self, mask: u8, torque_off: bool) {
         let present = self.present();
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
             let joint = n < JOINTS;
-            let to_clear = node.faulty() || (limp && joint && node.report.mc_occurred != 0);
+            let to_clear = node.faulty() || (torque_off && joint && node.report.mc_occurred != 0);
             node.clear |= mask & (1 << n) != 0 && to_clear;
         }
     }

@@ -4,7 +4,7 @@ use jtc_wire::UrgentCommands;
 
 use super::*;
 use crate::io::BusState;
-use crate::records::HOST_LINES;
+use crate::response_queue::HOST_LINES;
 
 mod frames;
 
@@ -116,7 +116,7 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
     for (unacknowledged, sent_move, valid, before, missed) in [
         (0, true, true, 0, 1),
         (3, true, true, 0, 1),
-        // Given up in this tick: the transmit timeout stands for all of them.
+        // ReceivedParameters up in this tick: the transmit timeout stands for all of them.
         (4, true, true, 0, 0),
         (4, true, true, 3, 0),
         (2, false, true, 3, 3),
@@ -202,10 +202,10 @@ fn j16_a_joint_that_leaves_operation_enable_or_does_not_reach_it_misbehaves() {
 
 #[test]
 fn j21_a_clear_is_for_the_nodes_in_its_mask_that_have_something_to_clear() {
-    let cleared = |mask: u8, limp: bool, n: usize, change: fn(&mut Node)| {
+    let cleared = |mask: u8, torque_off: bool, n: usize, change: fn(&mut Node)| {
         let mut nodes = ready();
         change(&mut nodes.nodes[n]);
-        nodes.clear(mask, limp);
+        nodes.clear(mask, torque_off);
         core::array::from_fn::<bool, NODES, _>(|n| nodes.nodes[n].clear).iter().position(|&clear| clear)
     };
     assert_eq!(cleared(0x7F, true, 3, |_| {}), None);

@@ -191,7 +191,11 @@ fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
         }
         let verdict = controller.set_model(&crate::Parameters::avena().model);
         assert_eq!(verdict.is_ok(), taken, "{known} {torque_max}");
-        assert_eq!(controller.given.missing() & Given::MODEL == 0, taken, "{known} {torque_max}");
+        assert_eq!(
+            controller.received.missing() & ReceivedParameters::MODEL == 0,
+            taken,
+            "{known} {torque_max}"
+        );
     }
 }
 
@@ -208,9 +212,9 @@ fn j06_a_table_takes_twelve_ticks() {
     let mut controller = bench();
     for tick in 1..=12 {
         match controller.take_table(&Floats::new(&bytes)) {
-            Progress::Working(work) => controller.work = work,
-            Progress::Done => assert_eq!(tick, 12),
-            Progress::Refused(status) => panic!("{status:?} in tick {tick}"),
+            SliceOutcome::Unfinished(next) => controller.slice_progress = next,
+            SliceOutcome::Done => assert_eq!(tick, 12),
+            SliceOutcome::Refused(status) => panic!("{status:?} in tick {tick}"),
         }
         assert_eq!(controller.friction_is_table, tick == 12, "{tick}");
     }

@@ -2,12 +2,13 @@
 use super::*;
 use crate::Parameters;
 use crate::catch::Catch;
-use crate::coast::Coast;
 use crate::config::Friction;
+use crate::deceleration::Deceleration;
 
 /// A bent arm: gravity loads joint 2 with some tens of N·m.
 const POSE: [f64; JOINTS] = [0.1, 0.9, 0.4, -0.2, 0.3, 0.5];
-const LAWS: [Law; 4] = [Law::Hold, Law::Follow, Law::Approach, Law::Teach];
+const MODES: [ControlMode; 4] =
+    [ControlMode::Hold, ControlMode::Follow, ControlMode::Approach, ControlMode::Teach];
 
 /// An arm that is held with gains of its own.
 struct Arm {
@@ -31,19 +32,19 @@ impl Arm {
     }
 
     /// A tick at the pose, with the measured `velocity` (rad/s): torques and errors.
-    fn tick(&mut self, law: Law, braking: bool, velocity: f64) -> ([f64; JOINTS], [u16; JOINTS]) {
-        self.tick_of(law, braking, &Nodes::enabled_at(POSE, [velocity; JOINTS]))
+    fn tick(&mut self, mode: ControlMode, braking: bool, velocity: f64) -> ([f64; JOINTS], [u16; JOINTS]) {
+        self.tick_of(mode, braking, &Nodes::enabled_at(POSE, [velocity; JOINTS]))
     }
 
     /// A tick of these nodes.
-    fn tick_of(&mut self, law: Law, braking: bool, nodes: &Nodes) -> ([f64; JOINTS], [u16; JOINTS]) {
+    fn tick_of(&mut self, mode: ControlMode, braking: bool, nodes: &Nodes) -> ([f64; JOINTS], [u16; JOINTS]) {
         let parameters = ControlParameters {
             dynamics: &self.dynamics,
             pid: &self.pid,
             polynomial: &self.polynomial,
             table: self.table.as_ref(),
         };
-        self.motion.control(law, braking, nodes, &self.config, &parameters)
+        self.motion.control(mode, braking, nodes, &self.config, &parameters)
     }
 }
 
@@ -52,18 +53,18 @@ const NONE: PidGains = PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: -1.0, int_
 /// Also where set values move: a joint that comes to rest in HoldPos has a velocity.
 #[test]
 fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_only() {
-    for law in LAWS {
+    for mode in MODES {
         let mut arm = Arm::held(NONE);
         let (qd, qdd) = ([0.5, -0.4, 0.3, 0.2, -0.1, 0.6], [1.0, 2.0, -3.0, 0.5, 1.0, -2.0]);
         (arm.motion.set.velocity, arm.motion.set.acceleration) = (qd, qdd);
-        arm.tick(law, false, 0.0);
-        let moves = matches!(law, Law::Follow | Law::Approach);
+        arm.tick(mode, false, 0.0);
+        let moves = matches!(mode, ControlMode::Follow | ControlMode::Approach);
         let (gravity, all) = (arm.dynamics.gravity_torque(&POSE), arm.dynamics.inverse(&POSE, &qd, &qdd));
         for j in 0..JOINTS {
             let model = if moves { all[j] + arm.config.joints[j].rotor_inertia * qdd[j] } else { gravity[j] };
             let torque = &arm.motion.torque[j];
-            assert!((torque.model - model).abs() < 1e-9, "{law:?}, joint {}: {torque:?}", j + 1);
-            assert_eq!(torque.friction != 0.0, moves, "{law:?}, joint {}: {torque:?}", j + 1);
+            assert!((torque.model - model).abs() < 1e-9, "{mode:?}, joint {}: {torque:?}", j + 1);
+            assert_eq!(torque.friction != 0.0, moves, "{mode:?}, joint {}: {torque:?}", j + 1);
         }
     }
 }
@@ -71,12 +72,14 @@ fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_onl
 /// Such a table is for no path, but an arm can be held with it.
 #[test]
 fn j42_a_table_without_standstill_is_no_error_while_the_arm_is_held() {
-    for (law, error) in [(Law::Hold, 0), (Law::Teach, 0), (Law::Follow, joint_error::FRICTION_TABLE)] {
+    for (mode, error) in
+        [(ControlMode::Hold, 0), (ControlMode::Teach, 0), (ControlMode::Follow, joint_error::FRICTION_TABLE)]
+    {
         let mut arm = Arm::held(NONE);
         let axis = |from: f32| core::array::from_fn(|k| from + k as f32);
         arm.table =
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
-        assert_eq!(arm.tick(law, false, 0.0).1, [error; JOINTS], "{law:?}");
+        assert_eq!(arm.tick(mode, false, 0.0).1, [error; JOINTS], "{mode:?}");
     }
 }
 
@@ -86,28 +89,28 @@ fn j25_only_teaching_carries_what_was_found_missing() {
     let missing = arm.dynamics.flange_torque(&POSE).map(|torque| 2.0 * torque);
     (0..1_000).for_each(|_| arm.motion.payload.observe(&missing));
     arm.motion.begin_teaching(&Nodes::enabled_at(POSE, [0.0; JOINTS]), &arm.config, &arm.dynamics);
-    for law in LAWS {
-        arm.tick(law, false, 0.0);
+    for mode in MODES {
+        arm.tick(mode, false, 0.0);
         for (torque, missing) in arm.motion.torque.iter().zip(&missing) {
-            let carried = if law == Law::Teach { *missing } else { 0.0 };
-            assert!((torque.payload - carried).abs() < 0.01, "{law:?}: {torque:?}, {missing}");
+            let carried = if mode == ControlMode::Teach { *missing } else { 0.0 };
+            assert!((torque.payload - carried).abs() < 0.01, "{mode:?}: {torque:?}, {missing}");
         }
     }
 }
 
 #[test]
 fn j25_what_is_missing_is_observed_while_the_arm_is_held_at_rest_and_firmly() {
-    let observed = |law: Law, change: fn(&mut Arm)| {
+    let observed = |mode: ControlMode, change: fn(&mut Arm)| {
         let mut arm = Arm::held(NONE);
-        arm.tick(Law::Hold, false, 0.0);
+        arm.tick(ControlMode::Hold, false, 0.0);
         change(&mut arm);
-        arm.tick(law, false, 0.0);
+        arm.tick(mode, false, 0.0);
         arm.motion.payload.is_known(&arm.config)
     };
-    assert!(observed(Law::Hold, |_| ()));
-    assert!(LAWS.iter().all(|&law| observed(law, |_| ()) == (law == Law::Hold)));
-    assert!(!observed(Law::Hold, |arm| arm.motion.yielding = true));
-    assert!(!observed(Law::Hold, |arm| arm.motion.holding[3] = false));
+    assert!(observed(ControlMode::Hold, |_| ()));
+    assert!(MODES.iter().all(|&mode| observed(mode, |_| ()) == (mode == ControlMode::Hold)));
+    assert!(!observed(ControlMode::Hold, |arm| arm.motion.yielding = true));
+    assert!(!observed(ControlMode::Hold, |arm| arm.motion.holding[3] = false));
 }
 
 /// In motion errors below what an encoder can tell add up as well.
@@ -119,7 +122,7 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
         let mut arm = Arm::held(PidGains { ki: 1.0, ..NONE });
         arm.motion.set.position = POSE.map(|q| q + 0.5 * arm.config.encoder_step);
         (arm.motion.set.velocity, arm.motion.set.acceleration) = ([velocity; JOINTS], [acceleration; JOINTS]);
-        arm.tick(Law::Follow, false, 0.0);
+        arm.tick(ControlMode::Follow, false, 0.0);
         let still = arm.motion.torque.map(|torque| torque.pid.i == 0.0);
         assert_eq!(still, [held; JOINTS], "{velocity} rad/s, {acceleration} rad/s²");
     }
@@ -129,18 +132,18 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
 #[test]
 fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
     let along = Arm::held(NONE).dynamics.gravity_torque(&POSE)[1].signum();
-    for (law, catches, coasts, braking, speed, error) in [
-        (Law::Hold, false, false, false, 0.0, true),
-        (Law::Hold, false, false, true, 0.0, false),
-        (Law::Hold, true, false, false, 0.0, false),
-        (Law::Follow, true, false, false, 0.0, true),
-        (Law::Hold, false, true, false, 0.0, false),
+    for (mode, catches, decelerates, braking, speed, error) in [
+        (ControlMode::Hold, false, false, false, 0.0, true),
+        (ControlMode::Hold, false, false, true, 0.0, false),
+        (ControlMode::Hold, true, false, false, 0.0, false),
+        (ControlMode::Follow, true, false, false, 0.0, true),
+        (ControlMode::Hold, false, true, false, 0.0, false),
         // Against the motion it stops the joint, along with it it drives the joint on.
-        (Law::Hold, true, false, false, -0.06, false),
-        (Law::Hold, true, false, false, 0.06, true),
-        (Law::Hold, false, true, false, 0.06, true),
-        (Law::Hold, true, false, false, DRIVEN, false),
-        (Law::Hold, true, false, true, 0.06, false),
+        (ControlMode::Hold, true, false, false, -0.06, false),
+        (ControlMode::Hold, true, false, false, 0.06, true),
+        (ControlMode::Hold, false, true, false, 0.06, true),
+        (ControlMode::Hold, true, false, false, DRIVEN, false),
+        (ControlMode::Hold, true, false, true, 0.06, false),
     ] {
         // No set position sags where there is no error of position.
         let mut arm = Arm::held(NONE);
@@ -149,30 +152,30 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         if catches {
             arm.motion.catch[1] = Catch::begin(&arm.config);
         }
-        if coasts {
-            arm.motion.coast[1] = Some(Coast::led(POSE[1], 0.0, &arm.config, &limits));
+        if decelerates {
+            arm.motion.deceleration[1] = Some(Deceleration::led(POSE[1], 0.0, &arm.config, &limits));
         }
-        let found = (0..100).any(|_| arm.tick(law, braking, along * speed).1[1] & joint_error::TORQUE != 0);
-        assert_eq!(found, error, "{law:?} {catches} {coasts} {braking} {speed}");
+        let found = (0..100).any(|_| arm.tick(mode, braking, along * speed).1[1] & joint_error::TORQUE != 0);
+        assert_eq!(found, error, "{mode:?} {catches} {decelerates} {braking} {speed}");
     }
 }
 
 #[test]
 fn j43_set_values_are_looked_at_where_the_law_holds_a_joint() {
-    for (law, braking, holding, errors) in [
-        (Law::Hold, false, true, joint_error::POSITION_ERROR),
-        (Law::Hold, true, true, joint_error::POSITION_ERROR),
-        (Law::Hold, false, false, 0),
-        (Law::Teach, false, true, 0),
-        (Law::Follow, false, true, joint_error::POSITION_ERROR),
-        (Law::Follow, true, true, 0),
-        (Law::Approach, true, true, joint_error::POSITION_ERROR),
+    for (mode, braking, holding, errors) in [
+        (ControlMode::Hold, false, true, joint_error::POSITION_ERROR),
+        (ControlMode::Hold, true, true, joint_error::POSITION_ERROR),
+        (ControlMode::Hold, false, false, 0),
+        (ControlMode::Teach, false, true, 0),
+        (ControlMode::Follow, false, true, joint_error::POSITION_ERROR),
+        (ControlMode::Follow, true, true, 0),
+        (ControlMode::Approach, true, true, joint_error::POSITION_ERROR),
     ] {
         let mut arm = Arm::held(NONE);
         arm.motion.holding = [holding; JOINTS];
         arm.motion.set.position[4] += 2.0 * arm.config.joints[4].position_error_max;
-        let found = arm.tick(law, braking, 0.0).1;
-        assert_eq!(found, [0, 0, 0, 0, errors, 0], "{law:?} {braking} {holding}");
+        let found = arm.tick(mode, braking, 0.0).1;
+        assert_eq!(found, [0, 0, 0, 0, errors, 0], "{mode:?} {braking} {holding}");
     }
 }
 
@@ -211,24 +214,24 @@ fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
 /// A joint that is not enabled yet may be found anywhere, at any speed; nothing is asked of it.
 #[test]
 fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
-    let limp = 3;
-    for (law, velocity, error) in [
-        (Law::Follow, 0.0, joint_error::FRICTION_TABLE),
-        (Law::Teach, 1.5 * Config::avena().teach_velocity_max, 0),
+    let off = 3;
+    for (mode, velocity, error) in [
+        (ControlMode::Follow, 0.0, joint_error::FRICTION_TABLE),
+        (ControlMode::Teach, 1.5 * Config::avena().teach_velocity_max, 0),
     ] {
         let mut arm = Arm::held(NONE);
-        arm.motion.holding[limp] = false;
+        arm.motion.holding[off] = false;
         let axis = |from: f32| core::array::from_fn(|k| from + k as f32);
         arm.table =
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
         let (torque, errors) =
-            arm.tick_of(law, false, &Nodes::enabled_at(POSE, [velocity; JOINTS]).with_limp(limp));
+            arm.tick_of(mode, false, &Nodes::enabled_at(POSE, [velocity; JOINTS]).with_torque_off(off));
         for j in 0..JOINTS {
-            assert_eq!(errors[j], if j == limp { 0 } else { error }, "{law:?}, joint {}", j + 1);
-            let brakes = law == Law::Teach && j != limp;
-            assert_eq!(arm.motion.torque[j].brake < 0.0, brakes, "{law:?}, joint {}", j + 1);
+            assert_eq!(errors[j], if j == off { 0 } else { error }, "{mode:?}, joint {}", j + 1);
+            let brakes = mode == ControlMode::Teach && j != off;
+            assert_eq!(arm.motion.torque[j].brake < 0.0, brakes, "{mode:?}, joint {}", j + 1);
         }
-        assert_eq!((torque[limp], arm.motion.torque[limp]), (0.0, JointTorque::default()), "{law:?}");
+        assert_eq!((torque[off], arm.motion.torque[off]), (0.0, JointTorque::default()), "{mode:?}");
     }
 }
 
@@ -238,14 +241,14 @@ fn j66_an_arm_that_gives_way_adds_a_little_to_the_torque_of_the_model() {
         let mut arm = Arm::held(PidGains { kp: 1e6, ..NONE });
         arm.motion.yielding = yielding;
         arm.motion.set.position = POSE.map(|q| q + direction * 0.001);
-        arm.tick(Law::Hold, false, 0.0);
+        arm.tick(ControlMode::Hold, false, 0.0);
         for (torque, joint) in arm.motion.torque.iter().zip(&arm.config.joints) {
             let most = if yielding { 0.3 * joint.torque_max } else { 1_000.0 };
             assert!((torque.correction() - direction * most).abs() < 1e-6, "{yielding}: {torque:?}");
         }
         // What is within that is not touched.
         arm.motion.set.position = POSE.map(|q| q + direction * 1e-6);
-        arm.tick(Law::Hold, false, 0.0);
+        arm.tick(ControlMode::Hold, false, 0.0);
         assert!(arm.motion.torque.iter().all(|torque| (torque.correction() - direction).abs() < 1e-6));
     }
 }

@@ -1,5 +1,5 @@
-//! Coming to rest: a joint that moves when it begins to be held, because a hand still led it, or because it sagged or fell
-//! while it was enabled (J-16, J-25).
+//! Deceleration to rest of a joint that moves when it begins to be held, because a hand still led it, or because it sagged or
+//! fell while it was enabled (J-16, J-25).
 use crate::config::{Config, JointConfig};
 use crate::motion::smooth;
 
@@ -17,7 +17,7 @@ pub(crate) fn moves(velocity: f64) -> bool {
 
 /// A joint that decelerates from where it was, along a smooth ramp of the velocity.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Coast {
+pub(crate) struct Deceleration {
     from: f64,
     velocity: f64,
     /// 0 in the first tick, which commands what was measured: the error begins at 0, and so does its derivative.
@@ -25,7 +25,7 @@ pub(crate) struct Coast {
     length_ms: f64,
 }
 
-impl Coast {
+impl Deceleration {
     /// A joint that a hand leads: from a measured position (rad) and velocity (rad/s), of which the velocity limit is used at
     /// most.
     pub fn led(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
@@ -73,10 +73,10 @@ mod tests {
     }
 
     /// Positions and velocities until the joint rests.
-    fn ways(mut coast: Coast, limits: &JointConfig) -> Vec<(f64, f64)> {
+    fn ways(mut deceleration: Deceleration, limits: &JointConfig) -> Vec<(f64, f64)> {
         let mut ways = Vec::new();
         for _ in 0..5_000 {
-            let (position, velocity, rests) = coast.step(limits);
+            let (position, velocity, rests) = deceleration.step(limits);
             ways.push((position, velocity));
             if rests {
                 return ways;
@@ -97,8 +97,8 @@ mod tests {
         let config = Config::avena();
         for velocity in [-1.4, -0.3, 0.05, 1.0] {
             let (led, falling) = (
-                Coast::led(0.7, velocity, &config, &limits()),
-                Coast::falling(0.7, velocity, &config, &limits()),
+                Deceleration::led(0.7, velocity, &config, &limits()),
+                Deceleration::falling(0.7, velocity, &config, &limits()),
             );
             for way in [ways(led, &limits()), ways(falling, &limits())] {
                 assert_eq!(way[0], (0.7, velocity), "no step of the error at the beginning");
@@ -117,7 +117,7 @@ mod tests {
     fn j16_a_falling_joint_is_slowed_down_no_faster_than_its_torque_allows_and_no_slower() {
         let config = Config::avena();
         let decelerations = |velocity: f64| {
-            let way = ways(Coast::falling(0.0, velocity, &config, &limits()), &limits());
+            let way = ways(Deceleration::falling(0.0, velocity, &config, &limits()), &limits());
             way.windows(2).map(|pair| (pair[0].1 - pair[1].1).abs() / DT).fold(0.0, f64::max)
         };
         for velocity in [-1.4, -0.5, 0.45, 1.5] {
@@ -126,7 +126,7 @@ mod tests {
         }
         // A slow one takes the time of the ramp.
         assert_eq!(
-            ways(Coast::falling(0.0, 0.1, &config, &limits()), &limits()).len(),
+            ways(Deceleration::falling(0.0, 0.1, &config, &limits()), &limits()).len(),
             usize::from(config.ramp_ms) + 1
         );
     }
@@ -135,15 +135,16 @@ mod tests {
     fn j43_coming_to_rest_keeps_the_velocity_limit_and_the_position_limits() {
         let (config, limits) = (Config::avena(), Config::avena().joints[0]);
         for velocity in [-7.0, 7.0] {
-            let way = ways(Coast::led(0.0, velocity, &config, &limits), &limits);
+            let way = ways(Deceleration::led(0.0, velocity, &config, &limits), &limits);
             assert_eq!(way[0].1, limits.velocity_max.copysign(velocity));
             for (end, outside) in [(limits.position_min, -0.1), (limits.position_max, 0.1)] {
-                let inside = ways(Coast::led(end - 0.1 * outside, velocity, &config, &limits), &limits);
+                let inside =
+                    ways(Deceleration::led(end - 0.1 * outside, velocity, &config, &limits), &limits);
                 let inward = velocity * outside < 0.0;
                 assert!(inside.iter().all(|(q, _)| (limits.position_min..=limits.position_max).contains(q)));
                 // An arm that is found outside is not driven further out.
                 let found = end + outside;
-                let beyond = ways(Coast::led(found, velocity, &config, &limits), &limits);
+                let beyond = ways(Deceleration::led(found, velocity, &config, &limits), &limits);
                 let last = beyond[beyond.len() - 1].0;
                 assert!(if inward { (last - end).abs() < (found - end).abs() } else { last == found });
             }
@@ -153,7 +154,7 @@ mod tests {
     #[test]
     fn j43_a_load_that_is_caught_moves_the_whole_way() {
         let config = Config::avena();
-        let plain = Coast::led(0.4, 0.3, &config, &limits());
+        let plain = Deceleration::led(0.4, 0.3, &config, &limits());
         let mut moved = plain;
         moved.shift(-0.02);
         for ((p, v), (q, w)) in ways(plain, &limits()).into_iter().zip(ways(moved, &limits())) {

@@ -1,4 +1,4 @@
-//! Response records that wait for their status frame (J-04), a queue for each line of the host link.
+//! Response records that wait for their status frame (J-04): a queue for each line of the host link.
 use jtc_wire::Response;
 
 /// Records that wait at most on a line: with fewer, none is lost.

@@ -11,6 +11,7 @@ mod frame;
 #[doc(hidden)]
 pub mod fuzzing;
 pub mod id;
+mod joint;
 mod request;
 mod scale;
 mod state;
@@ -21,6 +22,7 @@ pub use bits::{Bits, config, error, motor_control, warning};
 pub use display::Decoded;
 pub use duration::duration_ns;
 pub use frame::{Format, Frame, FrameError, MAX_LEN};
+pub use joint::Joint;
 pub use request::{Request, Target};
 pub use scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE};
 pub use state::NodeState;

@@ -2,8 +2,9 @@
 
 use jtc_core::{Config, JOINTS, POINTS_MAX, SetPoint, interpolate, position_speed};
 use jtc_dynamics::ArmModel;
+use jtc_wire::Joint;
 
-use crate::check::{Checker, POSITION_BIT};
+use crate::check::{Checker, POSITION_BIT, Problem, ProblemKind};
 use crate::trajectory::{Point, Trajectory};
 
 /// Step of planned moves, ms.
@@ -18,10 +19,10 @@ const SHORTEST: f64 = 0.2;
 #[non_exhaustive]
 pub enum PlanError {
     /// A pose that is no pose, or outside the limits.
-    #[error("joint {joint}: target {value} rad is outside {min}..{max} rad")]
+    #[error("{joint}: target {value} rad is outside {min}..{max} rad")]
     Target {
-        /// Joint from 1.
-        joint: usize,
+        /// Of this joint.
+        joint: Joint,
         /// rad.
         value: f64,
         /// rad.
@@ -30,10 +31,10 @@ pub enum PlanError {
         max: f64,
     },
     /// The measured position is no number.
-    #[error("joint {joint}: position {value} is no place to start from")]
+    #[error("{joint}: position {value} is no place to start from")]
     Start {
-        /// Joint from 1.
-        joint: usize,
+        /// Of this joint.
+        joint: Joint,
         /// rad.
         value: f64,
     },
@@ -41,10 +42,10 @@ pub enum PlanError {
     #[error("speed {0} % is not within 1..200 %")]
     Speed(f64),
     /// Even slowly the torque is over its limit.
-    #[error("joint {joint}: the move needs {torque:.1} N·m, more than {limit} N·m, at any speed")]
+    #[error("{joint}: the move needs {torque:.1} N·m, more than {limit} N·m, at any speed")]
     Torque {
-        /// Joint from 1.
-        joint: usize,
+        /// Of this joint.
+        joint: Joint,
         /// N·m.
         torque: f64,
         /// N·m.
@@ -76,13 +77,14 @@ pub fn joint_move(
     }
     let speed = speed_pct / 100.0 * SHARE;
     let mut seconds = SHORTEST;
-    for (j, limit) in config.joints.iter().enumerate() {
+    for (joint, limit) in Joint::ALL.into_iter().zip(&config.joints) {
+        let j = joint.index();
         if !from[j].is_finite() {
-            return Err(PlanError::Start { joint: j + 1, value: from[j] });
+            return Err(PlanError::Start { joint, value: from[j] });
         }
         let (min, max) = config.position_range(j);
         if !(min..=max).contains(&to[j]) {
-            return Err(PlanError::Target { joint: j + 1, value: to[j], min, max });
+            return Err(PlanError::Target { joint, value: to[j], min, max });
         }
         let distance = (to[j] - from[j]).abs();
         // Peaks of the quintic: 15/8 of the mean speed, 10/√3 of distance over time squared.
@@ -131,15 +133,13 @@ pub fn approach(
     loop {
         let plan = joint_move(from, to, config, speed)?;
         let verdict = Checker { model, ..Checker::new(config) }.check(&plan);
-        let over = verdict.problems.iter().find(|p| p.kind == crate::check::ProblemKind::Torque);
+        let torque =
+            |p: &Problem| Some((p.joint?, p.value, p.limit)).filter(|_| p.kind == ProblemKind::Torque);
+        let over = verdict.problems.iter().find_map(torque);
         match over {
             None => return Ok(plan),
-            Some(p) if speed < speed_pct / 8.0 || speed < 2.0 => {
-                return Err(PlanError::Torque {
-                    joint: p.joint.unwrap_or(0),
-                    torque: p.value.abs(),
-                    limit: p.limit.abs(),
-                });
+            Some((joint, torque, limit)) if speed < speed_pct / 8.0 || speed < 2.0 => {
+                return Err(PlanError::Torque { joint, torque: torque.abs(), limit: limit.abs() });
             }
             Some(_) => speed *= 0.7,
         }
@@ -286,7 +286,7 @@ mod tests {
         config.joints[1].torque_max = 60.0;
         assert!(matches!(
             approach(&[0.0; 6], &to, &config, Some(&arm.model), 100.0),
-            Err(PlanError::Torque { joint: 2, .. })
+            Err(PlanError::Torque { joint, .. }) if joint.number() == 2
         ));
     }
 }

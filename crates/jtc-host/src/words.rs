@@ -1,10 +1,10 @@
 //! The controller's numbers in words.
 
-use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Status};
+use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status};
 
-/// Name of a node on the joint bus: joints count from 1, as people do.
+/// Name of a node on the joint bus.
 pub fn node(n: usize) -> String {
-    if n == 6 { "gripper".into() } else { format!("joint {}", n + 1) }
+    Joint::from_index(n).map_or_else(|| "gripper".into(), |joint| joint.to_string())
 }
 
 /// A request, as people name it.
@@ -111,14 +111,14 @@ pub fn missing_nodes(node_init: u8) -> Vec<String> {
 pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
     all.extend(errors(s.errors & SAFETY_INPUT).into_iter().map(String::from));
-    for (j, joint) in s.joints.iter().enumerate() {
+    for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
         let words = joint_errors(joint.internal)
             .into_iter()
             .chain(node_errors(joint.errors))
             .chain(motor_faults(joint.mc_current))
-            .chain((joint.warnings & SAFETY_LINE != 0 && is_ready(s, j)).then_some("safety line active"))
+            .chain((joint.warnings & SAFETY_LINE != 0 && is_ready(s, number)).then_some("safety line active"))
             .chain(joint.state.is_fault().then(|| joint.state.name()));
-        all.extend(words.map(|w| format!("joint {}: {w}", j + 1)));
+        all.extend(words.map(|w| format!("{number}: {w}")));
     }
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
@@ -134,8 +134,8 @@ const SAFETY_INPUT: u16 = 1;
 const SAFETY_LINE: u8 = 8;
 
 /// Before it is configured a drive sets the bit, too, which says nothing then.
-fn is_ready(s: &Status, j: usize) -> bool {
-    s.node_init >> j & 1 == 0
+fn is_ready(s: &Status, joint: Joint) -> bool {
+    s.node_init >> joint.index() & 1 == 0
 }
 
 /// What nodes warn of and is no error.
@@ -160,10 +160,10 @@ pub fn errors_line(s: &Status) -> String {
 
 /// Errors of the joints that have occurred since those of `before`, in one line.
 pub fn occurred_since(before: &[u16; 6], s: &Status) -> String {
-    let joints = s.joints.iter().zip(before).enumerate();
-    let words = joints.flat_map(|(j, (joint, before))| {
+    let joints = Joint::ALL.into_iter().zip(s.joints.iter().zip(before));
+    let words = joints.flat_map(|(number, (joint, before))| {
         let new = joint_errors(joint.internal_occurred & !before);
-        new.into_iter().map(move |word| format!("joint {}: {word}", j + 1))
+        new.into_iter().map(move |word| format!("{number}: {word}"))
     });
     words.collect::<Vec<_>>().join(", ")
 }

@@ -36,7 +36,7 @@ pub use encode::{
     friction_table, pid_param, trajectory,
 };
 /// States of drives and gripper in a status are those of the joint bus.
-pub use jtc_bus::NodeState;
+pub use jtc_bus::{Joint, NodeState};
 
 pub use frame::{
     FRAME_MAX, FRAME_MIN, FRAME_POINTS_MAX, FrameRef, FrameType, HEADER, JOINTS, Lengths, POINT_LEN,

@@ -249,6 +249,8 @@ fn trajectory() -> Trajectory {
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::Joint;
+
     use super::*;
 
     #[test]
@@ -266,19 +268,10 @@ mod tests {
             }
         }
         for p in &t.points {
-            for (j, limit) in arm.joints.iter().enumerate() {
-                assert!(
-                    p.position[j].abs() < 0.95 * limit.position_max,
-                    "joint {}: {} rad",
-                    j + 1,
-                    p.position[j]
-                );
-                assert!(
-                    p.velocity[j].abs() < 0.8 * limit.velocity_max,
-                    "joint {}: {} rad/s",
-                    j + 1,
-                    p.velocity[j]
-                );
+            for (joint, limit) in Joint::ALL.into_iter().zip(&arm.joints) {
+                let j = joint.index();
+                assert!(p.position[j].abs() < 0.95 * limit.position_max, "{joint}: {} rad", p.position[j]);
+                assert!(p.velocity[j].abs() < 0.8 * limit.velocity_max, "{joint}: {} rad/s", p.velocity[j]);
                 assert!(p.acceleration[j].abs() < 0.5 * limit.acceleration_max);
             }
         }

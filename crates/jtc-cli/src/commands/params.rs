@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use cli_kit::{Output, table};
 use jtc_host::arm::{Arm, FrictionChoice, NOT_CARRIED, ParameterFile, ParameterSet};
 use jtc_host::words;
+use jtc_wire::Joint;
 use serde_json::json;
 
 use crate::args::{AcceptArgs, FrictionKind, LinkArgs, ParamsCommand};
@@ -142,11 +143,11 @@ fn show(files: &[PathBuf], link: Option<&LinkArgs>, out: &Output) -> Result<(), 
 fn as_text(set: &ParameterSet) -> String {
     let mut text = String::new();
     if let Some(pid) = &set.pid {
-        let row = |(j, g): (usize, &jtc_core::PidGains)| {
+        let row = |(joint, g): (Joint, &jtc_core::PidGains)| {
             let numbers = [g.kp, g.ki, g.kd, g.int_min, g.int_max].map(|v| format!("{v}"));
-            [vec![format!("joint {}", j + 1)], numbers.to_vec()].concat()
+            [vec![joint.to_string()], numbers.to_vec()].concat()
         };
-        let rows: Vec<_> = pid.iter().enumerate().map(row).collect();
+        let rows: Vec<_> = Joint::ALL.into_iter().zip(pid).map(row).collect();
         text += &table(
             &["gains", ">Kp N·m/rad", ">Ki N·m/(rad·s)", ">Kd N·m·s/rad", ">∫min rad·s", ">∫max rad·s"],
             &rows,
@@ -154,18 +155,18 @@ fn as_text(set: &ParameterSet) -> String {
     }
     match &set.friction {
         Some(jtc_core::Friction::Polynomial(c)) => {
-            let row = |(j, c): (usize, &[f64; 6])| {
-                [vec![format!("joint {}", j + 1)], c.map(|v| format!("{v:.4}")).to_vec()].concat()
+            let row = |(joint, c): (Joint, &[f64; 6])| {
+                [vec![joint.to_string()], c.map(|v| format!("{v:.4}")).to_vec()].concat()
             };
-            let rows: Vec<_> = c.iter().enumerate().map(row).collect();
+            let rows: Vec<_> = Joint::ALL.into_iter().zip(c).map(row).collect();
             text += &table(&["friction", ">c0", ">c1", ">c2", ">c3", ">c4 1/K", ">c5 °C"], &rows);
         }
         Some(jtc_core::Friction::Table(tables)) => {
-            let row = |(j, t): (usize, &jtc_core::TableOf<f32>)| {
+            let row = |(joint, t): (Joint, &jtc_core::TableOf<f32>)| {
                 let range = |a: &[f32; 20]| format!("{:.2} .. {:.2}", a[0], a[19]);
-                vec![format!("joint {}", j + 1), range(&t.velocity), range(&t.temperature)]
+                vec![joint.to_string(), range(&t.velocity), range(&t.temperature)]
             };
-            let rows: Vec<_> = tables.iter().enumerate().map(row).collect();
+            let rows: Vec<_> = Joint::ALL.into_iter().zip(tables.iter()).map(row).collect();
             text += &table(&["friction table", ">rad/s", ">°C"], &rows);
         }
         None => {}

@@ -2,7 +2,7 @@
 
 use cli_kit::Output;
 use jtc_host::words;
-use jtc_wire::ControllerState;
+use jtc_wire::{ControllerState, Joint};
 use serde_json::json;
 
 use crate::args::ResetArgs;
@@ -63,8 +63,11 @@ fn of_mask(text: &str) -> Failure {
     let Some(mask) = value.filter(|mask| *mask != 0 && mask & !ALL == 0) else {
         return failure.hint("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`");
     };
-    let joints: Vec<String> =
-        (0..6).filter(|joint| mask >> joint & 1 == 1).map(|joint| (joint + 1).to_string()).collect();
+    let joints: Vec<String> = Joint::ALL
+        .into_iter()
+        .filter(|joint| mask >> joint.index() & 1 == 1)
+        .map(|joint| joint.number().to_string())
+        .collect();
     let mut options = Vec::new();
     if !joints.is_empty() {
         options.push(format!("--joints {}", joints.join(",")));

@@ -5,7 +5,7 @@ use jtc_host::arm::Arm;
 use jtc_host::recording::RecordingInfo;
 use jtc_host::report::{Facts, RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
-use jtc_wire::{Status, TrajectoryState};
+use jtc_wire::{Joint, Status, TrajectoryState};
 
 /// What a recording of this arm says about itself.
 pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
@@ -38,13 +38,12 @@ pub fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
 
 /// The figures as a table.
 pub fn figures(summary: &Summary) -> String {
-    let rows: Vec<Vec<String>> = summary
-        .joints
+    let rows: Vec<Vec<String>> = Joint::ALL
         .iter()
-        .enumerate()
-        .map(|(j, s)| {
+        .zip(&summary.joints)
+        .map(|(joint, s)| {
             vec![
-                format!("joint {}", j + 1),
+                joint.to_string(),
                 figure(s.rms_error_mrad, 3),
                 figure(s.max_error_mrad, 3),
                 figure(s.peak_velocity_rad_s, 3),
@@ -116,9 +115,10 @@ pub fn motion_line(s: &Status) -> String {
         Some(TrajectoryState::Finish) => "finished",
         Some(TrajectoryState::Null | TrajectoryState::TransNullToStop) | None => "not moving",
     };
-    let most = s.joints.iter().enumerate().max_by(|a, b| a.1.torque.abs().total_cmp(&b.1.torque.abs()));
-    let torque = most.map_or(String::new(), |(j, joint)| {
-        format!(", most torque: joint {} {} N·m", j + 1, cli_kit::figure(joint.torque.into(), 0))
+    let torques = Joint::ALL.iter().zip(s.joints.map(|joint| joint.torque));
+    let most = torques.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    let torque = most.map_or(String::new(), |(joint, torque)| {
+        format!(", most torque: {joint} {} N·m", cli_kit::figure(torque.into(), 0))
     });
     format!("{what}{}", if s.is_executing() { &torque } else { "" })
 }

@@ -3,7 +3,7 @@
 use cli_kit::{Output, figure, table};
 use jtc_host::sample::is_measured;
 use jtc_host::words;
-use jtc_wire::{NodeState, Status};
+use jtc_wire::{Joint, NodeState, Status};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
@@ -18,14 +18,14 @@ pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 
 /// A status as JSON, units in the keys.
 pub fn as_json(s: &Status) -> Value {
-    let joints: Vec<Value> = s
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(i, j)| {
+    let joints: Vec<Value> = Joint::ALL
+        .into_iter()
+        .zip(&s.joints)
+        .map(|(joint, j)| {
+            let i = joint.index();
             let measured = is_measured(s, i);
             json!({
-                "joint": i + 1,
+                "joint": joint.number(),
                 "state": joint_state(s, i),
                 "fsm": j.state.code(),
                 "position_rad": measured.then_some(j.position + 0.0),
@@ -105,16 +105,16 @@ pub fn as_text(s: &Status) -> String {
         f64::from(s.point) * 1e-3,
         if s.friction_type == 0 { "polynomial" } else { "table" },
     );
-    let rows: Vec<Vec<String>> = s
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(i, j)| {
+    let rows: Vec<Vec<String>> = Joint::ALL
+        .into_iter()
+        .zip(&s.joints)
+        .map(|(joint, j)| {
+            let i = joint.index();
             let figure = |value: f32, digits| {
                 if is_measured(s, i) { figure(value.into(), digits) } else { "-".into() }
             };
             vec![
-                format!("joint {}", i + 1),
+                joint.to_string(),
                 joint_state(s, i).into(),
                 figure(j.position, 4),
                 figure(j.velocity, 4),

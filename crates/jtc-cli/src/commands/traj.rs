@@ -10,6 +10,7 @@ use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
 use jtc_host::{Error, Session, plan};
+use jtc_wire::Joint;
 use serde_json::json;
 
 use super::run;
@@ -274,13 +275,12 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
 }
 
 fn figures(verdict: &Verdict) -> String {
-    let rows: Vec<Vec<String>> = verdict
-        .joints
+    let rows: Vec<Vec<String>> = Joint::ALL
         .iter()
-        .enumerate()
-        .map(|(j, f)| {
+        .zip(&verdict.joints)
+        .map(|(joint, f)| {
             vec![
-                format!("joint {}", j + 1),
+                joint.to_string(),
                 format!("{} .. {}", figure(f.position_min_rad, 3), figure(f.position_max_rad, 3)),
                 figure(f.velocity_peak_rad_s, 3),
                 figure(f.acceleration_peak_rad_s2, 3),

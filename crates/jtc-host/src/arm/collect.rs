@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use jtc_core::{Friction, JOINTS, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
+use jtc_wire::Joint;
 
 use super::csv::{self, Table};
 use super::{Arm, ParameterSet, Warning, is_xml};
@@ -249,11 +250,11 @@ impl<T> PerJoint<T> {
                            (joint 1) to ...Joint5.csv (joint 6), and all six are needed";
             return Err(FileError::form(problem).in_file(path));
         };
-        if let Some((other, _)) = &self.found[joint] {
-            let problem = format!("holds joint {}, which {} holds already", joint + 1, other.display());
+        if let Some((other, _)) = &self.found[joint.index()] {
+            let problem = format!("holds {joint}, which {} holds already", other.display());
             return Err(FileError::form(problem).in_file(path));
         }
-        self.found[joint] = Some((path.to_owned(), table));
+        self.found[joint.index()] = Some((path.to_owned(), table));
         Ok(())
     }
 
@@ -261,9 +262,10 @@ impl<T> PerJoint<T> {
     fn complete(self) -> Result<Option<Complete<T>>, FileError> {
         let Some((first, _)) = self.found.iter().flatten().next() else { return Ok(None) };
         let first = first.clone();
-        let missing: Vec<String> = (0..JOINTS)
-            .filter(|joint| self.found[*joint].is_none())
-            .map(|joint| format!("{} (joint {})", sibling(&first, joint), joint + 1))
+        let missing: Vec<String> = Joint::ALL
+            .into_iter()
+            .filter(|joint| self.found[joint.index()].is_none())
+            .map(|joint| format!("{} ({joint})", sibling(&first, joint)))
             .collect();
         let found: Vec<(PathBuf, T)> = self.found.into_iter().flatten().collect();
         let (paths, tables): (Vec<PathBuf>, Vec<T>) = found.into_iter().unzip();
@@ -280,16 +282,17 @@ impl<T> PerJoint<T> {
     }
 }
 
-/// `PidParamJoint3.csv` is joint index 3 between `PidParamJoint` and `.csv`: these files count from 0.
-fn split_name(path: &Path) -> Option<(String, usize, String)> {
+/// `PidParamJoint3.csv` is joint 4 between `PidParamJoint` and `.csv`: these files count from 0.
+fn split_name(path: &Path) -> Option<(String, Joint, String)> {
     let name = path.file_name()?.to_string_lossy().into_owned();
     let (head, tail) = name.split_once("Joint")?;
     let digit = tail.chars().next()?.to_digit(10)? as usize;
-    (digit < JOINTS).then(|| (format!("{head}Joint"), digit, tail[1..].to_owned()))
+    Some((format!("{head}Joint"), Joint::from_index(digit)?, tail[1..].to_owned()))
 }
 
 /// The file of another joint beside `path`.
-fn sibling(path: &Path, joint: usize) -> String {
+fn sibling(path: &Path, joint: Joint) -> String {
+    let joint = joint.index();
     match split_name(path) {
         Some((head, _, tail)) => path.with_file_name(format!("{head}{joint}{tail}")).display().to_string(),
         None => format!("...Joint{joint}.csv"),

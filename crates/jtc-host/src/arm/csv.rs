@@ -2,6 +2,7 @@
 
 use jtc_core::{JOINTS, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
+use jtc_wire::Joint;
 
 use crate::file::{FileError, Place, number, number_rows, rows};
 
@@ -111,9 +112,9 @@ fn long_table(text: &str) -> Result<Table, FileError> {
         table.temperature[t] = value(4)?;
         table.torque[v][t] = value(5)?;
     }
-    for (j, t) in tables.iter().enumerate() {
+    for (joint, t) in Joint::ALL.into_iter().zip(tables.iter()) {
         if t.torque.iter().flatten().any(|v| v.is_nan()) {
-            return Err(FileError::form(format!("the table of joint {} is not complete (400 rows)", j + 1)));
+            return Err(FileError::form(format!("the table of {joint} is not complete (400 rows)")));
         }
         increasing(&t.velocity, 0, "velocities")?;
         increasing(&t.temperature, 0, "temperatures")?;

@@ -6,6 +6,8 @@
 
 use jtc_core::{Config, JointConfig};
 
+use jtc_wire::Joint;
+
 use super::Arm;
 
 /// Values closer than this, relative to their size, are the same number written in two ways.
@@ -16,8 +18,8 @@ const SAME: f64 = 1e-9;
 pub struct Difference {
     /// Its key in an arm file.
     pub name: &'static str,
-    /// Joint from 1; none for what concerns the whole arm.
-    pub joint: Option<usize>,
+    /// None for what concerns the whole arm.
+    pub joint: Option<Joint>,
     /// As the arm file says.
     pub file: f64,
     /// As the controller has it built in.
@@ -29,7 +31,7 @@ pub struct Difference {
 impl std::fmt::Display for Difference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some(joint) = self.joint {
-            write!(f, "joint {joint}, ")?;
+            write!(f, "{joint}, ")?;
         }
         let Self { name, file, device, unit, .. } = self;
         write!(f, "{name}: {file} {unit} in the file, {device} {unit} in the controller")
@@ -74,10 +76,10 @@ impl Arm {
         {
             compare(name, None, file, device, "m/s²");
         }
-        for (i, (file, device)) in own.joints.iter().zip(&device.joints).enumerate() {
+        for (joint, (file, device)) in Joint::ALL.into_iter().zip(own.joints.iter().zip(&device.joints)) {
             for (name, unit, value) in JOINT_SETTINGS {
-                if name != ROTOR || self.rotors_given[i] {
-                    compare(name, Some(i + 1), value(file), value(device), unit);
+                if name != ROTOR || self.rotors_given[joint.index()] {
+                    compare(name, Some(joint), value(file), value(device), unit);
                 }
             }
         }
@@ -124,7 +126,8 @@ mod tests {
         arm.joints[1].velocity_max = 3.15;
         arm.joints[4].rotor_inertia = 0.0;
         let all = arm.device_differences();
-        let seen: Vec<_> = all.iter().map(|d| (d.name, d.joint, d.file, d.device, d.unit)).collect();
+        let seen: Vec<_> =
+            all.iter().map(|d| (d.name, d.joint.map(Joint::number), d.file, d.device, d.unit)).collect();
         assert_eq!(
             seen,
             [

@@ -2,6 +2,7 @@
 
 use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
+use jtc_wire::Joint;
 
 /// Parameters to send; `None`: not this one.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,35 +15,35 @@ pub struct ParameterSet {
     pub model: Option<ArmModel>,
 }
 
-/// Why parameters cannot be sent. Joints count from 1.
+/// Why parameters cannot be sent.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParameterError {
     /// Not a number that a frame carries.
-    #[error("{what} of joint {joint}: {value} does not fit into a 32-bit float")]
+    #[error("{what} of {joint}: {value} does not fit into a 32-bit float")]
     NotFinite {
         /// Which number.
         what: &'static str,
-        /// Joint from 1.
-        joint: usize,
+        /// Of this joint.
+        joint: Joint,
         /// The value.
         value: f64,
     },
     /// Integral bounds the wrong way round.
-    #[error("integral of joint {joint}: lower bound {min} is above upper bound {max}")]
+    #[error("integral of {joint}: lower bound {min} is above upper bound {max}")]
     IntegralBounds {
-        /// Joint from 1.
-        joint: usize,
+        /// Of this joint.
+        joint: Joint,
         /// rad·s.
         min: f64,
         /// rad·s.
         max: f64,
     },
     /// A table axis does not increase.
-    #[error("friction table of joint {joint}: {axis} {after} at place {place} does not lie above {before}")]
+    #[error("friction table of {joint}: {axis} {after} at place {place} does not lie above {before}")]
     Axis {
-        /// Joint from 1.
-        joint: usize,
+        /// Of this joint.
+        joint: Joint,
         /// "velocity" or "temperature".
         axis: &'static str,
         /// Place of the second value, from 1.
@@ -57,11 +58,11 @@ pub enum ParameterError {
     Model(jtc_dynamics::ModelError),
 }
 
-/// A parameter beyond the bounds of a controller (J-06). Joints count from 1.
+/// A parameter beyond the bounds of a controller (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beyond {
-    /// Joint from 1; `None`: of the arm model.
-    pub joint: Option<usize>,
+    /// `None`: of the arm model.
+    pub joint: Option<Joint>,
     /// What it is, and within what.
     pub bounds: OutOfBounds,
 }
@@ -70,7 +71,7 @@ impl std::fmt::Display for Beyond {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let OutOfBounds { what, velocity, value, low, high } = self.bounds;
         if let Some(joint) = self.joint {
-            write!(f, "joint {joint}: ")?;
+            write!(f, "{joint}: ")?;
         }
         write!(f, "{what} ")?;
         if let Some(velocity) = velocity {
@@ -107,17 +108,20 @@ impl ParameterSet {
     /// The first parameter beyond what a controller with these settings takes (J-06): for the words after it refused.
     pub fn beyond(&self, config: &Config) -> Option<Beyond> {
         let bounds = &config.parameter_bounds;
-        let joints = config.joints.iter().enumerate();
-        let of_joint = |j: usize, checked: Result<(), OutOfBounds>| {
-            checked.err().map(|bounds| Beyond { joint: Some(j + 1), bounds })
+        let joints = Joint::ALL.into_iter().zip(&config.joints);
+        let of_joint = |joint: Joint, checked: Result<(), OutOfBounds>| {
+            checked.err().map(|bounds| Beyond { joint: Some(joint), bounds })
         };
         let friction = joints.clone().find_map(|(j, joint)| match &self.friction {
-            Some(Friction::Polynomial(c)) => of_joint(j, bounds.check_polynomial(&c[j], joint)),
-            Some(Friction::Table(t)) => of_joint(j, bounds.check_table(&t[j], joint)),
+            Some(Friction::Polynomial(c)) => of_joint(j, bounds.check_polynomial(&c[j.index()], joint)),
+            Some(Friction::Table(t)) => of_joint(j, bounds.check_table(&t[j.index()], joint)),
             None => None,
         });
-        let gains =
-            || joints.clone().find_map(|(j, joint)| of_joint(j, bounds.check_gains(&self.pid?[j], joint)));
+        let gains = || {
+            joints
+                .clone()
+                .find_map(|(j, joint)| of_joint(j, bounds.check_gains(&self.pid?[j.index()], joint)))
+        };
         let masses = || {
             let bounds = bounds.check_masses(self.model.as_ref()?).err()?;
             Some(Beyond { joint: None, bounds })
@@ -133,19 +137,19 @@ impl ParameterSet {
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {
             Some(Friction::Polynomial(c)) => {
-                for (j, c) in c.iter().enumerate() {
+                for (j, c) in Joint::ALL.into_iter().zip(c) {
                     c.iter().try_for_each(|v| finite("friction coefficient", j, *v))?;
                 }
             }
             Some(Friction::Table(tables)) => {
-                tables.iter().enumerate().try_for_each(|(j, t)| check_table(j, t))?;
+                Joint::ALL.into_iter().zip(tables.iter()).try_for_each(|(j, t)| check_table(j, t))?;
             }
             None => {}
         }
-        for (j, g) in self.pid.iter().flatten().enumerate() {
+        for (j, g) in Joint::ALL.into_iter().zip(self.pid.iter().flatten()) {
             [g.kp, g.ki, g.kd, g.int_min, g.int_max].into_iter().try_for_each(|v| finite("gain", j, v))?;
             if g.int_min > g.int_max {
-                return Err(ParameterError::IntegralBounds { joint: j + 1, min: g.int_min, max: g.int_max });
+                return Err(ParameterError::IntegralBounds { joint: j, min: g.int_min, max: g.int_max });
             }
         }
         if let Some(model) = &self.model {
@@ -155,26 +159,16 @@ impl ParameterSet {
     }
 }
 
-fn finite(what: &'static str, joint: usize, value: f64) -> Result<(), ParameterError> {
-    if (value as f32).is_finite() {
-        Ok(())
-    } else {
-        Err(ParameterError::NotFinite { what, joint: joint + 1, value })
-    }
+fn finite(what: &'static str, joint: Joint, value: f64) -> Result<(), ParameterError> {
+    if (value as f32).is_finite() { Ok(()) } else { Err(ParameterError::NotFinite { what, joint, value }) }
 }
 
-fn check_table(j: usize, t: &TableOf<f32>) -> Result<(), ParameterError> {
+fn check_table(j: Joint, t: &TableOf<f32>) -> Result<(), ParameterError> {
     for (axis, values) in [("velocity", &t.velocity), ("temperature", &t.temperature)] {
         values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;
         for (i, w) in values.windows(2).enumerate() {
             if w[1] <= w[0] {
-                return Err(ParameterError::Axis {
-                    joint: j + 1,
-                    axis,
-                    place: i + 2,
-                    before: w[0],
-                    after: w[1],
-                });
+                return Err(ParameterError::Axis { joint: j, axis, place: i + 2, before: w[0], after: w[1] });
             }
         }
     }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
+use jtc_wire::Joint;
 use serde::Serialize;
 
 use super::HOLD_SHARE;
@@ -12,8 +13,8 @@ use super::verdict::Problem;
 /// A place of the path where something is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Seen {
-    /// Joint from 1; `None`: the trajectory as a whole.
-    pub joint: Option<usize>,
+    /// `None`: the trajectory as a whole.
+    pub joint: Option<Joint>,
     /// Point (from 0); with `ms` > 0 between this and the next.
     pub point: usize,
     /// ms after `point`.
@@ -35,8 +36,8 @@ pub struct Cause {
     pub words: &'static str,
     /// Unit of values and limits; empty for numbers.
     pub unit: &'static str,
-    /// Joints from 1; none where it is the trajectory as a whole.
-    pub joints: Vec<usize>,
+    /// None where it is the trajectory as a whole.
+    pub joints: Vec<Joint>,
     /// Points of the file at which it is, or after which it is before the next.
     pub points: usize,
     /// The first place along the path.
@@ -112,8 +113,8 @@ impl fmt::Display for Cause {
 }
 
 /// "joint 2", "joints 1, 2 and 6".
-fn joints(joints: &[usize]) -> String {
-    let names: Vec<String> = joints.iter().map(usize::to_string).collect();
+fn joints(joints: &[Joint]) -> String {
+    let names: Vec<String> = joints.iter().map(|joint| joint.number().to_string()).collect();
     match names.split_last() {
         None => "the whole trajectory".into(),
         Some((last, [])) => format!("joint {last}"),
@@ -127,7 +128,7 @@ impl Seen {
         use ProblemKind::*;
         let Self { joint, point, ms, time_s, value, limit } = self;
         let (unit, words, next) = (kind.unit(), kind.words(), point + 1);
-        let joint = joint.map_or(String::new(), |joint| format!("joint {joint}: "));
+        let joint = joint.map_or(String::new(), |joint| format!("{joint}: "));
         let place = if *ms > 0.0 {
             format!("{ms} ms after point {point} ({time_s:.3} s)")
         } else {

@@ -17,8 +17,10 @@ impl Verdict {
                 Velocity => 0.95 / over,
                 // Seen at a place between two points, which need not be the fastest one.
                 PositionSpeed => {
-                    let peak =
-                        p.joint.and_then(|j| self.joints.get(j - 1)).map_or(0.0, |j| j.velocity_peak_rad_s);
+                    let peak = p
+                        .joint
+                        .and_then(|j| self.joints.get(j.index()))
+                        .map_or(0.0, |j| j.velocity_peak_rad_s);
                     0.95 / over.max(peak / p.limit.abs())
                 }
                 Acceleration => (0.9 / over).sqrt(),

@@ -6,6 +6,7 @@
 
 use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
+use jtc_wire::Joint;
 
 use super::{ProblemKind, Verdict};
 
@@ -48,16 +49,17 @@ pub(super) fn holds(
 fn hold(config: &Config, dynamics: &Dynamics, s: &SetPoint, i: usize, ms: u16, verdict: &mut Verdict) {
     let zero = [0.0; JOINTS];
     let torque = dynamics.inverse(&s.position, &zero, &zero);
-    for (j, limit) in config.joints.iter().enumerate() {
+    for (joint, limit) in Joint::ALL.into_iter().zip(&config.joints) {
+        let torque = torque[joint.index()];
         let most = HOLD_SHARE * limit.torque_max;
-        if torque[j].abs() > most {
+        if torque.abs() > most {
             verdict.add(
                 ProblemKind::HoldTorque,
-                Some(j),
+                Some(joint),
                 i,
                 f64::from(ms),
-                torque[j],
-                most.copysign(torque[j]),
+                torque,
+                most.copysign(torque),
             );
         }
     }

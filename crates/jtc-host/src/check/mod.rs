@@ -19,6 +19,7 @@ use jtc_core::{
     Violation, interpolate, position_speed,
 };
 use jtc_dynamics::{ArmModel, Dynamics};
+use jtc_wire::Joint;
 
 pub use cause::{Cause, Seen};
 pub use checked::{CheckOptions, CheckedTrajectory};
@@ -70,7 +71,7 @@ impl<'a> Checker<'a> {
                 Ok(raw) => SetPoint::from(&raw),
                 Err(e) => {
                     let kind = ProblemKind::scale(e.channel);
-                    verdict.add(kind, Some(e.joint - 1), i, 0.0, e.value, e.limit);
+                    verdict.add(kind, Some(e.joint), i, 0.0, e.value, e.limit);
                     SetPoint { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
                 }
             })
@@ -119,15 +120,15 @@ impl<'a> Checker<'a> {
                 Quantity::FrictionVelocity => ProblemKind::FrictionVelocity,
                 Quantity::FrictionTemperature => continue,
             };
-            let point = point as usize;
+            let (point, joint) = (point as usize, Joint::from_index(joint));
             let counted = matches!(kind, ProblemKind::PositionSpeed | ProblemKind::FrictionVelocity);
             let known = verdict.problems.iter().any(|p| {
                 let jump = p.kind == ProblemKind::Jump && p.point == point;
-                p.joint == Some(joint + 1) && (jump || (p.kind == kind && !counted))
+                p.joint == joint && (jump || (p.kind == kind && !counted))
             });
             if !known {
                 let ms = (fraction * f64::from(trajectory.step_ms)).round();
-                verdict.add(kind, Some(joint), point, ms, value, limit);
+                verdict.add(kind, joint, point, ms, value, limit);
             }
         }
     }
@@ -158,10 +159,17 @@ impl<'a> Checker<'a> {
 
     /// J-34.
     fn start_pose(&self, first: &SetPoint, verdict: &mut Verdict) {
-        for (j, measured) in self.start.into_iter().flatten().enumerate() {
-            let away = measured - first.position[j];
+        for (joint, measured) in Joint::ALL.into_iter().zip(self.start.into_iter().flatten()) {
+            let away = measured - first.position[joint.index()];
             if away.abs() > self.config.start_tolerance_rad || away.is_nan() {
-                verdict.add(ProblemKind::StartPose, Some(j), 0, 0.0, away, self.config.start_tolerance_rad);
+                verdict.add(
+                    ProblemKind::StartPose,
+                    Some(joint),
+                    0,
+                    0.0,
+                    away,
+                    self.config.start_tolerance_rad,
+                );
             }
         }
     }
@@ -169,9 +177,9 @@ impl<'a> Checker<'a> {
     /// The arm stands before and after.
     fn ends(&self, points: &[SetPoint], verdict: &mut Verdict) {
         for i in [0, points.len() - 1] {
-            for (j, v) in points[i].velocity.iter().enumerate() {
+            for (joint, v) in Joint::ALL.into_iter().zip(&points[i].velocity) {
                 if v.abs() > REST_SPEED {
-                    verdict.add(ProblemKind::NotAtRest, Some(j), i, 0.0, *v, REST_SPEED);
+                    verdict.add(ProblemKind::NotAtRest, Some(joint), i, 0.0, *v, REST_SPEED);
                 }
             }
             if points.len() == 1 {
@@ -202,7 +210,8 @@ impl<'a> Checker<'a> {
     /// Jumps and contradictions between two points; true when what lies between them makes no sense.
     fn step(&self, a: &SetPoint, b: &SetPoint, i: usize, h: f64, verdict: &mut Verdict) -> bool {
         let mut senseless = false;
-        for (j, limit) in self.config.joints.iter().enumerate() {
+        for (joint, limit) in Joint::ALL.into_iter().zip(&self.config.joints) {
+            let j = joint.index();
             let (moved, v0, v1) = (b.position[j] - a.position[j], a.velocity[j], b.velocity[j]);
             let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
             // What the velocities of both points allow, with rounding.
@@ -212,16 +221,16 @@ impl<'a> Checker<'a> {
                 + h * h * 0.25 * (a0.abs() + a1.abs());
             let beyond = (moved - expected).abs() - slack;
             if moved.abs() > 2.0 * limit.velocity_max * h + 3.0 * POSITION_BIT {
-                verdict.add(ProblemKind::Jump, Some(j), i, 0.0, moved, limit.velocity_max * h);
+                verdict.add(ProblemKind::Jump, Some(joint), i, 0.0, moved, limit.velocity_max * h);
                 senseless = true;
             } else if beyond > 0.05 * limit.velocity_max * h {
-                verdict.add(ProblemKind::VelocityMismatch, Some(j), i, 0.0, moved / h, expected / h);
+                verdict.add(ProblemKind::VelocityMismatch, Some(joint), i, 0.0, moved / h, expected / h);
             }
             let (sped, expected) = (v1 - v0, 0.5 * h * (a0 + a1));
             let slack = 3.0 * VELOCITY_BIT + h * 0.5 * (a1 - a0).abs();
             let beyond = (sped - expected).abs() - slack;
             if !senseless && beyond > 0.1 * limit.acceleration_max * h {
-                verdict.add(ProblemKind::AccelerationMismatch, Some(j), i, 0.0, sped / h, expected / h);
+                verdict.add(ProblemKind::AccelerationMismatch, Some(joint), i, 0.0, sped / h, expected / h);
             }
         }
         senseless
@@ -230,11 +239,12 @@ impl<'a> Checker<'a> {
     /// Limits at one millisecond.
     fn moment(&self, s: &SetPoint, i: usize, ms: f64, dynamics: Option<&Dynamics>, verdict: &mut Verdict) {
         let torque = dynamics.map(|d| d.inverse(&s.position, &s.velocity, &s.acceleration));
-        for (j, limit) in self.config.joints.iter().enumerate() {
+        for (joint, limit) in Joint::ALL.into_iter().zip(&self.config.joints) {
+            let j = joint.index();
             let (q, v, a) = (s.position[j], s.velocity[j], s.acceleration[j]);
             let mut over = |kind, value: f64, min: f64, max: f64| {
                 if !(min..=max).contains(&value) {
-                    verdict.add(kind, Some(j), i, ms, value, if value < min { min } else { max });
+                    verdict.add(kind, Some(joint), i, ms, value, if value < min { min } else { max });
                 }
             };
             let (low, high) = self.config.position_range(j);

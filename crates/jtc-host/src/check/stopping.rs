@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 
 use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
+use jtc_wire::Joint;
 
 use super::{ProblemKind, Verdict};
 
@@ -32,7 +33,7 @@ struct Place {
 #[derive(Clone, Copy)]
 struct Load {
     share: f64,
-    joint: usize,
+    joint: Joint,
     torque: f64,
 }
 
@@ -60,7 +61,7 @@ pub(super) fn stops(
         let loads = LENGTHS.iter().map(|share| ramp(config, &window, share * stop_ms));
         let easiest = loads.reduce(|a, b| if a.share <= 1.0 || a.share <= b.share { a } else { b });
         if let (Some(load), Some(start)) = (easiest.filter(|l| l.share > 1.0), window.front()) {
-            let limit = config.joints[load.joint].torque_max.copysign(load.torque);
+            let limit = config.joints[load.joint.index()].torque_max.copysign(load.torque);
             verdict.add(ProblemKind::NoStop, Some(load.joint), start.point, start.ms, load.torque, limit);
         }
         window.pop_front();
@@ -91,7 +92,7 @@ fn place(config: &Config, dynamics: &Dynamics, step_ms: u16, points: &[SetPoint]
 
 /// The highest load of a ramp of `length` ms from the first place of `window`.
 fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
-    let mut worst = Load { share: 0.0, joint: 0, torque: 0.0 };
+    let mut worst = Load { share: 0.0, joint: Joint::ALL[0], torque: 0.0 };
     let samples = (length / SPACING).ceil().max(2.0);
     let (mut way, mut before) = (0.0, 1.0);
     for k in 0..=samples as usize {
@@ -102,7 +103,8 @@ fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
         let index = (way as usize).min(window.len() - 1);
         let (a, u) = (&window[index], way - index as f64);
         let b = window.get(index + 1).unwrap_or(a);
-        for j in 0..JOINTS {
+        for joint in Joint::ALL {
+            let j = joint.index();
             let between = |part: fn(&Place) -> &[f64; JOINTS]| {
                 let (x, y) = (part(a)[j], part(b)[j]);
                 x + u.min(1.0) * (y - x)
@@ -111,7 +113,7 @@ fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
                 between(|p| &p.hold) + rate * rate * between(|p| &p.motion) + slope * between(|p| &p.slope);
             let share = torque.abs() / config.joints[j].torque_max;
             if share > worst.share {
-                worst = Load { share, joint: j, torque };
+                worst = Load { share, joint, torque };
             }
         }
     }

@@ -41,7 +41,7 @@ fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     start[4] = 0.021;
     let verdict = Checker { start: Some(start), ..Checker::new(&config) }.check(&smooth());
     let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
-    assert_eq!((problem.kind, problem.joint), (ProblemKind::StartPose, Some(5)));
+    assert_eq!((problem.kind, problem.joint), (ProblemKind::StartPose, Joint::from_number(5)));
     assert!(verdict.hint().contains("--approach"));
     start[4] = 0.019;
     assert!(Checker { start: Some(start), ..Checker::new(&config) }.check(&smooth()).is_ok());
@@ -62,7 +62,7 @@ fn j32_limits_are_checked_between_points() {
         Trajectory { step_ms: 1000, points: vec![at(1.5, 0.0), at(1.5, 1.0), at(1.5, -1.0), at(1.5, 0.0)] };
     let verdict = check(&t);
     let over = verdict.problems.iter().find(|p| p.kind == ProblemKind::Position).expect("found");
-    assert_eq!((over.joint, over.point), (Some(2), 1));
+    assert_eq!((over.joint, over.point), (Joint::from_number(2), 1));
     assert!(over.ms > 0.0 && over.value > 1.57);
 }
 
@@ -75,7 +75,7 @@ fn jumps_are_named_one_by_one() {
     }
     let verdict = check(&t);
     let jump = &verdict.problems[0];
-    assert_eq!((jump.kind, jump.joint, jump.point), (ProblemKind::Jump, Some(3), n / 2 - 1));
+    assert_eq!((jump.kind, jump.joint, jump.point), (ProblemKind::Jump, Joint::from_number(3), n / 2 - 1));
     assert!(
         verdict.to_string().contains(&format!("between points {} and {}", n / 2 - 1, n / 2)),
         "{verdict}"
@@ -128,7 +128,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     let verdict = Checker { model: Some(&arm.model), ..Checker::new(&config) }.check(&t);
     assert_eq!(
         (verdict.problems[0].kind, verdict.problems[0].joint),
-        (ProblemKind::Torque, Some(2)),
+        (ProblemKind::Torque, Joint::from_number(2)),
         "{verdict}"
     );
 }
@@ -142,7 +142,7 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     assert_eq!(verdict.problems.len(), 1, "{verdict}");
     assert_eq!(
         (verdict.problems[0].kind, verdict.problems[0].joint),
-        (ProblemKind::PositionSpeed, Some(3)),
+        (ProblemKind::PositionSpeed, Joint::from_number(3)),
         "{verdict}"
     );
     // 15/8 of 2.5 rad in 0.3 s, along the path and not at its points.
@@ -185,15 +185,15 @@ fn long_lists_are_summed_by_cause() {
     let config = Config::avena();
     let verdict = check(&t);
     let cause = verdict.causes.iter().find(|c| c.kind == ProblemKind::Velocity).expect("found");
-    assert_eq!(cause.joints, [2, 6]);
+    assert_eq!(cause.joints.iter().map(|j| j.number()).collect::<Vec<_>>(), [2, 6]);
     assert_eq!(
         (cause.worst.joint, cause.worst.point, cause.worst.limit),
-        (Some(2), n / 2 + 1, -1.5),
+        (Joint::from_number(2), n / 2 + 1, -1.5),
         "{verdict}"
     );
     assert!((cause.worst.value + 1.9).abs() < 1e-3, "{verdict}");
     // Between points the controller's velocity passes the limit before it is at the point.
-    assert_eq!((cause.first.joint, cause.first.point), (Some(6), n / 4 - 1), "{verdict}");
+    assert_eq!((cause.first.joint, cause.first.point), (Joint::from_number(6), n / 4 - 1), "{verdict}");
     let time = (cause.first.point as f64 * f64::from(t.step_ms) + cause.first.ms) * 1e-3;
     assert_eq!(cause.first.time_s, time);
     assert!((4..=7).contains(&cause.points), "{}", cause.points);
@@ -217,7 +217,7 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     t.points[20].position[4] += 0.02;
     let verdict = check(&t);
     let bump = verdict.refusals().next().expect("refused");
-    assert_eq!((bump.kind, bump.joint), (ProblemKind::PositionSpeed, Some(5)), "{verdict}");
+    assert_eq!((bump.kind, bump.joint), (ProblemKind::PositionSpeed, Joint::from_number(5)), "{verdict}");
     assert!((19..=20).contains(&bump.point) && bump.ms > 0.0, "{verdict}");
     // Limits beyond the drives' working area.
     let mut config = Config::avena();
@@ -239,7 +239,7 @@ fn j36_the_friction_table_bounds_the_speed() {
     assert!(with(50.0).is_ok(), "{}", with(50.0));
     let verdict = with(80.0);
     let over = verdict.refusals().next().expect("refused");
-    assert_eq!((over.kind, over.joint), (ProblemKind::FrictionVelocity, Some(4)), "{verdict}");
+    assert_eq!((over.kind, over.joint), (ProblemKind::FrictionVelocity, Joint::from_number(4)), "{verdict}");
     assert!(verdict.hint().contains("--speed"), "{}", verdict.hint());
 }
 
@@ -258,7 +258,7 @@ fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     config.joints[1].torque_max = peak + 0.5;
     let refused = verdict(&config);
     let stop = refused.refusals().next().expect("refused");
-    assert_eq!((stop.kind, stop.joint), (ProblemKind::NoStop, Some(2)), "{refused}");
+    assert_eq!((stop.kind, stop.joint), (ProblemKind::NoStop, Joint::from_number(2)), "{refused}");
     assert!(stop.value.abs() > stop.limit.abs() && stop.limit.abs() == peak + 0.5, "{refused}");
     assert!(refused.hint().contains("--speed") && refused.hint().contains("payload"), "{}", refused.hint());
     // With a second to stop in it is another matter.
@@ -294,10 +294,16 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     for share in [0.98, 0.975] {
         let (joint, point, over, hint) = refusal(&there, share, None).expect("at its end");
         // The last points are so slow that they stand.
-        assert!(joint == Some(2) && over && (last - 5..=last).contains(&point), "{point} of {last}");
+        assert!(
+            joint == Joint::from_number(2) && over && (last - 5..=last).contains(&point),
+            "{point} of {last}"
+        );
         assert!(hint.contains("poses") && hint.contains("payload") && !hint.contains("--speed"), "{hint}");
         let (joint, point, ..) = refusal(&both, share, None).expect("where it rests on the way");
-        assert!(joint == Some(2) && (last - 5..=last + 5).contains(&point), "{point} of {last}");
+        assert!(
+            joint == Joint::from_number(2) && (last - 5..=last + 5).contains(&point),
+            "{point} of {last}"
+        );
         assert!(refusal(&back, share, None).is_some(), "at its start");
         // Where the arm stands there already, to leave is right.
         assert_eq!(refusal(&back, share, Some(high)), None);

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use jtc_core::JOINTS;
+use jtc_wire::Joint;
 use serde::Serialize;
 
 use super::cause::{Cause, Places, Seen, causes};
@@ -14,8 +15,8 @@ use crate::trajectory::Trajectory;
 pub struct Problem {
     /// What is wrong.
     pub kind: ProblemKind,
-    /// Joint from 1; `None`: the trajectory as a whole.
-    pub joint: Option<usize>,
+    /// `None`: the trajectory as a whole.
+    pub joint: Option<Joint>,
     /// Where it is first along the path.
     pub first: Seen,
     /// Point (from 0) where it is worst.
@@ -159,13 +160,12 @@ impl Verdict {
     pub(super) fn add(
         &mut self,
         kind: ProblemKind,
-        joint: Option<usize>,
+        joint: Option<Joint>,
         point: usize,
         ms: f64,
         value: f64,
         limit: f64,
     ) {
-        let joint = joint.map(|j| j + 1);
         let time_s = (point as f64 * f64::from(self.step_ms) + ms) * 1e-3;
         let first = Seen { joint, point, ms, time_s, value, limit };
         let new = Problem { kind, joint, first, point, ms, time_s, value, limit, count: 1, warning: false };
@@ -232,7 +232,6 @@ impl Verdict {
         }
         let h = f64::from(self.step_ms) * 1e-3;
         for Problem { joint, point, value, limit, .. } in jumps {
-            let joint = joint.map(|j| j - 1);
             self.add(ProblemKind::PositionSpeed, joint, point, 0.0, value / h, limit / h);
         }
     }
@@ -272,10 +271,10 @@ impl Verdict {
         }
     }
 
-    /// The joint (from 1) that goes furthest from zero, and where to, rad.
-    fn furthest(&self) -> Option<(usize, f64)> {
-        let ends = self.joints.iter().enumerate();
-        let ends = ends.flat_map(|(j, f)| [(j + 1, f.position_min_rad), (j + 1, f.position_max_rad)]);
+    /// The joint that goes furthest from zero, and where to, rad.
+    fn furthest(&self) -> Option<(Joint, f64)> {
+        let ends = Joint::ALL.into_iter().zip(&self.joints);
+        let ends = ends.flat_map(|(j, f)| [(j, f.position_min_rad), (j, f.position_max_rad)]);
         ends.filter(|(_, q)| q.is_finite()).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
@@ -297,7 +296,7 @@ impl fmt::Display for Verdict {
         write!(f, "{word}: {points} points, step {step} ms, {s:.2} s")?;
         let (mut shown, mut left) = (self.causes.len(), 0);
         if let (Suspicion::Degrees, Some(far)) = (self.suspicion(), self.furthest()) {
-            write!(f, "\n  the positions look like degrees: joint {} is at {:.1}", far.0, far.1)?;
+            write!(f, "\n  the positions look like degrees: {} is at {:.1}", far.0, far.1)?;
             // What else is wrong comes from that.
             shown = self.causes.iter().take_while(|c| c.kind <= ProblemKind::Position).count().max(1);
             left = self.causes.len().saturating_sub(shown);

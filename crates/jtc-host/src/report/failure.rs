@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use jtc_wire::{ControllerState, NodeState, Status};
+use jtc_wire::{ControllerState, Joint, NodeState, Status};
 use serde::Serialize;
 
 use crate::recording::{Ending, RecordingInfo};
@@ -20,8 +20,8 @@ const STEP_SHARE: f64 = 1.2;
 pub struct Moment {
     /// Into the run, ms.
     pub time_ms: f64,
-    /// From 1.
-    pub joint: usize,
+    /// Which joint.
+    pub joint: Joint,
     /// State of the controller.
     pub state: &'static str,
     /// Commanded position, rad.
@@ -45,8 +45,8 @@ pub struct Moment {
 pub struct RunFailure {
     /// What is wrong, what broke first before what followed from it.
     pub causes: Vec<String>,
-    /// The joint that broke first, from 1; none where no joint did.
-    pub joint: Option<usize>,
+    /// The joint that broke first; none where no joint did.
+    pub joint: Option<Joint>,
     /// Into the run, ms: on the controller's count of 1 ms points while it moves.
     pub at_ms: f64,
     /// Time of the sample that shows it first, s, on the clock of the samples.
@@ -67,7 +67,7 @@ impl RunFailure {
         if joint.is_none()
             && let Some((j, step)) = stepped(info, samples, at)
         {
-            joint = Some(j + 1);
+            joint = Some(j);
             causes.insert(0, step);
         }
         Some(Self::at(info, samples, at, causes, joint))
@@ -113,34 +113,34 @@ impl RunFailure {
         samples: &[Sample],
         at: usize,
         causes: Vec<String>,
-        joint: Option<usize>,
+        joint: Option<Joint>,
     ) -> Self {
         let start_s = start_s(samples, at);
         let time = |i: usize| samples.get(i).map_or(start_s, |s| s.time_s);
         let into_ms = |i: usize| (time(i) - start_s) * 1e3;
-        let moment = |i: usize, j: usize| {
-            let (sample, own) = (&samples[i], &samples[i].joints[j]);
+        let moment = |i: usize, joint: Joint| {
+            let (sample, own) = (&samples[i], &samples[i].joints[joint.index()]);
             Moment {
                 time_ms: into_ms(i),
-                joint: j + 1,
+                joint,
                 state: sample.state.name(),
                 set_position_rad: own.set_position,
                 position_rad: own.position,
                 velocity_rad_s: own.velocity,
                 torque_nm: own.torque,
-                torque_limit_nm: info.joints[j].torque_max_nm,
-                errors: Words::of_sample(sample).joint(j),
+                torque_limit_nm: info.joints[joint.index()].torque_max_nm,
+                errors: Words::of_sample(sample).joint(joint),
                 first: i == at,
             }
         };
         // Of the joint that broke a piece of its history; where no joint did, all of them up to that moment.
         let moments = match joint {
             Some(joint) => (at.saturating_sub(BEFORE)..samples.len().min(at + AFTER + 1))
-                .map(|i| moment(i, joint - 1))
+                .map(|i| moment(i, joint))
                 .collect(),
             None if samples.is_empty() => Vec::new(),
             None => (at.saturating_sub(BEFORE)..=at)
-                .flat_map(|i| (0..6).map(move |j| (i, j)))
+                .flat_map(|i| Joint::ALL.into_iter().map(move |j| (i, j)))
                 .map(|(i, j)| moment(i, j))
                 .collect(),
         };
@@ -169,7 +169,7 @@ impl RunFailure {
         let row = |m: &Moment| {
             [
                 figure(m.time_ms, 0),
-                m.joint.to_string(),
+                m.joint.number().to_string(),
                 m.state.to_owned(),
                 figure(m.set_position_rad, 4),
                 figure(m.position_rad, 4),
@@ -193,7 +193,7 @@ impl RunFailure {
             let _ = writeln!(out, "<p>with it: {}</p>", others.join(", "));
         }
         let (whose, before) = match self.joint {
-            Some(joint) => (format!("Joint {joint} around it"), "the marked line"),
+            Some(joint) => (format!("Joint {} around it", joint.number()), "the marked line"),
             None => ("All joints up to it".to_owned(), "the last of these moments"),
         };
         let _ = writeln!(out, "<p>{whose}; it happened in the {:.0} ms before {before}.</p>", self.within_ms);
@@ -214,29 +214,29 @@ impl RunFailure {
     }
 }
 
-/// The joint (from 0) whose measured position went further from one sample to the next than its velocity limit allows, around the
+/// The joint whose measured position went further from one sample to the next than its velocity limit allows, around the
 /// sample `at`, where the status names no joint: words for it.
-fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(usize, String)> {
-    let mut worst: Option<(f64, usize, String)> = None;
+fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint, String)> {
+    let mut worst: Option<(f64, Joint, String)> = None;
     for i in at.max(1)..samples.len().min(at + 2) {
         let since = |i: usize| samples[i].time_s - samples[i.saturating_sub(1)].time_s;
         // Behind the fault the time is that of arrival: what came together was not measured together.
         let span_s = (1..=i).rev().take(3).map(since).fold(0.0, f64::max);
-        for (j, limits) in info.joints.iter().enumerate() {
-            let step = (samples[i].joints[j].position - samples[i - 1].joints[j].position).abs();
+        for (joint, limits) in Joint::ALL.into_iter().zip(&info.joints) {
+            let position = |i: usize| samples[i].joints[joint.index()].position;
+            let step = (position(i) - position(i - 1)).abs();
             let allowed = limits.velocity_max_rad_s * span_s;
             let share = step / allowed;
             if allowed > 0.0 && share > STEP_SHARE && worst.as_ref().is_none_or(|w| share > w.0) {
                 let words = format!(
-                    "joint {}: measured position went {step:.3} rad in {:.0} ms, its velocity limit allows {allowed:.3} rad",
-                    j + 1,
+                    "{joint}: measured position went {step:.3} rad in {:.0} ms, its velocity limit allows {allowed:.3} rad",
                     span_s * 1e3
                 );
-                worst = Some((share, j, words));
+                worst = Some((share, joint, words));
             }
         }
     }
-    worst.map(|(_, j, words)| (j, words))
+    worst.map(|(_, joint, words)| (joint, words))
 }
 
 /// The first sample of the execution, or the first of all.
@@ -286,10 +286,10 @@ impl Words {
         Self { errors: s.errors, can: s.can_current, joints }
     }
 
-    /// What is wrong with joint `j`.
-    fn joint(&self, j: usize) -> Vec<String> {
-        let own = &self.joints[j];
-        let silent = (self.can >> (8 + j) & 1 == 1).then_some("does not answer");
+    /// What is wrong with a joint.
+    fn joint(&self, joint: Joint) -> Vec<String> {
+        let own = &self.joints[joint.index()];
+        let silent = (self.can >> (8 + joint.index()) & 1 == 1).then_some("does not answer");
         let all = silent
             .into_iter()
             .chain(words::motor_faults(own.motor))
@@ -301,13 +301,13 @@ impl Words {
 }
 
 /// What is wrong, joints first: the controller's own words follow from theirs. And the first joint.
-fn causes(words: &Words) -> (Vec<String>, Option<usize>) {
+fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
     let mut all = Vec::new();
     let mut first = None;
-    for j in 0..6 {
-        for problem in words.joint(j) {
-            first = first.or(Some(j + 1));
-            all.push(format!("joint {}: {problem}", j + 1));
+    for joint in Joint::ALL {
+        for problem in words.joint(joint) {
+            first = first.or(Some(joint));
+            all.push(format!("{joint}: {problem}"));
         }
     }
     if words.can & 1 != 0 {

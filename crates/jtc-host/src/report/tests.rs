@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::sample::JointSample;
-use jtc_wire::{ControllerState, NodeState, TrajectoryState};
+use jtc_wire::{ControllerState, Joint, NodeState, TrajectoryState};
 
 fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
     let mut info =
@@ -130,7 +130,7 @@ fn silent_joint() -> (RecordingInfo, Vec<Sample>) {
 fn a_failed_run_leads_with_what_broke_first() {
     let (info, samples) = silent_joint();
     let failure = RunFailure::find(&info, &samples).expect("it failed");
-    assert_eq!((failure.joint, failure.at_ms.round()), (Some(3), 600.0));
+    assert_eq!((failure.joint.map(Joint::number), failure.at_ms.round()), (Some(3), 600.0));
     assert_eq!(failure.headline(), "FAILED 600 ms into the run: joint 3: does not answer");
     assert_eq!(failure.causes, ["joint 3: does not answer", "controller: internal CAN error"]);
     let times: Vec<f64> = failure.moments.iter().map(|m| m.time_ms.round()).collect();
@@ -157,7 +157,10 @@ fn a_failed_run_leads_with_what_broke_first() {
 fn a_run_without_its_own_error_says_why_it_ended() {
     let (info, samples) = run(1000);
     let failure = RunFailure::ended_by(&info, &samples, "the link was lost".into());
-    assert_eq!((failure.joint, failure.moments.len(), failure.at_ms.round()), (None, 24, 999.0));
+    assert_eq!(
+        (failure.joint.map(Joint::number), failure.moments.len(), failure.at_ms.round()),
+        (None, 24, 999.0)
+    );
     assert_eq!(RunFailure::ended_by(&info, &[], "early".into()).moments, []);
 }
 
@@ -184,14 +187,14 @@ fn an_encoder_that_jumps_is_named_by_its_step() {
         s.joints[3].position += 0.4;
     }
     let failure = RunFailure::find(&info, &samples).unwrap();
-    assert_eq!((failure.joint, failure.moments[0].time_ms.round()), (Some(4), 597.0));
+    assert_eq!((failure.joint.map(Joint::number), failure.moments[0].time_ms.round()), (Some(4), 597.0));
     assert!(failure.causes[0].starts_with("joint 4: measured position went "), "{:?}", failure.causes);
 
     for s in &mut samples[600..] {
         s.joints[3].position -= 0.4;
     }
     let failure = RunFailure::find(&info, &samples).unwrap();
-    assert_eq!((failure.joint, failure.moments[0].time_ms.round()), (None, 597.0));
+    assert_eq!((failure.joint.map(Joint::number), failure.moments[0].time_ms.round()), (None, 597.0));
     let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
     assert!(!page.contains("marked line") && !page.contains("<tr class=\"first\">"));
 }

@@ -11,7 +11,7 @@ mod tests;
 use std::path::Path;
 
 use jtc_core::JOINTS;
-use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
+use jtc_wire::{ACCELERATION_SCALE, Joint, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 pub use overshoot::{Overshoot, overshoot_words};
 
@@ -133,12 +133,12 @@ impl Loaded {
 
 /// A number that a trajectory frame cannot carry.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("point {point}, joint {joint}: {channel} {value} is outside the scale of ±{limit} {unit}")]
+#[error("point {point}, {joint}: {channel} {value} is outside the scale of ±{limit} {unit}")]
 pub struct ScaleError {
     /// Point from 0.
     pub point: usize,
-    /// Joint from 1.
-    pub joint: usize,
+    /// Of this joint.
+    pub joint: Joint,
     /// "position", "velocity" or "acceleration".
     pub channel: &'static str,
     /// The value.
@@ -169,18 +169,11 @@ impl Point {
     pub fn raw(&self, index: usize) -> Result<RawPoint, ScaleError> {
         let channel = |values: &[f64; JOINTS], scale: f64, channel, unit| {
             let mut out = [0i16; JOINTS];
-            for (j, (to, v)) in out.iter_mut().zip(values).enumerate() {
+            for (joint, (to, v)) in Joint::ALL.into_iter().zip(out.iter_mut().zip(values)) {
                 let exact = v * 32767.0 / scale;
                 // Neither clipped nor wrapped; a hair for the rounding of the multiplication. NaN is in no range.
                 if !(-32768.0 - 1e-9..=32767.0 + 1e-9).contains(&exact) {
-                    return Err(ScaleError {
-                        point: index,
-                        joint: j + 1,
-                        channel,
-                        value: *v,
-                        limit: scale,
-                        unit,
-                    });
+                    return Err(ScaleError { point: index, joint, channel, value: *v, limit: scale, unit });
                 }
                 *to = exact.round() as i16;
             }

@@ -1,14 +1,14 @@
 //! How far the curve through waypoints goes beyond them.
 
-use jtc_core::JOINTS;
+use jtc_wire::Joint;
 
 use super::Point;
 
 /// The furthest place of one joint outside of the interval between two waypoints.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Overshoot {
-    /// Joint from 1.
-    pub joint: usize,
+    /// Of this joint.
+    pub joint: Joint,
     /// How far it is outside, rad.
     pub beyond_rad: f64,
     /// Where it is then, rad.
@@ -22,7 +22,8 @@ const LEAST: f64 = 1e-3;
 
 /// Of each joint that has one the largest, for the cubics with these positions and velocities at these times (s).
 pub(super) fn overshoots(times: &[f64], points: &[Point]) -> Vec<Overshoot> {
-    let of_joint = |j: usize| {
+    let of_joint = |joint: Joint| {
+        let j = joint.index();
         let intervals = points.windows(2).zip(times.windows(2)).enumerate();
         let all = intervals.filter_map(|(i, (p, t))| {
             let (a, b, h) = (p[0].position[j], p[1].position[j], t[1] - t[0]);
@@ -31,11 +32,11 @@ pub(super) fn overshoots(times: &[f64], points: &[Point]) -> Vec<Overshoot> {
             let places = turns.into_iter().flatten().map(|d| a + d);
             let furthest = places.max_by(|x, y| outside(*x, low, high).total_cmp(&outside(*y, low, high)))?;
             let beyond_rad = outside(furthest, low, high);
-            Some(Overshoot { joint: j + 1, beyond_rad, position_rad: furthest, after: i + 1 })
+            Some(Overshoot { joint, beyond_rad, position_rad: furthest, after: i + 1 })
         });
         all.filter(|o| o.beyond_rad >= LEAST).max_by(|x, y| x.beyond_rad.total_cmp(&y.beyond_rad))
     };
-    (0..JOINTS).filter_map(of_joint).collect()
+    Joint::ALL.into_iter().filter_map(of_joint).collect()
 }
 
 fn outside(x: f64, low: f64, high: f64) -> f64 {
@@ -55,7 +56,7 @@ fn extrema(d: f64, v0: f64, v1: f64) -> [Option<f64>; 2] {
 pub fn overshoot_words(all: &[Overshoot]) -> Option<String> {
     let each = all.iter().map(|o| {
         format!(
-            "joint {} by {:.3} rad (to {:+.3} rad, after waypoint {})",
+            "{} by {:.3} rad (to {:+.3} rad, after waypoint {})",
             o.joint, o.beyond_rad, o.position_rad, o.after
         )
     });
@@ -79,7 +80,7 @@ mod tests {
             "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1,0.5,0,0,0,0,-0.1\n2,0.5,0,0,0,0,-0.2\n3,0,0,0,0,0,-0.3\n";
         let loaded = Loaded::parse(text, None).unwrap();
         let [over] = loaded.overshoot[..] else { panic!("{:?}", loaded.overshoot) };
-        assert_eq!((over.joint, over.after), (1, 2));
+        assert_eq!((over.joint.number(), over.after), (1, 2));
         // The spline through 0, 0.5, 0.5, 0 at rest at its ends turns at 1.5 s: slopes ±0.5 rad/s there and back.
         assert!(
             (over.beyond_rad - 0.125).abs() < 1e-9 && (over.position_rad - 0.625).abs() < 1e-9,

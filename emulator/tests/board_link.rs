@@ -170,23 +170,23 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
     }
 }
 
-/// J-03, J-07: rubbish of any kind costs one record and no frame that follows it, with or without a gap.
+/// J-03, J-07: noise of any kind costs one record and no frame that follows it, with or without a gap.
 #[test]
-fn j03_rubbish_costs_no_frame_that_follows() {
+fn j03_noise_costs_no_frame_that_follows() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.run(50);
     let every: Vec<u8> = (0..=255).collect();
     let header = [0x9B, 0x04, 0xEA, 0x46];
     let headers = [0x9B; 300];
     let zeros = [0; 1000];
-    for (n, rubbish) in [&every[..], &header, &headers, &zeros, &[0x9B]].into_iter().enumerate() {
+    for (n, noise) in [&every[..], &header, &headers, &zeros, &[0x9B]].into_iter().enumerate() {
         for (gap, port) in [(8, A), (8, B), (0, A), (0, B)] {
-            if gap == 0 && rubbish == header {
+            if gap == 0 && noise == header {
                 // A header that promises 59 974 bytes is waited for until a gap: what follows is looked at then.
-                rig.write(port, rubbish);
+                rig.write(port, noise);
             }
             rig.hosts[index(port)].records.clear();
-            rig.write(port, rubbish);
+            rig.write(port, noise);
             if gap > 0 {
                 silence(&mut rig, port, gap);
             }
@@ -195,8 +195,8 @@ fn j03_rubbish_costs_no_frame_that_follows() {
             let records = &rig.hosts[index(port)].records;
             let (bad, good): (Vec<&Response>, Vec<&Response>) =
                 records.iter().partition(|r| r.status != FrameStatus::NoError);
-            assert_eq!(good.len(), 1, "rubbish {n}, gap {gap}: {records:?}");
-            assert!((1..=2).contains(&bad.len()), "rubbish {n}, gap {gap}: {records:?}");
+            assert_eq!(good.len(), 1, "noise {n}, gap {gap}: {records:?}");
+            assert!((1..=2).contains(&bad.len()), "noise {n}, gap {gap}: {records:?}");
         }
     }
     no_losses(&mut rig);

@@ -16,8 +16,8 @@ use openjtc_firmware::{BAUD, lines};
 
 use crate::uart;
 
-/// A gap within a frame that ends it, µs (J-03).
-pub const GAP_US: u32 = 5_000;
+/// Inter-byte timeout: silence that ends a frame, µs (J-03).
+pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
 /// Bytes given to a parser at once.
 const CHUNK: usize = 1024;
 /// Rounds before the links wait for the next tick.
@@ -106,7 +106,7 @@ pub struct Link {
 impl Link {
     /// A link over `line`, whose bytes `uart` receives.
     pub fn new(line: usize, uart: uart::Receiver, buffer: &'static mut [u8; FRAME_MAX]) -> Self {
-        let parser = Receiver::new(&mut buffer[..], GAP_US);
+        let parser = Receiver::new(&mut buffer[..], INTER_BYTE_TIMEOUT_US);
         Self { line, uart, parser, taken: 0, lost: 0, looked_us: 0, left: 0 }
     }
 

@@ -122,7 +122,7 @@ pub fn start(parts: Parts) {
         heard: Heard::new(),
         pins,
         ahead,
-        watch: UrgentWatch::new(link::GAP_US + clock::TICK_US),
+        watch: UrgentWatch::new(link::INTER_BYTE_TIMEOUT_US + clock::TICK_US),
         slot,
         lines,
         watchdog,

@@ -35,7 +35,7 @@ def echoed(bus: can.BusABC) -> can.Message:
         try:
             message = bus.recv(PATIENCE_S)
         except can.CanOperationError:
-            continue  # the rubbish, which python-can reports
+            continue  # the noise, which python-can reports
         if message is not None and message.arbitration_id & 1:
             return message
     raise AssertionError("no echo came")
@@ -51,14 +51,14 @@ def differences(sent: can.Message, heard: can.Message) -> list[str]:
     return [f"{name}: {a!r} became {b!r}" for name, (a, b) in pairs.items() if a != b]
 
 
-def send_rubbish(group: str, port: int) -> None:
+def send_noise(group: str, port: int) -> None:
     six = ":" in group
     with socket.socket(socket.AF_INET6 if six else socket.AF_INET, socket.SOCK_DGRAM) as sender:
         if six:
             sender.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_HOPS, 0)
         else:
             sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-        sender.sendto(b"rubbish", (group, port))
+        sender.sendto(b"noise", (group, port))
 
 
 def check(group: str, port: int, seed: int) -> None:
@@ -73,8 +73,8 @@ def check(group: str, port: int, seed: int) -> None:
                 wrong = differences(message, echoed(bus))
                 assert not wrong, f"{message}: {wrong}"
                 count += 1
-            # Rubbish is passed over: what follows is echoed.
-            send_rubbish(group, port)
+            # Noise is passed over: what follows is echoed.
+            send_noise(group, port)
             # A burst stays in order and complete as long as it fits into the receive buffers.
             burst = [can.Message(arbitration_id=0x100, is_extended_id=False, is_fd=True, bitrate_switch=True,
                                  data=number.to_bytes(2, "big")) for number in range(50)]

@@ -134,7 +134,7 @@ fn decode_knows_frames_of_both_directions() {
     let said = jtc_with(&["--json", "decode"], "9B0B0007 03 7D9E").ends(0);
     assert_eq!(said.json()["frame"], "TrajSetExecStatus");
     assert_eq!(said.json()["type"], 0x0B);
-    // Rubbish before and after costs no frame.
+    // Noise before and after costs no frame.
     let said = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
     assert!(said.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", said.out);
     // Bit 2 of the mask is joint 3.

@@ -65,7 +65,7 @@ pub struct Board {
     watch: UrgentWatch<HOST_LINES>,
     batch: Box<EventBatch>,
     config: Config,
-    gap_us: u32,
+    inter_byte_timeout_us: u32,
     watchdog_ms: u32,
     /// Ticks that did not come.
     missed: u32,
@@ -79,15 +79,15 @@ pub struct Board {
 
 impl Board {
     /// A board with power just switched on.
-    pub fn new(config: Config, gap_us: u32, watchdog_ms: u32) -> Self {
+    pub fn new(config: Config, inter_byte_timeout_us: u32, watchdog_ms: u32) -> Self {
         Self {
             controller: Controller::new(config.clone(), vec![RawPoint::default(); POINTS_MAX]),
             ring: VecDeque::new(),
-            receiver: Receiver::new(vec![0; FRAME_MAX], gap_us),
-            watch: UrgentWatch::new(gap_us + TICK_US),
+            receiver: Receiver::new(vec![0; FRAME_MAX], inter_byte_timeout_us),
+            watch: UrgentWatch::new(inter_byte_timeout_us + TICK_US),
             batch: Box::new(EventBatch::new()),
             config,
-            gap_us,
+            inter_byte_timeout_us,
             watchdog_ms,
             missed: 0,
             worked: Vec::new(),
@@ -99,7 +99,7 @@ impl Board {
     /// Forget everything, as a reset does.
     pub fn reset(&mut self) {
         let resets = self.watchdog_resets;
-        *self = Self::new(self.config.clone(), self.gap_us, self.watchdog_ms);
+        *self = Self::new(self.config.clone(), self.inter_byte_timeout_us, self.watchdog_ms);
         self.watchdog_resets = resets;
     }
 

@@ -86,8 +86,8 @@ pub struct SimConfig {
     pub bus_monitored: bool,
     /// Rate of the serial line, bit/s; `None`: bytes take no time.
     pub baud: Option<u32>,
-    /// Gap that ends a frame, µs (J-03).
-    pub gap_us: u32,
+    /// Inter-byte timeout: silence that ends a frame, µs (J-03).
+    pub inter_byte_timeout_us: u32,
     /// Ticks that may fail to come before the controller's watchdog resets it (J-12).
     pub watchdog_ms: u32,
     /// The controller's safety output is wired to the drives' safety line.
@@ -125,7 +125,7 @@ impl SimConfig {
             absent_drives: 0,
             bus_monitored: false,
             baud: Some(115_200),
-            gap_us: 5_000,
+            inter_byte_timeout_us: 5_000,
             watchdog_ms: 10,
             safety_wired: false,
             seed: 1,

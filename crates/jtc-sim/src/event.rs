@@ -41,12 +41,12 @@ pub enum Event {
         /// State now.
         to: NodeState,
     },
-    /// A host frame was worked off.
+    /// A host frame was processed.
     Frame {
         /// Type byte.
         frame_type: u8,
     },
-    /// The line brought something that is no good frame.
+    /// Bytes arrived that are no good frame.
     BadFrame {
         /// Why.
         status: FrameStatus,

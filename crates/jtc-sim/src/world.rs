@@ -64,7 +64,7 @@ impl World {
         let scales = config.drives.map(|d| Scale { velocity: d.velocity_full_scale });
         let mut world = Self {
             ticks: 0,
-            board: Board::new(config.controller.clone(), config.gap_us, config.watchdog_ms),
+            board: Board::new(config.controller.clone(), config.inter_byte_timeout_us, config.watchdog_ms),
             bus: Bus::new(scales, config.seed ^ 0x6275_7300),
             node_states: plant.node_states(),
             plant,

@@ -239,7 +239,7 @@ impl Display for crate::GripperStatus {
 pub enum Piece<'a> {
     /// A good frame of either direction.
     Frame(FrameRef<'a>),
-    /// Bytes between good frames: bad frames, rubbish, a frame that the capture cuts off.
+    /// Bytes between good frames: bad frames, noise, a frame that the capture cuts off.
     Other(&'a [u8]),
 }
 

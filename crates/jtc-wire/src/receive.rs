@@ -2,7 +2,7 @@
 use crate::frame::{FrameType, HEADER, field};
 use crate::status::{STATUS_LEN, Status};
 
-/// What came so far.
+/// Bytes and statuses received so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct StatusCounters {
     /// Good statuses.
@@ -13,8 +13,8 @@ pub struct StatusCounters {
     pub skipped_bytes: u64,
 }
 
-/// Stream parser of the host, for the layouts of 165, 173 and 175 bytes (J-08). It finds the next status by itself after
-/// rubbish or lost bytes; none costs a good status that follows it.
+/// Stream parser of the host, for the layouts of 165, 173 and 175 bytes (J-08). It resynchronises after noise
+/// and lost bytes without losing a good status that follows them.
 ///
 /// ```
 /// use jtc_wire::{Status, StatusReceiver};
@@ -40,10 +40,11 @@ impl Default for StatusReceiver {
     }
 }
 
-enum Sight {
+/// The scan result at the first held byte.
+enum ScanResult {
     /// The first held byte begins no status.
     Nothing,
-    /// This many bytes are needed to tell more.
+    /// This many bytes are needed to decide.
     Needs(usize),
 }
 
@@ -60,9 +61,9 @@ impl StatusReceiver {
     /// Takes bytes from the front of `bytes` until a status is complete; `None` when all are taken.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Status> {
         loop {
-            match look(&self.held[..self.len]) {
-                Sight::Nothing => self.skip(),
-                Sight::Needs(n) if self.len < n => {
+            match scan(&self.held[..self.len]) {
+                ScanResult::Nothing => self.skip(),
+                ScanResult::Needs(n) if self.len < n => {
                     if bytes.is_empty() {
                         return None;
                     }
@@ -71,7 +72,7 @@ impl StatusReceiver {
                     self.len += taken.len();
                     *bytes = rest;
                 }
-                Sight::Needs(n) => match Status::parse(&self.held[..n]) {
+                ScanResult::Needs(n) => match Status::parse(&self.held[..n]) {
                     Some(status) => {
                         self.drop_front(n);
                         self.counters.frames += 1;
@@ -86,7 +87,7 @@ impl StatusReceiver {
         }
     }
 
-    /// What came so far.
+    /// Bytes and statuses received so far.
     pub fn counters(&self) -> StatusCounters {
         self.counters
     }
@@ -96,13 +97,13 @@ impl StatusReceiver {
         self.len
     }
 
-    /// Forgets the held bytes: for a line that was closed and opened again.
+    /// Discards the held bytes: for a line that was closed and opened again.
     pub fn clear(&mut self) {
         self.counters.skipped_bytes += self.len as u64;
         self.len = 0;
     }
 
-    /// Gives up the first byte and all up to the next header.
+    /// Skips the first byte and all up to the next header.
     fn skip(&mut self) {
         let rest = &self.held[1..self.len];
         let more = rest.iter().position(|byte| *byte == HEADER).unwrap_or(rest.len());
@@ -116,16 +117,16 @@ impl StatusReceiver {
     }
 }
 
-fn look(held: &[u8]) -> Sight {
+fn scan(held: &[u8]) -> ScanResult {
     let wrong = |at: usize, value: u8| held.get(at).is_some_and(|byte| *byte != value);
     if wrong(field::HEADER, HEADER) || wrong(field::TYPE, FrameType::JtcStatus as u8) {
-        return Sight::Nothing;
+        return ScanResult::Nothing;
     }
     match held.get(field::LENGTH) {
-        None => Sight::Needs(field::LENGTH.end),
+        None => ScanResult::Needs(field::LENGTH.end),
         Some(n) => match usize::from(u16::from_be_bytes([n[0], n[1]])) {
-            n if FrameType::JtcStatus.can_have(n) => Sight::Needs(n),
-            _ => Sight::Nothing,
+            n if FrameType::JtcStatus.can_have(n) => ScanResult::Needs(n),
+            _ => ScanResult::Nothing,
         },
     }
 }

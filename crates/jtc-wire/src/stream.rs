@@ -1,16 +1,16 @@
-//! The device's stream parser: finds frames in bytes that arrive in any pieces, and says what else arrived (J-03, J-04).
+//! The device's stream parser: finds frames in bytes that arrive in any pieces, and reports all other bytes (J-03, J-04).
 //!
 //! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins where no good frame begins and ends
-//! where one does, or at a gap. It makes one event when it is known what is wrong at its first byte; the rest of it is
-//! passed over in silence. A frame that is not yet complete is waited for until it is, or until a gap ends it; then the bytes
-//! after its first one are looked at again, so that a false header costs nothing that follows it.
+//! where one does, or at a gap. It makes one event as soon as the fault at its first byte is known; the rest of it is
+//! skipped without an event. An incomplete frame ends when its last byte arrives, or at a gap; after a gap the bytes
+//! behind its first one are scanned again, so that a false header costs nothing that follows it.
 //!
 //! Terms: a *candidate* is a place with a header, a known type and a length that the type can have. A *gap* is a silence of
-//! `gap_us` or more after bytes that were received.
+//! the inter-byte timeout or more after received bytes.
 //!
 //! Cost: each byte is copied and enters the CRC once, when it arrives. The CRC register is kept at every 64th byte, so that
 //! any candidate is checked with two registers and some arithmetic, however long it is. Hostile bytes full of false
-//! headers cost a constant each, and [`Receiver::poll`] looks at a bounded number of them per call.
+//! headers cost a constant each, and [`Receiver::poll`] scans a bounded number of them per call.
 use crate::crc::advance;
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
 use crate::response::{FrameStatus, Response};
@@ -19,7 +19,7 @@ mod registers;
 
 use registers::Registers;
 
-/// What the parser found.
+/// A result of the parser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkEvent<'a> {
     /// A good frame.
@@ -31,7 +31,7 @@ pub enum LinkEvent<'a> {
 }
 
 impl LinkEvent<'_> {
-    /// How it arrived: what its response record says of it (J-05).
+    /// The frame status of its response record (J-05).
     pub fn status(&self) -> FrameStatus {
         match self {
             Self::Frame(_) => FrameStatus::NoError,
@@ -40,7 +40,7 @@ impl LinkEvent<'_> {
     }
 }
 
-/// Gaps among the held bytes that are remembered.
+/// Most gaps among the held bytes that are stored.
 const GAPS: usize = 64;
 /// Work of one `poll`: a byte passed over costs one, a candidate whose CRC is taken `CANDIDATE`.
 const BUDGET: usize = 2048;
@@ -62,17 +62,17 @@ const CANDIDATE: usize = 128;
 /// ```
 pub struct Receiver<B> {
     buffer: B,
-    gap_us: u64,
+    inter_byte_timeout_us: u64,
     /// Where in the stream the first byte of the buffer was.
     base: u64,
     /// Held bytes are `start..end` of the buffer.
     start: usize,
     end: usize,
-    /// When the last byte came.
+    /// Time of the last byte, µs.
     last_us: u64,
-    /// The caller has bytes that were not taken: silence is not the line's.
+    /// The caller holds bytes that were not taken: silence now is no gap on the line.
     refused: bool,
-    /// Such bytes come after a gap.
+    /// Those bytes follow a gap.
     gap_before_refused: bool,
     /// The bytes from `start` belong to a run that has had its event.
     in_run: bool,
@@ -86,7 +86,7 @@ pub struct Receiver<B> {
 #[derive(Clone, Copy)]
 enum Found {
     Frame(FrameType, usize),
-    /// What is wrong at which byte of the stream.
+    /// The fault, and the byte of the stream that it is at.
     Run(Sort, Response, u64),
 }
 
@@ -98,20 +98,20 @@ enum Sort {
     Noise,
 }
 
-/// What is at the first held byte.
-enum Sight {
+/// The scan result at the first held byte.
+enum ScanResult {
     Frame(FrameType, usize),
-    /// Nothing can be said before more bytes or a gap.
+    /// Undecided until more bytes or a gap arrive.
     Wait,
     Run(Sort, Response),
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
-    /// `gap_us`: a gap within a frame that ends it (5000).
-    pub fn new(buffer: B, gap_us: u32) -> Self {
+    /// `inter_byte_timeout_us`: silence that ends a frame, µs (5000).
+    pub fn new(buffer: B, inter_byte_timeout_us: u32) -> Self {
         Self {
             buffer,
-            gap_us: gap_us.into(),
+            inter_byte_timeout_us: inter_byte_timeout_us.into(),
             base: 0,
             start: 0,
             end: 0,
@@ -131,10 +131,11 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.buffer.as_ref().len().min(FRAME_MAX)
     }
 
-    /// Take bytes that were received until `now_us`; returns how many were taken (fewer when the buffer is full: offer the
-    /// rest again after `release` or more `poll`s; that they came late is not taken for a gap).
+    /// Takes bytes that were received until `now_us`; returns how many were taken (fewer when the buffer is full: offer the
+    /// rest again after `release` or more `poll`s; their delay does not count as a gap).
     ///
-    /// Call it at least each millisecond or two while bytes come: between two calls more than `gap_us` apart is a gap.
+    /// Call it at least each millisecond or two while bytes arrive: two calls the inter-byte timeout or more apart have a gap
+    /// between them.
     pub fn push(&mut self, now_us: u64, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
             return 0;
@@ -142,7 +143,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         let gap = if self.refused {
             self.gap_before_refused
         } else {
-            now_us.saturating_sub(self.last_us) >= self.gap_us
+            now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us
         };
         if gap && !self.gaps.mark(self.end) {
             self.refused = true;
@@ -165,10 +166,10 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         taken.len()
     }
 
-    /// Look for the next event with bounded work; true when `event` has one. Call it after `push` and at least each
-    /// millisecond so that gaps are seen; false with [`busy`](Self::busy) means that calling it again goes on.
+    /// Scans for the next event with bounded work; true when `event` has one. Call it after `push` and at least each
+    /// millisecond so that gaps are detected; false with [`busy`](Self::busy) means that calling it again goes on.
     pub fn poll(&mut self, now_us: u64) -> bool {
-        if !self.refused && now_us.saturating_sub(self.last_us) >= self.gap_us {
+        if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
             // A full list of gaps ends in one at the last byte or is shortened below.
             self.gaps.mark(self.end);
         }
@@ -187,13 +188,13 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
                 self.busy = true;
                 return false;
             };
-            match self.look() {
-                Sight::Wait => return false,
-                Sight::Frame(kind, n) => {
+            match self.scan() {
+                ScanResult::Wait => return false,
+                ScanResult::Frame(kind, n) => {
                     self.in_run = false;
                     self.event = Some(Found::Frame(kind, n));
                 }
-                Sight::Run(sort, response) => {
+                ScanResult::Run(sort, response) => {
                     if !self.in_run {
                         self.in_run = true;
                         self.event = Some(Found::Run(sort, response, self.base + self.start as u64));
@@ -217,8 +218,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// Where in the stream the first byte of the event was, counted from the first byte ever pushed: with it the event is
-    /// older or newer than an urgent command that an [`UrgentWatch`](crate::UrgentWatch) has seen.
+    /// Position in the stream of the first byte of the event, counted from the first byte ever pushed. It orders the event
+    /// and the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
     pub fn event_position(&self) -> Option<u64> {
         Some(match self.event? {
             Found::Frame(..) => self.base + self.start as u64,
@@ -226,9 +227,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// Forgets all that is held, the event too: bytes were lost in front of the next one, which is byte `position` of the
-    /// stream. What was lost is reported as one run that was not received to its end (J-04); what comes next continues no
-    /// frame, and up to the next one it belongs to that run.
+    /// Discards all held bytes and the event: bytes were lost in front of the next one, which is byte `position` of the
+    /// stream. The loss is reported as one run that was not received to its end (J-04); the next bytes continue no
+    /// frame, and up to the next frame they belong to that run.
     pub fn restart(&mut self, position: u64) {
         (self.base, self.start, self.end) = (position, 0, 0);
         (self.refused, self.gap_before_refused) = (false, false);
@@ -238,7 +239,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         (self.gaps, self.registers) = (Gaps::new(), Registers::new());
     }
 
-    /// Done with the event.
+    /// Releases the event.
     pub fn release(&mut self) {
         if let Some(Found::Frame(_, n)) = self.event.take() {
             self.start += n;
@@ -254,22 +255,23 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.end > self.start + frame
     }
 
-    /// The last `poll` stopped because its work is bounded: there is more to look at without new bytes.
+    /// The last `poll` stopped because its work is bounded: more can be scanned without new bytes.
     pub fn busy(&self) -> bool {
         self.busy
     }
 
-    /// What is at `start`, seen up to the next gap. There is at least one byte.
-    fn look(&self) -> Sight {
+    /// Scans the bytes at `start` up to the next gap. There is at least one byte.
+    fn scan(&self) -> ScanResult {
         let closed = self.gaps.first();
         let limit = closed.unwrap_or(self.end);
         let seen = &self.buffer.as_ref()[self.start..limit];
-        let run =
-            |sort, kind, status, length: usize| Sight::Run(sort, Response::bad(kind, status, length as u16));
+        let run = |sort, kind, status, length: usize| {
+            ScanResult::Run(sort, Response::bad(kind, status, length as u16))
+        };
         let bad = |kind, status, length| run(Sort::Bad, kind, status, length);
         let incomplete = |kind| match closed {
             Some(_) => bad(kind, FrameStatus::DiscontinuousFrame, seen.len()),
-            None => Sight::Wait,
+            None => ScanResult::Wait,
         };
         if seen[field::HEADER] != HEADER {
             return run(Sort::Noise, 0, FrameStatus::IncorrectHeader, 0);
@@ -278,7 +280,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
             return match closed {
                 // A header and nothing more.
                 Some(_) => run(Sort::Noise, 0, FrameStatus::DiscontinuousFrame, seen.len()),
-                None => Sight::Wait,
+                None => ScanResult::Wait,
             };
         };
         let kind = match FrameType::from_byte(byte) {
@@ -300,13 +302,13 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
         let (from, to) = (self.start, self.start + n);
         if self.register(to) == advance(self.register(from), n) {
-            Sight::Frame(kind, n)
+            ScanResult::Frame(kind, n)
         } else {
             bad(byte, FrameStatus::IncorrectCrc, n)
         }
     }
 
-    /// Gives up the first held byte and at most `most` more up to the next header or gap; returns how many more.
+    /// Skips the first held byte and at most `most` more up to the next header or gap; returns how many more.
     fn pass_over(&mut self, most: usize) -> usize {
         self.start += 1;
         let limit = self.gaps.first().unwrap_or(self.end).min(self.start + most);
@@ -355,7 +357,7 @@ impl Gaps {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Remembers a gap before the byte at `place`, which is not before the others; false when there is no room for it.
+    /// Stores a gap before the byte at `place`, which is not before the others; false when there is no room for it.
     fn mark(&mut self, place: usize) -> bool {
         let place = place as u16;
         if self.places[..self.count].last() == Some(&place) {

@@ -126,17 +126,17 @@ struct Tail {
 /// ```
 #[derive(Clone, Debug)]
 pub struct UrgentWatch<const LINES: usize> {
-    gap_us: u64,
+    inter_byte_timeout_us: u64,
     lines: [Tail; LINES],
 }
 
 impl<const LINES: usize> UrgentWatch<LINES> {
-    /// `gap_us`: silence after which bytes no longer belong together. Times are only as fine as the calls of `scan`, so give
-    /// the receiver's gap and a tick more: then every Stop that the receiver finds is seen.
-    pub const fn new(gap_us: u32) -> Self {
+    /// `inter_byte_timeout_us`: silence after which bytes no longer belong to one frame, µs. Times are only as fine as the calls
+    /// of `scan`: with the timeout of the receiver and a tick more, every Stop that the receiver finds is found here.
+    pub const fn new(inter_byte_timeout_us: u32) -> Self {
         let tail =
             Tail { window: 0, received: 0, last_us: 0, commands: UrgentCommands::NONE, hit: 0, overtaken: 0 };
-        Self { gap_us: gap_us as u64, lines: [tail; LINES] }
+        Self { inter_byte_timeout_us: inter_byte_timeout_us as u64, lines: [tail; LINES] }
     }
 
     /// Bytes that have arrived on a line by `now_us`: every byte once, in order. A few instructions a byte.
@@ -145,7 +145,7 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         if bytes.is_empty() {
             return;
         }
-        if now_us.saturating_sub(tail.last_us) >= self.gap_us {
+        if now_us.saturating_sub(tail.last_us) >= self.inter_byte_timeout_us {
             tail.window = 0;
         }
         tail.last_us = now_us;

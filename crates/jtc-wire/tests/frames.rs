@@ -307,7 +307,7 @@ fn j04_unknown_codes_confirm_nothing() {
 }
 
 #[test]
-fn j08_statuses_are_found_after_rubbish_and_lost_bytes() {
+fn j08_statuses_are_found_after_noise_and_lost_bytes() {
     let mut receiver = StatusReceiver::new();
     let mut heard = 0;
     for lost in 0..STATUS_LEN {

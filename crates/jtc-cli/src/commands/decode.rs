@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::status;
 use crate::failure::Failure;
 
-/// Longest piece of rubbish that is shown byte by byte.
+/// Longest piece of noise that is shown byte by byte.
 const SHOWN: usize = 32;
 
 /// Decodes stdin to its end. Exit code 2 when nothing in it is a frame.

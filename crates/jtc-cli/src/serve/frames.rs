@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn rubbish_loses_no_byte_and_no_status_after_it() {
+    fn noise_loses_no_byte_and_no_status_after_it() {
         let mut frames = Frames::default();
         let mut stream = vec![0x9B, 0x9B, 0x03, 0x00, 0x11];
         stream.extend(status(9));

@@ -1,4 +1,4 @@
-//! Streams made from bytes: frames, broken frames, false headers, rubbish, gaps, in any pieces and with a slow reader.
+//! Streams made from bytes: frames, broken frames, false headers, noise, gaps, in any pieces and with a slow reader.
 use std::vec;
 use std::vec::Vec;
 

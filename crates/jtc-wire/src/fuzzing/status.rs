@@ -1,4 +1,4 @@
-//! Streams of statuses of all layouts, broken ones and rubbish.
+//! Streams of statuses of all layouts, broken ones and noise.
 use std::format;
 use std::vec::Vec;
 
@@ -27,7 +27,7 @@ fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     (found, skipped)
 }
 
-/// First byte: length of the pieces. Then steps: statuses from some bytes, broken ones, rubbish.
+/// First byte: length of the pieces. Then steps: statuses from some bytes, broken ones, noise.
 pub fn status_stream(data: &[u8]) {
     let Some((piece, mut rest)) = data.split_first() else { return };
     let mut stream = Vec::new();

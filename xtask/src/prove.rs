@@ -1,5 +1,6 @@
 //! `cargo xtask prove`: what takes hours and therefore is no part of `cargo xtask test`. What was found stands in
 //! docs/evidence.md.
+mod changes;
 mod evidence;
 mod fuzz;
 mod mutants;

@@ -9,8 +9,9 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
+use super::changes::{changes, complete};
 use super::evidence::{self, Named};
-use crate::shell::{self, cargo, command, root, run, target, works};
+use crate::shell::{self, cargo, command, run, target, works};
 
 /// Reports of another version may differ.
 const VERSION: &str = "0.4.0";
@@ -156,8 +157,13 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     if which == Which::Survivors {
         gamma.arg("--only-survivors");
     }
+    let mut changed = BTreeMap::new();
     if let Some(before) = before.as_ref().filter(|_| which == Which::Changed) {
-        gamma.arg("--in-diff").arg(changes(package, before)?);
+        changed = changes(&results, before)?;
+        let path = results.join("changes.diff");
+        write(&path, changed.values().map(|changes| changes.diff.as_str()).collect::<String>())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        gamma.arg("--in-diff").arg(path);
     }
     println!("== {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
@@ -169,7 +175,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     if let Some(mut before) = before {
         let mut part = read_report(&whole)?;
         let report = if which == Which::Changed {
-            complete(&mut part, &before);
+            complete(&mut part, before, &changed)?;
             part
         } else {
             update(&mut before, &part);
@@ -179,45 +185,6 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     }
     let path = results.join(COMMIT);
     write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// A file with what has changed in the sources of a crate since its report, whose sources are in the report.
-fn changes(package: &str, report: &Value) -> Result<PathBuf> {
-    let results = results(package);
-    let (old, path) = (results.join("old.rs"), results.join("changes.diff"));
-    let mut diff = String::new();
-    for (file, content) in report["files"].as_object().into_iter().flatten() {
-        let source = content["source"].as_str().unwrap_or_default();
-        if root().join(file).is_file() {
-            write(&old, source).with_context(|| format!("cannot write {}", old.display()))?;
-            let mut git = command("git");
-            git.args(["diff", "--no-index", "-U0"]).arg(&old).arg(file);
-            // It ends with 1 where there is a difference.
-            diff += &String::from_utf8_lossy(&git.output().context("cannot start git")?.stdout);
-        }
-    }
-    write(&path, diff).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(path)
-}
-
-/// Fill in, from a report of before, what became of the mutants that were not run again.
-fn complete(part: &mut Value, before: &Value) {
-    let mut known = BTreeMap::new();
-    for mutant in before["files"].as_object().into_iter().flatten().flat_map(|(_, file)| mutants(file)) {
-        if let Some(id) = mutant["id"].as_str() {
-            known.insert(id, mutant);
-        }
-    }
-    for file in part["files"].as_object_mut().into_iter().flat_map(|files| files.values_mut()) {
-        for mutant in file["mutants"].as_array_mut().into_iter().flatten() {
-            let waits = mutant["status"] == "Pending";
-            let Some(was) = mutant["id"].as_str().filter(|_| waits).and_then(|id| known.get(id)) else {
-                continue;
-            };
-            mutant["status"] = was["status"].clone();
-            mutant["statusReason"] = was["statusReason"].clone();
-        }
-    }
 }
 
 /// Take over what became of the mutants that were run again.
@@ -355,12 +322,5 @@ mod tests {
         let mut whole = report(&[("a", "Killed"), ("b", "Survived"), ("c", "Survived")]);
         update(&mut whole, &report(&[("a", "Pending"), ("b", "Killed"), ("c", "Survived")]));
         assert_eq!(whole, report(&[("a", "Killed"), ("b", "Killed"), ("c", "Survived")]));
-
-        // Of a run of what has changed: `c` is gone with its line, `d` is new, `a` is as it was.
-        let mut part = report(&[("a", "Pending"), ("b", "Survived"), ("d", "Killed"), ("e", "Pending")]);
-        complete(&mut part, &whole);
-        let reason = part["files"]["a.rs"]["mutants"][0].as_object_mut().unwrap().remove("statusReason");
-        assert_eq!(reason, Some(Value::Null));
-        assert_eq!(part, report(&[("a", "Killed"), ("b", "Survived"), ("d", "Killed"), ("e", "Pending")]));
     }
 }

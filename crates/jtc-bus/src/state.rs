@@ -103,3 +103,17 @@ impl fmt::Debug for NodeState {
         write!(f, "{} ({})", self.0, self.description())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::format;
+
+    use super::*;
+
+    #[test]
+    fn a_state_prints_its_name_and_in_debug_its_number() {
+        assert_eq!(format!("{}|{:>8}", NodeState::ENABLED, NodeState::INIT), "OperationEnable|    Init");
+        assert_eq!(format!("{:?}", NodeState::ENABLED), format!("3 ({})", NodeState::ENABLED.description()));
+    }
+}

@@ -238,3 +238,26 @@ fn a_capture_in_pieces() {
     assert_eq!(pieces(&fixed::STOP).count(), 1);
     assert_eq!(pieces(&[]).next(), None);
 }
+
+/// J-31: which states hold the arm, and which one moves it; the bytes are those of the manual.
+#[test]
+fn a_status_knows_whether_the_controller_comes_up_or_executes() {
+    let of = |state: u8, trajectory: u8| Status {
+        state: Code::new(state),
+        trajectory: Code::new(trajectory),
+        ..Status::default()
+    };
+    let coming_up: Vec<u8> = (0..=8).filter(|state| of(*state, 0).is_coming_up()).collect();
+    assert_eq!(coming_up, [0, 1]);
+    let executing: Vec<u8> = (0..=8).filter(|trajectory| of(5, *trajectory).is_executing()).collect();
+    assert_eq!(executing, [3]);
+}
+
+#[test]
+fn positions_of_a_status_are_those_of_its_joints() {
+    let mut status = Status::default();
+    for (joint, position) in status.joints.iter_mut().zip([0.5, -1.0, 1.5, -2.0, 2.5, -3.0]) {
+        joint.position = position;
+    }
+    assert_eq!(status.positions(), [0.5, -1.0, 1.5, -2.0, 2.5, -3.0]);
+}

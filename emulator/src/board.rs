@@ -52,10 +52,10 @@ struct Nodes {
 }
 
 impl CanPeers for Nodes {
-    fn hear(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>) {
+    fn receive(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>) {
         let id = u16::try_from(frame.id().value()).ok().filter(|_| !frame.is_extended() && frame.is_fd());
         let Some(frame) = id.and_then(|id| jtc_bus::Frame::new(id, frame.data())) else { return };
-        self.plant.borrow_mut().hear(end / MICROSECOND, &frame, &mut self.answers);
+        self.plant.borrow_mut().receive(end / MICROSECOND, &frame, &mut self.answers);
         for (delay, answer) in self.answers.drain(..) {
             let frame =
                 Id::standard(u32::from(answer.id)).and_then(|id| CanFrame::fd_padded(id, answer.data()));

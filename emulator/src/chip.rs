@@ -502,7 +502,7 @@ fn is_plain(address: u32) -> bool {
     )
 }
 
-/// Bits that say "ready", in blocks that are memory otherwise.
+/// Bits that read "ready", in blocks that are memory otherwise.
 fn ready_bits(address: u32, plain: &Plain) -> u32 {
     let vos = plain.read(PWR + 0x18) & 0xC000;
     match address {

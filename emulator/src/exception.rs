@@ -16,7 +16,7 @@ const FPSCR_AT: usize = 24;
 const TO_HANDLER: u32 = 0xFFFF_FFE1;
 const TO_THREAD: u32 = 0xFFFF_FFE9;
 
-/// Bit of the stacked xPSR that tells of a padding word.
+/// Bit of the stacked xPSR that marks a padding word.
 const ALIGNED: u32 = 1 << 9;
 
 /// Run the handler of an exception next.

@@ -84,8 +84,8 @@ pub struct Usart {
     output: VecDeque<WireByte>,
     /// Rate of the host, bit/s.
     pub host_baud: u32,
-    /// Bytes from the host that met no receiver.
-    pub unheard: u64,
+    /// Bytes from the host that arrived while the receiver was off.
+    pub missed: u64,
     /// Overruns.
     pub overruns: u64,
     /// Bytes sent at a rate that the other end cannot read.
@@ -123,7 +123,7 @@ impl Usart {
             shifting: None,
             output: VecDeque::new(),
             host_baud: 115_200,
-            unheard: 0,
+            missed: 0,
             overruns: 0,
             garbled: 0,
             received: 0,
@@ -139,7 +139,7 @@ impl Usart {
         self.output = old.output;
         self.host_baud = old.host_baud;
         self.kernel_hz = old.kernel_hz;
-        (self.unheard, self.overruns, self.garbled) = (old.unheard, old.overruns, old.garbled);
+        (self.missed, self.overruns, self.garbled) = (old.missed, old.overruns, old.garbled);
         (self.received, self.sent) = (old.received, old.sent);
     }
 
@@ -243,7 +243,7 @@ impl Usart {
 
     fn receive(&mut self, next: WireByte, dma: &mut Dma, memory: &mut dyn Memory) {
         if !self.on(cr1::RE) {
-            self.unheard += 1;
+            self.missed += 1;
             return;
         }
         self.received += 1;

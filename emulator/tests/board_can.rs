@@ -42,7 +42,7 @@ fn j10_registers_of_the_controller() {
     }
 }
 
-/// J-10: each filter hears one identifier and puts it into a buffer of its own.
+/// J-10: each filter accepts one identifier and puts it into a buffer of its own.
 #[test]
 fn j10_filters_are_the_expected_answers() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -58,11 +58,11 @@ fn j10_filters_are_the_expected_answers() {
     assert_eq!(rig.board.machine.chip().fdcan.ram.outside, 0, "nothing beyond the message RAM");
 }
 
-/// Members that acknowledge, and say nothing.
+/// Members that acknowledge, and send nothing.
 struct Mute;
 
 impl CanPeers for Mute {
-    fn hear(&mut self, _: Time, _: &CanFrame, _: &mut Vec<(Time, CanFrame)>) {}
+    fn receive(&mut self, _: Time, _: &CanFrame, _: &mut Vec<(Time, CanFrame)>) {}
     fn acknowledge(&self) -> bool {
         true
     }
@@ -94,7 +94,7 @@ fn j10_only_expected_frames_arrive() {
         offered.push(CanFrame::classic(standard(id), &[3; 8]).expect("8 bytes"));
     }
 
-    let mut heard = Vec::new();
+    let mut received = Vec::new();
     for (n, frames) in offered.chunks(5).enumerate() {
         for frame in frames {
             let chip = rig.board.machine.chip();
@@ -102,14 +102,14 @@ fn j10_only_expected_frames_arrive() {
             chip.fdcan.wire.put(now, *frame);
         }
         rig.step();
-        heard.extend(rig.flight.heard.iter().map(|f| (n * 5, *f)));
+        received.extend(rig.flight.received.iter().map(|f| (n * 5, *f)));
     }
     rig.wait("everything was offered", 3_000, |rig| rig.board.machine.chip().fdcan.wire.waiting() == 0);
     rig.run(3);
-    let ids: Vec<u16> = heard.iter().map(|(_, f)| f.id).collect();
+    let ids: Vec<u16> = received.iter().map(|(_, f)| f.id).collect();
     assert_eq!(ids, expected().into_iter().collect::<Vec<_>>(), "each once");
-    assert!(heard.iter().all(|(n, f)| *n < fd + 10 && f.data() == [f.id as u8; 16]));
-    // The filters of this controller cannot tell classic frames from CAN FD: the driver drops and counts them (J-15).
+    assert!(received.iter().all(|(n, f)| *n < fd + 10 && f.data() == [f.id as u8; 16]));
+    // The filters of this controller cannot distinguish classic frames from CAN FD: the driver drops and counts them (J-15).
     assert!(classic > fd && rig.flight.wrong_format == 21, "{}", rig.flight.wrong_format);
     let fdcan = &rig.board.machine.chip().fdcan;
     assert_eq!((fdcan.stored, fdcan.state().lost), (42, 0));
@@ -232,7 +232,7 @@ fn j15_short_answers_are_no_answers() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });
     rig.board.machine.chip().fdcan.wire.peers = Some(Box::new(Mute));
     let short = [0, 1, 7, 8, 12].map(|len| vec![0xFF; len]);
-    let mut heard = 0;
+    let mut received = 0;
     // Nodes may be silent for 2 s after a reset.
     for ms in 0..2_600 {
         if ms >= 20 {
@@ -243,9 +243,9 @@ fn j15_short_answers_are_no_answers() {
             chip.fdcan.wire.put(now, frame);
         }
         rig.step();
-        heard += rig.flight.heard.len();
+        received += rig.flight.received.len();
     }
-    assert!(heard > 2_500, "they were heard: {heard}");
+    assert!(received > 2_500, "they were received: {received}");
     assert_eq!(rig.state(), ControllerState::Error, "nobody has answered a Move");
     assert_eq!(rig.status(Port::Usart2).can_current, 0x7F00, "and the bus is well");
 }

@@ -29,7 +29,7 @@ fn silence(rig: &mut Rig, port: Port, ms: u64) {
 
 fn no_losses(rig: &mut Rig) {
     for usart in &rig.board.machine.chip().usarts {
-        assert_eq!((usart.overruns, usart.garbled, usart.unheard), (0, 0, 0));
+        assert_eq!((usart.overruns, usart.garbled, usart.missed), (0, 0, 0));
     }
 }
 
@@ -39,7 +39,7 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        // Long enough that no silence behind it tells the program that it is there.
+        // Long enough that no silence behind it wakes the program.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
         // With the bytes' own time the silence is 0.2 ms shorter than the time between the halves.
@@ -111,7 +111,7 @@ fn j01_frames_of_60_000_bytes_at_15_mbd() {
     longest_frames(rig);
 }
 
-/// J-04: an answer goes to who asked, in order, whatever the other line says at the same time.
+/// J-04: an answer goes to who asked, in order, whatever the other line sends at the same time.
 #[test]
 fn j04_every_port_gets_its_own_records() {
     let mut rig = Rig::new(BOARDS[0]);

@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What a command said and how it ended.
-struct Said {
+/// What a command printed and how it ended.
+struct Finished {
     code: i32,
     out: String,
     err: String,
 }
 
-impl Said {
+impl Finished {
     #[track_caller]
     fn ends(self, code: i32) -> Self {
         assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
@@ -21,7 +21,7 @@ impl Said {
     }
 
     /// The JSON that it printed has this in it.
-    fn says(&self, name: &str, value: &str) -> bool {
+    fn shows(&self, name: &str, value: &str) -> bool {
         self.out.contains(&format!("\"{name}\":\"{value}\""))
     }
 }
@@ -62,17 +62,17 @@ impl Live {
         command
     }
 
-    fn jtc(&self, words: &[&str]) -> Said {
-        said(self.command(words).spawn().expect("jtc starts"))
+    fn jtc(&self, words: &[&str]) -> Finished {
+        finished(self.command(words).spawn().expect("jtc starts"))
     }
 
-    /// Waits until a status says so.
+    /// Waits until a status shows it.
     #[track_caller]
     fn wait_for(&self, name: &str, value: &str) {
         let begin = Instant::now();
         loop {
             let status = self.jtc(&["status"]).ends(0);
-            if status.says(name, value) {
+            if status.shows(name, value) {
                 return;
             }
             assert!(
@@ -92,10 +92,10 @@ impl Drop for Live {
     }
 }
 
-fn said(child: Child) -> Said {
+fn finished(child: Child) -> Finished {
     let output = child.wait_with_output().expect("jtc ends");
     let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
-    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+    Finished { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
 }
 
 fn interrupt(child: &Child) {
@@ -132,7 +132,7 @@ fn a_session_at_the_command_line() {
     let file = file.to_str().expect("UTF-8");
     live.jtc(&["traj", "run", file]).ends(4); // the arm is not at the first point
     let run = live.jtc(&["traj", "run", file, "--approach"]).ends(0);
-    assert!(run.says("outcome", "finished"), "{}", run.out);
+    assert!(run.shows("outcome", "finished"), "{}", run.out);
     live.wait_for("trajectory", "Finish");
 
     // What is finished is not gone on with.
@@ -146,7 +146,7 @@ fn a_session_at_the_command_line() {
         live.command(&["traj", "run", file, "--approach", "--speed", "25"]).spawn().expect("jtc starts");
     std::thread::sleep(Duration::from_secs(4));
     interrupt(&run);
-    said(run).ends(5);
+    finished(run).ends(5);
     live.wait_for("state", "HoldPos");
 
     live.jtc(&["teach", "on"]).ends(0);

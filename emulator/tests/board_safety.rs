@@ -46,7 +46,7 @@ fn torque_of(frame: &can_link::CanFrame) -> Option<[f64; 6]> {
 }
 
 /// J-22, J-12, J-21: Error in the first tick that reads 0, with zero torque in the frame of that tick; a broken wire is the
-/// same; it stays until the wire is well and the host has said so.
+/// same; it stays until the wire is well and the host has cleared the error.
 #[test]
 fn j22_the_safety_input_acts_in_one_tick() {
     for level in [Some(false), None] {
@@ -120,7 +120,7 @@ struct End {
     /// Reset.
     reset: Time,
     cause: ResetCause,
-    /// What it said.
+    /// Its last words.
     last_words: Vec<u8>,
     /// Torques of the frames that passed in between.
     torques: Vec<[f64; 6]>,
@@ -170,8 +170,8 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
 fn latched_until_cleared(mut rig: Rig, cause: u32) {
     rig.wait("the first tick", 10, |rig| rig.ticks > 0);
     assert_eq!(rig.flight.cause, cause);
-    let heard = rig.hosts[1].times.len();
-    rig.wait("the first status", 100, |rig| rig.hosts[1].times.len() > heard);
+    let received = rig.hosts[1].times.len();
+    rig.wait("the first status", 100, |rig| rig.hosts[1].times.len() > received);
     let status = rig.status(HOST);
     let bits = error::INTERNAL | error::EMERGENCY_OUTPUT;
     assert_eq!((status.errors & bits, status.occurred & bits), (bits, bits), "J-12: in the first status");

@@ -58,7 +58,7 @@ pub fn init() -> Peripherals {
         use embassy_stm32::SharedData;
         use embassy_stm32::rcc::SupplyConfig;
 
-        /// Where the HAL would tell a program on the Cortex-M4 about the clocks. Nobody reads it.
+        /// Where the HAL passes the clocks to a program on the Cortex-M4. Nobody reads it.
         #[unsafe(link_section = ".sram4")]
         static SHARED: MaybeUninit<SharedData> = MaybeUninit::uninit();
 

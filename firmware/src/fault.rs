@@ -73,7 +73,7 @@ impl LastWords {
 pub struct Boot {
     /// Why.
     pub cause: Cause,
-    /// What the last program said, and its last tick if that was kept.
+    /// The last words of the last program, and its last tick if that was kept.
     last_words: LastWords,
     last_flight: Option<(u64, u32, u8)>,
     /// The flight record of this program.
@@ -141,7 +141,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     let mut words = LastWords { magic: LastWords::PANIC, ..LastWords::NONE };
     if let Some(place) = info.location() {
         words.line = place.line();
-        // The end of the name says most.
+        // The end of the name is the most useful part.
         let name = place.file().as_bytes();
         let name = &name[name.len().saturating_sub(words.file.len())..];
         for (to, from) in words.file.iter_mut().zip(name) {

@@ -22,13 +22,13 @@ const PATIENCE: u32 = 10_000;
 /// The same within a tick, which has no time to lose: it looks again a millisecond later.
 const PATIENCE_IN_TICK: u32 = 100;
 
-/// Frames heard in a tick.
-pub struct Heard {
+/// Frames received in a tick.
+pub struct ReceivedFrames {
     frames: [Frame; ram::RX],
     count: usize,
 }
 
-impl Heard {
+impl ReceivedFrames {
     /// No frame.
     pub const fn new() -> Self {
         const NONE: Frame = Frame::new(0, &[]).expect("an empty frame is allowed");
@@ -127,16 +127,16 @@ impl Fdcan {
         Self { last: 0, sent: false, recovering: false, counters: Counters::new() }
     }
 
-    /// What happened since the last tick: frames heard, and how the bus is. Before `send`, once a tick.
-    pub fn look(&mut self, heard: &mut Heard) -> BusState {
+    /// Takes the frames received since the last tick; returns the state of the bus. Before `send`, once a tick.
+    pub fn poll(&mut self, frames: &mut ReceivedFrames) -> BusState {
         let acknowledged = self.finish_last();
         let off = self.recover();
-        heard.count = 0;
+        frames.count = 0;
         let new = CAN.ndat1().read().nd();
         for n in 0..ram::RX {
             if new & 1 << n != 0 {
                 match received(n) {
-                    Some(frame) => heard.push(frame),
+                    Some(frame) => frames.push(frame),
                     None => self.counters.wrong_format = self.counters.wrong_format.wrapping_add(1),
                 }
             }

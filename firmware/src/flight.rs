@@ -112,8 +112,8 @@ pub struct Flight {
     pub safety_input: u8,
     /// Both lines could take a status.
     pub status_free: u8,
-    /// Frames in `heard`.
-    pub heard_count: u8,
+    /// Frames in `received`.
+    pub received_count: u8,
     /// Frames of the wrong format that were received instead (J-15), since the start.
     pub wrong_format: u32,
     /// Stop and Pause that arrived on each line.
@@ -126,7 +126,7 @@ pub struct Flight {
     /// These events, oldest first.
     pub events: [FlightEvent; EVENTS_MAX],
     /// Frames received since the last tick.
-    pub heard: [FlightFrame; RX],
+    pub received: [FlightFrame; RX],
 
     // Outputs.
     /// State of the controller.
@@ -179,14 +179,14 @@ impl Flight {
             bus_state: 0,
             safety_input: 0,
             status_free: 0,
-            heard_count: 0,
+            received_count: 0,
             wrong_format: 0,
             urgent: [FlightUrgent([[0; 2]; 2]); HOST_LINES],
             event_count: 0,
             reserved: 0,
             missed_ticks: 0,
             events: [FlightEvent { kind: 0, line: 0, frame_type: 0, status: 0, len: 0, crc: 0 }; EVENTS_MAX],
-            heard: [FlightFrame::NONE; RX],
+            received: [FlightFrame::NONE; RX],
             state: 0,
             trajectory: 0,
             safety_output: 0,
@@ -224,8 +224,8 @@ impl Flight {
         for (slot, received) in self.events.iter_mut().zip(inputs.host) {
             *slot = event(received);
         }
-        self.heard_count = inputs.bus.len().min(RX) as u8;
-        for (slot, frame) in self.heard.iter_mut().zip(inputs.bus) {
+        self.received_count = inputs.bus.len().min(RX) as u8;
+        for (slot, frame) in self.received.iter_mut().zip(inputs.bus) {
             *slot = FlightFrame::of(frame);
         }
     }
@@ -253,8 +253,8 @@ impl Flight {
     }
 
     /// The frames that went in.
-    pub fn heard(&self) -> impl Iterator<Item = Frame> {
-        self.heard.iter().take(self.heard_count.into()).filter_map(FlightFrame::frame)
+    pub fn received(&self) -> impl Iterator<Item = Frame> {
+        self.received.iter().take(self.received_count.into()).filter_map(FlightFrame::frame)
     }
 }
 
@@ -312,7 +312,7 @@ mod tests {
             flight.complete(&outputs, board.telemetry());
             assert!(flight.valid() && flight.phase == Flight::PHASE_COMPLETE && flight.tick == tick as u64);
 
-            let bus: Vec<Frame> = flight.heard().collect();
+            let bus: Vec<Frame> = flight.received().collect();
             let again = pc.tick(&Inputs {
                 bus: &bus,
                 bus_state: flight.bus_state(),

@@ -6,7 +6,7 @@ use jtc_bus::{MAX_LEN, NODES, id};
 
 /// Bytes of the message memory.
 pub const BYTES: usize = 10 * 1024;
-/// Identifiers that are heard: answers of seven nodes to Move, ChangeFsm and ChangeMode.
+/// Identifiers that are received: answers of seven nodes to Move, ChangeFsm and ChangeMode.
 pub const RX: usize = 3 * NODES;
 /// Transmit buffers: one for this tick's frame, one for the last one's while it is being cancelled.
 pub const TX: usize = 2;
@@ -42,8 +42,8 @@ pub const fn tx(n: usize) -> usize {
     TX_BUFFERS + n * BUFFER_WORDS
 }
 
-/// The identifier that receive buffer `n` hears.
-pub const fn heard(n: usize) -> u16 {
+/// The identifier of the frames in receive buffer `n`.
+pub const fn received_id(n: usize) -> u16 {
     let node = (n % NODES) as u8;
     match n / NODES {
         0 => id::answer(id::MOVE, node),
@@ -55,7 +55,7 @@ pub const fn heard(n: usize) -> u16 {
 /// Filter element `n`: frames with just that identifier go into receive buffer `n`.
 pub const fn filter(n: usize) -> u32 {
     const STORE_INTO_BUFFER: u32 = 0b111 << 27;
-    STORE_INTO_BUFFER | (heard(n) as u32) << 16 | n as u32
+    STORE_INTO_BUFFER | (received_id(n) as u32) << 16 | n as u32
 }
 
 #[cfg(test)]
@@ -63,10 +63,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn j10_exactly_the_expected_identifiers_are_heard_each_in_its_own_buffer() {
+    fn j10_exactly_the_expected_identifiers_are_received_each_in_its_own_buffer() {
         let expected: Vec<u16> = (0x200..=0x206).chain(0x210..=0x216).chain(0x2F0..=0x2F6).collect();
-        let heard: Vec<u16> = (0..RX).map(heard).collect();
-        assert_eq!(heard, expected);
+        let received: Vec<u16> = (0..RX).map(received_id).collect();
+        assert_eq!(received, expected);
         for n in 0..RX {
             // By the reference manual: SFEC bits 29..27, SFID1 bits 26..16, buffer in bits 5..0 with bits 10..9 zero.
             assert_eq!(filter(n) >> 27 & 0b111, 0b111);

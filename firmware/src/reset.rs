@@ -14,12 +14,12 @@ pub enum Cause {
     Watchdog = 4,
     /// A hard fault of the processor.
     HardFault = 5,
-    /// The program found itself in a state that it says cannot be.
+    /// The program panicked: a state that must be impossible.
     Panic = 6,
 }
 
 impl Cause {
-    /// The program failed: it says so to the host, until the host has cleared it.
+    /// The program failed: the controller reports it to the host until the host has cleared it.
     pub const fn failed(self) -> bool {
         matches!(self, Self::Watchdog | Self::HardFault | Self::Panic)
     }

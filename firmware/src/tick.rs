@@ -18,7 +18,7 @@ use static_cell::StaticCell;
 
 use crate::board::Pins;
 use crate::fault::Boot;
-use crate::fdcan::{Counters, Fdcan, Heard};
+use crate::fdcan::{Counters, Fdcan, ReceivedFrames};
 use crate::link::{self, SlotOut};
 use crate::uart::{Lookahead, Transmitter};
 
@@ -53,7 +53,7 @@ pub struct Parts {
     pub boot: Boot,
 }
 
-/// What the log says about the tick.
+/// The tick in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub struct Summary {
     /// State of the controller.
@@ -76,7 +76,7 @@ impl Summary {
 struct Tick {
     controller: Jtc,
     can: Fdcan,
-    heard: Heard,
+    received: ReceivedFrames,
     pins: Pins,
     ahead: [Lookahead; lines::LINES],
     watch: UrgentWatch<{ lines::LINES }>,
@@ -119,7 +119,7 @@ pub fn start(parts: Parts) {
     let tick = PLACE.init_with(|| Tick {
         controller: Controller::new(Config::default(), points),
         can,
-        heard: Heard::new(),
+        received: ReceivedFrames::new(),
         pins,
         ahead,
         watch: UrgentWatch::new(link::INTER_BYTE_TIMEOUT_US + clock::TICK_US),
@@ -174,14 +174,14 @@ fn TIM7() {
 impl Tick {
     fn run(&mut self) -> Summary {
         let missed_ticks = self.missed_ticks();
-        let bus_state = self.can.look(&mut self.heard);
+        let bus_state = self.can.poll(&mut self.received);
         let counters = self.can.counters();
         self.look_ahead();
         let urgent = self.watch.take();
         let mut host = [NO_EVENT; EVENTS_MAX];
         let count = self.slot.batch().map_or(0, |batch| collect(batch, &self.watch, &mut host));
         let inputs = Inputs {
-            bus: self.heard.frames(),
+            bus: self.received.frames(),
             bus_state,
             safety_input: self.pins.safety_input.is_safe(),
             missed_ticks,

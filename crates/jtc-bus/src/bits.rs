@@ -27,7 +27,7 @@ pub mod warning {
 pub mod error {
     /// Position encoder failed (oldest drives).
     pub const POSITION_ENCODER: u8 = 0x01;
-    /// Motor-control fault: its bits tell which.
+    /// Motor-control fault: its bits identify it.
     pub const MOTOR_CONTROL: u8 = 0x02;
     /// Joint over-speed.
     pub const OVER_SPEED: u8 = 0x04;

@@ -16,7 +16,7 @@ pub struct Frame {
     data: [u8; MAX_LEN],
 }
 
-/// How a frame arrived, for drivers that hear everything on a bus.
+/// The format of a received frame, for drivers that receive every frame of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
     /// 29-bit identifier.
@@ -48,8 +48,11 @@ impl Frame {
         Some(frame)
     }
 
-    /// A frame as heard on a bus where others may talk, too; what is not of this bus is a
-    /// [`FrameError::WrongFormat`] to be counted (J-15).
+    /// A frame received on a bus that others may use, too.
+    ///
+    /// # Errors
+    ///
+    /// [`FrameError::WrongFormat`] for a frame of another format than this bus's, to be counted (J-15).
     pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, FrameError> {
         let wrong = FrameError::WrongFormat { id, len: data.len().min(255) as u8 };
         if format != Format::BUS {
@@ -162,7 +165,7 @@ pub enum FrameError {
     },
     /// Not a CAN FD data frame with an 11-bit id and at most 24 bytes.
     WrongFormat {
-        /// Identifier as heard, up to 29 bits.
+        /// Identifier as received, up to 29 bits.
         id: u32,
         /// Bytes received.
         len: u8,

@@ -55,7 +55,7 @@ impl NodeState {
         self.texts().1
     }
 
-    /// Generations of drives disagree about what 14, 15 and 16 mean, so these only say that the node is between two states.
+    /// Generations of drives disagree about 14, 15 and 16: these mean only that the node is between two states.
     const fn texts(self) -> (&'static str, &'static str) {
         match self {
             Self::START => ("Start", "start"),

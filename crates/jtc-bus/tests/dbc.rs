@@ -1,4 +1,4 @@
-//! `joint-bus.dbc` says the same as the code: what it decodes from frames is what was put into them.
+//! `joint-bus.dbc` agrees with the code: the values that it decodes from frames are those encoded by the code.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;

@@ -283,19 +283,19 @@ proptest! {
     fn j13_reports_saturate_too(position in ANY, velocity in ANY, torque in ANY) {
         let report = JointReport { position, velocity, torque, ..JointReport::default() };
         let frame = Answer::Joint { node: 1, report }.emit(SCALE);
-        let Ok(Answer::Joint { report: heard, .. }) = Answer::parse(&frame, SCALE) else {
+        let Ok(Answer::Joint { report: received, .. }) = Answer::parse(&frame, SCALE) else {
             panic!("not understood: {frame}");
         };
         let pairs = [
-            (position, heard.position, POSITION_FULL_SCALE),
-            (velocity, heard.velocity, 2.0),
-            (torque, heard.torque, TORQUE_FULL_SCALE),
+            (position, received.position, POSITION_FULL_SCALE),
+            (velocity, received.velocity, 2.0),
+            (torque, received.torque, TORQUE_FULL_SCALE),
         ];
-        for (told, heard, scale) in pairs {
-            prop_assert!(heard.abs() <= scale);
-            prop_assert!(told.is_nan() && heard == 0.0 || heard * told >= 0.0);
-            if told.abs() < scale {
-                prop_assert!((heard - told).abs() <= 0.51 * scale / 32767.0);
+        for (sent, received, scale) in pairs {
+            prop_assert!(received.abs() <= scale);
+            prop_assert!(sent.is_nan() && received == 0.0 || received * sent >= 0.0);
+            if sent.abs() < scale {
+                prop_assert!((received - sent).abs() <= 0.51 * scale / 32767.0);
             }
         }
     }

@@ -152,7 +152,7 @@ mod tests {
         assert!(goes_on(&[0.1, 0.2, 0.1, -0.15, -0.18, -0.05, 0.15, 0.1, -0.14]), "it fades");
         assert!(goes_on(&[0.2, -0.2, 0.2]), "it does not grow");
         assert!(!goes_on(&[0.2, -0.15, 0.16]) && !goes_on(&[-0.2, 0.15, 0.21]));
-        assert!(goes_on(&[0.03, -0.05, 0.1]), "too slow to tell");
+        assert!(goes_on(&[0.03, -0.05, 0.1]), "too slow to count");
         assert!(!goes_on(&[0.03, -0.05, 0.101]));
     }
 

@@ -44,7 +44,7 @@ impl ReceivedParameters {
 
 /// The joint trajectory controller. `M` is the memory of its trajectory: [`crate::POINTS_MAX`] points.
 ///
-/// Parts that differ in what they know live in modules of their own: `nodes` (the bus), `host` (commands), `store` (trajectory),
+/// Parts with state of their own are in modules of their own: `nodes` (the bus), `host` (commands), `store` (trajectory),
 /// `motion` (control law), `errors`. This type connects them; [`Controller::tick`] is the figure of the manual, top to bottom.
 #[derive(Clone, Debug)]
 pub struct Controller<M> {
@@ -185,7 +185,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Outputs { bus: Some(bus), safety_output, status, record_line, host_done }
     }
 
-    /// The JtcStatus frame of the last tick whose outputs said that one is to be sent; zeros before the first.
+    /// The JtcStatus frame of the last tick whose outputs had `status` set; zeros before the first.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         &self.status_frame
     }

@@ -161,7 +161,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.clock.advance(f64::from(self.store.duration_ms()));
                 self.follow();
                 match leave {
-                    // The last point is at rest: there the arm stands whatever the ramp says.
+                    // The last point is at rest: the arm stands there whatever the rate is.
                     Some(trajectory) if self.clock.standing() || self.at_end() => {
                         self.clock.rest();
                         self.set_trajectory(trajectory);

@@ -114,7 +114,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (self.overtaken(received.line, exec).into(), Served::Quickly)
                             }
-                            command => (self.obey(command), served),
+                            command => (self.carry_out(command), served),
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
@@ -138,8 +138,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         served
     }
 
-    /// What the record of an execution command says that an urgent one has overtaken (J-04). A Stop or a Pause has acted.
-    /// It was accepted, or else it has cancelled an Execute and the arm is where the command wants it.
+    /// Data status of an execution command that an urgent one has overtaken (J-04). A Stop or a Pause has acted: it was
+    /// accepted, or it has cancelled an Execute, and the trajectory is in the commanded state.
     fn overtaken(&mut self, line: usize, exec: ExecCommand) -> Result<(), DataStatus> {
         let overtaking = self.overtaking.get_mut(line).ok_or(DataStatus::NotAllowed)?;
         let Some(command) = UrgentCommand::from_exec(exec) else {
@@ -169,7 +169,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    fn obey(&mut self, command: Command<'_>) -> SliceOutcome {
+    fn carry_out(&mut self, command: Command<'_>) -> SliceOutcome {
         // Parameters would change the torque under a moving arm.
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);

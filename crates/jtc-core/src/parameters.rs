@@ -218,7 +218,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         model.check().map_err(|_| DataStatus::IncorrectValue)?;
         self.config.parameter_bounds.check_masses(model)?;
         let dynamics = Dynamics::new(model, self.config.gravity);
-        // Before every position is known it cannot be said; it is asked again when Init ends.
+        // Undecided before every position is known; it is checked again when Init ends.
         if !self.nodes.fallen_back() && !self.holdable(&dynamics) {
             return Err(DataStatus::IncorrectValue);
         }

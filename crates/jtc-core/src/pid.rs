@@ -13,7 +13,7 @@ const RELEASE_STEPS: f64 = 4.0;
 /// Part of an encoder step that positions may be off by, being rounded on the bus.
 const ROUNDING: f64 = 0.01;
 
-/// What the controller remembers.
+/// The state of the controller.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pid {
     /// Integral of the error, rad·s.
@@ -43,13 +43,13 @@ impl PidTorque {
 }
 
 impl Pid {
-    /// Forget everything; `error` is taken as having stood for long, so that the derivative starts at 0.
+    /// Resets the state; `error` (rad) counts as constant until now, so that the derivative starts at 0.
     pub fn reset(&mut self, error: f64) {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
     /// As [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral: bumpless transfer from a state that had
-    /// found it. An integral that has no gain or is bounded cannot have it all.
+    /// found it. An integral without gain or at its bounds takes over less.
     pub fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         let integral = torque / gains.ki;
@@ -64,11 +64,11 @@ impl Pid {
     }
 
     /// One tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held. `encoder_step`
-    /// (rad): the joint is commanded at rest, and this is what its encoder can tell; `None` in motion.
+    /// (rad): the joint is commanded at rest, and this is the resolution of its encoder; `None` in motion.
     ///
     /// At rest the integral is held from where the error is within one step until it exceeds [`RELEASE_STEPS`]. An integral
-    /// that goes on below what the encoder can tell breaks a joint with stiction away for ever again, and so does one that
-    /// begins anew at each toggle of the last bit.
+    /// that goes on below the resolution of the encoder breaks a joint with stiction away again and again (hunting), and so does
+    /// one that begins anew at each toggle of the last bit.
     pub fn step(
         &mut self,
         gains: &PidGains,
@@ -144,7 +144,7 @@ mod tests {
             }
             pid.integral - before
         };
-        // In motion every error counts, at rest those beyond what the encoder can tell.
+        // In motion every error counts, at rest those beyond the resolution of the encoder.
         assert!(run(&mut pid, 0.5, false) > 0.0);
         assert!(run(&mut pid, 2.0, true) > 0.0);
         assert_eq!(run(&mut pid, 1.0, true), 0.0);

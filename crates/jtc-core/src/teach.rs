@@ -1,11 +1,11 @@
 //! What Teaching carries besides the modelled arm: a mass at the flange, fitted to the torque that HoldPos had found missing
 //! (J-25).
 //!
-//! HoldPos cannot tell an unknown payload or a wrong mass from stiction: what is fitted contains up to the static friction of
+//! HoldPos cannot distinguish an unknown payload or a wrong mass from stiction: the fit contains up to the static friction of
 //! each joint. At the pose where teaching begins that is harmless, because the same friction holds the difference. So that
 //! little friction never becomes a great mass elsewhere, nothing is fitted where a mass at the flange would hardly load the
-//! joints, and the mass is bounded. Nor can it tell a load from somebody who leans on the arm and will let go: what is fitted
-//! drives no joint faster than slowly.
+//! joints, and the mass is bounded. Nor can it distinguish a load from somebody who leans on the arm and will let go: the
+//! fitted torque drives a joint slowly at most.
 use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
@@ -42,7 +42,7 @@ impl Payload {
         self.observed_ms = 0;
     }
 
-    /// It has been observed for long enough to tell what the arm carries, or that it is next to nothing.
+    /// It has been observed for long enough to know what the arm carries, or that it is next to nothing.
     pub fn is_known(&self, config: &Config) -> bool {
         let little = |(missing, joint): (&f64, &JointConfig)| missing.abs() < LITTLE * joint.torque_max;
         let nothing = self.observed_ms > 0 && self.missing.iter().zip(&config.joints).all(little);
@@ -201,7 +201,7 @@ mod tests {
         assert!((payload.missing[3] - 2.632).abs() < 0.005, "{}", payload.missing[3]);
     }
 
-    /// What was found before the arm moved says nothing about where it is now.
+    /// What was found before the arm moved does not hold where it is now.
     #[test]
     fn j25_what_was_found_is_forgotten_when_the_arm_is_not_held() {
         let (config, q) = (Config::avena(), [0.3, 0.8, -0.9, 0.4, 0.7, 0.2]);

@@ -43,7 +43,7 @@ fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
     }
 }
 
-/// An answer that was on its way when the node was reset says nothing of the node that restarts.
+/// An answer that was on its way when the node was reset is not of the node that restarts.
 #[test]
 fn j20_late_answers_after_a_reset_do_not_count() {
     let mut rig = Rig::holding();
@@ -159,7 +159,7 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init));
 }
 
-/// Occurred words tell of what has been, current ones of what is.
+/// Occurred words report past errors, current words present ones.
 #[test]
 fn j21_occurred_errors_are_not_reported_as_current() {
     // A joint's own error, and a CAN timeout.

@@ -28,7 +28,7 @@ fn table_wire(tables: &[Table; 6]) -> Vec<u8> {
     }))
 }
 
-/// Torque of a table as `torque` says, from `velocity` on in steps of 0.1 rad/s.
+/// A table of the torques `torque`, from `velocity` on in steps of 0.1 rad/s.
 fn table_of(velocity: f32, torque: impl Fn(f32) -> f32) -> Table {
     let velocity: [f32; 20] = core::array::from_fn(|i| velocity + 0.1 * i as f32);
     Table {

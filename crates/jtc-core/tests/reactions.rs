@@ -218,7 +218,7 @@ fn j21_j66_which_error_does_what_is_what_the_table_says() {
     } else {
         assert!(
             text[begin..end] == table,
-            "docs/safety.md says something else: look, then `cargo xtask docs`"
+            "docs/safety.md differs from the code: look, then `cargo xtask docs`"
         );
     }
 }

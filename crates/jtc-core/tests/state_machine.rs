@@ -212,7 +212,7 @@ fn j22_safety_input_acts_in_the_first_tick_and_output_follows_internal_errors() 
     assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6]);
     assert!(is_move(rig.sent.last().unwrap()), "the first frame after an error is Move");
     assert!(rig.last.safety_output, "an external error does not pull the output");
-    // An internal error pulls it and its bit says so.
+    // An internal error pulls it, and its bit is set.
     let mut rig = Rig::holding();
     rig.nodes[4].silent = true;
     rig.until(20, |r| r.state() == ControllerState::Error);
@@ -528,7 +528,7 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
-    // It latches, and says what it is: an internal error that neither a joint nor the bus explains.
+    // It latches, and its bit is that of an internal error that neither a joint nor the bus explains.
     let status = rig.status();
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);

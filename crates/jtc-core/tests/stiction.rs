@@ -79,7 +79,8 @@ fn j41_no_joint_hunts_or_buzzes_in_stiction() {
     }
 }
 
-/// What the encoder cannot tell, an integral that is never held turns into a limit cycle: the plant of these tests shows it.
+/// An integral that is never held turns an error below the resolution of the encoder into a limit cycle: the plant of these tests
+/// shows it.
 #[test]
 fn j41_an_integral_that_is_never_held_hunts() {
     let mut arm =

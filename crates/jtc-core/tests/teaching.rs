@@ -1,4 +1,4 @@
-//! Teaching an arm that carries more, or less, than its model says (J-25, J-44).
+//! Teaching an arm that carries more, or less, than its model does (J-25, J-44).
 mod plant;
 mod rig;
 

@@ -123,7 +123,7 @@ fn j06_angles_without_a_meaning_are_refused() {
     assert_eq!(error.to_string(), "joint 2: origin pitch is 10000000 rad, limit 1000000 rad; degrees?");
 }
 
-/// The largest angle is told, and is allowed itself.
+/// The error names the largest angle, which is allowed itself.
 #[test]
 fn j06_an_angle_at_the_limit_is_accepted() {
     let mut model = arms::avena();
@@ -161,7 +161,7 @@ fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
 
 #[test]
 fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
-    let says = |error: ModelError, text: &str| assert_eq!(error.to_string(), text);
+    let shows = |error: ModelError, text: &str| assert_eq!(error.to_string(), text);
     let fields = [
         (Field::JointXyz(0), "joint 2: origin x"),
         (Field::JointRpy(2), "joint 2: origin yaw"),
@@ -172,18 +172,18 @@ fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
     ];
     for (field, place) in fields {
         let error = ModelError::NotFinite { index: 2, field, value: f64::INFINITY };
-        says(error, &format!("{place} is inf, not a finite number"));
+        shows(error, &format!("{place} is inf, not a finite number"));
         let error = ModelError::AngleTooLarge { index: 2, field, value: 90.0, limit: 7.0 };
-        says(error, &format!("{place} is 90 rad, limit 7 rad; degrees?"));
+        shows(error, &format!("{place} is 90 rad, limit 7 rad; degrees?"));
     }
-    says(ModelError::MassNegative { link: 4, mass: -2.5 }, "link 4: mass is -2.5 kg, must not be negative");
-    says(ModelError::MassZero { link: 4 }, "link 4: mass is 0, only links 0 and 6 may be without");
-    says(
+    shows(ModelError::MassNegative { link: 4, mass: -2.5 }, "link 4: mass is -2.5 kg, must not be negative");
+    shows(ModelError::MassZero { link: 4 }, "link 4: mass is 0, only links 0 and 6 may be without");
+    shows(
         ModelError::InertiaNegative { link: 4, moment: -1.5 },
         "link 4: smallest principal moment of inertia is -1.5 kg m2, must not be negative; sign of the products of \
          inertia?",
     );
-    says(
+    shows(
         ModelError::InertiaTriangle { link: 4, moment: 3.0, limit: 2.5 },
         "link 4: largest principal moment of inertia is 3 kg m2, more than the sum of the others, 2.5 kg m2; wrong \
          unit or order of ixx ixy ixz iyy iyz izz?",

@@ -3,7 +3,7 @@
 //!
 //! A line holds 154 numbers: for 7 joints x y z roll pitch yaw; for 7 links x y z roll pitch yaw Ixx Ixy Ixz
 //! Iyy Iyz Izz mass; gravity (3); rotor inertia, position and velocity of 6 joints each. No friction, no end
-//! stops, no drives; RK4 in steps of 1 ms, or as many ms as the first argument says.
+//! stops, no drives; RK4 in steps of 1 ms, or as many ms as the first argument.
 use std::io::{BufRead, Write};
 
 use jtc_sim::{Arm, SimArm, SimFriction};

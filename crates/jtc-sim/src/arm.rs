@@ -62,7 +62,7 @@ impl SimArm {
         Self {
             model: parameters.model,
             gravity: config.gravity,
-            // An arm whose file says nothing of its rotors has them all the same.
+            // A drive has a rotor also where the file of the arm gives no inertia for it.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
             // Nobody has measured beyond what the arm may do.

@@ -103,7 +103,7 @@ impl Board {
         self.watchdog_resets = resets;
     }
 
-    /// The status of the last tick, when its outputs said that one is to be sent.
+    /// The status of the last tick, when its outputs had `status` set.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         self.controller.status_frame()
     }

@@ -57,7 +57,7 @@ pub struct BusFault {
     pub corrupted: f64,
     /// Share of answers that reach the controller with other contents than were sent, 0..1.
     pub garbled: f64,
-    /// The controller's line is cut: it hears nothing, nobody hears it.
+    /// The controller's line is cut: it receives no frame, and none of its frames is received.
     pub cut: bool,
     /// The controller is kept off the bus.
     pub bus_off: bool,

@@ -121,7 +121,7 @@ impl Drive {
         self.torque
     }
 
-    /// It can hear and acknowledge frames.
+    /// It receives and acknowledges frames.
     pub fn on_bus(&self) -> bool {
         self.booting == 0 && !self.fault.silent && !self.absent
     }

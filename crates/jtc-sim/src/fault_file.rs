@@ -46,7 +46,7 @@ const STATES: [(&str, ControllerState); 6] = [
     ("error", ControllerState::Error),
 ];
 
-/// What every format says of itself.
+/// The key that every format has.
 #[derive(Deserialize)]
 struct Head {
     format: Option<f64>,
@@ -96,7 +96,7 @@ impl FaultPlan {
         Self::from_toml_with(text, |file| Err(format!("{file}: files cannot be read here")))
     }
 
-    /// Read a fault file; `load` reads the trajectory files of hands, or says why it cannot.
+    /// Read a fault file; `load` reads the trajectory files of hands; its error is the reason why it cannot.
     pub fn from_toml_with(
         text: &str,
         mut load: impl FnMut(&str) -> Result<HandPath, String>,

@@ -1,4 +1,4 @@
-//! Fault files: what is read, and what mistakes are told.
+//! Fault files: what is read, and which mistakes are reported.
 use proptest::prelude::*;
 
 use super::*;

@@ -48,7 +48,7 @@ pub enum FaultKind {
         /// Added to the position, rad.
         rad: f64,
     },
-    /// A drive says that its position is not accurate.
+    /// A drive reports that its position is not accurate.
     NotAccurate {
         /// 0..5.
         joint: u8,
@@ -88,7 +88,7 @@ pub enum FaultKind {
     NoAcknowledge,
     /// The controller's safety input is low.
     SafetyInput,
-    /// The safety line of a drive says danger.
+    /// The safety line of a drive reads danger.
     SafetyLine {
         /// 0..5 joints, 6 gripper.
         node: u8,

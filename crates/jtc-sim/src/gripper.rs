@@ -72,7 +72,7 @@ impl Gripper {
         self.state
     }
 
-    /// It can hear and acknowledge frames.
+    /// It receives and acknowledges frames.
     pub fn on_bus(&self) -> bool {
         self.booting == 0 && !self.silent
     }

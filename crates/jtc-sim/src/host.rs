@@ -1,4 +1,4 @@
-//! A small host for tests, soak runs and the fault matrix: it makes frames, hears statuses, and plans simple
+//! A small host for tests, soak runs and the fault matrix: it makes frames, receives statuses, and plans simple
 //! motions.
 //!
 //! The real client library is `jtc-host`; this one exists so that the world can be exercised without it.
@@ -29,7 +29,7 @@ pub fn use_defaults() -> Vec<u8> {
         .collect()
 }
 
-/// The arm model with which the controller is to reckon, as far as 32 bit floats can say it.
+/// The arm model that the controller receives, rounded to 32 bit floats.
 pub fn arm_model(model: &ArmModel) -> Vec<u8> {
     let origin = |o: &Origin| o.xyz.into_iter().chain(o.rpy);
     let joints = model.joints.iter().flat_map(origin);
@@ -104,8 +104,8 @@ pub struct Listener {
     pub last: Option<Status>,
     /// Statuses that carried a response record, oldest first; take them out.
     pub responses: Vec<jtc_wire::Response>,
-    /// Bytes heard.
-    pub heard: u64,
+    /// Bytes received.
+    pub received: u64,
 }
 
 impl Listener {
@@ -117,7 +117,7 @@ impl Listener {
             if count == 0 {
                 break;
             }
-            self.heard += count as u64;
+            self.received += count as u64;
             self.bytes.extend_from_slice(&buffer[..count]);
         }
         while self.bytes.len() >= STATUS_LEN {

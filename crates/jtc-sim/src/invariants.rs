@@ -130,7 +130,7 @@ pub enum Broken {
         /// So many of the last 100 ticks.
         ticks: u32,
     },
-    /// The safety output is not what the errors say.
+    /// The safety output does not follow from the errors.
     SafetyOutput {
         /// Its level.
         level: bool,
@@ -215,11 +215,11 @@ impl Invariants {
         }
         let telemetry = moment.telemetry;
         if telemetry.tick <= self.controller_ticks {
-            // A fresh controller after a reset.
+            // A new controller after a reset.
             *self = Self::default();
         }
         self.controller_ticks = telemetry.tick;
-        self.hear(moment);
+        self.note_commands(moment);
         self.finite(moment)?;
         self.states(moment)?;
         self.frame(moment)?;
@@ -234,8 +234,8 @@ impl Invariants {
         Ok(())
     }
 
-    /// Commands that permit something.
-    fn hear(&mut self, moment: &Moment<'_>) {
+    /// Notes the commands that permit a change.
+    fn note_commands(&mut self, moment: &Moment<'_>) {
         const CLEAR_CURRENT: u8 = FrameType::ClearCurrentErrors as u8;
         const CLEAR_OCCURRED: u8 = FrameType::ClearOccurredErrors as u8;
         const EXECUTE: u8 = ExecCommand::Execute as u8;

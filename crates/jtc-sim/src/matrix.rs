@@ -161,10 +161,10 @@ enum Back {
 /// The table, as Markdown.
 pub fn fault_matrix() -> Result<String, MatrixError> {
     let mut out = format!(
-        "A cell says which state the controller goes to, in which tick, and why; tick 1 is the first that begins\n\
+        "A cell shows which state the controller goes to, in which tick, and why; tick 1 is the first that begins\n\
          after the fault. In that tick the torque is zero already. Faults without a time last {LASTING_MS} ms;\n\
          *clearing* means that no error is left, and that the nodes are being cleared. Where nothing happens within\n\
-         {WATCH_MS} ms, the cell says why:\n\n\
+         {WATCH_MS} ms, the cell shows why:\n\n\
          - *bridged*: up to four missing or impossible answers running are allowed, the motion is predicted meanwhile\n  \
            (J-63). The fifth is the error, so that an encoder that jumps for 10 ms is one.\n\
          - *controlled*: the control law makes up for it, no limit is reached.\n\
@@ -177,7 +177,7 @@ pub fn fault_matrix() -> Result<String, MatrixError> {
          - *bounded*: a tick does a bounded part of the host's work, however much there is (J-07).\n\
          - *no supervision*: a host that falls silent is no error.\n\
          - *late ticks*: fewer than ten late or missing ticks within a second are borne (J-12).\n\n\
-         The last column says what the host has to send, once the cause is gone, until the arm is held again: nothing,\n\
+         The last column shows what the host has to send, once the cause is gone, until the arm is held again: nothing,\n\
          ClearCurrentErrors, or all parameters. Start lasts a single tick.\n\n| fault |"
     );
     for state in STATES {

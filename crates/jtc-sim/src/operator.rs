@@ -93,7 +93,7 @@ impl Operator {
         Err(OperatorError::Late { waited_for, ms, state: telemetry.state, errors: telemetry.errors })
     }
 
-    /// Send a frame and wait for its response, which must say no error.
+    /// Send a frame and wait for its response, which must be without an error.
     pub fn ask(&mut self, frame: &[u8]) -> Result<(), OperatorError> {
         let response = self.response(frame)?;
         let good = response.status == FrameStatus::NoError && response.data == DataStatus::NoError;

@@ -30,7 +30,7 @@ pub type ReadyAnswer = (u32, Frame);
 /// }
 /// let request = Request::Move { torque: [0.0; 6], pump: false }.emit();
 /// let mut answers = Vec::new();
-/// plant.hear(300_000, &request, &mut answers);
+/// plant.receive(300_000, &request, &mut answers);
 /// assert_eq!(answers.len(), 7);
 /// ```
 pub struct Plant {
@@ -77,7 +77,7 @@ impl Plant {
 
     /// A frame has ended on the bus at `now_us`; the nodes' answers are added to `answers`. Answers of nodes and frames that
     /// are no request are passed over.
-    pub fn hear(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
+    pub fn receive(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
         let Some(request) = NodeRequest::parse(frame) else { return };
         for node in 0..NODES {
             answers.extend(self.nodes.answer(node, now_us, &request, &self.scales));

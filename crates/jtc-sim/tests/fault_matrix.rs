@@ -26,7 +26,7 @@ fn documented(name: &str, table: &str) {
     } else {
         assert!(
             &text[begin..end] == table,
-            "docs/safety.md does not say what the controller does: look at the difference, then `cargo xtask docs`"
+            "docs/safety.md differs from what the controller does: look at the difference, then `cargo xtask docs`"
         );
     }
 }

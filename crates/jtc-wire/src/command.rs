@@ -173,7 +173,7 @@ impl<'a> Command<'a> {
         })
     }
 
-    /// The type of frame that says this.
+    /// The type of its frame.
     pub const fn frame_type(&self) -> FrameType {
         match self {
             Self::ClearCurrentErrors { .. } => FrameType::ClearCurrentErrors,

@@ -64,7 +64,7 @@ impl Display for FrameRef<'_> {
         match Command::parse(*self) {
             Ok(command) => {
                 command.fmt(f)?;
-                // Two frames say this, only one of them is the right one.
+                // Two frames have this meaning, only one of them is the right one.
                 if self.frame_type != command.frame_type() {
                     write!(f, " (sent as an empty {})", self.frame_type)?;
                 }

@@ -318,7 +318,7 @@ fn raw_floats(out: &mut [u8], frame_type: FrameType, floats: Floats<'_>) -> Resu
 }
 
 impl Command<'_> {
-    /// The frame that says this; returns its length. Floats are copied as they are.
+    /// Writes its frame; returns the length. Floats are copied as they are.
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
         let mut fixed = |bytes: &[u8]| {
             let given = out.len();

@@ -38,7 +38,7 @@ pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     Some(sealed(kind as u8, &body))
 }
 
-/// The frame of [`body_frame`]: parse, say in words, send again, parse again.
+/// The frame of [`body_frame`]: parse, describe, encode again, parse again.
 pub fn frame_bodies(data: &[u8]) {
     let Some(bytes) = body_frame(data) else { return };
     let frame = FrameRef::new_checked(&bytes).expect("a good frame");
@@ -58,7 +58,7 @@ pub fn frame_bodies(data: &[u8]) {
     }
     let Ok(command) = Command::parse(frame) else { return };
     let mut out = vec![0; bytes.len().max(10)];
-    let n = command.emit(&mut out).expect("what was understood can be said");
+    let n = command.emit(&mut out).expect("what was parsed can be encoded");
     let again = FrameRef::new_checked(&out[..n]).expect("what is sent is a good frame");
     assert_eq!(Command::parse(again), Ok(command));
     assert!(command.emit(&mut vec![0; n - 1]).is_err(), "never longer than the buffer");

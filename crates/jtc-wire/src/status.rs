@@ -1,4 +1,4 @@
-//! JtcStatus: what the controller says about itself 25 times a second.
+//! JtcStatus: the controller's report to the hosts, 25 times a second.
 use jtc_bus::NodeState;
 
 use crate::code::Code;

@@ -39,11 +39,11 @@ fn j07_floats_of_another_count_are_no_command() {
         for n in (6..700).chain(10_500..10_580) {
             let parsed = Command::parse(FrameRef { frame_type: kind, bytes: &bytes[..n] });
             let expected = if kind.can_have(n) { Ok(kind) } else { Err(DataStatus::IncorrectValue) };
-            let said = parsed.map(|command| match command {
+            let parsed_type = parsed.map(|command| match command {
                 Command::FrictionPolynomialUseDefault => FrameType::FrictionPolynomial,
                 command => command.frame_type(),
             });
-            assert_eq!(said, expected, "{kind} of {n} bytes");
+            assert_eq!(parsed_type, expected, "{kind} of {n} bytes");
         }
     }
 }

@@ -85,9 +85,9 @@ fn j06_every_number_has_its_name() {
 
 #[test]
 fn errors_name_what_was_asked_and_the_limit() {
-    let says = |error: EncodeError, text: &str| assert_eq!(error.to_string(), text);
-    says(EncodeError::BufferTooShort { needed: 126, given: 10 }, "the frame has 126 bytes, the buffer 10");
-    says(EncodeError::TooManyPoints { points: 1667, limit: 1666 }, "1667 points, a frame carries 1666");
+    let shows = |error: EncodeError, text: &str| assert_eq!(error.to_string(), text);
+    shows(EncodeError::BufferTooShort { needed: 126, given: 10 }, "the frame has 126 bytes, the buffer 10");
+    shows(EncodeError::TooManyPoints { points: 1667, limit: 1666 }, "1667 points, a frame carries 1666");
     let error = EncodeError::WrongCount { frame_type: FrameType::PidParam, count: 29 };
-    says(error, "no PidParam frame has 29 numbers");
+    shows(error, "no PidParam frame has 29 numbers");
 }

@@ -309,7 +309,7 @@ fn j04_unknown_codes_confirm_nothing() {
 #[test]
 fn j08_statuses_are_found_after_noise_and_lost_bytes() {
     let mut receiver = StatusReceiver::new();
-    let mut heard = 0;
+    let mut received = 0;
     for lost in 0..STATUS_LEN {
         let [full, short_index, no_gripper] = layouts();
         let mut cut = full.clone();
@@ -318,35 +318,35 @@ fn j08_statuses_are_found_after_noise_and_lost_bytes() {
         for mut piece in stream.chunks(lost % 40 + 1) {
             while let Some(s) = receiver.next(&mut piece) {
                 assert_eq!(s.joints, status().joints);
-                heard += 1;
+                received += 1;
             }
         }
     }
-    assert_eq!(heard, 3 * STATUS_LEN);
-    assert_eq!(receiver.counters().frames, heard as u64);
+    assert_eq!(received, 3 * STATUS_LEN);
+    assert_eq!(receiver.counters().frames, received as u64);
     assert_eq!(receiver.counters().skipped_bytes, (STATUS_LEN * (3 + 174)) as u64);
     assert!(receiver.counters().bad_frames >= 171);
 }
 
 #[test]
 fn every_frame_in_words() {
-    let says = |bytes: &[u8], text: &str| assert_eq!(Described(bytes).to_string(), text);
-    says(
+    let shows = |bytes: &[u8], text: &str| assert_eq!(Described(bytes).to_string(), text);
+    shows(
         &fixed::clear_current_errors(true, 0x41),
         "ClearCurrentErrors: the controller's own, nodes: node 0 (joint 1), gripper",
     );
-    says(
+    shows(
         &fixed::empty(FrameType::FrictionPolynomial),
         "FrictionPolynomialUseDefault (sent as an empty FrictionPolynomial)",
     );
-    says(&fixed::PUMP_OFF, "GripperControl: pump off");
-    says(&fixed::reset_can_devices(0x02), "ResetCanDevices: node 1 (joint 2)");
-    says(&[0x9B, 0x0B, 0, 9], "TrajSetExecStatus with a length field of 9, which it cannot have; 4 bytes");
-    says(&[0x9B, 0x09, 2, 0x1A, 0, 0], "ArmModel: 6 bytes of 538");
-    says(&[0x00; 7], "7 bytes that begin with 00 instead of 9B");
+    shows(&fixed::PUMP_OFF, "GripperControl: pump off");
+    shows(&fixed::reset_can_devices(0x02), "ResetCanDevices: node 1 (joint 2)");
+    shows(&[0x9B, 0x0B, 0, 9], "TrajSetExecStatus with a length field of 9, which it cannot have; 4 bytes");
+    shows(&[0x9B, 0x09, 2, 0x1A, 0, 0], "ArmModel: 6 bytes of 538");
+    shows(&[0x00; 7], "7 bytes that begin with 00 instead of 9B");
     let mut out = [0; 200];
     let n = trajectory(&mut out, (0, 1, 24), 10, [RawPoint::default(); 3]).expect("it fits");
-    says(&out[..n], "Trajectory: trajectory 0, segment 1 of 24, 3 points, 10 ms apart");
+    shows(&out[..n], "Trajectory: trajectory 0, segment 1 of 24, 3 points, 10 ms apart");
     let text = Described(&status().emit()).to_string();
     assert!(text.starts_with(
         "JtcStatus: Error, trajectory Execute, point 120000; record: Trajectory of 18014 bytes: no error, data: \

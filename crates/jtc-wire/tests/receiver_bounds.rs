@@ -1,13 +1,13 @@
 //! The device's parser at its bounds: nothing pushed, a full buffer, the work of a call.
 use jtc_wire::{FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, fixed};
 
-const GAP_US: u32 = 5000;
+const INTER_BYTE_TIMEOUT_US: u32 = 5000;
 const ON: [u8; 6] = fixed::TEACHING_MODE_ENABLE;
 
 /// Time passes by itself: a call without bytes does not keep half a frame alive.
 #[test]
 fn j03_no_bytes_end_no_silence() {
-    let mut receiver = Receiver::new([0; 64], GAP_US);
+    let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
     assert_eq!(receiver.push(0, &ON[..4]), 4);
     assert_eq!(receiver.push(4000, &[]), 0);
     assert!(receiver.poll(5000));
@@ -17,7 +17,7 @@ fn j03_no_bytes_end_no_silence() {
 
 #[test]
 fn a_frame_that_waits_to_be_released_is_not_the_middle_of_one() {
-    let mut receiver = Receiver::new([0; 64], GAP_US);
+    let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
     for _ in 0..2 {
         receiver.push(0, &ON);
         assert!(receiver.mid_frame(), "nobody has looked yet");
@@ -36,7 +36,7 @@ fn a_frame_that_waits_to_be_released_is_not_the_middle_of_one() {
 
 #[test]
 fn a_frame_as_long_as_the_buffer_fits() {
-    let mut receiver = Receiver::new([0; 7], GAP_US);
+    let mut receiver = Receiver::new([0; 7], INTER_BYTE_TIMEOUT_US);
     for _ in 0..3 {
         assert_eq!(receiver.push(0, &fixed::STOP), 7);
         assert!(receiver.poll(0));
@@ -48,7 +48,7 @@ fn a_frame_as_long_as_the_buffer_fits() {
 /// Each byte is copied once, when it arrives, unless the buffer has no room behind it.
 #[test]
 fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
-    let mut receiver = Receiver::new([0; 64], GAP_US);
+    let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
     receiver.push(0, &ON);
     assert!(receiver.poll(0));
     receiver.release();
@@ -70,7 +70,7 @@ fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
 /// A call of `poll` passes over at most 2,048 bytes, so that a tick is not held up (J-07).
 #[test]
 fn j07_noise_is_passed_over_in_bounded_steps() {
-    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
     assert_eq!(receiver.push(0, &[0; FRAME_MAX]), FRAME_MAX);
     assert!(receiver.poll(0));
     receiver.release();

@@ -1,21 +1,21 @@
-//! The stream parser as the device sees it, story by story.
+//! The stream parser of the device, story by story.
 use jtc_wire::{
     Command, DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, HEADER, LinkEvent, RawPoint, Receiver,
     Response, crc16, fixed, trajectory,
 };
 
-const GAP_US: u32 = 5000;
+const INTER_BYTE_TIMEOUT_US: u32 = 5000;
 
-/// What came out, short enough to write down.
+/// An event, short enough to write down.
 #[derive(Debug, PartialEq)]
-enum Heard {
+enum Received {
     Good(FrameType, usize),
     Bad(u8, FrameStatus, u16),
     /// Not even a header.
     Noise(FrameStatus, u16),
 }
 use FrameStatus::*;
-use Heard::{Bad, Good, Noise};
+use Received::{Bad, Good, Noise};
 
 struct Line {
     receiver: Receiver<Vec<u8>>,
@@ -24,22 +24,22 @@ struct Line {
 
 impl Line {
     fn new() -> Self {
-        Line { receiver: Receiver::new(vec![0; FRAME_MAX], GAP_US), now: 1_000_000 }
+        Line { receiver: Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US), now: 1_000_000 }
     }
 
-    /// All bytes at once, and what is heard of them.
-    fn send(&mut self, bytes: &[u8]) -> Vec<Heard> {
+    /// All bytes at once, and the events of them.
+    fn send(&mut self, bytes: &[u8]) -> Vec<Received> {
         self.now += 100;
         assert_eq!(self.receiver.push(self.now, bytes), bytes.len());
-        self.heard()
+        self.received()
     }
 
-    fn silence(&mut self, us: u64) -> Vec<Heard> {
+    fn silence(&mut self, us: u64) -> Vec<Received> {
         self.now += us;
-        self.heard()
+        self.received()
     }
 
-    fn heard(&mut self) -> Vec<Heard> {
+    fn received(&mut self) -> Vec<Received> {
         let mut all = Vec::new();
         while self.receiver.poll(self.now) || self.receiver.busy() {
             match self.receiver.event() {
@@ -70,7 +70,7 @@ fn segment(points: usize) -> Vec<u8> {
 }
 
 const ON: [u8; 6] = fixed::TEACHING_MODE_ENABLE;
-const GOOD_ON: Heard = Good(FrameType::TeachingModeEnable, 6);
+const GOOD_ON: Received = Good(FrameType::TeachingModeEnable, 6);
 
 #[test]
 fn j03_byte_by_byte() {
@@ -138,9 +138,9 @@ fn j05_length_of_another_type() {
             frame[..4].copy_from_slice(&[HEADER, kind as u8, (n >> 8) as u8, n as u8]);
             let crc = crc16(&frame[..n - 2]).to_be_bytes();
             frame[n - 2..].copy_from_slice(&crc);
-            let heard = line.send(&frame);
-            assert_eq!(heard.first(), Some(&Bad(kind as u8, IncorrectFrameType, n as u16)));
-            assert_eq!(heard.len(), 1);
+            let received = line.send(&frame);
+            assert_eq!(received.first(), Some(&Bad(kind as u8, IncorrectFrameType, n as u16)));
+            assert_eq!(received.len(), 1);
             line.silence(5000);
         }
     }
@@ -171,7 +171,7 @@ fn j05_gap() {
         line.silence(4800);
         line.send(piece);
     }
-    assert_eq!(line.send(&ON), [GOOD_ON], "the frame was heard in the loop");
+    assert_eq!(line.send(&ON), [GOOD_ON], "the frame was received in the loop");
     // The type is not known yet.
     assert_eq!(line.send(&ON[..1]), []);
     assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
@@ -215,10 +215,10 @@ fn j03_a_false_header_costs_no_frame() {
 fn j03_a_false_header_that_fills_up_costs_no_frame() {
     let mut line = Line::new();
     let bytes = [&[HEADER, 0x07, 0, 126][..], &ON.repeat(30)].concat();
-    let heard = line.send(&bytes);
-    assert_eq!(heard[0], Bad(7, IncorrectCrc, 126));
-    assert_eq!(heard.len(), 31);
-    assert!(heard[1..].iter().all(|h| *h == GOOD_ON));
+    let received = line.send(&bytes);
+    assert_eq!(received[0], Bad(7, IncorrectCrc, 126));
+    assert_eq!(received.len(), 31);
+    assert!(received[1..].iter().all(|h| *h == GOOD_ON));
 }
 
 /// A cut frame, and the whole one behind it without a gap.
@@ -247,11 +247,11 @@ fn j04_one_record_for_a_bad_frame_and_what_follows_it() {
 
 #[test]
 fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
-    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
     let mut now = 0;
     // More frames, each behind a gap, than gaps can be remembered: some are refused, none is lost.
-    let (mut sent, mut heard) = (0, 0);
-    while heard < 500 {
+    let (mut sent, mut received) = (0, 0);
+    while received < 500 {
         if sent < 500 && receiver.push(now, &ON) == ON.len() {
             sent += 1;
             now += 10_000;
@@ -260,7 +260,7 @@ fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
             let Some(LinkEvent::Frame(frame)) = receiver.event() else { panic!("no frame") };
             assert_eq!(frame.bytes, ON);
             receiver.release();
-            heard += 1;
+            received += 1;
         }
     }
     assert!(!receiver.poll(now + 10_000));
@@ -271,7 +271,7 @@ fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
 #[test]
 fn j05_gaps_are_never_forgotten() {
     for first in 0..2 {
-        let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+        let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
         let (mut now, mut piece, mut bad, mut refused) = (0, first, 0, 0);
         while piece < 300 {
             let half = if piece % 2 == 0 { &ON[..3] } else { &ON[3..] };
@@ -301,7 +301,7 @@ fn j05_gaps_are_never_forgotten() {
 
 #[test]
 fn j04_silence_behind_a_held_event_is_one_gap() {
-    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
     receiver.push(0, &ON);
     receiver.push(0, &ON[..4]);
     for now in 0..1000 {
@@ -313,28 +313,28 @@ fn j04_silence_behind_a_held_event_is_one_gap() {
 /// A reader slower than a gap: the rest of a piece is offered late, the frame is whole all the same.
 #[test]
 fn j03_a_slow_reader_is_no_gap() {
-    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
     let frame = segment(1000);
     let bytes = frame.repeat(2);
     let taken = receiver.push(0, &bytes);
     assert_eq!(taken, FRAME_MAX);
     for now in [1, 100_000] {
         assert!(receiver.poll(now));
-        let Some(LinkEvent::Frame(heard)) = receiver.event() else { panic!("no frame") };
-        assert_eq!(heard.bytes, frame);
+        let Some(LinkEvent::Frame(received)) = receiver.event() else { panic!("no frame") };
+        assert_eq!(received.bytes, frame);
     }
     receiver.release();
     assert!(!receiver.poll(200_000));
     assert_eq!(receiver.push(200_000, &bytes[taken..]), bytes.len() - taken);
     assert!(receiver.poll(200_000));
-    let Some(LinkEvent::Frame(heard)) = receiver.event() else { panic!("no frame") };
-    assert_eq!(heard.bytes, frame);
+    let Some(LinkEvent::Frame(received)) = receiver.event() else { panic!("no frame") };
+    assert_eq!(received.bytes, frame);
 }
 
 /// 15,000 false headers, each announcing tens of thousands of bytes: a bounded number of bounded steps.
 #[test]
 fn j07_hostile_bytes_cost_little() {
-    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
     let bytes: Vec<u8> = (0..FRAME_MAX / 4)
         .flat_map(|i| {
             let n = 14 + 36 * (i % 1666) as u16;
@@ -359,17 +359,17 @@ fn j07_hostile_bytes_cost_little() {
 /// With a buffer that is too short, long frames are refused; nothing hangs.
 #[test]
 fn a_short_buffer() {
-    let mut receiver = Receiver::new([0; 64], GAP_US);
+    let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
     let bytes = [&segment(2)[..], &ON].concat();
     let mut rest = &bytes[..];
-    let mut heard = Vec::new();
+    let mut received = Vec::new();
     for now in 0..100 {
         rest = &rest[receiver.push(now, rest)..];
         while receiver.poll(now) || receiver.busy() {
             match receiver.event() {
-                Some(LinkEvent::Bad(record) | LinkEvent::Noise(record)) => heard.push(record),
+                Some(LinkEvent::Bad(record) | LinkEvent::Noise(record)) => received.push(record),
                 Some(LinkEvent::Frame(frame)) => {
-                    assert_eq!(heard, [Response::bad(0, IncorrectHeader, 0)]);
+                    assert_eq!(received, [Response::bad(0, IncorrectHeader, 0)]);
                     assert_eq!(Command::parse(frame), Ok(Command::TeachingModeEnable));
                     return;
                 }
@@ -399,7 +399,7 @@ fn j06_oddities_of_existing_hosts() {
 /// found at its true place.
 #[test]
 fn j04_lost_bytes_have_one_record_and_are_not_joined_across() {
-    let mut receiver = Receiver::new(vec![0; FRAME_MAX], GAP_US);
+    let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
     let frame = segment(100);
     receiver.push(0, &ON);
     assert!(receiver.poll(0));

@@ -53,29 +53,29 @@ fn bits_in_words() {
 
 #[test]
 fn records_in_words() {
-    let says = |response: Response, text: &str| assert_eq!(response.to_string(), text);
-    says(Response::bad(0x55, FrameStatus::IncorrectFrameType, 0), "type 0x55: incorrect frame type");
-    says(Response::bad(0x04, FrameStatus::IncorrectCrc, 50), "Trajectory of 50 bytes: incorrect CRC");
+    let shows = |response: Response, text: &str| assert_eq!(response.to_string(), text);
+    shows(Response::bad(0x55, FrameStatus::IncorrectFrameType, 0), "type 0x55: incorrect frame type");
+    shows(Response::bad(0x04, FrameStatus::IncorrectCrc, 50), "Trajectory of 50 bytes: incorrect CRC");
     let good = Response::good(FrameType::TeachingModeEnable, jtc_wire::DataStatus::NotAllowed, 6);
-    says(good, "TeachingModeEnable of 6 bytes: no error, data: not allowed in this state");
+    shows(good, "TeachingModeEnable of 6 bytes: no error, data: not allowed in this state");
 }
 
 #[test]
 fn what_is_no_frame_in_words() {
-    let says = |bytes: &[u8], text: &str| assert_eq!(Described(bytes).to_string(), text);
-    says(&[0x9B, 0x0C, 0], "3 bytes, too few for a frame");
-    says(&[0x9B, 0x55, 0, 6, 1, 2], "frame of unknown type 55, 6 bytes");
-    says(&[0x9B, 0x0C, 0, 5], "TeachingModeEnable with a length field of 5, which it cannot have; 4 bytes");
-    says(&[0x9B, 0x0C, 0, 6], "TeachingModeEnable: 4 bytes of 6");
-    says(&[0x9B, 0x0C, 0, 6, 0xCD], "TeachingModeEnable: 5 bytes of 6");
-    says(&[0x9B, 0x0C, 0, 6, 0, 1], "TeachingModeEnable of 6 bytes: CRC is 0001, should be CD27");
-    says(&[0x9B, 0x0C, 0, 6, 0xCD, 0x27, 0], "TeachingModeEnable: 7 bytes of 6");
-    says(&fixed::TEACHING_MODE_ENABLE, "TeachingModeEnable");
-    says(&fixed::PUMP_ON, "GripperControl: pump on");
-    says(&fixed::STOP, "TrajSetExecStatus: stop");
-    says(&fixed::PAUSE, "TrajSetExecStatus: pause");
-    says(&fixed::EXECUTE, "TrajSetExecStatus: execute");
-    says(&fixed::clear_current_errors(false, 0), "ClearCurrentErrors: nodes: -");
+    let shows = |bytes: &[u8], text: &str| assert_eq!(Described(bytes).to_string(), text);
+    shows(&[0x9B, 0x0C, 0], "3 bytes, too few for a frame");
+    shows(&[0x9B, 0x55, 0, 6, 1, 2], "frame of unknown type 55, 6 bytes");
+    shows(&[0x9B, 0x0C, 0, 5], "TeachingModeEnable with a length field of 5, which it cannot have; 4 bytes");
+    shows(&[0x9B, 0x0C, 0, 6], "TeachingModeEnable: 4 bytes of 6");
+    shows(&[0x9B, 0x0C, 0, 6, 0xCD], "TeachingModeEnable: 5 bytes of 6");
+    shows(&[0x9B, 0x0C, 0, 6, 0, 1], "TeachingModeEnable of 6 bytes: CRC is 0001, should be CD27");
+    shows(&[0x9B, 0x0C, 0, 6, 0xCD, 0x27, 0], "TeachingModeEnable: 7 bytes of 6");
+    shows(&fixed::TEACHING_MODE_ENABLE, "TeachingModeEnable");
+    shows(&fixed::PUMP_ON, "GripperControl: pump on");
+    shows(&fixed::STOP, "TrajSetExecStatus: stop");
+    shows(&fixed::PAUSE, "TrajSetExecStatus: pause");
+    shows(&fixed::EXECUTE, "TrajSetExecStatus: execute");
+    shows(&fixed::clear_current_errors(false, 0), "ClearCurrentErrors: nodes: -");
 }
 
 #[test]

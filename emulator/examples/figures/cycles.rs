@@ -43,7 +43,7 @@ fn trace(rig: &mut Rig) -> Result<Vec<u32>, Box<dyn Error>> {
         let until = machine.now() + n * cycle;
         machine.run_until(until);
     };
-    // The record says that the tick has its inputs shortly before the step begins.
+    // The record is marked with the inputs of the tick shortly before the step begins.
     let phase = |machine: &Machine| machine.word(flight + 8);
     while phase(machine) != Some(1) {
         steps(machine, 10);

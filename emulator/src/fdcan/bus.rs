@@ -15,7 +15,7 @@ const LOG: usize = 100_000;
 /// The other members of the bus.
 pub trait CanPeers {
     /// A frame of the controller has passed at `end`; answers with the moments at which they are ready go to `answers`.
-    fn hear(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>);
+    fn receive(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>);
     /// Some member acknowledges frames.
     fn acknowledge(&self) -> bool;
 }
@@ -188,10 +188,10 @@ impl Wire {
         one || self.fault.destroy_all
     }
 
-    /// Tell the other members of a frame of the controller.
-    pub fn tell(&mut self, end: Time, frame: &CanFrame) {
+    /// Delivers a frame of the controller to the other members.
+    pub fn deliver(&mut self, end: Time, frame: &CanFrame) {
         let Some(peers) = &mut self.peers else { return };
-        peers.hear(end, frame, &mut self.answers);
+        peers.receive(end, frame, &mut self.answers);
         self.queue.extend(self.answers.drain(..).map(|(ready, frame)| Queued { ready, frame }));
     }
 }

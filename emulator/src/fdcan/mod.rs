@@ -274,7 +274,7 @@ impl Fdcan {
         match (done.buffer, done.entry.outcome) {
             (Some(buffer), Outcome::Good) => {
                 self.sent(buffer);
-                self.wire.tell(end, &done.entry.frame);
+                self.wire.deliver(end, &done.entry.frame);
             }
             (Some(buffer), outcome) => self.failed(buffer, outcome, end),
             (None, Outcome::Good) if end >= self.takes_part() => {

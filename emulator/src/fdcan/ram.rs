@@ -47,7 +47,7 @@ impl MessageRam {
         }
     }
 
-    /// First match among the standard filters; `busy` tells of receive buffers that hold new data: their filters do not
+    /// First match among the standard filters; `busy` marks receive buffers that hold new data: their filters do not
     /// match. Registers SIDFC and GFC.
     pub fn standard(&self, id: u32, sidfc: u32, gfc: u32, busy: impl Fn(u32) -> bool) -> Target {
         let start = sidfc & 0xFFFC;

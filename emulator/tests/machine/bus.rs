@@ -29,12 +29,12 @@ const TX: u32 = 0x800;
 /// An element with room for 24 bytes.
 const ELEMENT: u32 = 32;
 
-/// A member that acknowledges and remembers what it hears.
+/// A member that acknowledges and stores what it receives.
 #[derive(Clone, Default)]
 struct Listener(Rc<RefCell<Vec<(Time, CanFrame)>>>);
 
 impl CanPeers for Listener {
-    fn hear(&mut self, end: Time, frame: &CanFrame, _: &mut Vec<(Time, CanFrame)>) {
+    fn receive(&mut self, end: Time, frame: &CanFrame, _: &mut Vec<(Time, CanFrame)>) {
         self.0.borrow_mut().push((end, *frame));
     }
     fn acknowledge(&self) -> bool {
@@ -118,18 +118,18 @@ fn a_dedicated_buffer_holds_a_frame_until_its_flag_is_cleared() {
 #[test]
 fn the_lowest_identifier_goes_first_and_takes_its_time() {
     let listener = Listener::default();
-    let heard = Rc::clone(&listener.0);
+    let received = Rc::clone(&listener.0);
     let mut machine = with_prescaler(5, Some(listener));
     let start = machine.now();
     machine.write_register(TXBAR, 3);
     assert_eq!(machine.read_register(TXBRP), 3);
     run(&mut machine, MILLISECOND);
-    let heard = heard.borrow();
-    let ids: Vec<u32> = heard.iter().map(|(_, f)| f.id().value()).collect();
+    let received = received.borrow();
+    let ids: Vec<u32> = received.iter().map(|(_, f)| f.id().value()).collect();
     assert_eq!(ids, [0x080, 0x100]);
-    assert_eq!(heard[0].1.data(), [1, 2, 3, 4, 1, 2, 3, 4, 1, 2, 3, 4]);
-    assert_eq!(heard[0].0, start + frame_time(&heard[0].1));
-    assert_eq!(heard[1].0, start + frame_time(&heard[0].1) + frame_time(&heard[1].1));
+    assert_eq!(received[0].1.data(), [1, 2, 3, 4, 1, 2, 3, 4, 1, 2, 3, 4]);
+    assert_eq!(received[0].0, start + frame_time(&received[0].1));
+    assert_eq!(received[1].0, start + frame_time(&received[0].1) + frame_time(&received[1].1));
     assert_eq!((machine.read_register(TXBRP), machine.read_register(TXBTO)), (0, 3));
 }
 
@@ -151,7 +151,7 @@ fn without_acknowledge_it_becomes_passive_but_not_bus_off() {
 #[test]
 fn bus_off_ends_129_times_11_bits_after_init_is_cleared() {
     let listener = Listener::default();
-    let heard = Rc::clone(&listener.0);
+    let received = Rc::clone(&listener.0);
     let mut machine = with_prescaler(5, Some(listener));
     machine.chip().fdcan.wire.fault.destroy_all = true;
     machine.write_register(TXBAR, 1);
@@ -169,10 +169,10 @@ fn bus_off_ends_129_times_11_bits_after_init_is_cleared() {
     machine.run_until(start + 1420 * MICROSECOND);
     assert_eq!(machine.read_register(PSR) & BUS_OFF, 0);
     assert_eq!(machine.read_register(ECR), 0);
-    assert!(heard.borrow().is_empty(), "a cancelled frame is not sent");
+    assert!(received.borrow().is_empty(), "a cancelled frame is not sent");
     machine.write_register(TXBAR, 2);
     run(&mut machine, MILLISECOND);
-    assert_eq!(heard.borrow().len(), 1);
+    assert_eq!(received.borrow().len(), 1);
 }
 
 #[test]

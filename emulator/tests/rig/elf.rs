@@ -1,4 +1,4 @@
-//! The boards' programs, and the record in them that says what they are.
+//! The boards' programs, and the record in them that identifies them.
 use openjtc_emulator::Elf;
 use std::path::PathBuf;
 

@@ -20,7 +20,7 @@ pub struct Flight {
     pub urgent: [UrgentCommands; HOST_LINES],
     /// What was offered, oldest first.
     pub events: Vec<Event>,
-    pub heard: Vec<Frame>,
+    pub received: Vec<Frame>,
     pub state: u8,
     pub trajectory: u8,
     pub safety_output: bool,
@@ -91,7 +91,7 @@ impl Flight {
             return None;
         }
         let (phase, cause, tick) = (b.u32(), b.u32(), b.u64());
-        let [bus_state, safety_input, status_free, heard_count] = b.take();
+        let [bus_state, safety_input, status_free, received_count] = b.take();
         let wrong_format = b.u32();
         let urgent = [(); HOST_LINES].map(|()| {
             let mut commands = UrgentCommands::NONE;
@@ -111,8 +111,8 @@ impl Flight {
             })
             .collect();
         events.truncate(event_count.into());
-        let mut heard: Vec<_> = (0..21).map(|_| b.frame()).collect();
-        heard.truncate(heard_count.into());
+        let mut received: Vec<_> = (0..21).map(|_| b.frame()).collect();
+        received.truncate(received_count.into());
         let [state, trajectory, safety_output, status] = b.take();
         let sent = b.frame();
         let (point, errors) = (b.u32(), b.u16());
@@ -130,7 +130,7 @@ impl Flight {
             wrong_format,
             urgent,
             events,
-            heard: heard.into_iter().map(|f| f.expect("what was heard is a frame")).collect(),
+            received: received.into_iter().map(|f| f.expect("what was received is a frame")).collect(),
             state,
             trajectory,
             safety_output: safety_output != 0,

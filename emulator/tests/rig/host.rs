@@ -1,4 +1,4 @@
-//! A host on a line: what it sent, and what it heard.
+//! A host on a line: what it sent, and what it received.
 use std::collections::VecDeque;
 
 use jtc_wire::{FrameRef, Response, Status, StatusReceiver};
@@ -21,27 +21,27 @@ pub struct Host {
     pub last: Option<Status>,
     /// When statuses were complete.
     pub times: Vec<Time>,
-    /// Records heard, oldest first.
+    /// Records received, oldest first.
     pub records: Vec<Response>,
-    /// Bytes heard.
-    pub heard: u64,
-    /// A start of the device that the bytes heard so far are older than.
+    /// Bytes received.
+    pub received: u64,
+    /// A start of the device that the bytes received so far are older than.
     reset: Option<Time>,
 }
 
 impl Host {
     /// Bytes from the device: those of the controller beside it, each of them.
-    pub fn hear(&mut self, bytes: &[WireByte]) {
+    pub fn receive(&mut self, bytes: &[WireByte]) {
         for byte in bytes {
-            self.heard += 1;
+            self.received += 1;
             // What was on the line while the device was reset is cut off.
             if self.reset.is_some_and(|reset| byte.end < reset) {
                 continue;
             }
             if let Some(expected) = self.expected.pop_front() {
-                assert_eq!(byte.byte, expected, "byte {} from the device", self.heard);
+                assert_eq!(byte.byte, expected, "byte {} from the device", self.received);
             } else {
-                panic!("byte {} from the device, {:#04x}, belongs to no status", self.heard, byte.byte);
+                panic!("byte {} from the device, {:#04x}, belongs to no status", self.received, byte.byte);
             }
             let mut one = &[byte.byte][..];
             if let Some(status) = self.receiver.next(&mut one) {
@@ -64,7 +64,7 @@ impl Host {
         self.receiver.clear();
     }
 
-    /// The bytes of a frame that the device says it has: they were sent, and not before the last one.
+    /// The bytes of a frame that the device has recorded: they were sent, and not before the last one.
     pub fn frame(&self, event: &Event) -> Vec<u8> {
         let length = usize::from(event.len);
         let (_, bytes) = self.place(event);

@@ -1,5 +1,5 @@
 //! A board under test: the very ELF, the simulated arm on its joint bus, a host on each serial line, and beside it the
-//! same controller on this machine, which is given what the board's flight record says went in, and must give out the same.
+//! same controller on this machine, which gets the inputs of the board's flight record, and must have the same outputs.
 //!
 //! Every millisecond of every test is checked: no tick is missing, all torques have the same bits as those computed
 //! here, the same frame and the same statuses go out on the wires, and the invariants of the simulator hold.
@@ -40,7 +40,7 @@ pub fn index(port: Port) -> usize {
 pub struct Rig {
     /// The board.
     pub board: Board,
-    /// What each host sent and heard.
+    /// What each host sent and received.
     pub hosts: [Host; 2],
     /// The controller on this machine; `None` until the board's first tick after a start.
     pub shadow: Option<Shadow>,
@@ -117,7 +117,7 @@ impl Rig {
         }
         for port in PORTS {
             let bytes = self.board.read_timed(port);
-            self.hosts[index(port)].hear(&bytes);
+            self.hosts[index(port)].receive(&bytes);
         }
     }
 
@@ -225,7 +225,7 @@ impl Rig {
         self.write(port, frame);
         self.wait("a record", 8_000, |rig| !rig.hosts[index(port)].records.is_empty());
         let other = &self.hosts[1 - index(port)];
-        assert!(other.records.is_empty(), "J-04: the other port heard {:?}", other.records);
+        assert!(other.records.is_empty(), "J-04: the other port received {:?}", other.records);
         self.hosts[index(port)].records.remove(0)
     }
 
@@ -239,7 +239,7 @@ impl Rig {
 
     /// The newest status at a port.
     pub fn status(&self, port: Port) -> Status {
-        self.hosts[index(port)].last.expect("a status was heard")
+        self.hosts[index(port)].last.expect("a status was received")
     }
 
     /// Default parameters by the host at `port`, then every joint enabled and held.

@@ -6,7 +6,7 @@ use jtc_wire::{FrameRef, FrameStatus, LinkEvent, RawPoint, Response, Status};
 use super::flight::{Event, Flight};
 use super::host::Host;
 
-/// Causes of a start after which the controller says that it failed (J-12): watchdog, hard fault, panic.
+/// Causes of a start after which the controller reports that it failed (J-12): watchdog, hard fault, panic.
 const FAILED: [u32; 3] = [4, 5, 6];
 
 /// The controller beside the board.
@@ -50,7 +50,7 @@ impl Shadow {
         let host: Vec<HostEvent<'_>> =
             flight.events.iter().zip(&bytes).map(|(event, bytes)| host_event(event, bytes)).collect();
         let outputs = self.controller.tick(&Inputs {
-            bus: &flight.heard,
+            bus: &flight.received,
             bus_state: flight.bus(),
             safety_input: flight.safety_input,
             missed_ticks: flight.missed_ticks,

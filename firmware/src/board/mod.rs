@@ -1,4 +1,4 @@
-//! The boards: one file each says which pin does what.
+//! The boards: the pins of each in a file of its own.
 use embassy_stm32::gpio::{AfType, Flex, Output, OutputType, Pin, Pull, Speed};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::{Peri, pac};

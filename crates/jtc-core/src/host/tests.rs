@@ -55,7 +55,7 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
     assert_eq!(done_of_three(&mut error, ClearOccurredErrors, &[]), 1);
 }
 
-/// A Stop whose frame never came is not told as accepted to one that comes later.
+/// A Stop whose frame never came is not reported as accepted to a later one.
 #[test]
 fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
     let before = Overtaking { stops: 2, pauses: 1, cancelled: true };
@@ -73,7 +73,7 @@ fn j21_a_clear_of_nodes_alone_leaves_the_controller_its_own_errors() {
     for (jtc, left) in [(true, false), (false, true)] {
         let mut controller = holding();
         controller.errors.raise_device();
-        controller.obey(Command::ClearCurrentErrors { jtc, nodes: 0x7F });
+        controller.carry_out(Command::ClearCurrentErrors { jtc, nodes: 0x7F });
         assert_eq!(controller.errors.any(), left, "{jtc}");
     }
 }
@@ -83,7 +83,7 @@ fn j23_a_reset_switches_the_pump_off_with_its_gripper_only() {
     for (nodes, pump) in [(0x00, true), (0x3F, true), (0x40, false), (0x7F, false)] {
         let mut controller = holding();
         controller.pump = true;
-        assert!(matches!(controller.obey(Command::ResetCanDevices { nodes }), SliceOutcome::Done));
+        assert!(matches!(controller.carry_out(Command::ResetCanDevices { nodes }), SliceOutcome::Done));
         assert_eq!(controller.pump, pump, "{nodes:#x}");
     }
 }
@@ -101,7 +101,7 @@ fn j23_a_pump_is_switched_where_there_is_a_gripper_and_never_on_in_error() {
     ] {
         let mut controller = holding();
         (controller.config.gripper, controller.state, controller.pump) = (gripper, state, !pump);
-        let progress = controller.obey(Command::GripperControl { pump });
+        let progress = controller.carry_out(Command::GripperControl { pump });
         assert_eq!(matches!(progress, SliceOutcome::Done), done, "{gripper} {state:?} {pump}");
         assert_eq!(controller.pump == pump, done, "{gripper} {state:?} {pump}");
     }

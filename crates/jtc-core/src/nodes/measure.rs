@@ -13,8 +13,8 @@ const IMPLAUSIBLE: f64 = 3.0;
 /// Usable answers that are kept, and milliseconds over which the rate of a joint is taken at least.
 const WINDOW: usize = 5;
 const WINDOW_MS: u32 = 5;
-/// Distance from the prediction, in what is implausible, from which on an answer says nothing of the rate: an encoder that
-/// jumps has not moved the joint.
+/// Distance from the prediction, as a share of the implausible distance, from which on an answer does not count for the rate:
+/// the joint of an encoder that jumps has not moved.
 const UNEXPECTED: f64 = 0.1;
 /// Most that the rate carried on differs from the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
@@ -36,7 +36,7 @@ pub(crate) struct Reading {
     pub velocity: f64,
 }
 
-/// What a tick says about a joint.
+/// The measurements of a joint in a tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
     /// What the joint answered, if it did.
@@ -126,7 +126,7 @@ impl Measurement {
         self.used
     }
 
-    /// Speed of the joint, rad/s: what it reports, or what its positions say, whichever is more. Reported velocities are not
+    /// Speed of the joint, rad/s: its reported velocity or the rate of its positions, whichever is higher. Reported velocities are not
     /// trusted alone: their full scale depends on the drive (J-11).
     pub fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())

@@ -187,7 +187,7 @@ impl Nodes {
                         node.refused = !accepted;
                     }
                 }
-                // The byte is the state before or after the change, depending on the drive: Move answers tell it surely.
+                // The byte is the state before or after the change, depending on the drive: the state is taken from Move answers.
                 Ok(Answer::State { .. }) => {}
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
@@ -291,8 +291,8 @@ impl Nodes {
                 // by its state when it answers again; if it is enabled still, it has held its part meanwhile.
                 node.lose_configuration();
             } else if node.missed == config.missed_moves_max && n < JOINTS {
-                // J-35: it answers, but not with positions that it can have. Or too few of its Moves were acknowledged to say
-                // whether it would have answered: for longer than this it is not to be predicted (J-63).
+                // J-35: its answers have impossible positions. Or too few of its Moves were acknowledged to decide
+                // whether it answers: for longer than this it is not to be predicted (J-63).
                 node.misbehaved = true;
                 node.missed = 0;
                 node.measured.forget();

@@ -233,14 +233,14 @@ fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
         assert_eq!(nodes.can_flags(&inputs(&[], GOOD), &config), flags, "after {ms}");
         assert_eq!(nodes.gripper_flags(&config), shown, "after {ms}");
         assert_eq!(nodes.nodes[2].configured, ms < 5, "it may have lost its supply");
-        assert!(nodes.nodes[GRIPPER].configured, "it is enabled: its state will tell");
+        assert!(nodes.nodes[GRIPPER].configured, "it is enabled: its state will show it");
     }
     assert_eq!(nodes.can_flags(&inputs(&[], BusState { bus_off: true, ..GOOD }), &config) & 1, 1);
     let absent = Nodes::new(&Config { gripper: false, ..Config::avena() });
     assert_eq!(absent.gripper_flags(&config), 0, "none is expected");
 }
 
-/// Any node may have lost its supply while it was silent, but the state of an enabled gripper will tell.
+/// Any node may have lost its supply while it was silent, but the state of an enabled gripper will show it.
 #[test]
 fn j14_a_node_that_was_silent_has_lost_its_configuration_unless_it_is_an_enabled_gripper() {
     for (n, state, kept) in [

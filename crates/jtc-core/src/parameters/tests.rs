@@ -126,7 +126,7 @@ fn j06_masses_and_inertias_reach_their_bounds() {
     assert!(with(|link| link.inertia[4] = -100.0) && !with(|link| link.inertia[4] = -100.1));
 }
 
-/// Friction against the motion is told as positive; at rest there is no motion, and it is told as it was given.
+/// Friction against the motion is reported as positive; at rest there is no motion, and it is reported with its own sign.
 #[test]
 fn j06_what_is_refused_is_told_with_its_value() {
     for (velocity, torque, value) in

@@ -8,11 +8,11 @@ use super::{KINDS, STATES};
 /// Why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FaultFileError {
-    /// It is not TOML of this form; the text says where and why.
+    /// It is not TOML of this form; the text is the reader's, with the place.
     Syntax(String),
-    /// It does not say `format = 2`.
+    /// It has no `format = 2`.
     Format {
-        /// What it says instead.
+        /// Its format.
         found: Option<f64>,
     },
     /// The key `node`, which formats before 2 had.
@@ -29,7 +29,7 @@ pub enum FaultFileError {
         /// Kind.
         kind: String,
     },
-    /// The file of a hand cannot be used; the text says why.
+    /// The file of a hand cannot be used; the text is the reason.
     Hand {
         /// Number of the fault in the file, from 1.
         fault: usize,
@@ -100,7 +100,7 @@ impl fmt::Display for FaultFileError {
         match self {
             Self::Syntax(text) => f.write_str(text),
             Self::Format { found: None } => f.write_str(
-                "the file does not say `format = 2`. In files without it joints counted from 0. To change it: add 1 to every \
+                "the file has no `format = 2`. In files without it joints counted from 0. To change it: add 1 to every \
                  `joint`, write `joint = N + 1` for every `node = N` of 0..5 and `gripper = true` for `node = 6`, then put \
                  `format = 2` in the first line",
             ),
@@ -138,7 +138,7 @@ impl fmt::Display for FaultFileError {
                 write!(f, "fault {fault}: there is no state `{state}`; states are {}", names.join(", "))
             }
             Self::Trigger { fault } => {
-                write!(f, "fault {fault}: say when with exactly one of at_s, in_state, at_point")
+                write!(f, "fault {fault}: needs exactly one of at_s, in_state, at_point")
             }
         }
     }

@@ -81,7 +81,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// What the cell says where there is no reaction; `None`: there should be one.
+    /// The text of a cell without a reaction; `None`: there should be one.
     pub fn quiet(&self, state: ControllerState) -> Option<String> {
         match state {
             ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => {

@@ -6,7 +6,7 @@ use super::reference::{Event, placed_events, urgent_ends};
 use super::{body_len, sealed};
 use crate::{FrameType, HEADER, LinkEvent, Receiver, UrgentWatch, fixed};
 
-const GAP_US: u64 = 5000;
+const INTER_BYTE_TIMEOUT_US: u64 = 5000;
 
 enum Step {
     Bytes(Vec<u8>),
@@ -53,8 +53,8 @@ impl<'a> Reader<'a> {
     fn step(&mut self) -> Step {
         Step::Bytes(match self.byte() % 16 {
             // With 0 exactly a gap: 200 µs are gone already.
-            0 => return Step::Silence(GAP_US - 200 + u64::from(self.byte()) * 100),
-            1 => return Step::Silence(GAP_US - 201),
+            0 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 200 + u64::from(self.byte()) * 100),
+            1 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 201),
             2 => return Step::Hold(self.byte() % 40),
             3 => return Step::Pieces(usize::from(self.byte()) * 3 + 1),
             4 => return Step::Lazy(self.byte() % 2 == 1),
@@ -171,7 +171,8 @@ impl Driver {
 
     /// In the pieces of the reader the watch must see what it would see in the whole.
     fn watch(&mut self, bytes: &[u8]) {
-        self.arrived_us += if self.now - self.last >= GAP_US { GAP_US } else { 0 };
+        self.arrived_us +=
+            if self.now - self.last >= INTER_BYTE_TIMEOUT_US { INTER_BYTE_TIMEOUT_US } else { 0 };
         for piece in bytes.chunks(self.piece) {
             let before = self.watch.received(0);
             self.watch.scan(0, self.arrived_us, piece);
@@ -196,7 +197,7 @@ impl Driver {
             self.bytes += taken;
             if taken < piece.len() {
                 // A reader that was slow for longer than a gap must not break a frame.
-                self.now += 2 * GAP_US;
+                self.now += 2 * INTER_BYTE_TIMEOUT_US;
                 let before = self.found.len();
                 self.drain();
                 assert!(taken > 0 || self.found.len() > before || self.receiver.event().is_none());
@@ -225,7 +226,7 @@ pub fn stream_regions(data: &[u8]) -> Vec<Vec<u8>> {
         match reader.step() {
             Step::Bytes(bytes) if bytes.is_empty() => {}
             Step::Bytes(bytes) => {
-                if silence >= GAP_US {
+                if silence >= INTER_BYTE_TIMEOUT_US {
                     regions.push(Vec::new());
                 }
                 regions.last_mut().expect("one at least").extend(bytes);
@@ -244,7 +245,7 @@ pub fn stream_parser(data: &[u8]) {
     let mut reader = Reader(data);
     let capacity = CAPACITY[usize::from(reader.byte()) % CAPACITY.len()];
     let mut driver = Driver {
-        receiver: Receiver::new(vec![0; capacity], GAP_US as u32),
+        receiver: Receiver::new(vec![0; capacity], INTER_BYTE_TIMEOUT_US as u32),
         now: 0,
         last: 0,
         hold: 0,
@@ -252,7 +253,7 @@ pub fn stream_parser(data: &[u8]) {
         piece: usize::MAX,
         lazy: false,
         found: Vec::new(),
-        watch: UrgentWatch::new(GAP_US as u32),
+        watch: UrgentWatch::new(INTER_BYTE_TIMEOUT_US as u32),
         arrived_us: 0,
         urgent: Vec::new(),
         urgent_count: 0,
@@ -264,7 +265,7 @@ pub fn stream_parser(data: &[u8]) {
         match reader.step() {
             Step::Bytes(bytes) if bytes.is_empty() => {}
             Step::Bytes(bytes) => {
-                if driver.now - driver.last >= GAP_US {
+                if driver.now - driver.last >= INTER_BYTE_TIMEOUT_US {
                     regions.push(Vec::new());
                 }
                 driver.push(&bytes);
@@ -276,7 +277,7 @@ pub fn stream_parser(data: &[u8]) {
             Step::Lazy(lazy) => driver.lazy = lazy,
         }
     }
-    driver.now += GAP_US;
+    driver.now += INTER_BYTE_TIMEOUT_US;
     driver.drain();
     assert!(!driver.receiver.mid_frame(), "nothing is left");
     assert_eq!(driver.found, placed_events(&regions, capacity));

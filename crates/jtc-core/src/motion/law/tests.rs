@@ -113,7 +113,7 @@ fn j25_what_is_missing_is_observed_while_the_arm_is_held_at_rest_and_firmly() {
     assert!(!observed(ControlMode::Hold, |arm| arm.motion.holding[3] = false));
 }
 
-/// In motion errors below what an encoder can tell add up as well.
+/// In motion errors below the resolution of an encoder add up as well.
 #[test]
 fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
     for (velocity, acceleration, held) in

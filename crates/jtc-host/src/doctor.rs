@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use host_kit::Findings;
+pub use host_kit::{Finding, Severity};
 use jtc_wire::{ControllerState, NodeState, Status};
 
 use crate::port::Port;
@@ -29,48 +31,6 @@ pub struct Observation {
     pub confirmed: Option<bool>,
     /// Another rate at which statuses were found.
     pub other_baud: Option<u32>,
-}
-
-/// How bad a finding is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Severity {
-    /// Nothing works until it is gone.
-    Problem,
-    /// It works, but not as it should.
-    Warning,
-    /// As it should be.
-    Good,
-}
-
-/// One finding.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Finding {
-    /// How bad it is.
-    pub severity: Severity,
-    /// What was found.
-    pub what: String,
-    /// What probably is the cause; may be empty.
-    pub why: String,
-    /// The next command or act; empty when there is nothing to do.
-    pub next: String,
-}
-
-impl std::fmt::Display for Finding {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}", self.what)?;
-        if !self.why.is_empty() {
-            write!(f, ": {}", self.why)?;
-        }
-        if !self.next.is_empty() {
-            write!(f, "\n    next: {}", self.next)?;
-        }
-        Ok(())
-    }
-}
-
-fn finding(severity: Severity, what: impl Into<String>, why: &str, next: &str) -> Finding {
-    Finding { severity, what: what.into(), why: why.into(), next: next.into() }
 }
 
 impl<P: Port> Session<P> {
@@ -106,142 +66,136 @@ impl<P: Port> Session<P> {
 
 /// Findings, worst first.
 pub fn findings(seen: &Observation) -> Vec<Finding> {
-    let mut all = Vec::new();
+    let mut all = Findings::default();
     link(seen, &mut all);
     if let Some(status) = &seen.status {
         errors(status, &mut all);
         set_up(status, &mut all);
         temperatures(status, &mut all);
     }
-    all.sort_by_key(|f| f.severity);
-    all
+    all.worst_first()
 }
 
-fn link(seen: &Observation, all: &mut Vec<Finding>) {
-    use Severity::{Good, Problem, Warning};
+fn link(seen: &Observation, all: &mut Findings) {
+    use Severity::{Problem, Warning};
     let baud = seen.baud.map_or_else(|| "this rate".to_owned(), |b| format!("{b} Bd"));
     if seen.bytes == 0 {
-        all.push(finding(
+        all.add(
             Problem,
             format!("no byte came in {:.1} s", seen.time_s),
             "controller off, wrong port, or receive wire open",
             "check power and cable, then `jtc ports`",
-        ));
+        );
         return;
     }
     if seen.statuses == 0 {
         match seen.other_baud {
-            Some(rate) => all.push(finding(
+            Some(rate) => all.add(
                 Problem,
                 format!("{} bytes came at {baud}, but no frame in them", seen.bytes),
-                &format!("the controller speaks at {rate} Bd"),
-                &format!("`--baud {rate}`"),
-            )),
-            None => all.push(finding(
+                format!("the controller speaks at {rate} Bd"),
+                format!("`--baud {rate}`"),
+            ),
+            None => all.add(
                 Problem,
                 format!("{} bytes came at {baud}, but no frame in them", seen.bytes),
                 "wrong rate, or another device at this port",
                 "`jtc doctor --baud RATE` with the rate of the controller (it starts with 115200)",
-            )),
+            ),
         }
         return;
     }
     let bad = seen.bad_bytes as f64 / seen.bytes as f64;
     // The first status may have been cut by our coming in the middle of it.
     if seen.bad_bytes > 175 && bad > 0.001 {
-        all.push(finding(
+        all.add(
             Warning,
             format!("{:.1} % of the bytes belong to no frame", bad * 100.0),
             "a bad cable, no common earth, or a rate that is a little off",
             "another cable, or a lower rate",
-        ));
+        );
     }
     let rate = seen.statuses as f64 / seen.time_s.max(1e-3);
     if rate < 15.0 && seen.time_s >= 0.5 {
-        all.push(finding(
+        all.add(
             Warning,
             format!("only {rate:.0} statuses per second, 25 are usual"),
             "bytes are lost on the way, or this computer is busy",
             "`jtc monitor` shows the link",
-        ));
+        );
     } else {
-        all.push(finding(Good, format!("link: {rate:.0} statuses per second at {baud}"), "", ""));
+        all.good(format!("link: {rate:.0} statuses per second at {baud}"));
     }
     if seen.confirmed == Some(false) {
-        all.push(finding(
+        all.add(
             Problem,
             "the controller speaks, but does not answer",
             "the wire towards the controller is open, or another program sends at the same time",
             "check the transmit wire; `fuser -v PORT` names other programs",
-        ));
+        );
     }
 }
 
-fn errors(s: &Status, all: &mut Vec<Finding>) {
+fn errors(s: &Status, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & 1 != 0 {
-        all.push(finding(
+        all.add(
             Problem,
             "the safety input is low",
             "emergency stop pressed, or its wire broken (it is pulled down)",
             "make the cell safe, release it, then `jtc recover`",
-        ));
+        );
     }
     for flag in words::can_flags(s.can_current) {
-        all.push(finding(
+        all.add(
             Problem,
             format!("joint bus: {flag}"),
             "supply or cable of this node",
             "`jtc recover` when it is back",
-        ));
+        );
     }
     for (j, joint) in s.joints.iter().enumerate() {
         let who = words::node(j);
         for word in words::joint_errors(joint.internal) {
-            all.push(finding(
+            all.add(
                 Problem,
                 format!("{who}: {word}"),
                 "",
                 "`jtc recover`, after the trajectory or the model was corrected",
-            ));
+            );
         }
         for word in words::node_errors(joint.errors).into_iter().chain(words::motor_faults(joint.mc_current))
         {
-            all.push(finding(
+            all.add(
                 Problem,
                 format!("{who}: {word}"),
                 "reported by the drive",
                 "`jtc explain`, then `jtc recover`",
-            ));
+            );
         }
         for word in words::node_warnings(joint.warnings) {
             let severity = if joint.warnings & 8 != 0 { Problem } else { Warning };
-            all.push(finding(severity, format!("{who}: {word}"), "reported by the drive", "`jtc explain`"));
+            all.add(severity, format!("{who}: {word}"), "reported by the drive", "`jtc explain`");
         }
         if joint.state.is_fault() {
-            all.push(finding(Problem, format!("{who}: drive in its fault state"), "", "`jtc recover`"));
+            all.add(Problem, format!("{who}: drive in its fault state"), "", "`jtc recover`");
         }
     }
-    if s.state == ControllerState::Error && all.iter().all(|f| f.severity != Problem) {
-        all.push(finding(
-            Problem,
-            "an error is latched whose cause is gone",
-            &words::errors_line(s),
-            "`jtc recover`",
-        ));
+    if s.state == ControllerState::Error && !all.has_problem() {
+        all.add(Problem, "an error is latched whose cause is gone", words::errors_line(s), "`jtc recover`");
     }
 }
 
-fn set_up(s: &Status, all: &mut Vec<Finding>) {
-    use Severity::{Good, Problem, Warning};
+fn set_up(s: &Status, all: &mut Findings) {
+    use Severity::{Problem, Warning};
     let missing = words::missing_parameters(s.jtc_init);
     if !missing.is_empty() {
-        all.push(finding(
+        all.add(
             Problem,
             format!("not given yet: {}", missing.join(", ")),
             "the controller waits for it in Init",
             "`jtc params push FILE` or `jtc params use-defaults`",
-        ));
+        );
     }
     for n in (0..7).filter(|n| s.node_init >> n & 1 == 1) {
         let (state, warnings) = match (s.joints.get(n), s.gripper) {
@@ -259,33 +213,23 @@ fn set_up(s: &Status, all: &mut Vec<Finding>) {
             _ => "it is being brought up",
         };
         let what = format!("{} is not ready ({})", words::node(n), state.name());
-        all.push(finding(
-            if s.is_coming_up() { Problem } else { Warning },
-            what,
-            why,
-            "wait 10 s; then `jtc recover`",
-        ));
+        all.add(if s.is_coming_up() { Problem } else { Warning }, what, why, "wait 10 s; then `jtc recover`");
     }
     if s.errors == 0 && s.jtc_init == 0 && s.node_init == 0 {
         let line = format!("controller: {}, trajectory {}", s.state.name(), s.trajectory.name());
-        all.push(finding(Good, line, "", ""));
+        all.good(line);
     }
 }
 
 /// Bearing temperature above which friction and life suffer, °C.
 const HOT: u8 = 70;
 
-fn temperatures(s: &Status, all: &mut Vec<Finding>) {
+fn temperatures(s: &Status, all: &mut Findings) {
     for (j, joint) in s.joints.iter().enumerate() {
         // Above 200 the byte is a negative temperature.
         if (HOT..200).contains(&joint.temperature) {
             let what = format!("{}: bearing at {} °C", words::node(j), joint.temperature);
-            all.push(finding(
-                Severity::Warning,
-                what,
-                "long motion at high torque",
-                "let it cool; `jtc monitor`",
-            ));
+            all.add(Severity::Warning, what, "long motion at high torque", "let it cool; `jtc monitor`");
         }
     }
 }

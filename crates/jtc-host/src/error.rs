@@ -8,21 +8,7 @@ use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::port::PortError;
 use crate::words;
-
-/// What kind of failure an error is: what a caller can act on without knowing each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ErrorKind {
-    /// The controller reported an error.
-    Device,
-    /// Wrong usage or unreadable input.
-    Usage,
-    /// No port, or no answer.
-    NoLink,
-    /// Refused by a check: nothing was sent or moved.
-    Refused,
-    /// Something went wrong while the arm moved, or it was cancelled.
-    Fault,
-}
+use host_kit::ErrorKind;
 
 /// Any failure of this library.
 #[derive(Debug, thiserror::Error)]

@@ -23,7 +23,8 @@ pub mod words;
 
 pub use arm::Arm;
 pub use check::{CheckOptions, CheckedTrajectory};
-pub use error::{Error, ErrorKind};
+pub use error::Error;
+pub use host_kit::ErrorKind;
 pub use port::{Port, PortError};
 pub use sample::{JointSample, Sample};
 pub use session::Session;

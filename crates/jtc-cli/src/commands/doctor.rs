@@ -40,12 +40,7 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     });
     out.result(&value, || {
         let line = |f: &jtc_host::doctor::Finding| {
-            let mark = match f.severity {
-                Severity::Problem => "✗",
-                Severity::Warning => "!",
-                Severity::Good => "✓",
-            };
-            format!("{mark} {}\n", f.to_string().replace('`', ""))
+            format!("{} {}\n", f.severity.mark(), f.to_string().replace('`', ""))
         };
         all.iter().map(line).collect()
     });

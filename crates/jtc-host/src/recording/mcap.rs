@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Seek, Write};
 use std::path::PathBuf;
 
+use host_kit::mcap::each_record;
 use jtc_wire::{Code, NodeState};
-use mcap::records::{self, MessageHeader, Metadata, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::{self, MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
@@ -17,8 +17,6 @@ use crate::sample::Sample;
 const METADATA: &str = "openjtc";
 /// Name of the metadata record with the [`Ending`], behind all messages.
 const END: &str = "openjtc_end";
-/// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
-const MAX_RECORD: usize = 1 << 26;
 const STATES_TOPIC: &str = "/joint_states";
 const COMMANDS_TOPIC: &str = "/joint_commands";
 const CONTROL_TOPIC: &str = "/jtc/control";
@@ -159,8 +157,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     let seconds = |info: &Option<RecordingInfo>, time_ns: u64| {
         time_ns.saturating_sub(info.as_ref().map_or(0, |i| i.start_unix_ns)) as f64 * 1e-9
     };
-    // A file that was cut off has no end.
-    let read = each_record(bytes, LinearReaderOptions::default().with_skip_end_magic(true), |record| {
+    let read = each_record(bytes, |record| {
         match record {
             records::Record::Metadata(metadata) if metadata.name == METADATA => {
                 info = Some(RecordingInfo::from_map(&metadata.metadata));
@@ -209,38 +206,6 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
     }
     let ending = ending.or_else(|| info.as_ref().map(|i| i.ending.clone())).unwrap_or_default();
     Ok(Recording::new(info, ending, samples, cut))
-}
-
-/// Shows the records of a file that we write, those in chunks too, and returns whether the file was completed. Attachments and
-/// indices are passed over unread: the library panics at damaged ones.
-fn each_record(
-    file: &[u8],
-    options: LinearReaderOptions,
-    mut see: impl FnMut(records::Record) -> Result<(), RecordingError>,
-) -> Result<bool, RecordingError> {
-    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(MAX_RECORD));
-    let (mut rest, mut whole) = (file, false);
-    while let Some(event) = reader.next_event() {
-        let event = match event {
-            // What stands behind the data is an index.
-            Err(_) if whole => break,
-            other => other?,
-        };
-        match event {
-            LinearReadEvent::ReadRequest(wanted) => {
-                let (piece, later) = rest.split_at(wanted.min(rest.len()));
-                reader.insert(piece.len()).copy_from_slice(piece);
-                reader.notify_read(piece.len());
-                rest = later;
-            }
-            LinearReadEvent::Record { opcode: opcode @ (op::CHANNEL | op::MESSAGE | op::METADATA), data } => {
-                see(mcap::parse_record(opcode, data)?)?;
-            }
-            LinearReadEvent::Record { opcode: op::DATA_END, .. } => whole = true,
-            LinearReadEvent::Record { .. } => {}
-        }
-    }
-    Ok(whole)
 }
 
 fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {

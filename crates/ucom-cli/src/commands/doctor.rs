@@ -82,12 +82,7 @@ pub fn controller(driver: &mut Driver) -> Option<Controller> {
 }
 
 fn line(f: &Finding) -> String {
-    let mark = match f.severity {
-        Severity::Problem => "✗",
-        Severity::Warning => "!",
-        Severity::Good => "✓",
-    };
-    let mut text = format!("{mark} {}\n", f.what);
+    let mut text = format!("{} {}\n", f.severity.mark(), f.what);
     for (word, more) in [("why", &f.why), ("next", &f.next)] {
         if !more.is_empty() {
             text += &format!("    {word}: {}\n", more.replace('`', ""));

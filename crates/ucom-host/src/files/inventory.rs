@@ -8,6 +8,7 @@
 //! name = "head pan"
 //! ```
 
+use host_kit::write_whole;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -119,11 +120,7 @@ impl Inventory {
     /// Writes a file, at once or not at all.
     pub fn write(&self, path: &Path) -> Result<(), InventoryError> {
         let io = |source| InventoryError::Io { path: path.into(), source };
-        let mut beside = path.as_os_str().to_owned();
-        beside.push(".new");
-        let beside = PathBuf::from(beside);
-        std::fs::write(&beside, self.to_toml()).map_err(io)?;
-        std::fs::rename(&beside, path).map_err(io)
+        write_whole(path, self.to_toml().as_bytes()).map_err(io)
     }
 
     /// Adds a board. Numbers above 31, a place taken and a flash number known already are refused.

@@ -1,5 +1,6 @@
 //! What is wrong with bus, chain and boards, in words with the next command.
-use serde::Serialize;
+use host_kit::Findings;
+pub use host_kit::{Finding, Severity};
 
 use super::{Boards, InitFinding, InitReport, Life, ScanFinding, ScanReport, Statistics, counted};
 use ucom::{Function, Profile};
@@ -48,63 +49,14 @@ pub struct Observation {
     pub profile: Profile,
 }
 
-/// How bad a finding is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// Nothing works until it is gone.
-    Problem,
-    /// It works, but not as it should.
-    Warning,
-    /// As it should be.
-    Good,
-}
-
-/// One finding.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    /// How bad it is.
-    pub severity: Severity,
-    /// What was found.
-    pub what: String,
-    /// What probably is the cause; may be empty.
-    pub why: String,
-    /// The next command or act; empty when there is nothing to do.
-    pub next: String,
-}
-
-struct Findings(Vec<Finding>);
-
-impl Findings {
-    fn add(
-        &mut self,
-        severity: Severity,
-        what: impl Into<String>,
-        why: impl Into<String>,
-        next: impl Into<String>,
-    ) {
-        self.0.push(Finding { severity, what: what.into(), why: why.into(), next: next.into() });
-    }
-    fn problem(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<String>) {
-        self.add(Severity::Problem, what, why, next);
-    }
-    fn warn(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<String>) {
-        self.add(Severity::Warning, what, why, next);
-    }
-    fn good(&mut self, what: impl Into<String>) {
-        self.add(Severity::Good, what, "", "");
-    }
-}
-
 /// Everything that can be said, problems first.
 pub fn findings(o: &Observation) -> Vec<Finding> {
-    let mut f = Findings(Vec::new());
+    let mut f = Findings::default();
     bus(o, &mut f);
     traffic(o, &mut f);
     chain(o, &mut f);
     boards(o, &mut f);
-    f.0.sort_by_key(|finding| finding.severity);
-    f.0
+    f.worst_first()
 }
 
 fn bus(o: &Observation, f: &mut Findings) {

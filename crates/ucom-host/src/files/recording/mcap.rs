@@ -1,7 +1,7 @@
 //! MCAP with one channel `/can` of JSON messages, readable by Foxglove, PlotJuggler and the MCAP tools.
 
-use mcap::records::{self, MessageHeader, Metadata, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use host_kit::mcap::each_record;
+use mcap::records::{self, MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -13,8 +13,6 @@ use super::{Direction, FrameKind, Record, RecordedFrame, Recording, RecordingErr
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const TOPIC: &str = "/can";
 const METADATA: &str = "ucom";
-/// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
-const MAX_RECORD: usize = 1 << 26;
 /// JSON schema of a message.
 const SCHEMA: &str = r#"{
   "title": "CanFrame",
@@ -166,8 +164,7 @@ impl<W: Write + Seek> McapWriter<W> {
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
     let mut channels = BTreeMap::new();
-    let options = LinearReaderOptions::default();
-    let broken_off = each_record(file, options, |record| {
+    let read = each_record(file, |record| {
         match record {
             records::Record::Metadata(metadata) if metadata.name == METADATA => {
                 recording.profile = metadata.metadata.get("profile").cloned();
@@ -187,46 +184,15 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
             _ => {}
         }
         Ok(())
-    })?;
-    recording.broken_off = broken_off;
-    Ok(recording)
-}
-
-/// Shows the records of a file that we write, those in chunks too. Attachments and indices are passed over unread: the
-/// library panics at damaged ones. What is wrong in a file that its writer did not end is no error: it is returned.
-fn each_record(
-    file: &[u8],
-    options: LinearReaderOptions,
-    mut see: impl FnMut(records::Record) -> Result<(), RecordingError>,
-) -> Result<Option<String>, RecordingError> {
-    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(MAX_RECORD));
-    let mut rest = file;
-    let mut next = || -> Result<bool, RecordingError> {
-        let Some(event) = reader.next_event() else { return Ok(false) };
-        match event? {
-            LinearReadEvent::ReadRequest(wanted) => {
-                let (piece, later) = rest.split_at(wanted.min(rest.len()));
-                reader.insert(piece.len()).copy_from_slice(piece);
-                reader.notify_read(piece.len());
-                rest = later;
-            }
-            LinearReadEvent::Record { opcode: opcode @ (op::CHANNEL | op::MESSAGE | op::METADATA), data } => {
-                see(mcap::parse_record(opcode, data)?)?;
-            }
-            LinearReadEvent::Record { .. } => {}
-        }
-        Ok(true)
-    };
+    });
     // A chunk whose writer was killed says nothing of its length yet, so its damage need not be at the end.
     let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
-    loop {
-        match next() {
-            Ok(true) => {}
-            Ok(false) => return Ok(None),
-            Err(e) if file.starts_with(MAGIC) && !ended => {
-                return Ok(Some(format!("the file is broken off after {} bytes ({e})", file.len())));
-            }
-            Err(e) => return Err(e),
-        }
-    }
+    let broken_off = |why: String| format!("the file is broken off after {} bytes{why}", file.len());
+    recording.broken_off = match read {
+        Ok(true) => None,
+        Ok(false) => Some(broken_off(String::new())),
+        Err(e) if file.starts_with(MAGIC) && !ended => Some(broken_off(format!(" ({e})"))),
+        Err(e) => return Err(e),
+    };
+    Ok(recording)
 }

@@ -5,11 +5,11 @@
 pub enum ErrorKind {
     /// Wrong usage or unreadable input.
     Usage,
-    /// Refused by a check: nothing was changed.
+    /// Refused by a check: nothing was sent, moved or changed.
     Refused,
-    /// A board reported an error.
+    /// The controller or a board reported an error.
     Device,
-    /// No bus, or no answer.
+    /// No port or bus, or no answer.
     NoLink,
     /// Something went wrong on the way, or was cancelled there.
     Fault,

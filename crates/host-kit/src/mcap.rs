@@ -1,0 +1,97 @@
+//! Reading MCAP files, those too whose writer was killed.
+use mcap::McapError;
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+/// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
+const MAX_RECORD: usize = 1 << 26;
+
+/// Shows channels, messages and metadata of a file, those in chunks too, and returns whether the file was completed.
+/// Attachments and indices are passed over unread: the library panics at damaged ones. What is wrong behind the data is
+/// no error, as an index stands there.
+///
+/// # Errors
+///
+/// The first record that cannot be read, or that `see` refuses; what came before it was shown.
+pub fn each_record<E: From<McapError>>(
+    file: &[u8],
+    mut see: impl FnMut(Record<'_>) -> Result<(), E>,
+) -> Result<bool, E> {
+    // A file that was cut off has no end.
+    let options =
+        LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
+    let mut reader = LinearReader::new_with_options(options);
+    let (mut rest, mut whole) = (file, false);
+    while let Some(event) = reader.next_event() {
+        let event = match event {
+            Err(_) if whole => break,
+            other => other?,
+        };
+        match event {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (piece, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(piece.len()).copy_from_slice(piece);
+                reader.notify_read(piece.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { opcode: opcode @ (op::CHANNEL | op::MESSAGE | op::METADATA), data } => {
+                see(mcap::parse_record(opcode, data)?)?;
+            }
+            LinearReadEvent::Record { opcode: op::DATA_END, .. } => whole = true,
+            LinearReadEvent::Record { .. } => {}
+        }
+    }
+    Ok(whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+
+    use mcap::records::MessageHeader;
+
+    use super::*;
+
+    /// A file with `n` messages in chunks of their own.
+    fn written(n: u32) -> Vec<u8> {
+        let mut out = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
+        let channel = out.add_channel(0, "topic", "json", &BTreeMap::new()).unwrap();
+        for sequence in 0..n {
+            let time = u64::from(sequence);
+            let header = MessageHeader { channel_id: channel, sequence, log_time: time, publish_time: time };
+            out.write_to_known_channel(&header, b"{}").unwrap();
+            out.flush().unwrap();
+        }
+        out.finish().unwrap();
+        out.into_inner().into_inner()
+    }
+
+    fn read(file: &[u8]) -> (usize, Result<bool, McapError>) {
+        let mut messages = 0;
+        let end = each_record(file, |record| {
+            messages += usize::from(matches!(record, Record::Message { .. }));
+            Ok(())
+        });
+        (messages, end)
+    }
+
+    #[test]
+    fn a_file_is_read_wherever_it_was_cut_off() {
+        let file = written(5);
+        assert!(matches!(read(&file), (5, Ok(true))));
+        let mut last = 0;
+        for end in 0..file.len() {
+            let (messages, _) = read(&file[..end]);
+            assert!(messages >= last && messages <= 5, "{end}: {messages} after {last}");
+            last = messages;
+        }
+        assert_eq!(last, 5);
+    }
+
+    #[test]
+    fn what_the_caller_refuses_is_its_error() {
+        let refused = each_record(&written(2), |_| Err(McapError::BadIndex));
+        assert!(matches!(refused, Err(McapError::BadIndex)));
+    }
+}

@@ -1,4 +1,5 @@
 //! Exit codes: what scripts may rely on.
+use host_kit::ErrorKind;
 
 /// A device reported an error.
 pub const DEVICE: u8 = 1;
@@ -10,3 +11,14 @@ pub const NO_LINK: u8 = 3;
 pub const REFUSED: u8 = 4;
 /// A fault while running.
 pub const FAULT: u8 = 5;
+
+/// The exit code of a kind of failure.
+pub const fn of(kind: ErrorKind) -> u8 {
+    match kind {
+        ErrorKind::Usage => USAGE,
+        ErrorKind::Refused => REFUSED,
+        ErrorKind::Device => DEVICE,
+        ErrorKind::NoLink => NO_LINK,
+        ErrorKind::Fault => FAULT,
+    }
+}

@@ -3,11 +3,10 @@
 use std::fmt::Display;
 
 use cli_kit::output_file::OutputError;
-use jtc_host::ErrorKind;
 use jtc_host::port::PortError;
 use jtc_host::recording::RecordingError;
 
-pub use cli_kit::exit::{DEVICE, FAULT, NO_LINK, REFUSED, USAGE};
+pub use cli_kit::exit::{FAULT, NO_LINK, REFUSED, USAGE};
 
 /// The end of a command that failed.
 #[derive(Debug)]
@@ -39,13 +38,7 @@ impl Failure {
     /// What the library says.
     pub fn of(e: &jtc_host::Error) -> Self {
         Self {
-            exit: match e.kind() {
-                ErrorKind::Device => DEVICE,
-                ErrorKind::Usage => USAGE,
-                ErrorKind::NoLink => NO_LINK,
-                ErrorKind::Refused => REFUSED,
-                ErrorKind::Fault => FAULT,
-            },
+            exit: cli_kit::exit::of(e.kind()),
             code: e.code().into(),
             message: e.to_string(),
             hint: e.hint(),

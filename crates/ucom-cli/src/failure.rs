@@ -4,20 +4,8 @@ use std::fmt::Display;
 
 use can_link::CanError;
 use cli_kit::output_file::OutputError;
-use ucom_host::master::ErrorKind;
 
-pub use cli_kit::exit::{DEVICE, FAULT, NO_LINK, REFUSED, USAGE};
-
-/// Exit code of a kind of failure.
-pub const fn exit(kind: ErrorKind) -> u8 {
-    match kind {
-        ErrorKind::Usage => USAGE,
-        ErrorKind::Refused => REFUSED,
-        ErrorKind::Device => DEVICE,
-        ErrorKind::NoLink => NO_LINK,
-        ErrorKind::Fault => FAULT,
-    }
-}
+pub use cli_kit::exit::{DEVICE, FAULT, NO_LINK, REFUSED, USAGE, of as exit};
 
 /// The end of a command that failed.
 #[derive(Debug)]

@@ -84,7 +84,7 @@ impl Driver {
         self.drive(request, true, see)
     }
 
-    /// Ends control loops before anything else is sent or asked: of these boards, or of everybody.
+    /// Ends control loops before anything else is sent or asked: of these boards, or by broadcast of all.
     pub fn stop_at_once(&mut self, boards: Option<&[u8]>) {
         self.master.stop_at_once(self.link.now_us(), boards);
     }
@@ -260,8 +260,8 @@ pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
             format!("board {board} reports {code}: {} {}", code.meaning(), code.reaction())
         }
         Event::Supervision { board, change } => match change {
-            Supervision::Late => format!("board {board}: life sign is late"),
-            Supervision::Lost => format!("board {board}: lost, no life sign any more"),
+            Supervision::Late => format!("board {board}: heartbeat is late"),
+            Supervision::Lost => format!("board {board}: lost, no heartbeat any more"),
             Supervision::Back => format!("board {board}: back"),
             Supervision::Rebooted { ucom_id } => {
                 format!(
@@ -274,7 +274,7 @@ pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
         },
         Event::Debug { board, text } => format!("board {board} says: {text}"),
         Event::Foreign(kind) => format!("frames of another protocol are on the bus: {kind}"),
-        Event::ForeignMaster { function, to } => {
+        Event::CompetingMaster { function, to } => {
             format!("another PC talks on the bus: {} to {to}", function.name())
         }
         Event::NumberShared { board, found } => {

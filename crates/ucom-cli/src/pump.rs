@@ -11,7 +11,7 @@ use crate::failure::Failure;
 /// Longest wait: so often Ctrl-C is looked at.
 pub const LOOK: Duration = Duration::from_millis(50);
 /// Most frames that are handed over, and the longest time that it takes, before it is looked at what is to be sent: a
-/// flooded bus must not stop life signs.
+/// flooded bus must not stop heartbeats.
 const MOST_HEARD: usize = 2000;
 const LONGEST_US: u64 = 50_000;
 /// Most frames that are sent before it is looked at what has arrived.
@@ -219,9 +219,9 @@ mod tests {
         }
     }
 
-    /// D-50: a bus that brings more frames than can be handed over does not stop life signs, nor what has its time.
+    /// D-50: a bus that brings more frames than can be handed over does not stop heartbeats, nor what has its time.
     #[test]
-    fn d50_a_flood_does_not_stop_life_signs() {
+    fn d50_a_flood_does_not_stop_heartbeats() {
         let mut bench = Bench::new([]);
         // Each takes 5 µs here.
         bench.flood_us = Some(4);

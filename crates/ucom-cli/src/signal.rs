@@ -128,8 +128,8 @@ pub fn say_at_most(patience: Duration, say: impl FnOnce() + Send + 'static) {
 fn left_running(boards: &[u8]) -> Left {
     let list = |separator: &str| boards.iter().map(u8::to_string).collect::<Vec<_>>().join(separator);
     let what = match boards.len() {
-        1 => "may run; without life signs it becomes safe by itself",
-        _ => "may run; without life signs they become safe by themselves",
+        1 => "may run; without heartbeats it becomes safe by itself",
+        _ => "may run; without heartbeats they become safe by themselves",
     };
     (format!("{} {what}", several(boards.len(), &list(", "))), format!("ucom stop {}", list(",")))
 }
@@ -154,7 +154,7 @@ fn left_by(request: &Request) -> Option<Left> {
             (format!("board {board} may be in its exloader"), format!("ucom start {board}"))
         }
         Request::Start { board, .. } | Request::Stop { board, .. } => (
-            format!("board {board} may be started; if it runs, it becomes safe without life signs"),
+            format!("board {board} may be started; if it runs, it becomes safe without heartbeats"),
             format!("ucom stop {board}"),
         ),
         Request::Run(options) => {

@@ -55,9 +55,9 @@ impl Decoder {
         let from_pc = match function.sender() {
             Sender::Pc => Some(true),
             Sender::Board => Some(false),
-            // With data it is always the answer of a board (D-12); to everybody only the PC speaks (D-05).
+            // With data it is always the answer of a board (D-12); only the PC sends broadcasts (D-05).
             Sender::Both if function == Function::DumpIo => Some(frame.dlc() == 0),
-            Sender::Both if Some(sequence) == self.profile.everybody() => Some(true),
+            Sender::Both if Some(sequence) == self.profile.broadcast_number() => Some(true),
             Sender::Both => None,
         };
         let who = self.who(from_pc, sequence);

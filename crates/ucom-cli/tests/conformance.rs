@@ -53,7 +53,7 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
     );
     assert_eq!(peer.wait("1C1#"), "1C1#0040");
-    // One frame to everybody.
+    // One broadcast frame.
     sim.ucom(&["status", "all", "--raw", "40:00"]).ends(0);
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);

@@ -11,10 +11,10 @@ use cli_kit::trial::{ended, signal};
 use common::Sim;
 use serde_json::json;
 
-/// D-50: nobody reads stdout, whose pipe is full from the start: life signs go out, boards keep running and are stopped at
+/// D-50: nobody reads stdout, whose pipe is full from the start: heartbeats go out, boards keep running and are stopped at
 /// the end, and what was not printed is told.
 #[test]
-fn d50_a_blocked_stdout_does_not_stop_life_signs() {
+fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     let sim = Sim::start(&["--boards", "1"]);
     sim.ucom(&["init"]).ends(0);
     let (reader, mut writer) = std::io::pipe().unwrap();
@@ -123,7 +123,7 @@ fn ctrl_c_and_a_wrapper_s_signal_are_one() {
 fn d51_losses_during_the_start_count() {
     let sim = Sim::start(&["--boards", "3"]);
     sim.ucom(&["init"]).ends(0);
-    // Boards send a life sign a second; this PC is less patient.
+    // Boards send a heartbeat a second; this PC is less patient.
     let profile = sim.file("p.toml", b"alive.dsp_period = 20\nalive.dsp_lost = 40\n");
     let words = ["--json", "--profile", &profile, "run", "all", "--on-lost", "report", "--for", "0.01"];
     let said = sim.ucom(&words).ends(5);
@@ -203,7 +203,7 @@ fn d26_a_reboot_counts_even_if_the_board_answers() {
     assert!(said.err.contains("a board has rebooted"), "{}", said.err);
 }
 
-/// A board that does not answer keeps no other one from being stopped: everybody is told before anything is asked.
+/// A board that does not answer keeps no other one from being stopped: the stop is broadcast before any question.
 #[test]
 fn a_stop_of_all_does_not_hang_on_one_board() {
     let mut sim = Sim::start(&["--boards", "3"]);

@@ -60,7 +60,7 @@ fn d51_a_board_that_falls_silent_leads_the_view() {
     sim.fault("silent board=2");
     terminal.until_it_shows(" lost ");
     let rows = terminal.picture.rows();
-    assert!(rows[0].contains("board 2 gives no life sign"), "{}", terminal.picture.text());
+    assert!(rows[0].contains("board 2 gives no heartbeat"), "{}", terminal.picture.text());
     assert!(terminal.picture.text().contains("next: ucom info 2"), "{}", terminal.picture.text());
     terminal.press("q");
     assert_eq!(terminal.ends(&mut child), 0);

@@ -13,7 +13,7 @@ fn sharing() -> Sim {
     sim
 }
 
-/// D-24: exit code 4, both flash numbers, the next command; nothing is sent but questions and life signs.
+/// D-24: exit code 4, both flash numbers, the next command; nothing is sent but questions and heartbeats.
 #[test]
 fn d24_every_command_names_it_and_changes_nothing() {
     let sim = sharing();

@@ -85,7 +85,7 @@ impl Desk for Sim {
     }
 }
 
-/// Without what differs from run to run: numbers, and signs of life that a busy computer finds late.
+/// Without what differs from run to run: numbers, and heartbeats that a busy computer finds late.
 fn of_a_moment(printed: Printed) -> Printed {
     let text: String = printed
         .text

@@ -24,7 +24,7 @@ pub enum FaultKind {
     /// A board's flash memory cannot be written.
     FlashBroken,
     /// Another PC is master of the bus (D-08).
-    ForeignMaster,
+    CompetingMaster,
     /// Frames of other protocols (D-02).
     ForeignFrames,
     /// A share of the frames between chain and clients is lost.
@@ -185,7 +185,7 @@ impl Entry {
             "same-number" => FaultKind::SameNumber,
             "ack-held" => FaultKind::AckHeld,
             "flash-broken" => FaultKind::FlashBroken,
-            "foreign-master" => FaultKind::ForeignMaster,
+            "foreign-master" => FaultKind::CompetingMaster,
             "foreign-frames" => FaultKind::ForeignFrames,
             "lost" => FaultKind::Lost(share()?),
             "corrupted" => FaultKind::Corrupted(share()?),

@@ -257,7 +257,7 @@ impl ChainSim {
             FaultKind::Corrupted(s) => self.corrupted = share(s),
             FaultKind::Doubled(s) => self.doubled = share(s),
             FaultKind::Disturbed(s) => self.disturbed = share(s),
-            FaultKind::ForeignMaster => self.master_at = on.then_some(now),
+            FaultKind::CompetingMaster => self.master_at = on.then_some(now),
             FaultKind::ForeignFrames => self.foreign_at = on.then_some(now),
             kind => {
                 let i = fault.board.wrapping_sub(1);

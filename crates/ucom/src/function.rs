@@ -5,7 +5,7 @@ use core::fmt;
 use crate::frame::Foreign;
 
 /// Position of a board in the chain, 0..31. What 0 means depends on the sender (D-04): from the PC it is
-/// everybody, from a board "I have no number yet".
+/// broadcast, from a board "I have no number yet".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(u8);
 
@@ -135,7 +135,7 @@ functions! {
     Admin = 24, "MCA_ADMIN_DATA", Both;
     /// A text for people.
     Debug = 25, "MCA_DEBUG_MSG", Board;
-    /// Life sign.
+    /// Heartbeat.
     Alive = 26, "MCA_ALIVE", Both;
     /// Initial controller inputs.
     DspCi = 27, "MCA_DSP_CI", Board;
@@ -187,7 +187,7 @@ impl Function {
         !matches!(self.sender(), Sender::Pc)
     }
 
-    /// Whether a board takes it when it goes to everybody (D-04).
+    /// Whether a board takes it when it is broadcast (D-04).
     pub const fn broadcast(self) -> bool {
         use Function::*;
         matches!(

@@ -93,7 +93,7 @@ pub enum Command {
                             ucom status 1 --raw 00:40\n\n\
                             Bits: MSTART ASTART MCARUN EXLRUN INIT PROG OPINIT IPINIT; MCARUN, EXLRUN and IPINIT cannot be set.\n\
                             --raw sends one PC_SETSTATUS as it is: new = (old & ~MASK) | VALUE, so value bits outside the mask\n\
-                            are set, too. It is not repeated; `all` is one frame to everybody. What the rules expect of it is\n\
+                            are set, too. It is not repeated; `all` is one broadcast frame. What the rules expect of it is\n\
                             shown beside what came of it; another result ends with exit code 1. Running boards: only with --force."
     )]
     Status(StatusArgs),

@@ -190,7 +190,7 @@ pub struct SoArgs {
     pub cache: CacheArgs,
 }
 
-/// What happens when a board's life signs stop.
+/// What happens when a board's heartbeats stop.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum OnLost {
     /// Only say it.
@@ -315,7 +315,7 @@ pub struct ProbeArgs {
     /// Measure also what shows only while numbers are given: resets and numbers the chain
     #[arg(long, env = "UCOM_INIT", value_parser = FalseyValueParser::new())]
     pub init: bool,
-    /// Start a control loop, outputs safe, to see which life signs count
+    /// Start a control loop, outputs safe, to see which heartbeats count
     #[arg(long, env = "UCOM_ALIVE", value_parser = FalseyValueParser::new())]
     pub alive: bool,
     /// Image that is on a board, to find the checksum of Program IDs

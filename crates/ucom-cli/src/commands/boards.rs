@@ -68,7 +68,7 @@ fn raw_status(
     let numbers = driver.numbers(&args.boards)?;
     all_there(&mut driver, &numbers)?;
     let targets: Vec<(Option<u8>, Vec<u8>)> = match args.boards {
-        Boards::All if driver.master.profile().everybody().is_some() => vec![(None, numbers)],
+        Boards::All if driver.master.profile().broadcast_number().is_some() => vec![(None, numbers)],
         _ => numbers.into_iter().map(|n| (Some(n), vec![n])).collect(),
     };
     let mut all = Vec::new();

@@ -25,17 +25,17 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = Driver::open(link)?;
     out.note(format!("listening on {}", link.url()?));
     let start = Instant::now();
-    let mut foreign_master = None;
+    let mut competing_master = None;
     while start.elapsed() < LISTEN && !driver.stop_asked() {
         driver.turn(Duration::from_millis(50))?;
         while let Some(event) = driver.master.take_event() {
-            if let Event::ForeignMaster { function, to } = event {
-                foreign_master = Some((function, to));
+            if let Event::CompetingMaster { function, to } = event {
+                competing_master = Some((function, to));
             }
         }
     }
     // With another master on the bus even questions could mix with its own.
-    let scan = match foreign_master {
+    let scan = match competing_master {
         Some(_) => None,
         None => match driver.run(Request::Scan)? {
             Outcome::Scan(report) => Some(report),
@@ -51,7 +51,7 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         boards: driver.master.boards(),
         controller,
         scan,
-        foreign_master,
+        competing_master,
         profile,
         ..Default::default()
     };

@@ -65,7 +65,7 @@ const WORDS: [Fixed; 37] = [
     (HEARTBEAT, &["late"], "A heartbeat is missing: bus load, or frames get lost.", "ucom doctor"),
     (
         HEARTBEAT,
-        &["lost", "no heartbeat", "gives no life sign"],
+        &["lost", "no heartbeat", "gives no heartbeat"],
         "Three heartbeats are missing: the board lost power or the bus. What was received before is not shown.",
         "ucom doctor; cable and power of this board",
     ),

@@ -160,12 +160,12 @@ impl Followed {
             many => format!("boards {} left their control loops by themselves", many.join(", ")),
         };
         Err(Failure::new(FAULT, "left-loop", what).hint(
-            "ucom doctor: another PC on the bus, life signs that did not arrive, an application that stops",
+            "ucom doctor: another PC on the bus, heartbeats that did not arrive, an application that stops",
         ))
     }
 }
 
-/// Life signs that are missing say nothing good of its values.
+/// Heartbeats that are missing say nothing good of its values.
 fn in_doubt(board: &Board) -> bool {
     board.rebooted || matches!(board.life, Life::Late | Life::Lost)
 }

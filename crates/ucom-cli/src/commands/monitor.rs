@@ -10,7 +10,7 @@ use ucom::Profile;
 use ucom_host::master::{Board, Event, Life, Request};
 
 use super::doctor::controller;
-use super::monitor_view::{self as view, ForeignMaster};
+use super::monitor_view::{self as view, CompetingMaster};
 use crate::args::{LinkArgs, MonitorArgs};
 use crate::driver::{Driver, nothing_shared, shared_numbers, words};
 use crate::failure::Failure;
@@ -30,7 +30,7 @@ pub struct Watch {
     /// What happened, oldest first: time in s and words.
     pub log: VecDeque<(f64, String)>,
     /// Another PC is master, by what it sent last: nothing is asked.
-    pub foreign_master: Option<ForeignMaster>,
+    pub competing_master: Option<CompetingMaster>,
     /// Nothing may be sent.
     pub listen_only: bool,
     /// The boards are to be asked who they are.
@@ -51,7 +51,7 @@ impl Watch {
             url,
             load: VecDeque::new(),
             log: VecDeque::new(),
-            foreign_master: None,
+            competing_master: None,
             listen_only,
             ask: !listen_only,
             profile,
@@ -71,11 +71,11 @@ impl Watch {
         let time_s = driver.now_us() as f64 * 1e-6;
         while let Some(event) = driver.master.take_event() {
             match &event {
-                Event::ForeignMaster { function, to } => {
-                    if self.foreign_master.is_none() {
+                Event::CompetingMaster { function, to } => {
+                    if self.competing_master.is_none() {
                         self.note(time_s, "another PC is master of the bus: this view only listens".into());
                     }
-                    self.foreign_master = Some((*function, *to));
+                    self.competing_master = Some((*function, *to));
                 }
                 Event::Note { .. } | Event::Done { .. } => {}
                 other => {
@@ -181,7 +181,7 @@ fn value(driver: &Driver, watch: &Watch) -> Value {
         "load_percent": statistics.load_percent(now),
         "received": statistics.received,
         "foreign_frames": statistics.foreign_count(),
-        "foreign_master": watch.foreign_master.is_some(),
+        "foreign_master": watch.competing_master.is_some(),
         "shared_numbers": shared_numbers(&driver.master),
         "boards": boards.iter().map(board).collect::<Vec<_>>(),
         "events": watch.log.iter().map(|(time_s, text)| json!({ "time_s": time_s, "text": text })).collect::<Vec<_>>(),
@@ -236,7 +236,7 @@ pub fn doing(board: &Board, now_us: u64) -> &'static str {
     }
 }
 
-/// Life signs in a word.
+/// Heartbeats in a word.
 pub fn life(board: &Board) -> &'static str {
     match board.life {
         Life::Unarmed => "-",
@@ -246,7 +246,7 @@ pub fn life(board: &Board) -> &'static str {
     }
 }
 
-/// Since the last life sign, s.
+/// Since the last heartbeat, s.
 pub fn age_s(board: &Board, now_us: u64) -> Option<f64> {
     board.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
 }

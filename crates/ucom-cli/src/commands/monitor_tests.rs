@@ -145,7 +145,7 @@ fn d51_a_lost_board_looks_dead() {
         let place = |part: &str| {
             lines.iter().position(|line| line.contains(part)).unwrap_or_else(|| panic!("{part}\n{text}"))
         };
-        assert!(place("board 3 gives no life sign") <= 1, "{text}");
+        assert!(place("board 3 gives no heartbeat") <= 1, "{text}");
         assert!(
             place("board 3 gives") < place("next: ucom info 3") && place("next:") < place("load"),
             "{text}"

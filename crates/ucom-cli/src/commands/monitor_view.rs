@@ -101,7 +101,7 @@ fn trouble(picture: &Picture<'_>) -> Trouble {
         statistics: (*statistics).clone(),
         boards: (*boards).clone(),
         controller: picture.controller,
-        foreign_master: watch.foreign_master,
+        competing_master: watch.competing_master,
         profile: watch.profile,
         ..Default::default()
     };
@@ -157,7 +157,7 @@ fn facts(picture: &Picture<'_>, boards: u16, width: u16) -> Line<'static> {
 
 fn summary(picture: &Picture<'_>) -> Paragraph<'static> {
     let Picture { watch, statistics, now, .. } = picture;
-    let role = if watch.foreign_master.is_some() {
+    let role = if watch.competing_master.is_some() {
         "another PC is master; only listens".yellow()
     } else if watch.listen_only {
         "only listens".dark_gray()
@@ -216,7 +216,7 @@ fn events(frame: &mut Frame<'_>, watch: &Watch, area: Rect, framed: bool) {
 }
 
 /// Function and addressee of another PC's frame.
-pub type ForeignMaster = (Function, u8);
+pub type CompetingMaster = (Function, u8);
 
 #[cfg(test)]
 #[path = "monitor_tests.rs"]

@@ -72,7 +72,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         while let Some(event) = driver.master.take_event() {
             match event {
                 // Another PC runs the boards: that is why there is something to see.
-                Event::ForeignMaster { .. } => {}
+                Event::CompetingMaster { .. } => {}
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;
                     heard = Instant::now();

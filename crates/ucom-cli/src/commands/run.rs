@@ -86,7 +86,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     if !running.is_empty() {
         let what = format!("not stopped for certain: {}", list().join(", "));
         let next =
-            format!("without life signs they become safe by themselves; ucom stop {}", list().join(","));
+            format!("without heartbeats they become safe by themselves; ucom stop {}", list().join(","));
         return Err(Failure::new(FAULT, "not-stopped", what).hint(next));
     }
     driver.nobody_lost(&boards)?;

@@ -1,12 +1,12 @@
-//! The boards as last seen, and their supervision by life signs (D-51).
+//! The boards as last seen, and their supervision by heartbeats (D-51).
 
 use std::collections::BTreeMap;
 use ucom::{Admin, BoardInfo, ErrorCode, Function, Status, StringAssembler};
 
-/// How a board's life signs are.
+/// How a board's heartbeats are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Life {
-    /// No life sign yet, or the application was stopped on purpose.
+    /// No heartbeat yet, or the application was stopped on purpose.
     #[default]
     Unarmed,
     /// In time.
@@ -17,7 +17,7 @@ pub enum Life {
     Lost,
 }
 
-/// So long a board's last life sign may still be under way when its application has ended, µs.
+/// So long a board's last heartbeat may still be under way when its application has ended, µs.
 const UNDER_WAY: u64 = 100_000;
 
 /// What is known of a board.
@@ -31,7 +31,7 @@ pub struct Board {
     pub admin: Option<Admin>,
     /// Supervision.
     pub life: Life,
-    /// Last life sign, µs.
+    /// Last heartbeat, µs.
     pub alive_at: Option<u64>,
     /// Last frame of any kind, µs, and which.
     pub last: Option<(u64, Function)>,
@@ -74,12 +74,12 @@ impl Board {
         self.errors.push((at, code));
     }
 
-    /// Whether a life sign under its number cannot be its own (D-08).
+    /// Whether a heartbeat under its number cannot be its own (D-08).
     pub(crate) fn cannot_be_alive(&self, now: u64) -> bool {
         self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }
 
-    /// The application has ended or is about to: its life signs are no longer expected, nothing of it is known.
+    /// The application has ended or is about to: its heartbeats are no longer expected, nothing of it is known.
     pub(crate) fn application_ended(&mut self) {
         self.life = Life::Unarmed;
         self.alive_at = None;

@@ -135,7 +135,7 @@ pub(crate) async fn wait_status(
 pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<Outcome, Error> {
     let to = match board {
         Some(board) => link.board(board)?,
-        None => link.everybody(),
+        None => link.broadcast_number(),
     };
     link.become_master(force).await?;
     // Whether there is such a board: a frame to nobody would look like a reset without an answer.

@@ -44,7 +44,7 @@ pub struct Observation {
     /// Another bit rate at which frames were heard, bit/s.
     pub other_bitrate: Option<u32>,
     /// Another PC's last frame.
-    pub foreign_master: Option<(Function, u8)>,
+    pub competing_master: Option<(Function, u8)>,
     /// The profile in use.
     pub profile: Profile,
 }
@@ -119,7 +119,7 @@ fn count(counter: Option<u16>) -> String {
 fn traffic(o: &Observation, f: &mut Findings) {
     let load = o.statistics.load_percent(o.now_us);
     if load > f64::from(o.profile.load_limit) {
-        let why = "life signs rank behind all process data and starve first";
+        let why = "heartbeats rank behind all process data and starve first";
         f.warn(
             format!("bus load {load:.0} %, limit {} %", o.profile.load_limit),
             why,
@@ -136,7 +136,7 @@ fn traffic(o: &Observation, f: &mut Findings) {
             "`ucom monitor` shows them",
         );
     }
-    if let Some((function, to)) = o.foreign_master {
+    if let Some((function, to)) = o.competing_master {
         let why = "exactly one PC may be master";
         f.warn(
             format!("another PC talks on this bus ({} to {to})", function.name()),
@@ -264,12 +264,12 @@ fn boards(o: &Observation, f: &mut Findings) {
         }
         match board.life {
             Life::Lost => f.problem(
-                format!("board {n} gives no life sign"),
+                format!("board {n} gives no heartbeat"),
                 "it lost power or the bus",
                 format!("`ucom info {n}`, cable and power of this board"),
             ),
             Life::Late => f.warn(
-                format!("board {n} is late with its life signs"),
+                format!("board {n} is late with its heartbeats"),
                 "the bus is overloaded or frames get lost",
                 "`ucom monitor`",
             ),

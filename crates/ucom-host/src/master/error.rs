@@ -175,9 +175,9 @@ pub enum Error {
         /// What it says.
         is: ucom::Admin,
     },
-    /// Another PC is on the bus (D-08).
+    /// A competing master: another PC is on the bus (D-08).
     #[error("another PC is on the bus: {} to {to} was heard {ago_ms} ms ago", function.name())]
-    ForeignMaster {
+    CompetingMaster {
         /// What it sent.
         function: Function,
         /// To which number.

@@ -22,7 +22,7 @@ impl Error {
             | Self::ByteOrder { .. }
             | Self::NumberShared { .. }
             | Self::MayTakeNumber { .. }
-            | Self::ForeignMaster { .. }
+            | Self::CompetingMaster { .. }
             | Self::Running { .. }
             | Self::LoopRuns { .. }
             | Self::NotNumbered { .. }
@@ -51,7 +51,7 @@ impl Error {
             Self::StatusNotTaken { .. } => "status-not-taken",
             Self::NotReached { .. } => "not-reached",
             Self::AdminRefused { .. } => "admin-refused",
-            Self::ForeignMaster { .. } => "foreign-master",
+            Self::CompetingMaster { .. } => "foreign-master",
             Self::Running { .. } | Self::LoopRuns { .. } => "running",
             Self::NotNumbered { .. } => "not-numbered",
             Self::Load(_) => "load",
@@ -108,7 +108,7 @@ impl Error {
             }
             Self::NotReached { board, .. } => format!("`ucom info {board}`, then `ucom reset` and `ucom init`"),
             Self::AdminRefused { .. } => "outputs need a running control loop: `ucom start`".into(),
-            Self::ForeignMaster { .. } => {
+            Self::CompetingMaster { .. } => {
                 "end the other program, or force this one if you know that it does not matter".into()
             }
             Self::Running { .. } | Self::LoopRuns { .. } => "`ucom stop all` first, or force it".into(),

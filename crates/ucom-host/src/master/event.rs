@@ -37,7 +37,7 @@ pub enum Event {
         /// In words.
         text: String,
     },
-    /// A board's life signs changed.
+    /// A board's heartbeats changed.
     Supervision {
         /// Its number.
         board: u8,
@@ -76,8 +76,8 @@ pub enum Event {
     },
     /// A frame that is not of this protocol (D-02); the first of each kind, all are counted.
     Foreign(Foreign),
-    /// Another PC talks on the bus (D-08).
-    ForeignMaster {
+    /// A competing master: another PC sends on the bus (D-08).
+    CompetingMaster {
         /// What it sent.
         function: Function,
         /// To which number.
@@ -100,7 +100,7 @@ pub enum Event {
 /// Change of a board's supervision (D-51).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Supervision {
-    /// One life sign is missing.
+    /// One heartbeat is missing.
     Late,
     /// Three are; frames of the policy follow at once.
     Lost,

@@ -228,8 +228,8 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Err
 /// The same for every number.
 pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Error> {
     link.listen(u32::MAX, &[Function::DspInfo]);
-    let asked = match link.profile().everybody() {
-        Some(everybody) => vec![everybody],
+    let asked = match link.profile().broadcast_number() {
+        Some(broadcast) => vec![broadcast],
         None => link.profile().board_numbers().collect(),
     };
     for number in asked {
@@ -273,7 +273,7 @@ impl super::shared::Core {
 
     /// A frame of this PC, or of another one: what it means for who has which number.
     pub(crate) fn holders_may_change(&mut self, function: Function, to: Sequence, data: &[u8]) {
-        let everybody = self.profile.everybody() == Some(to);
+        let broadcast = self.profile.broadcast_number() == Some(to);
         let forgets = match function {
             Function::Reset | Function::Init => true,
             Function::SetStatus => match data {
@@ -283,10 +283,10 @@ impl super::shared::Core {
             _ => false,
         };
         match (forgets, function) {
-            // A reset goes to everybody under the number that is nobody's, whatever `addr.broadcast` says.
-            (true, _) if everybody || to == self.profile.unnumbered() => self.holders.clear(),
+            // A reset reaches all boards under the number that is no board's, whatever `addr.broadcast` says.
+            (true, _) if broadcast || to == self.profile.unnumbered() => self.holders.clear(),
             (true, _) => self.holders.forget(to.number()),
-            (false, Function::Info) if everybody => {
+            (false, Function::Info) if broadcast => {
                 let (now, profile) = (self.now, self.profile);
                 profile.board_numbers().for_each(|number| self.holders.asked(number, now));
             }

@@ -177,7 +177,7 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
 async fn reset_all(link: &Link, reports: &mut Reports) {
     for _ in 0..2 {
         link.listen(0, &REPORTS);
-        link.ask(link.everybody(), ToBoard::Reset).await;
+        link.ask(link.broadcast_number(), ToBoard::Reset).await;
         link.with(|core| {
             core.boards.clear();
             core.data.clear();

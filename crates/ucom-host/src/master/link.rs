@@ -44,8 +44,8 @@ impl Link {
         self.with(|core| core.profile)
     }
 
-    /// Everybody, or 0 where the profile has no number for it.
-    pub(crate) fn everybody(&self) -> Sequence {
+    /// The broadcast number, or 0 where the profile has none.
+    pub(crate) fn broadcast_number(&self) -> Sequence {
         self.profile().unnumbered()
     }
 
@@ -217,27 +217,27 @@ impl Link {
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }
-            self.no_foreign_master(listen)?;
-            self.whose_life_signs(listen).await;
-            self.no_foreign_master(2 * listen)?;
+            self.no_competing_master(listen)?;
+            self.whose_heartbeats(listen).await;
+            self.no_competing_master(2 * listen)?;
         }
         Ok(())
     }
 
     /// Refuses when another PC was heard within the last `window` µs.
-    fn no_foreign_master(&self, window: u64) -> Result<(), Error> {
-        let (now, heard) = self.with(|core| (core.now, core.foreign_master));
+    fn no_competing_master(&self, window: u64) -> Result<(), Error> {
+        let (now, heard) = self.with(|core| (core.now, core.competing_master));
         match heard.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
             Some((at, function, to)) => {
-                Err(Error::ForeignMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
+                Err(Error::CompetingMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
             }
             None => Ok(()),
         }
     }
 
-    /// A life sign under the number of a board may be the board's, or another PC's for that board alone: whether it is
+    /// A heartbeat under the number of a board may be the board's, or another PC's for that board alone: whether it is
     /// started, the board knows. Without an answer it is taken for the board's.
-    async fn whose_life_signs(&self, window: u64) {
+    async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);
         let unknown: Vec<u8> = self.with(|core| {
@@ -248,7 +248,7 @@ impl Link {
             let answer = numbers(self, board).await;
             let stopped = |core: &Core| core.boards.get(board).is_some_and(|b| b.stopped_at.is_some());
             if answer.is_ok() && self.with(|core| stopped(core)) {
-                self.with(|core| core.foreign_pc(Function::Alive, board, &[]));
+                self.with(|core| core.competing_master_frame(Function::Alive, board, &[]));
             }
         }
     }

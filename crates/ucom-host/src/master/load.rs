@@ -90,7 +90,7 @@ mod tests {
             (7, 12, 3, 1, 472.5),
         ] {
             let f = forecast(boards, so, ci, period);
-            // Life signs add less than 0.2 %.
+            // Heartbeats add less than 0.2 %.
             assert!((f.percent() - percent).abs() < 0.3, "{f}");
             assert_eq!(f.exceeds(), percent > 70.0);
         }

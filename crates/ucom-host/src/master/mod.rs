@@ -31,7 +31,7 @@
 //! ```
 //!
 //! Procedures that change something make this PC the master of the bus first: it listens for another one (D-08), then
-//! sends life signs until [`Master::end_session`]. Scan, information and descriptions change nothing and send none.
+//! sends heartbeats until [`Master::end_session`]. Scan, information and descriptions change nothing and send none.
 
 mod boards;
 mod byte_order;
@@ -168,7 +168,7 @@ impl Master {
     }
 
     /// The same for a driver that has handed over what arrived up to `heard`, not what came between that and `now`: no
-    /// wait ends beyond `heard`, but life signs go out.
+    /// wait ends beyond `heard`, but heartbeats go out.
     pub fn poll_behind(&mut self, now: u64, heard: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -221,12 +221,12 @@ impl Master {
         lock(&self.core).profile
     }
 
-    /// Whether life signs go out.
+    /// Whether heartbeats go out.
     pub fn is_master(&self) -> bool {
         lock(&self.core).session != Session::Quiet
     }
 
-    /// No more life signs and repeated inputs: boards that run become safe by themselves (D-50).
+    /// No more heartbeats and repeated inputs: boards that run become safe by themselves (D-50).
     pub fn end_session(&mut self) {
         let mut core = lock(&self.core);
         core.session = Session::Quiet;
@@ -311,7 +311,7 @@ impl Master {
         }
     }
 
-    /// Makes this PC the master without a procedure: life signs from now on.
+    /// Makes this PC the master without a procedure: heartbeats from now on.
     pub fn begin_session(&mut self, now: u64) {
         let mut core = lock(&self.core);
         core.advance(now);

@@ -57,7 +57,7 @@ pub(crate) async fn raw_status(
 ) -> Result<Outcome, Error> {
     let address = match to {
         Some(board) => link.board(board)?,
-        None => link.everybody(),
+        None => link.broadcast_number(),
     };
     let mut before = Vec::new();
     for board in &seen {

@@ -1,5 +1,5 @@
 //! From a started board to a running control loop, in the order of the protocol: description, initial inputs, inputs,
-//! parameters, life signs, loop, outputs.
+//! parameters, heartbeats, loop, outputs.
 
 use super::boards::Life;
 use super::control::{AdminChange, change_flags, start_from};

@@ -151,7 +151,7 @@ impl ScanFinding {
 /// PC_REPORT, and who answers within the window.
 pub(crate) async fn ask_reports(link: &Link, reports: &mut Reports) {
     link.listen(0, &REPORTS);
-    link.ask(link.everybody(), ToBoard::Report).await;
+    link.ask(link.broadcast_number(), ToBoard::Report).await;
     collect_reports(link, link.times().report_ask, reports).await;
 }
 
@@ -362,7 +362,7 @@ pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     link.listen(mask, &[Function::DspInfo, Function::So]);
     let mut states: BTreeMap<u8, Status> = BTreeMap::new();
     let mut outputs = BTreeSet::new();
-    let asked = link.profile().everybody().map_or(numbers, |everybody| vec![everybody]);
+    let asked = link.profile().broadcast_number().map_or(numbers, |broadcast| vec![broadcast]);
     for _ in 0..2 {
         let mut collectors: BTreeMap<u8, InfoCollector> = BTreeMap::new();
         for number in &asked {

@@ -116,7 +116,7 @@ pub(crate) struct Core {
     pub since: Option<u64>,
     pub session: Session,
     /// Another PC's last frame.
-    pub foreign_master: Option<(u64, Function, u8)>,
+    pub competing_master: Option<(u64, Function, u8)>,
     /// Reports until then are answers.
     pub report_until: u64,
     /// Stops of the policy that are said again, and when: one frame can be lost.
@@ -153,7 +153,7 @@ impl Core {
             handed_over: 0,
             since: None,
             session: Session::Quiet,
-            foreign_master: None,
+            competing_master: None,
             report_until: 0,
             stops: Vec::new(),
             inputs_from: 0,
@@ -197,7 +197,7 @@ impl Core {
         event
     }
 
-    /// Queues a frame that must not wait behind others: life signs and stops.
+    /// Queues a frame that must not wait behind others: heartbeats and stops.
     pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
@@ -298,10 +298,10 @@ impl Core {
         }
     }
 
-    /// A board, or everybody, was told to start the application.
+    /// A start of the application was sent to a board or broadcast.
     fn may_start(&mut self, to: Sequence) {
-        let everybody = self.profile.everybody() == Some(to);
-        let told = self.boards.iter_mut().filter(|(number, _)| everybody || *number == to.number());
+        let broadcast = self.profile.broadcast_number() == Some(to);
+        let told = self.boards.iter_mut().filter(|(number, _)| broadcast || *number == to.number());
         told.for_each(|(_, board)| board.stopped_at = None);
     }
 
@@ -371,8 +371,8 @@ impl Core {
     }
 
     /// A frame that only a PC sends.
-    pub(crate) fn foreign_pc(&mut self, function: Function, to: u8, data: &[u8]) {
-        self.statistics.foreign_pc += 1;
+    pub(crate) fn competing_master_frame(&mut self, function: Function, to: u8, data: &[u8]) {
+        self.statistics.competing_master += 1;
         if let Some(to) = Sequence::new(to) {
             self.holders_may_change(function, to, data);
         }
@@ -386,10 +386,10 @@ impl Core {
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
         // Once a second at most.
-        let news = self.foreign_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
-        self.foreign_master = Some((self.now, function, to));
+        let news = self.competing_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
+        self.competing_master = Some((self.now, function, to));
         if news {
-            self.event(Event::ForeignMaster { function, to });
+            self.event(Event::CompetingMaster { function, to });
         }
     }
 }

@@ -49,7 +49,7 @@ pub struct Statistics {
     /// Foreign frames by kind.
     pub foreign: Vec<(Foreign, u64)>,
     /// Frames that only a PC sends.
-    pub foreign_pc: u64,
+    pub competing_master: u64,
     /// Frames of boards that are too short or say nothing that can be.
     pub undecodable: u64,
 }

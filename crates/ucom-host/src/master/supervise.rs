@@ -1,4 +1,4 @@
-//! The master's own duties beside the procedures: life signs of both sides, policies, repeated inputs.
+//! The master's own duties beside the procedures: heartbeats of both sides, policies, repeated inputs.
 use super::boards::Life;
 use super::event::Supervision;
 use super::io::{ProcessData, Snapshot};
@@ -21,19 +21,19 @@ const INPUTS_CREDIT: u64 = 5_000;
 
 impl Master {
     /// Stops control loops (ADMIN_DATA, all 0) before everything else that is to be sent, and twice again a moment later: those
-    /// of these boards, the last one first, or of everybody. No answer is waited for; [`Request::Stop`](super::Request::Stop) sees to each
+    /// of these boards, the last one first, or by broadcast of all. No answer is waited for; [`Request::Stop`](super::Request::Stop) sees to each
     /// board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);
         let profile = core.profile;
         let valid = |number: u8| Sequence::new(number).filter(|n| profile.is_board(*n));
-        let to: Vec<Sequence> = match (boards, profile.everybody()) {
+        let to: Vec<Sequence> = match (boards, profile.broadcast_number()) {
             (Some(boards), _) => boards.iter().rev().copied().filter_map(valid).collect(),
-            (None, Some(everybody)) => vec![everybody],
+            (None, Some(broadcast)) => vec![broadcast],
             (None, None) => (0..32).filter_map(valid).collect(),
         };
-        to.iter().for_each(|to| match profile.everybody() == Some(*to) {
+        to.iter().for_each(|to| match profile.broadcast_number() == Some(*to) {
             true => core.stop_all_inputs(),
             false => core.stop_inputs(to.number()),
         });
@@ -42,7 +42,7 @@ impl Master {
 }
 
 impl Core {
-    /// From now on life signs go out.
+    /// From now on heartbeats go out.
     pub(crate) fn start_session(&mut self) {
         if self.session == Session::Quiet {
             self.session = Session::Master { next_alive: self.now };
@@ -65,7 +65,7 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // Not up to `now`: the life sign may be among what the caller has not handed over yet.
+            // Not up to `now`: the heartbeat may be among what the caller has not handed over yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
@@ -88,13 +88,13 @@ impl Core {
 
     fn send_alive(&mut self) {
         let mode = self.profile.alive_mode;
-        let everybody = self.profile.everybody();
+        let broadcast = self.profile.broadcast_number();
         if mode != AliveMode::Unicast
-            && let Some(everybody) = everybody
+            && let Some(broadcast) = broadcast
         {
-            self.urgent(everybody, ToBoard::Alive);
+            self.urgent(broadcast, ToBoard::Alive);
         }
-        if mode != AliveMode::Broadcast || everybody.is_none() {
+        if mode != AliveMode::Broadcast || broadcast.is_none() {
             let known: Vec<u8> =
                 self.boards.iter().filter(|(_, b)| b.info.is_some()).map(|(n, _)| n).collect();
             for number in known.into_iter().filter_map(Sequence::new) {
@@ -103,16 +103,16 @@ impl Core {
         }
     }
 
-    /// The policy for boards whose life signs are gone; only a master stops boards.
+    /// The policy for boards whose heartbeats are gone; only a master stops boards.
     fn on_lost(&mut self, lost: &[u8]) {
         lost.iter().for_each(|board| self.stop_inputs(*board));
         if self.session == Session::Quiet {
             return;
         }
-        let stopped: Vec<Sequence> = match (self.profile.on_lost, self.profile.everybody()) {
+        let stopped: Vec<Sequence> = match (self.profile.on_lost, self.profile.broadcast_number()) {
             (OnLost::Report, _) => return,
             (OnLost::StopBoard, _) => lost.iter().filter_map(|n| Sequence::new(*n)).collect(),
-            (OnLost::StopAll, Some(everybody)) => vec![everybody],
+            (OnLost::StopAll, Some(broadcast)) => vec![broadcast],
             (OnLost::StopAll, None) => self.boards.iter().filter_map(|(n, _)| Sequence::new(n)).collect(),
         };
         stopped.into_iter().for_each(|to| self.stop_running(to));
@@ -150,7 +150,7 @@ impl Core {
     /// CI again every `ci.period`, so that a lost frame heals (D-34): whoever has waited longest is first.
     ///
     /// All repetitions together leave the bus to others for a part of the time, whatever was started with force: answers
-    /// and life signs come after inputs on the bus, and a socket takes more frames than the bus carries.
+    /// and heartbeats come after inputs on the bus, and a socket takes more frames than the bus carries.
     fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -227,7 +227,7 @@ impl Core {
             Ok((frame, (function, number))) => {
                 self.statistics.received(self.now, &frame);
                 if self.is_pc(function, number, &frame) {
-                    return self.foreign_pc(function, number.number(), frame.data());
+                    return self.competing_master_frame(function, number.number(), frame.data());
                 }
                 frame
             }
@@ -242,13 +242,13 @@ impl Core {
 
     /// Whether only a PC can have sent it (D-08, D-12).
     fn is_pc(&self, function: Function, number: Sequence, frame: &Frame) -> bool {
-        let everybody = number == self.profile.unnumbered();
+        let broadcast = number == self.profile.unnumbered();
         match function {
             Function::DumpIo => frame.dlc() == 0,
             Function::Alive => {
-                everybody || self.boards.get(number.number()).is_some_and(|b| b.cannot_be_alive(self.now))
+                broadcast || self.boards.get(number.number()).is_some_and(|b| b.cannot_be_alive(self.now))
             }
-            Function::Admin => everybody,
+            Function::Admin => broadcast,
             _ => !function.from_board(),
         }
     }

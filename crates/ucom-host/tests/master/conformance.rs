@@ -74,7 +74,7 @@ fn without_options_only_harmless_frames_leave() {
     let mut last = 0;
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
-        // PC_INFO, PC_REPORT, a number that the board has already, dumps; life signs go on as `start` began them.
+        // PC_INFO, PC_REPORT, a number that the board has already, dumps; heartbeats go on as `start` began them.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
             // A number is given only to who has just said that it has it.
@@ -253,7 +253,7 @@ fn each_mistake_is_found_by_its_test() {
             "D-T12",
             Mistake { says: |_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] }, ..NONE },
         ),
-        // A life sign is enough to start it again.
+        // A heartbeat is enough to start it again.
         (
             "D-T13",
             Mistake {
@@ -264,7 +264,7 @@ fn each_mistake_is_found_by_its_test() {
                 ..NONE
             },
         ),
-        // Life signs stop it.
+        // Heartbeats stop it.
         (
             "D-T14",
             Mistake {

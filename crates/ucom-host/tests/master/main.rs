@@ -3,6 +3,7 @@
 
 mod bench;
 mod chain;
+mod competing_master;
 mod conformance;
 mod conformance_ends;
 mod faults;
@@ -15,7 +16,6 @@ mod repairing;
 mod robust;
 mod running;
 mod scripted;
-mod second_pc;
 mod shared_numbers;
 mod starting;
 mod stopping;

@@ -1,4 +1,4 @@
-//! Started with force on a bus that cannot carry all inputs: life signs go out all the same, and what is sent is fresh.
+//! Started with force on a bus that cannot carry all inputs: heartbeats go out all the same, and what is sent is fresh.
 
 use std::collections::VecDeque;
 
@@ -22,7 +22,7 @@ fn overloaded() -> Bench {
 }
 
 /// D-34, D-50: inputs that wait are not queued again, so a change reaches its board soon however long the load lasts, and
-/// life signs keep their time.
+/// heartbeats keep their time.
 #[test]
 fn d34_d50_inputs_that_wait_are_never_stale() {
     let mut bench = overloaded();
@@ -47,13 +47,13 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
 }
 
 /// D-50: behind the master there are more queues, as a socket's. What is handed to them is no more than the bus carries, or
-/// life signs would wait there behind inputs.
+/// heartbeats would wait there behind inputs.
 #[test]
 fn d50_no_more_inputs_than_the_bus_carries() {
     let mut bench = overloaded();
     let (master, start) = (&mut bench.master, bench.now);
     let mut queue = VecDeque::new();
-    let (mut spare, mut longest, mut life_signs) = (0, 0, 0);
+    let (mut spare, mut longest, mut heartbeats) = (0, 0, 0);
     for ms in 0..30_000 {
         let now = start + ms * MS;
         if ms % 500 == 0 {
@@ -71,7 +71,7 @@ fn d50_no_more_inputs_than_the_bus_carries() {
             spare -= frame_bits(next.dlc());
             if next.id() == 0x680 {
                 longest = longest.max(now - since);
-                life_signs += 1;
+                heartbeats += 1;
             }
             queue.pop_front();
         }
@@ -80,8 +80,8 @@ fn d50_no_more_inputs_than_the_bus_carries() {
         }
         while master.take_event().is_some() {}
     }
-    assert!(life_signs >= 59, "{life_signs}");
-    assert!(longest <= 200 * MS, "a life sign waited {longest} µs");
+    assert!(heartbeats >= 59, "{heartbeats}");
+    assert!(longest <= 200 * MS, "a heartbeat waited {longest} µs");
 }
 
 /// D-34: a driver that gets rid of one frame in 20 ms has at most one package of each board's inputs waiting, as it is then.

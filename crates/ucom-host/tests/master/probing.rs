@@ -109,9 +109,9 @@ fn p20_probe_is_harmless_unless_allowed() {
     }
 }
 
-/// The checksum of a board's program, and the life signs that a running board counts.
+/// The checksum of a board's program, and the heartbeats that a running board counts.
 #[test]
-fn probe_of_checksum_and_life_signs() {
+fn probe_of_checksum_and_heartbeats() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
     let mut bench = Bench::chain_with(&[0x21], theirs);
     bench.go(Request::Init(InitOptions::default()), 20).unwrap();

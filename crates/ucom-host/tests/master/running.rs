@@ -76,7 +76,7 @@ fn d34_d35_inputs_and_parameters() {
     assert_eq!(bench.master.parameters(1), [ParValue::Unknown; 3]);
 }
 
-/// D-36: the description is read once from each board since its application started, P-14: with life signs meanwhile.
+/// D-36: the description is read once from each board since its application started, P-14: with heartbeats meanwhile.
 #[test]
 fn d36_p14_descriptions_are_cached() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -231,7 +231,7 @@ fn stop_in_reverse() {
     assert!(!lost, "an application that was stopped on purpose is not lost");
 }
 
-/// P-15, D-51: a lost board is told within 3.1 s of its last life sign, the policy's frames leave within 100 ms.
+/// P-15, D-51: a lost board is told within 3.1 s of its last heartbeat, the policy's frames leave within 100 ms.
 #[test]
 fn p15_d51_lost_boards() {
     for (on_lost, frame) in [
@@ -305,7 +305,7 @@ fn d26_reboot_of_a_running_board() {
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
-    // From a life sign on.
+    // From a heartbeat on.
     let alive = bench.count("680#");
     while bench.count("680#") == alive {
         bench.run(1);

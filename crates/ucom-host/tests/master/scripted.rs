@@ -32,7 +32,7 @@ fn init(bench: &mut Bench) -> ucom_host::master::InitReport {
     }
 }
 
-/// P-1: a scan sends only `240#` and `200+n#`, on a silent and on a busy bus, and no life signs.
+/// P-1: a scan sends only `240#` and `200+n#`, on a silent and on a busy bus, and no heartbeats.
 #[test]
 fn p1_scan_is_harmless() {
     for boards in [0, 3] {
@@ -131,13 +131,13 @@ fn p16_spontaneous_report() {
     assert_eq!(*event, expected);
 }
 
-/// P-17, D-08: frames of another master: refused, unless forced; a running board's own life signs are none.
+/// P-17, D-08: frames of another master: refused, unless forced; a running board's own heartbeats are none.
 #[test]
 fn p17_d08_second_master() {
     for foreign in ["680#", "341#0000000000000000", "240#", "581#"] {
         let mut bench = Bench::script(golden(1).at(100, foreign));
         let result = bench.go(Request::Init(InitOptions::default()), 10);
-        assert!(matches!(result, Err(Error::ForeignMaster { .. })), "{foreign}: {result:?}");
+        assert!(matches!(result, Err(Error::CompetingMaster { .. })), "{foreign}: {result:?}");
         assert!(bench.sent().is_empty(), "{:?}", bench.sent());
         assert_eq!(result.unwrap_err().exit(), 4);
         let mut bench = Bench::script(golden(1).at(100, foreign));

@@ -67,7 +67,7 @@ fn requests() -> Vec<Request> {
     ]
 }
 
-/// Questions and life signs.
+/// Questions and heartbeats.
 fn changes_nothing(frame: &str) -> bool {
     let id = u16::from_str_radix(&frame[..3], 16).unwrap();
     matches!(id >> 6, 8 | 9 | 22 | 23) || frame == "680#"

@@ -123,7 +123,7 @@ fn slow_boards_are_idle_after_a_cancelled_run() {
     }
 }
 
-/// The stop of everybody leaves before anything else, and three times; of some boards, only to these.
+/// The broadcast stop leaves before anything else, and three times; of some boards, only to these.
 #[test]
 fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);

@@ -70,9 +70,9 @@ fn golden_update() {
     assert!(master.map(|(.., f)| f.to_string()).all(|t| silent.contains(&t.as_str())));
 }
 
-/// P-7: no frame of a block before READY of the one before it; P-14: life signs every 500 ±50 ms meanwhile.
+/// P-7: no frame of a block before READY of the one before it; P-14: heartbeats every 500 ±50 ms meanwhile.
 #[test]
-fn p7_p14_flow_control_and_life_signs() {
+fn p7_p14_flow_control_and_heartbeats() {
     let mut bench = initialised(&[0x21]);
     bench.board(0).flash.erase_us = 8_000_000;
     let before = bench.log.len();

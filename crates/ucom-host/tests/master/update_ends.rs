@@ -296,11 +296,11 @@ fn d08_a_dry_run_looks_for_another_pc() {
     let dry = UpdateOptions { dry_run: true, ..options(&[1], 1000) };
     let report = update(&mut bench, dry.clone());
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
-    assert!(matches!(**e, Error::ForeignMaster { .. }), "{e}");
+    assert!(matches!(**e, Error::CompetingMaster { .. }), "{e}");
     assert_eq!(report.exit(), 4);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
     assert!(!bench.master.is_master());
-    // Without one: fine, and no life signs either.
+    // Without one: fine, and no heartbeats either.
     let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
     assert_eq!(update(&mut bench, dry).exit(), 0);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());

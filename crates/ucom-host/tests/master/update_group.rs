@@ -15,13 +15,13 @@ fn group(boards: &[u8]) -> UpdateOptions {
     UpdateOptions { mode: UpdateMode::Group, keep_going: true, ..options(boards, 128) }
 }
 
-/// Frames of PC_PROG to everybody.
+/// Broadcast frames of PC_PROG.
 fn broadcasts(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| f.id() == 0x2C0).count()
 }
 
 /// D-46: every number that is not selected is told to leave programming and asked whether it did: the answers to one
-/// PC_INFO to everybody may be lost, and a board left with PROG = 1 would be erased with the group.
+/// A broadcast PC_INFO may be lost, and a board left with PROG = 1 would be erased with the group.
 #[test]
 fn d46_a_group_leaves_other_boards_alone() {
     for lose in [vec![], vec![("> 142#", 2)], vec![("> 142#", 2), ("< 1C2#0400", 2)]] {
@@ -61,7 +61,7 @@ impl Member for Stubborn {
         self.out.first().map_or(u64::MAX, |(at, _)| *at)
     }
     fn receive(&mut self, now: u64, frame: &Frame) {
-        // It does not answer questions to everybody.
+        // It does not answer broadcast questions.
         if frame.to_string() == "209#" {
             self.out.push((now + 300, crate::bench::frame("149#7700091F34126E38")));
             self.out.push((now + 301, crate::bench::frame("149#0000")));
@@ -110,8 +110,8 @@ fn d42_a_group_waits_for_every_board() {
     }
 }
 
-/// A selected board hears XRESET and is not heard any more: it would be erased by the group's frames behind everybody's
-/// back. So there are none: the others are updated one by one.
+/// A selected board takes XRESET and sends nothing any more: the group's frames would erase it unnoticed. So there are
+/// none: the others are updated one by one.
 #[test]
 fn a_board_that_may_listen_unheard_ends_the_broadcast() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -247,7 +247,7 @@ fn p12_a_cancel_reaches_every_board_of_the_group() {
     assert!(!bench.board(1).status().has(ucom::Status::PROG), "{report:?}");
 }
 
-/// Where no number reaches everybody a group is updated one by one.
+/// Without a broadcast number a group is updated one by one.
 #[test]
 fn d04_no_broadcast_no_group() {
     let profile = Profile { addr_broadcast: ucom::profile::Broadcast::None, ..Profile::default() };

@@ -7,7 +7,7 @@ use crate::frame::{Frame, Payload};
 use crate::function::{Function, Sequence};
 use crate::profile::Profile;
 
-/// A message from the PC to one board, or to everybody.
+/// A message from the PC to one board, or a broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToBoard {
     /// PC_RESET.

@@ -6,7 +6,7 @@ use crate::buffer::BufferPackage;
 use crate::error_code::ErrorCode;
 use crate::profile::CiLatch;
 
-/// Text when the PC's life sign stays away, if anybody wants texts.
+/// Text when the PC's heartbeat stays away, if anybody wants texts.
 pub(super) const PC_LOST: &[u8] = b"PC alive lost";
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
@@ -23,7 +23,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.jobs.forget_application();
     }
 
-    /// The application is up: READY, the first life sign, the flags (D-30, D-37).
+    /// The application is up: READY, the first heartbeat, the flags (D-30, D-37).
     pub(super) fn application_up(&mut self) {
         self.app = App::Up;
         self.outbox.mca_ready = true;
@@ -31,7 +31,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.tell_admin_unasked();
     }
 
-    /// The control loop runs from now on; the PC's life sign is due from now on (D-50).
+    /// The control loop runs from now on; the PC's heartbeat is due from now on (D-50).
     pub(super) fn run_loop(&mut self) {
         if self.app != App::Up {
             return;
@@ -61,7 +61,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.active = active;
     }
 
-    /// The PC's life sign stayed away (D-50).
+    /// The PC's heartbeat stayed away (D-50).
     pub(super) fn pc_lost(&mut self) {
         self.stop_loop();
         self.initial_ci();

@@ -32,7 +32,7 @@ pub(super) struct Outbox {
     pub report_after_boot: bool,
     /// MCA_DSP_READY.
     pub mca_ready: bool,
-    /// Life sign.
+    /// Heartbeat.
     pub alive: bool,
     /// When MCA_ADMIN_DATA is due.
     pub admin_at: Option<u64>,

@@ -128,13 +128,13 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 
     /// An eighth of a block.
-    pub(super) fn program(&mut self, data: [u8; 8], to_everybody: bool) {
+    pub(super) fn program(&mut self, data: [u8; 8], is_broadcast: bool) {
         if self.programming.discard {
             return;
         }
         if !self.prog {
             // A group update goes past the boards that are not in it (D-46).
-            if !to_everybody {
+            if !is_broadcast {
                 self.abort(ErrorCode::MemProtected);
             }
             return;

@@ -49,8 +49,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.counters.ignored = self.counters.ignored.saturating_add(1);
     }
 
-    fn is_everybody(&self, to: Sequence) -> bool {
-        self.config.profile.everybody() == Some(to)
+    fn is_broadcast(&self, to: Sequence) -> bool {
+        self.config.profile.broadcast_number() == Some(to)
     }
 
     /// Whether a message concerns this board (D-04).
@@ -59,7 +59,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             (Function::Init, _) => self.config.profile.is_board(to),
             (Function::Reset | Function::AskReport, None) => to == self.config.profile.unnumbered(),
             (_, None) => false,
-            (function, Some(number)) => number == to || (function.broadcast() && self.is_everybody(to)),
+            (function, Some(number)) => number == to || (function.broadcast() && self.is_broadcast(to)),
         }
     }
 
@@ -73,7 +73,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Function::Init if self.number != Some(to) => {}
             Function::Prog if self.programming.discarding() => {}
             Function::Prog if self.prog => self.abort(ErrorCode::CanReceive),
-            Function::Prog if self.is_everybody(to) => {}
+            Function::Prog if self.is_broadcast(to) => {}
             Function::Ci
             | Function::Par
             | Function::McaStart
@@ -94,7 +94,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             ToBoard::XReset => self.xreset(),
             ToBoard::SetStatus { mask, value } => self.set_status(mask, value),
             ToBoard::Info => self.jobs.ask_info(),
-            ToBoard::Prog(data) => self.program(data, self.is_everybody(to)),
+            ToBoard::Prog(data) => self.program(data, self.is_broadcast(to)),
             ToBoard::Start => self.start(),
             ToBoard::Alive => self.pc_is_alive(to),
             // The application level exists only while the application is up.

@@ -108,7 +108,7 @@ keys! {
     addr_first: u32 = 1, Number, "addr.first", "1", "0 or 1", 0..=1,
         "D-04: number of the first board.";
     addr_broadcast: Broadcast = Broadcast::Zero, Word, "addr.broadcast", "0", "0, 31 or none", _,
-        "D-04: number that means everybody.";
+        "D-04: broadcast number.";
     shared_delay: u32 = 2, Number, "shared.delay", "2", "0 to 50", 0..=50,
         "D-05: ms before a board answers a function that both sides send.";
     shared_backoff: u32 = 8, Number, "shared.backoff", "8", "1 to 50", 1..=50,
@@ -180,15 +180,15 @@ keys! {
     pd_signed: bool = true, YesNo, "pd.signed", "yes", "yes or no", _,
         "D-11: process words without a type of their own are shown as signed.";
     alive_mode: AliveMode = AliveMode::Broadcast, Word, "alive.mode", "broadcast",
-        "broadcast, unicast or both", _, "D-04: to whom the PC's life sign goes.";
+        "broadcast, unicast or both", _, "D-04: to whom the PC's heartbeat goes.";
     alive_pc_period: u32 = 500, Number, "alive.pc_period", "500", "1 to 60000", 1..=60_000,
-        "ms between life signs of the PC.";
+        "ms between heartbeats of the PC.";
     alive_dsp_period: u32 = 1000, Number, "alive.dsp_period", "1000", "1 to 60000", 1..=60_000,
-        "ms between life signs of a board.";
+        "ms between heartbeats of a board.";
     alive_pc_lost: u32 = 1500, Number, "alive.pc_lost", "1500", "2 to 600000", 2..=600_000,
-        "D-50: ms without a life sign of the PC until a running board stops.";
+        "D-50: ms without a heartbeat of the PC until a running board stops.";
     alive_dsp_lost: u32 = 3000, Number, "alive.dsp_lost", "3000", "2 to 600000", 2..=600_000,
-        "D-51: ms without a life sign of a board until it counts as lost.";
+        "D-51: ms without a heartbeat of a board until it counts as lost.";
     on_lost: OnLost = OnLost::StopAll, Word, "on_lost", "stop-all", "report, stop-board or stop-all", _,
         "D-51: what the PC does then.";
     load_limit: u32 = 70, Number, "load.limit", "70", "1 to 100", 1..=100,

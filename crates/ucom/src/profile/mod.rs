@@ -45,7 +45,7 @@ impl Profile {
     /// Values that fit their ranges and yet cannot be used together.
     pub const fn check(&self) -> Result<(), ProfileError> {
         let contradiction = if self.addr_first == 0 && matches!(self.addr_broadcast, Broadcast::Zero) {
-            "addr.first and addr.broadcast cannot both be 0: the first board would hear what is for everybody"
+            "addr.first and addr.broadcast cannot both be 0: the first board would receive all broadcasts"
         } else if self.alive_pc_lost <= self.alive_pc_period {
             "alive.pc_lost must be longer than alive.pc_period, or every board stops at once"
         } else if self.alive_dsp_lost <= self.alive_dsp_period {
@@ -56,8 +56,8 @@ impl Profile {
         Err(ProfileError::Contradiction(contradiction))
     }
 
-    /// The number that means everybody when the PC sends it; `None` when there is none (D-04).
-    pub const fn everybody(&self) -> Option<Sequence> {
+    /// The broadcast number of the PC; `None` when there is none (D-04).
+    pub const fn broadcast_number(&self) -> Option<Sequence> {
         match self.addr_broadcast {
             Broadcast::Zero => Some(Sequence::ZERO),
             Broadcast::ThirtyOne => Some(Sequence::MAX),
@@ -65,10 +65,10 @@ impl Profile {
         }
     }
 
-    /// The number that reaches boards without one, and that they use themselves: what means everybody, else 0
+    /// The number that reaches boards without one, and that they use themselves: the broadcast number, else 0
     /// (D-04, D-06).
     pub const fn unnumbered(&self) -> Sequence {
-        match self.everybody() {
+        match self.broadcast_number() {
             Some(number) => number,
             None => Sequence::ZERO,
         }
@@ -76,11 +76,11 @@ impl Profile {
 
     /// Whether a board can have this number.
     pub const fn is_board(&self, number: Sequence) -> bool {
-        let everybody = match self.everybody() {
-            Some(everybody) => everybody.number() == number.number(),
+        let broadcast = match self.broadcast_number() {
+            Some(broadcast) => broadcast.number() == number.number(),
             None => false,
         };
-        number.number() as u32 >= self.addr_first && !everybody
+        number.number() as u32 >= self.addr_first && !broadcast
     }
 
     /// The numbers that boards can have, in the order of the chain.

@@ -74,7 +74,7 @@ impl Endian {
 }
 
 words! {
-    /// The number that means everybody (D-04).
+    /// The broadcast number (D-04).
     pub enum Broadcast {
         /// 0.
         Zero = "0",
@@ -132,11 +132,11 @@ words! {
 }
 
 words! {
-    /// To whom the PC's life sign goes (D-04, D-50).
+    /// To whom the PC's heartbeat goes (D-04, D-50).
     pub enum AliveMode {
-        /// One frame to everybody.
+        /// One broadcast frame.
         Broadcast = "broadcast",
-        /// One frame to each board; boards do not count the one to everybody.
+        /// One frame to each board; boards do not count broadcast ones.
         Unicast = "unicast",
         /// Both.
         Both = "both",
@@ -144,7 +144,7 @@ words! {
 }
 
 words! {
-    /// What the PC does when a board's life sign stays away (D-51).
+    /// What the PC does when a board's heartbeat stays away (D-51).
     pub enum OnLost {
         /// An event, nothing else.
         Report = "report",

@@ -198,7 +198,7 @@ fn d_t12_inputs_beyond_the_dimension() {
     assert_eq!(bus.boards[0].application.par, [0, 0, 7]);
 }
 
-/// D-T13, D-50: without the PC's life sign the board stops, and only a start starts it again.
+/// D-T13, D-50: without the PC's heartbeat the board stops, and only a start starts it again.
 #[test]
 fn d_t13_pc_lost() {
     let mut bus = Bus::started();
@@ -231,7 +231,7 @@ fn d_t13_pc_lost() {
     assert!(bus.take().iter().any(|frame| frame.id() == 0x381));
 }
 
-/// D-T14, D-50: one missing life sign is nothing, three are the end.
+/// D-T14, D-50: one missing heartbeat is nothing, three are the end.
 #[test]
 fn d_t14_alive_for_a_minute() {
     let mut bus = Bus::started();

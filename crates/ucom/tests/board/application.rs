@@ -146,9 +146,9 @@ fn d50_text_when_the_pc_is_lost() {
     assert!(heard.contains(&frames("601#00000100")[0]));
 }
 
-/// A board's life sign, every second while the application is up, and only then (D-51 is what the PC makes of it).
+/// A board's heartbeat, every second while the application is up, and only then (D-51 is what the PC makes of it).
 #[test]
-fn d51_life_sign_of_the_board() {
+fn d51_heartbeat_of_the_board() {
     let mut bus = Bus::started();
     bus.run(10_000);
     assert_eq!(bus.take(), vec![frames("681#")[0]; 10]);
@@ -289,9 +289,9 @@ fn a_program_is_stopped_once() {
     assert_eq!(bus.boards[0].application.started_us, None);
 }
 
-/// D-50: a start while the loop runs is no life sign of the PC.
+/// D-50: a start while the loop runs is no heartbeat of the PC.
 #[test]
-fn d50_a_repeated_start_is_no_life_sign() {
+fn d50_a_repeated_start_is_no_heartbeat() {
     let mut bus = Bus::running();
     for _ in 0..3 {
         bus.run(400);

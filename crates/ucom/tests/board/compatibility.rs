@@ -82,7 +82,7 @@ fn d15_short_last_package() {
     assert_eq!(bus.ask("5C1#", 20), frames("6C1#000000000000"));
 }
 
-/// D-04: numbers from 0, everybody is 31; and nobody is everybody.
+/// D-04: numbers from 0 with 31 for broadcast; and no broadcast number at all.
 #[test]
 fn d04_other_addresses() {
     let profile = with(|p| {
@@ -104,9 +104,9 @@ fn d04_other_addresses() {
     assert_eq!(bus.ask("241#", 300), frames("441#21"));
 }
 
-/// D-04, D-50: which life sign counts.
+/// D-04, D-50: which heartbeat counts.
 #[test]
-fn d50_unicast_life_sign() {
+fn d50_unicast_heartbeat() {
     let runs = |mode, text: &str| {
         let mut bus = Bus::new(&[0x21], with(|p| p.alive_mode = mode));
         bus.number(1);

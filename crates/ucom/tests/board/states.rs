@@ -105,7 +105,7 @@ fn d07_pc_report_in_every_state() {
 fn d24_pc_init_in_every_state() {
     row("281#", |phase| (if phase == Uninitialised { Idle } else { phase }, "0C1#01"));
     row("282#", |phase| if phase == Uninitialised { (Idle, "0C2#02") } else { (phase, "") });
-    // 0 is everybody, not a board.
+    // 0 is the broadcast number, not a board.
     row("280#", |phase| (phase, ""));
     let mut bus = Bus::one();
     bus.boards[0].pins.input.store(false, std::sync::atomic::Ordering::SeqCst);
@@ -275,7 +275,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
             let taken = application.latched_ci[1] == 7 || application.par[1] == 7;
             assert_eq!(taken, matches!(phase, Ready | Running), "{text} in {phase:?}");
         }
-        // Not to everybody.
+        // Not by broadcast.
         let mut bus = in_state(phase);
         bus.send("340#010007000000");
         bus.send("3C0#010007000000");
@@ -283,7 +283,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
     }
 }
 
-/// D-36: dumps exist only while the application is up, and never to everybody.
+/// D-36: dumps exist only while the application is up, and never by broadcast.
 #[test]
 fn d36_dumps_in_every_state() {
     for phase in STATES {

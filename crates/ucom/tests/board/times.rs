@@ -124,7 +124,7 @@ fn d25_hold_off() {
     assert_eq!((flush(&mut board, start), board.phase()), (vec![], Phase::Idle));
 }
 
-/// D-33, D-35, D-50, D-51: the beats of a running board, and the end without the PC's life sign.
+/// D-33, D-35, D-50, D-51: the beats of a running board, and the end without the PC's heartbeat.
 #[test]
 fn d33_d35_d50_d51_beats() {
     let (mut board, start) = board(Bus::started());
@@ -156,9 +156,9 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// D-50: the PC counts as lost 1500 ms after its last life sign.
+/// D-50: the PC counts as lost 1500 ms after its last heartbeat.
 #[test]
-fn d50_life_sign_of_the_pc() {
+fn d50_heartbeat_of_the_pc() {
     let (mut board, now) = board(Bus::running());
     board.receive(now, &frame("680#"));
     flush(&mut board, now + 1500 * MS - 1);
@@ -194,7 +194,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     let cases: [Case; 7] = [
         ("error", Bus::initialised, "1C1#00", "081#07"),
         ("READY of the application", Bus::started, "301#", "501#"),
-        ("life sign", Bus::started, "", "681#"),
+        ("heartbeat", Bus::started, "", "681#"),
         ("info", Bus::initialised, "201#", "141#2100011B34126E38"),
         ("inputs", Bus::started, "5C1#", "6C1#0000000000000000"),
         ("description", Bus::started, "581#", "581#020004000300"),

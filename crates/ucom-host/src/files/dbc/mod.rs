@@ -220,7 +220,7 @@ fn message(text: &mut String, function: Function, number: Sequence, signals: Vec
     };
     let (sender, receiver) = match function.sender() {
         Sender::Board => (board.as_str(), "PC"),
-        // A frame to everybody is the PC's; under its number a board says most.
+        // A broadcast is the PC's; under its own number a board sends most.
         Sender::Both if number != Sequence::ZERO => (board.as_str(), "PC"),
         _ => ("PC", board.as_str()),
     };

@@ -101,13 +101,13 @@ pub(super) async fn alone(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
     need!(bench.started(board).await?);
     let outputs = dimensions(bench, board).await.map_or(0, |d| d.so);
     let lost = u64::from(bench.profile().alive_pc_lost) * MS;
-    bench.life_signs(false);
+    bench.heartbeats(false);
     bench.send(Function::McaStart, board, &[]).await;
     let start = bench.link.now();
     let came = bench.hear_all(lost + 500 * MS).await;
     let ended = came.iter().find(|(at, f)| *at > start + 200 * MS && is(f, Function::Admin, board));
     let result = judge_alone(bench, board, start, lost, outputs, &came, ended).await;
-    bench.life_signs(true);
+    bench.heartbeats(true);
     halt(bench, board).await;
     Ok(result)
 }
@@ -136,12 +136,12 @@ async fn judge_alone(
     if came.iter().any(|(t, f)| so(f) && *t > at + 50 * MS) {
         return Verdict::Fail("outputs came after it ended".into());
     }
-    bench.life_signs(true);
+    bench.heartbeats(true);
     let again = bench.hear_all(1_000 * MS).await;
     if again.iter().any(|(_, f)| so(f)) {
-        return Verdict::Fail("a life sign started it again".into());
+        return Verdict::Fail("a heartbeat started it again".into());
     }
-    if let Err(v) = bench.status_is(board, 0x8B, "a life sign").await {
+    if let Err(v) = bench.status_is(board, 0x8B, "a heartbeat").await {
         return v;
     }
     bench.send(Function::McaStart, board, &[]).await;
@@ -154,36 +154,36 @@ pub(super) async fn alive(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
     bench.send(Function::McaStart, board, &[]).await;
     bench.hear(bench.link.times().admin).await;
     let result = judge_alive(bench, board).await;
-    bench.life_signs(true);
+    bench.heartbeats(true);
     halt(bench, board).await;
     Ok(result)
 }
 
-/// No life signs for so long after a last one.
+/// No heartbeats for so long after a last one.
 async fn pause(bench: &mut Bench<'_>, us: u64) {
-    bench.life_signs(false);
-    bench.life_signs(true);
+    bench.heartbeats(false);
+    bench.heartbeats(true);
     // The last one leaves.
     bench.link.sleep(5 * MS).await;
-    bench.life_signs(false);
+    bench.heartbeats(false);
     bench.link.sleep(us - 5 * MS).await;
 }
 
 async fn judge_alive(bench: &mut Bench<'_>, board: u8) -> Verdict {
     let period = u64::from(bench.profile().alive_pc_period) * MS;
     bench.link.sleep(60_000 * MS).await;
-    if let Err(v) = bench.status_is(board, 0xAB, "60 s with life signs").await {
+    if let Err(v) = bench.status_is(board, 0xAB, "60 s with heartbeats").await {
         return v;
     }
     pause(bench, 2 * period).await;
-    bench.life_signs(true);
+    bench.heartbeats(true);
     bench.link.sleep(5 * MS).await;
-    if let Err(v) = bench.status_is(board, 0xAB, "one missing life sign").await {
+    if let Err(v) = bench.status_is(board, 0xAB, "one missing heartbeat").await {
         return v;
     }
     pause(bench, 4 * period).await;
-    bench.life_signs(true);
-    bench.status_is(board, 0x8B, "three missing life signs").await.err().unwrap_or(Verdict::Pass)
+    bench.heartbeats(true);
+    bench.status_is(board, 0x8B, "three missing heartbeats").await.err().unwrap_or(Verdict::Pass)
 }
 
 pub(super) async fn flags(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {

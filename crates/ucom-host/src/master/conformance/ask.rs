@@ -30,10 +30,10 @@ pub(super) fn expected_reports(bench: &Bench<'_>, boards: &[BoardSeen]) -> Optio
 
 pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Result<Verdict, Error> {
     let window = bench.link.times().report_ask;
-    let everybody = bench.link.everybody().number();
+    let broadcast = bench.link.broadcast_number().number();
     let mut seen = Vec::new();
     for _ in 0..2 {
-        bench.send(Function::AskReport, everybody, &[]).await;
+        bench.send(Function::AskReport, broadcast, &[]).await;
         seen.push(only_reports(&bench.hear(window).await));
     }
     let [first, second] = seen.as_slice() else { return Ok(Verdict::Pass) };
@@ -66,7 +66,7 @@ pub(super) async fn init_again(
         return Ok(Verdict::Skipped(why.into()));
     }
     match bench.link.look_for_master(force).await {
-        Err(e @ Error::ForeignMaster { .. }) => return Ok(Verdict::Skipped(e.to_string())),
+        Err(e @ Error::CompetingMaster { .. }) => return Ok(Verdict::Skipped(e.to_string())),
         other => other?,
     }
     // A board that has rebooted since would take any number.

@@ -129,8 +129,8 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// No life signs of this PC, or life signs again.
-    pub fn life_signs(&self, on: bool) {
+    /// No heartbeats of this PC, or heartbeats again.
+    pub fn heartbeats(&self, on: bool) {
         self.link.with(|core| match on {
             true => core.start_session(),
             false => core.session = Session::Quiet,

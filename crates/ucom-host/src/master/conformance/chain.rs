@@ -8,7 +8,7 @@ use ucom::{Function, Status};
 
 /// PC_RESET to all, and time for all to be ready.
 async fn reset_all(bench: &mut Bench<'_>) -> Vec<ucom::Frame> {
-    bench.send(Function::Reset, bench.link.everybody().number(), &[]).await;
+    bench.send(Function::Reset, bench.link.broadcast_number().number(), &[]).await;
     bench.link.with(|core| {
         core.boards.clear();
         core.data.clear();
@@ -50,8 +50,8 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>) -> Verdict {
             return Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came)));
         }
     }
-    // To everybody, too: without a number nobody is meant (D-04, D-06).
-    bench.send(Function::Info, bench.link.everybody().number(), &[]).await;
+    // By broadcast, too: a board without a number does not take it (D-04, D-06).
+    bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
     let came = bench.hear(150 * MS).await;
     verdict(came.is_empty(), &came)
 }

@@ -48,9 +48,9 @@ pub(super) const TESTS: [(&str, Level, &str); 21] = [
     (
         "D-T13",
         Level::Run,
-        "no life sign of the PC: loop ends after 1.5 s, flags 0, no outputs; a life sign does not restart it, MCA_PC_START does",
+        "no heartbeat of the PC: loop ends after 1.5 s, flags 0, no outputs; a heartbeat does not restart it, MCA_PC_START does",
     ),
-    ("D-T14", Level::Run, "life signs for 60 s: runs; one missing: runs; three missing: safe"),
+    ("D-T14", Level::Run, "heartbeats for 60 s: runs; one missing: runs; three missing: safe"),
     ("D-T15", Level::Run, "flags 02000000: ignored; flags of three bytes: error 7"),
     ("D-T16", Level::Init, "PC_XRESET within 300 ms of PC_INIT prevents the autostart"),
     (
@@ -68,7 +68,7 @@ pub(super) const TESTS: [(&str, Level, &str); 21] = [
         Level::Elsewhere(
             "would program several boards at once: `ucom update --group` does, and says what each took",
         ),
-        "program data to everybody: boards with PROG = 1 take them, the others are silent",
+        "broadcast program data: boards with PROG = 1 take them, the others are silent",
     ),
     (
         "D-T20",

@@ -141,7 +141,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
     } else {
         seen.infos.keys().next().filter(|n| **n == 1).map(|_| "1")
     };
-    rows.add("addr.broadcast", ("number that means everybody", "nothing"), observed, value.as_deref());
+    rows.add("addr.broadcast", ("broadcast number", "nothing"), observed, value.as_deref());
     let lowest = if seen.zero_answers { Some(0) } else { seen.infos.keys().next().copied() };
     let observed =
         lowest.map_or("no board has a number".into(), |n| format!("lowest number that answers: {n}"));
@@ -249,7 +249,7 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     }
 }
 
-/// Which life signs held a control loop: to everybody, to its number.
+/// Which heartbeats kept a control loop running: broadcast ones, those to its number.
 pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
     let mut rows = Rows { rows: core::mem::take(&mut report.rows), profile: report.profile };
     let mode = match (broadcast, unicast) {
@@ -259,14 +259,14 @@ pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
     };
     let word = |held| if held { "runs on" } else { "stops" };
     let observed = format!(
-        "with life signs to all it {}, with those to its number it {}",
+        "with heartbeats to all it {}, with those to its number it {}",
         word(broadcast),
         word(unicast)
     );
     let value = mode.map(|m| m.to_string());
     rows.add(
         "alive.mode",
-        ("to whom life signs go", "to all boards, every 500 ms"),
+        ("to whom heartbeats go", "to all boards, every 500 ms"),
         observed,
         value.as_deref(),
     );

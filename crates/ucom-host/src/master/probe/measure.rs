@@ -76,7 +76,7 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     let mut reports = Vec::new();
     for _ in 0..ROUNDS {
         link.listen(0, &REPORTS);
-        link.ask(link.everybody(), ToBoard::Report).await;
+        link.ask(link.broadcast_number(), ToBoard::Report).await;
         let until = link.now() + link.times().report_ask;
         while let Some(heard) = link.next(until).await {
             if let FromBoard::Report(report) = heard.message {
@@ -93,7 +93,7 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
 /// PC_RESET, PC_INIT to the first board, and whether its status shows OPINIT at once; `None`: nobody took the number.
 async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     link.listen(0, &REPORTS);
-    link.ask(link.everybody(), ToBoard::Reset).await;
+    link.ask(link.broadcast_number(), ToBoard::Reset).await;
     link.with(|core| {
         core.boards.clear();
         core.data.clear();
@@ -156,7 +156,7 @@ async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     offsets
 }
 
-/// Whether a control loop goes on with life signs to everybody only, and with those to its number only.
+/// Whether a control loop goes on with broadcast heartbeats only, and with those to its number only.
 async fn alive_form(link: &Link, board: u8) -> Result<[bool; 2], Error> {
     start_application(link, board).await?;
     let mut held = [false; 2];

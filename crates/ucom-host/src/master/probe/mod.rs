@@ -17,7 +17,7 @@ use ucom::Profile;
 pub struct ProbeOptions {
     /// Reset and number the chain anew: shows whether boards raise their pin by themselves.
     pub init: bool,
-    /// Start a control loop, outputs inactive: shows which life signs count.
+    /// Start a control loop, outputs inactive: shows which heartbeats count.
     pub alive: bool,
     /// An image that some board has, as sent: shows how the Program ID is computed.
     pub image: Option<Vec<u8>>,

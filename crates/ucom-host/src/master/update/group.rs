@@ -1,4 +1,4 @@
-//! Several boards at once, by PC_PROG to everybody: each board with PROG = 1 takes it, so all others must be known not to.
+//! Several boards at once, by broadcast PC_PROG: each board with PROG = 1 takes it, so all others must be known not to.
 use super::board::{enter, has, judge, one, verify};
 use super::campaign::{Campaign, Stage};
 use super::procedure::refuse;
@@ -14,7 +14,7 @@ use ucom::{Sequence, Status, ToBoard};
 ///
 /// Where the broadcast could reach a board that must not have it, boards stay open and are updated one by one.
 pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> {
-    let Some(everybody) = link.profile().everybody() else {
+    let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
         return Ok(());
     };
@@ -39,7 +39,7 @@ pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> 
     let gap_us = u64::from(link.profile().prog_frame_gap_us);
     let since_transfer = link.now();
     let attempt =
-        Attempt { link, plan: &plan, to: everybody, boards, number: 1, gap_us, since: since_transfer };
+        Attempt { link, plan: &plan, to: broadcast, boards, number: 1, gap_us, since: since_transfer };
     let erasing = |boards: &[u8], left: &[(u8, Broken)]| {
         boards.iter().for_each(|board| run.reach(*board, Stage::Erased));
         let listening = left.iter().filter(|(_, why)| !why.ended_transfer());
@@ -99,7 +99,7 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
 }
 
 /// The selected boards in their exloaders. `true`: one failed, and did not say that it left programming either: it would
-/// be erased by the group's frames behind everybody's back.
+/// be erased by the group's frames unnoticed.
 async fn gather(link: &Link, run: &mut Campaign, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {

@@ -1,4 +1,4 @@
-//! Another PC's life signs for single boards (D-08), and single boards that are reset.
+//! A competing master's heartbeats for single boards (D-08), and single boards that are reset.
 
 use crate::bench::Exit;
 use ucom::Profile;
@@ -9,14 +9,14 @@ use ucom_host::master::{Error, Event, InitOptions, Life, Outcome, Request};
 use crate::bench::{Bench, MS, Script, frame};
 use crate::chain::initialised;
 
-fn foreign(bench: &Bench) -> bool {
-    bench.events.iter().any(|(_, e)| matches!(e, Event::ForeignMaster { .. }))
+fn has_competing_master(bench: &Bench) -> bool {
+    bench.events.iter().any(|(_, e)| matches!(e, Event::CompetingMaster { .. }))
 }
 
-/// D-08: before the first intrusive command a life sign under a board's number is the board's own if that is started,
+/// D-08: before the first intrusive command a heartbeat under a board's number is the board's own if that is started,
 /// another PC's if it is not; a board that does not answer decides nothing.
 #[test]
-fn d08_whose_life_sign_is_it() {
+fn d08_whose_heartbeat_is_it() {
     for (status, refused) in [(Some("8B"), false), (Some("AB"), false), (Some("1B"), true), (None, false)] {
         let mut script = Script::default().at(100, "681#").at(600, "681#").on("301#", &["501#"]);
         if let Some(status) = status {
@@ -24,32 +24,33 @@ fn d08_whose_life_sign_is_it() {
         }
         let mut bench = Bench::script(script);
         let result = bench.go(Request::Start { board: 1, force: false }, 30);
-        let is_refused = matches!(result, Err(Error::ForeignMaster { function: Function::Alive, to: 1, .. }));
+        let is_refused =
+            matches!(result, Err(Error::CompetingMaster { function: Function::Alive, to: 1, .. }));
         assert_eq!(is_refused, refused, "status {status:?}: {result:?}");
         let commands = bench.sent().iter().filter(|t| *t != "201#" && *t != "680#").count();
         assert!(!refused || commands == 0, "{:?}", bench.sent());
     }
 }
 
-/// D-08, D-51: while this PC is master, another one's life signs for a board that is not started are told; they do not make
+/// D-08, D-51: while this PC is master, another one's heartbeats for a board that is not started are told; they do not make
 /// anybody wait for more of them, and a board that is started by us is not mistaken for a PC.
 #[test]
-fn d08_d51_life_signs_of_another_pc() {
+fn d08_d51_heartbeats_of_another_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
     bench.go(Request::Start { board: 2, force: false }, 10).unwrap();
     bench.run(5_000);
-    assert!(!foreign(&bench), "{:?}", bench.events);
+    assert!(!has_competing_master(&bench), "{:?}", bench.events);
     let now = bench.now;
     bench.master.handle(now, Ok(frame("681#")));
     bench.run(10_000);
-    let told = Event::ForeignMaster { function: Function::Alive, to: 1 };
+    let told = Event::CompetingMaster { function: Function::Alive, to: 1 };
     assert!(bench.events.iter().any(|(_, e)| *e == told), "{:?}", bench.events);
     assert_eq!(bench.master.boards().get(1).unwrap().life, Life::Unarmed);
     assert_eq!(bench.master.boards().get(2).unwrap().life, Life::Alive);
     assert!(!bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { .. })), "{:?}", bench.events);
 }
 
-/// D-25: a board that starts its application by itself is no second PC, nor is one that is stopped and started.
+/// D-25: a board that starts its application by itself is no competing master, nor is one that is stopped and started.
 #[test]
 fn d08_d25_no_board_is_mistaken_for_a_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -64,7 +65,7 @@ fn d08_d25_no_board_is_mistaken_for_a_pc() {
         bench.go(set(Status::MSTART, Status::MSTART), 10).unwrap();
         bench.run(1_000 + 100 * round);
     }
-    assert!(!foreign(&bench), "{:?}", bench.events);
+    assert!(!has_competing_master(&bench), "{:?}", bench.events);
     assert_eq!(bench.master.boards().get(1).unwrap().life, Life::Alive);
 }
 
@@ -108,7 +109,7 @@ fn a_single_reset_is_checked() {
     assert!(matches!(error, Error::NoAnswer { board: 2, asked: Function::Reset, .. }), "{error:?}");
 }
 
-/// The driver is behind: what it has not handed over yet is not taken for silence, and life signs go out all the same.
+/// The driver is behind: what it has not handed over yet is not taken for silence, and heartbeats go out all the same.
 #[test]
 fn d50_a_driver_that_is_behind() {
     let mut master = ucom_host::master::Master::new(Profile::default());

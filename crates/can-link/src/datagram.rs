@@ -155,7 +155,7 @@ mod tests {
         }
 
         #[test]
-        fn rubbish_is_no_frame(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        fn noise_is_no_frame(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
             prop_assert_eq!(decode(&bytes), None);
         }
     }

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CanBus, CanError, CanFrame, ControllerState};
 
-/// What happens to frames in one direction. Probabilities are shares of 1 per frame.
+/// Faults of the frames in one direction. Probabilities are shares of 1 per frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Faults {
+pub struct FaultConfig {
     /// Probability that a frame is lost.
     pub loss: f64,
     /// Probability that one bit of the payload is turned over.
@@ -29,18 +29,18 @@ pub struct Faults {
 /// Faults of both directions of one member.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Plan {
+pub struct FaultSchedule {
     /// The same seed gives the same faults for the same frames.
     pub seed: u64,
     /// What the member sends.
-    pub send: Faults,
+    pub send: FaultConfig,
     /// What the member hears.
-    pub receive: Faults,
+    pub receive: FaultConfig,
 }
 
 /// How often each fault happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct FaultStats {
     /// Frames that came in.
     pub frames: u64,
     /// Lost ones.
@@ -55,55 +55,55 @@ pub struct Counts {
 
 /// One direction: frames that are under way.
 pub(crate) struct Line {
-    faults: Faults,
+    faults: FaultConfig,
     random: fastrand::Rng,
     /// Sorted by the time when they are due; equal times in order of arrival.
     under_way: Vec<(Duration, CanFrame)>,
     /// Frames that are not held back do not overtake each other.
     last_due: Duration,
-    counts: Counts,
+    stats: FaultStats,
 }
 
-/// Seconds from a setting; rubbish is no delay.
+/// Seconds from a setting; an invalid one is no delay.
 fn seconds(value: f64) -> Duration {
     Duration::try_from_secs_f64(value).unwrap_or_default()
 }
 
 impl Line {
-    pub(crate) fn new(faults: Faults, seed: u64) -> Self {
+    pub(crate) fn new(faults: FaultConfig, seed: u64) -> Self {
         let random = fastrand::Rng::with_seed(seed);
-        Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, counts: Counts::default() }
+        Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, stats: FaultStats::default() }
     }
 
     /// Draws in the same number and order whatever happens: one setting does not change the others' faults.
     pub(crate) fn put(&mut self, now: Duration, mut frame: CanFrame) {
-        let Faults { loss, corruption, duplication, reordering, .. } = self.faults;
+        let FaultConfig { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
             [loss, corruption, duplication, reordering].map(|share| self.random.f64() < share);
         let (place, jitter) = (self.random.f64(), self.random.f64());
-        self.counts.frames += 1;
+        self.stats.frames += 1;
         if lose {
-            self.counts.lost += 1;
+            self.stats.lost += 1;
             return;
         }
         if corrupt && !frame.data().is_empty() {
             let bit = (place * (frame.data().len() * 8) as f64) as usize;
             frame.data_mut()[bit / 8] ^= 1 << (bit % 8);
-            self.counts.corrupted += 1;
+            self.stats.corrupted += 1;
         }
         let (shortest, longest) = (seconds(self.faults.delay_min_s), seconds(self.faults.delay_max_s));
         let spread = longest.saturating_sub(shortest).mul_f64(jitter);
         let mut due = now.saturating_add(shortest).saturating_add(spread).max(self.last_due);
         if hold {
             due = due.saturating_add(seconds(self.faults.reordering_hold_s));
-            self.counts.reordered += 1;
+            self.stats.reordered += 1;
         } else {
             self.last_due = due;
         }
         self.insert(due, frame);
         if double {
             self.insert(due, frame);
-            self.counts.doubled += 1;
+            self.stats.doubled += 1;
         }
     }
 
@@ -129,17 +129,17 @@ impl Line {
         self.under_way.len()
     }
 
-    pub(crate) fn counts(&self) -> Counts {
-        self.counts
+    pub(crate) fn stats(&self) -> FaultStats {
+        self.stats
     }
 }
 
 /// A bus whose frames suffer faults on their way from and to this member.
 ///
 /// ```
-/// use can_link::{Faults, Faulty, Plan, VirtualBus};
-/// let plan = Plan { seed: 1, receive: Faults { loss: 0.01, ..Faults::default() }, ..Plan::default() };
-/// let bus = Faulty::new(VirtualBus::join("lossy"), plan);
+/// use can_link::{FaultConfig, Faulty, FaultSchedule, VirtualBus};
+/// let schedule = FaultSchedule { seed: 1, receive: FaultConfig { loss: 0.01, ..FaultConfig::default() }, ..FaultSchedule::default() };
+/// let bus = Faulty::new(VirtualBus::join("lossy"), schedule);
 /// ```
 ///
 /// Frames under way to others leave while this member sends or receives.
@@ -152,22 +152,26 @@ pub struct Faulty<B> {
 
 impl<B: CanBus> Faulty<B> {
     /// Delays by the clock on the wall.
-    pub fn new(bus: B, plan: Plan) -> Self {
+    pub fn new(bus: B, schedule: FaultSchedule) -> Self {
         let start = Instant::now();
-        Self::with_clock(bus, plan, move || start.elapsed())
+        Self::with_clock(bus, schedule, move || start.elapsed())
     }
 
     /// Delays by a clock of your own, which must not run backwards: virtual time makes them repeatable.
-    pub fn with_clock(bus: B, plan: Plan, clock: impl FnMut() -> Duration + Send + 'static) -> Self {
-        let mut seeds = fastrand::Rng::with_seed(plan.seed);
-        let out = Line::new(plan.send, seeds.u64(..));
-        let heard = Line::new(plan.receive, seeds.u64(..));
+    pub fn with_clock(
+        bus: B,
+        schedule: FaultSchedule,
+        clock: impl FnMut() -> Duration + Send + 'static,
+    ) -> Self {
+        let mut seeds = fastrand::Rng::with_seed(schedule.seed);
+        let out = Line::new(schedule.send, seeds.u64(..));
+        let heard = Line::new(schedule.receive, seeds.u64(..));
         Self { bus, out, heard, clock: Box::new(clock) }
     }
 
     /// What happened so far to frames heard.
-    pub fn received_counts(&self) -> Counts {
-        self.heard.counts
+    pub fn received_stats(&self) -> FaultStats {
+        self.heard.stats
     }
 
     /// The bus without faults; frames under way are gone.
@@ -244,11 +248,11 @@ mod tests {
         now_ms: Arc<AtomicU64>,
     }
 
-    fn bench(send: Faults, receive: Faults, seed: u64) -> Bench {
+    fn bench(send: FaultConfig, receive: FaultConfig, seed: u64) -> Bench {
         let hub = VirtualHub::new();
         let now_ms = Arc::new(AtomicU64::new(0));
         let clock = Arc::clone(&now_ms);
-        let faulty = Faulty::with_clock(hub.join(), Plan { seed, send, receive }, move || {
+        let faulty = Faulty::with_clock(hub.join(), FaultSchedule { seed, send, receive }, move || {
             Duration::from_millis(clock.load(Ordering::Relaxed))
         });
         Bench { faulty, peer: hub.join(), now_ms }
@@ -266,7 +270,7 @@ mod tests {
 
     #[test]
     fn without_faults_it_is_the_bus() {
-        let mut bench = bench(Faults::default(), Faults::default(), 1);
+        let mut bench = bench(FaultConfig::default(), FaultConfig::default(), 1);
         for number in 0..100 {
             bench.faulty.send(&frame(number)).unwrap();
             bench.peer.send(&frame(number)).unwrap();
@@ -279,26 +283,26 @@ mod tests {
 
     #[test]
     fn faults_come_as_often_as_asked_for() {
-        let receive = Faults { loss: 0.1, corruption: 0.2, duplication: 0.3, ..Faults::default() };
-        let mut bench = bench(Faults::default(), receive, 2);
+        let receive = FaultConfig { loss: 0.1, corruption: 0.2, duplication: 0.3, ..FaultConfig::default() };
+        let mut bench = bench(FaultConfig::default(), receive, 2);
         let mut heard = Vec::new();
         for number in 0..4000 {
             bench.peer.send(&frame(number)).unwrap();
             heard.extend(numbers(&mut bench.faulty));
         }
-        let counts = bench.faulty.received_counts();
-        assert_eq!(counts.frames, 4000);
-        assert_eq!(heard.len() as u64, 4000 - counts.lost + counts.doubled);
+        let stats = bench.faulty.received_stats();
+        assert_eq!(stats.frames, 4000);
+        assert_eq!(heard.len() as u64, 4000 - stats.lost + stats.doubled);
         // Six standard deviations and more.
-        for (count, share) in [(counts.lost, 0.1), (counts.corrupted, 0.18), (counts.doubled, 0.27)] {
-            assert!((count as f64 / 4000.0 - share).abs() < 0.05, "{counts:?}");
+        for (count, share) in [(stats.lost, 0.1), (stats.corrupted, 0.18), (stats.doubled, 0.27)] {
+            assert!((count as f64 / 4000.0 - share).abs() < 0.05, "{stats:?}");
         }
     }
 
     #[test]
     fn corruption_turns_exactly_one_bit() {
-        let send = Faults { corruption: 1.0, ..Faults::default() };
-        let mut bench = bench(send, Faults::default(), 3);
+        let send = FaultConfig { corruption: 1.0, ..FaultConfig::default() };
+        let mut bench = bench(send, FaultConfig::default(), 3);
         for number in 0..500 {
             bench.faulty.send(&frame(number)).unwrap();
             assert_eq!((numbers(&mut bench.peer)[0] ^ number).count_ones(), 1);
@@ -311,8 +315,8 @@ mod tests {
 
     #[test]
     fn delays_keep_the_order() {
-        let send = Faults { delay_min_s: 0.002, delay_max_s: 0.010, ..Faults::default() };
-        let mut bench = bench(send, Faults::default(), 4);
+        let send = FaultConfig { delay_min_s: 0.002, delay_max_s: 0.010, ..FaultConfig::default() };
+        let mut bench = bench(send, FaultConfig::default(), 4);
         for number in 0..20 {
             bench.faulty.send(&frame(number)).unwrap();
         }
@@ -326,8 +330,8 @@ mod tests {
 
     #[test]
     fn reordered_frames_are_overtaken() {
-        let receive = Faults { reordering: 0.3, reordering_hold_s: 0.005, ..Faults::default() };
-        let mut bench = bench(Faults::default(), receive, 5);
+        let receive = FaultConfig { reordering: 0.3, reordering_hold_s: 0.005, ..FaultConfig::default() };
+        let mut bench = bench(FaultConfig::default(), receive, 5);
         for number in 0..100 {
             bench.peer.send(&frame(number)).unwrap();
         }
@@ -335,7 +339,7 @@ mod tests {
         let first = heard.len();
         bench.now_ms.store(5, Ordering::Relaxed);
         heard.extend(numbers(&mut bench.faulty));
-        assert_eq!(bench.faulty.received_counts().reordered as usize, 100 - first);
+        assert_eq!(bench.faulty.received_stats().reordered as usize, 100 - first);
         assert!((40..100).contains(&first) && !heard.is_sorted());
         heard.sort();
         assert_eq!(heard, (0..100).collect::<Vec<_>>());
@@ -343,7 +347,7 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_faults() {
-        let faults = Faults {
+        let faults = FaultConfig {
             loss: 0.2,
             corruption: 0.2,
             duplication: 0.2,
@@ -368,9 +372,9 @@ mod tests {
     }
 
     #[test]
-    fn rubbish_in_the_plan_is_no_panic() {
+    fn invalid_numbers_in_the_schedule_is_no_panic() {
         for bad in [f64::NAN, f64::INFINITY, -1.0, 1.8e19, f64::MAX] {
-            let faults = Faults {
+            let faults = FaultConfig {
                 loss: 0.0,
                 corruption: bad,
                 duplication: bad,

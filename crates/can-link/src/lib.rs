@@ -21,7 +21,7 @@ mod virtual_bus;
 
 pub use bus::{CanBus, open, open_url};
 pub use error::CanError;
-pub use faulty::{Counts, Faults, Faulty, Plan};
+pub use faulty::{FaultConfig, FaultSchedule, FaultStats, Faulty};
 pub use frame::{CanFrame, Id, InvalidFrame};
 pub use multicast::MulticastBus;
 pub use slcan::{AdapterError, SlcanAdapter, SlcanBus, SlcanOptions};
@@ -33,7 +33,7 @@ pub use socketcand::{
 };
 pub use state::{ControllerState, ErrorState};
 pub use timed::{
-    BusError, BusStats, Happening, MemberId, QueueError, TimedBus, TimedEvent, classic_frame_bits,
+    BusError, BusEvent, BusStats, MemberId, QueueError, TimedBus, TimedEvent, classic_frame_bits,
 };
 pub use url::{CanUrl, UrlError};
 pub use virtual_bus::{VirtualBus, VirtualHub};

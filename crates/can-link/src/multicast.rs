@@ -13,7 +13,7 @@ use crate::{CanBus, CanError, CanFrame, CanUrl};
 const RECEIVE_BUFFER: usize = 2 << 20;
 
 /// How long sending waits for the system to have room again.
-const SEND_PATIENCE: Duration = Duration::from_secs(1);
+const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A member of a multicast group.
 ///
@@ -156,7 +156,7 @@ fn unspecified(group: IpAddr) -> IpAddr {
 impl CanBus for MulticastBus {
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
         let datagram = encode(frame);
-        let give_up = Instant::now() + SEND_PATIENCE;
+        let give_up = Instant::now() + SEND_TIMEOUT;
         loop {
             match self.sender.send(&datagram) {
                 Ok(_) => return Ok(()),
@@ -236,12 +236,12 @@ mod tests {
                 return;
             }
         }
-        b.sender.send(b"rubbish").unwrap();
+        b.sender.send(b"noise").unwrap();
         b.send(&frames[1]).unwrap();
         for frame in frames {
             assert_eq!(heard(&mut b), Some(frame));
         }
-        assert_eq!(heard(&mut a), Some(frames[1]), "of its own frames and of rubbish it hears nothing");
+        assert_eq!(heard(&mut a), Some(frames[1]), "of its own frames and of noise it hears nothing");
         assert_eq!((a.ignored(), b.ignored()), (1, 0));
         assert_eq!(a.receive(Duration::ZERO).unwrap(), None);
         assert_eq!(b.receive(Duration::from_millis(2)).unwrap(), None);

@@ -10,7 +10,7 @@ use crate::{CanBus, CanError, CanFrame, ControllerState, ErrorState};
 const QUEUE: usize = 4096;
 
 /// How long a sender waits for a member whose queue is full, if nothing else is asked for.
-const PATIENCE: Duration = Duration::from_millis(100);
+const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// A bus without a name, to be joined by whoever holds it.
 ///
@@ -29,7 +29,7 @@ pub struct VirtualHub {
 }
 
 struct Shared {
-    patience: Duration,
+    timeout: Duration,
     state: Mutex<State>,
     /// Something was put into or taken from a queue.
     changed: Condvar,
@@ -37,7 +37,7 @@ struct Shared {
 
 impl Default for Shared {
     fn default() -> Self {
-        Self { patience: PATIENCE, state: Mutex::default(), changed: Condvar::new() }
+        Self { timeout: TIMEOUT, state: Mutex::default(), changed: Condvar::new() }
     }
 }
 
@@ -117,8 +117,8 @@ impl VirtualHub {
     /// A bus where a sender waits so long for a member whose queue of 4096 frames is full (else 100 ms). A
     /// member that takes nothing for so long misses frames from then on until it takes one: it must not stop
     /// the bus for the others.
-    pub fn with_patience(patience: Duration) -> Self {
-        Self { shared: Arc::new(Shared { patience, ..Shared::default() }) }
+    pub fn with_timeout(timeout: Duration) -> Self {
+        Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
     /// A new member; it hears what is sent from now on.
@@ -253,7 +253,7 @@ impl VirtualBus {
 impl CanBus for VirtualBus {
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
         let shared = self.shared();
-        let give_up = Instant::now().checked_add(shared.patience);
+        let give_up = Instant::now().checked_add(shared.timeout);
         let mut state = shared.state();
         // Waiting for the slowest before anyone gets the frame keeps one order for all.
         loop {
@@ -261,7 +261,7 @@ impl CanBus for VirtualBus {
                 *number != self.number() && member.full() && !member.stalled && !member.deaf
             };
             let blocked = state.members.iter().any(blocks);
-            let left = give_up.map_or(PATIENCE, |end| end.saturating_duration_since(Instant::now()));
+            let left = give_up.map_or(TIMEOUT, |end| end.saturating_duration_since(Instant::now()));
             if !blocked || left.is_zero() {
                 break;
             }
@@ -354,7 +354,7 @@ mod tests {
 
     #[test]
     fn a_member_that_takes_nothing_misses_frames_and_stops_nobody() {
-        let hub = VirtualHub::with_patience(Duration::ZERO);
+        let hub = VirtualHub::with_timeout(Duration::ZERO);
         let (mut a, mut sleeper) = (hub.join(), hub.join());
         let count = QUEUE as u32 + 50;
         for number in 0..count {
@@ -371,7 +371,7 @@ mod tests {
 
     #[test]
     fn a_slow_member_in_another_thread_misses_nothing() {
-        let hub = VirtualHub::with_patience(Duration::MAX);
+        let hub = VirtualHub::with_timeout(Duration::MAX);
         let (mut a, mut slow) = (hub.join(), hub.join());
         let count = 5 * QUEUE as u32;
         let heard = std::thread::spawn(move || {

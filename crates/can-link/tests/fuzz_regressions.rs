@@ -8,7 +8,7 @@ fn kept_inputs() {
     test_kit::run_kept_inputs(&[("socketcand_stream", socketcand_stream), ("slcan_stream", slcan_stream)]);
 }
 
-/// Words of the protocols and rubbish, mixed.
+/// Words of the protocols and noise, mixed.
 fn words(words: &'static [&'static str]) -> impl Strategy<Value = Vec<u8>> {
     let word = prop_oneof![
         8 => prop::sample::select(words).prop_map(|word| word.as_bytes().to_vec()),

@@ -13,14 +13,14 @@ use can_link::{
 };
 
 /// Only something broken waits so long.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 fn frame(id: u32, data: &[u8]) -> CanFrame {
     CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
 }
 
 fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(PATIENCE).unwrap().expect("a frame is on its way")
+    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
 }
 
 /// An adapter between a port and a bus, in a thread of its own.
@@ -255,7 +255,7 @@ fn states_come_by_themselves_from_newer_adapters() {
     });
     let mut bus = SlcanBus::open(&options(&device, None, None)).unwrap();
     let state = ControllerState { errors: ErrorState::Passive, tec: Some(7), rec: Some(130) };
-    let end = std::time::Instant::now() + PATIENCE;
+    let end = std::time::Instant::now() + TIMEOUT;
     while bus.state() != state {
         assert!(std::time::Instant::now() < end);
     }
@@ -302,7 +302,7 @@ fn a_port_without_an_adapter_and_one_that_goes_are_told_apart() {
     let mut bus = SlcanBus::open(&options(&device, None, None)).unwrap();
     bus.send(&frame(1, &[])).unwrap();
     let error = loop {
-        match bus.receive(PATIENCE) {
+        match bus.receive(TIMEOUT) {
             Ok(_) => {}
             Err(error) => break error,
         }

@@ -10,7 +10,7 @@ use can_link::{
 };
 
 /// Only something broken waits so long.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 fn frame(id: u32, data: &[u8]) -> CanFrame {
     CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
@@ -32,7 +32,7 @@ struct Raw(TcpStream);
 impl Raw {
     fn connect(server: &SocketcandServer) -> Self {
         let stream = TcpStream::connect(server.local_addr()).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream.set_read_timeout(Some(TIMEOUT)).unwrap();
         Self(stream)
     }
 
@@ -83,7 +83,7 @@ impl Drop for Guard<'_> {
 
 /// Waits for something that other threads do.
 fn until(mut done: impl FnMut() -> bool) {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     while !done() {
         assert!(Instant::now() < end, "it does not happen");
         std::thread::sleep(Duration::from_millis(1));
@@ -91,7 +91,7 @@ fn until(mut done: impl FnMut() -> bool) {
 }
 
 fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(PATIENCE).unwrap().expect("a frame is on its way")
+    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
 }
 
 #[test]
@@ -216,7 +216,7 @@ fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
 #[test]
 fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     // A sender would wait for ever for a member that it waits for.
-    let hub = VirtualHub::with_patience(Duration::MAX);
+    let hub = VirtualHub::with_timeout(Duration::MAX);
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     let mut node = hub.join();
     let mut sleeper = Raw::raw_mode(&server);
@@ -238,7 +238,7 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
         }
         done.send(node).unwrap();
     });
-    let mut node = waited.recv_timeout(10 * PATIENCE).expect("the sleeper holds up the bus");
+    let mut node = waited.recv_timeout(10 * TIMEOUT).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
     // It is still a client: it finds the oldest that waited, and with room again hears what is new.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
@@ -265,7 +265,7 @@ fn what_cannot_be_said_is_counted_and_what_is_not_understood_does_no_harm() {
     assert_eq!(client.ask("< subscribe 0 0 123 >"), "< error unknown command >");
     assert_eq!(client.ask("< rawmode >"), "< ok >");
     // In raw mode no error texts: python-can would stumble over them.
-    client.say("< rubbish >< send 281 9 >< send xyz 0  ><<<>>> \u{e4} < \u{e4} >");
+    client.say("< noise >< send 281 9 >< send xyz 0  ><<<>>> \u{e4} < \u{e4} >");
     client.say(&"x".repeat(100_000));
     client.say(&format!("< {}", "y".repeat(100_000)));
     node.send(&CanFrame::fd(Id::standard(1).unwrap(), &[1; 12]).unwrap()).unwrap();
@@ -304,7 +304,7 @@ fn the_client_says_when_the_server_goes_and_when_it_was_never_there() {
     node.send(&numbered(1)).unwrap();
     assert_eq!(take(&mut client), numbered(1));
     drop(server);
-    let error = client.receive(PATIENCE).expect_err("the server is gone");
+    let error = client.receive(TIMEOUT).expect_err("the server is gone");
     assert!(matches!(error, CanError::Closed { .. }) && error.to_string().contains(&url), "{error}");
     assert!(matches!(client.receive(Duration::ZERO), Err(CanError::Closed { .. })), "for good");
     assert!(matches!(client.send(&numbered(1)), Err(CanError::Closed { .. })));
@@ -361,7 +361,7 @@ fn servers_that_are_none_end_in_words() {
         let result = bus.map(|mut bus| {
             let mut frames = Vec::new();
             let end = loop {
-                match bus.receive(PATIENCE) {
+                match bus.receive(TIMEOUT) {
                     Ok(Some(frame)) => frames.push(frame),
                     Ok(None) => panic!("it must end"),
                     Err(error) => break error,

@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use can_link::{CanBus, CanFrame, ClientEvent, ErrorState, Happening, Id, SocketcandGateway, TimedBus, open};
+use can_link::{BusEvent, CanBus, CanFrame, ClientEvent, ErrorState, Id, SocketcandGateway, TimedBus, open};
 
 /// Only something broken waits so long.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 fn numbered(number: u32) -> CanFrame {
     CanFrame::classic(Id::standard(0x100).unwrap(), &number.to_be_bytes()).unwrap()
 }
 
 fn until(mut done: impl FnMut() -> bool) {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     while !done() {
         assert!(Instant::now() < end, "it does not happen");
         std::thread::sleep(Duration::from_millis(1));
@@ -22,7 +22,7 @@ fn until(mut done: impl FnMut() -> bool) {
 }
 
 fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(PATIENCE).unwrap().expect("a frame is on its way")
+    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
 }
 
 #[test]
@@ -30,7 +30,7 @@ fn a_host_can_run_the_bus_itself() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0", "can1"]).unwrap();
     let joined = |gateway: &mut SocketcandGateway, name| {
         let bus = open(&gateway.url(name)).unwrap();
-        let event = gateway.next(PATIENCE).unwrap();
+        let event = gateway.next(TIMEOUT).unwrap();
         assert_eq!(event.event, ClientEvent::Joined);
         (bus, event.client, event.channel)
     };
@@ -41,7 +41,7 @@ fn a_host_can_run_the_bus_itself() {
     assert_eq!(channel, 1);
     assert_ne!(id_a, id_b);
     a.send(&numbered(1)).unwrap();
-    let event = gateway.next(PATIENCE).unwrap();
+    let event = gateway.next(TIMEOUT).unwrap();
     assert_eq!((event.channel, event.client, event.event), (0, id_a, ClientEvent::Frame(numbered(1))));
     // Nobody has heard it yet: the host decides.
     gateway.deliver(0, &numbered(2), None);
@@ -55,7 +55,7 @@ fn a_host_can_run_the_bus_itself() {
     assert_eq!([take(&mut b), take(&mut b)], [numbered(5), numbered(6)]);
     assert_eq!(take(&mut a), numbered(6));
     drop(a);
-    let event = gateway.next(PATIENCE).unwrap();
+    let event = gateway.next(TIMEOUT).unwrap();
     assert_eq!((event.client, event.event), (id_a, ClientEvent::Left));
     assert_eq!(gateway.next(Duration::ZERO), None);
     // Full queues towards a host that takes nothing do not keep the gateway from ending.
@@ -91,7 +91,7 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
                 }
                 let now = bus.now_ns();
                 while let Some(event) = bus.advance_to(now + 1_000_000) {
-                    let Happening::Received { member, frame } = event.what else { continue };
+                    let BusEvent::Received { member, frame } = event.what else { continue };
                     if member == board && frame.id().value() == 0x100 {
                         let answer = CanFrame::classic(Id::standard(0x80).unwrap(), frame.data()).unwrap();
                         bus.queue(board, answer).unwrap();
@@ -122,9 +122,9 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
 fn a_client_is_told_of_its_own_bus_off() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();
     let mut own = open(&gateway.url("can0")).unwrap();
-    let client = gateway.next(PATIENCE).unwrap().client;
+    let client = gateway.next(TIMEOUT).unwrap().client;
     let mut other = open(&gateway.url("can0")).unwrap();
-    gateway.next(PATIENCE).unwrap();
+    gateway.next(TIMEOUT).unwrap();
     let states = [ErrorState::BusOff, ErrorState::Active];
     for (number, state) in (0..).zip(states) {
         gateway.report_state(client, state);

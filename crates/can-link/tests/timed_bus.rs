@@ -1,8 +1,8 @@
 //! The bus in virtual time against what ISO 11898-1 says of a wire.
 
 use can_link::{
-    BusError, CanFrame, ErrorState, Faults, Happening, Id, MemberId, Plan, QueueError, TimedBus, TimedEvent,
-    classic_frame_bits,
+    BusError, BusEvent, CanFrame, ErrorState, FaultConfig, FaultSchedule, Id, MemberId, QueueError, TimedBus,
+    TimedEvent, classic_frame_bits,
 };
 use proptest::prelude::*;
 
@@ -23,7 +23,7 @@ fn bits(frame: &CanFrame) -> u64 {
 
 fn received(events: &[TimedEvent], by: MemberId) -> Vec<CanFrame> {
     let frame = |event: &TimedEvent| match event.what {
-        Happening::Received { member, frame } if member == by => Some(frame),
+        BusEvent::Received { member, frame } if member == by => Some(frame),
         _ => None,
     };
     events.iter().filter_map(frame).collect()
@@ -31,7 +31,7 @@ fn received(events: &[TimedEvent], by: MemberId) -> Vec<CanFrame> {
 
 fn errors(events: &[TimedEvent]) -> Vec<BusError> {
     let error = |event: &TimedEvent| match event.what {
-        Happening::Error { error, .. } => Some(error),
+        BusEvent::Error { error, .. } => Some(error),
         _ => None,
     };
     events.iter().filter_map(error).collect()
@@ -49,7 +49,7 @@ fn a_frame_takes_its_bits_and_the_answer_waits_for_the_intermission() {
     let mut events = Vec::new();
     while let Some(event) = bus.advance_to(10 * MS) {
         assert_eq!(event.at_ns, bus.now_ns());
-        if event.what == (Happening::Received { member: b, frame: question }) {
+        if event.what == (BusEvent::Received { member: b, frame: question }) {
             bus.queue(b, answer).unwrap();
         }
         events.push((event.at_ns, event.what));
@@ -57,12 +57,12 @@ fn a_frame_takes_its_bits_and_the_answer_waits_for_the_intermission() {
     assert_eq!(
         events,
         [
-            (end, Happening::Sent { member: a, frame: question }),
-            (end, Happening::Received { member: b, frame: question }),
-            (end, Happening::Received { member: c, frame: question }),
-            (answered, Happening::Sent { member: b, frame: answer }),
-            (answered, Happening::Received { member: a, frame: answer }),
-            (answered, Happening::Received { member: c, frame: answer }),
+            (end, BusEvent::Sent { member: a, frame: question }),
+            (end, BusEvent::Received { member: b, frame: question }),
+            (end, BusEvent::Received { member: c, frame: question }),
+            (answered, BusEvent::Sent { member: b, frame: answer }),
+            (answered, BusEvent::Received { member: a, frame: answer }),
+            (answered, BusEvent::Received { member: c, frame: answer }),
         ]
     );
     assert_eq!((bus.now_ns(), bus.next_ns()), (10 * MS, None));
@@ -120,7 +120,7 @@ proptest! {
         }
         let events = run(&mut bus, time + MS);
         let heard: Vec<_> = events.iter().filter_map(|event| match event.what {
-            Happening::Received { member, frame } if member == listener => Some((event.at_ns, frame)),
+            BusEvent::Received { member, frame } if member == listener => Some((event.at_ns, frame)),
             _ => None,
         }).collect();
         prop_assert_eq!(heard, expected);
@@ -144,14 +144,14 @@ proptest! {
                     4 => bus.set_disturbance(f64::from(*id) / 80.0),
                     5 => { bus.set_one_shot(member, id % 2 == 0); bus.set_acknowledges(member, id % 3 != 0); }
                     6 => { bus.recover(member); if id % 8 == 0 { bus.leave(member) } else if id % 4 == 0 { bus.clear(member) } }
-                    7 => bus.set_faults(member, Plan { seed: *value, send: Faults { loss: 0.1, duplication: 0.2, delay_max_s: 0.001, ..Faults::default() }, ..Plan::default() }),
+                    7 => bus.set_faults(member, FaultSchedule { seed: *value, send: FaultConfig { loss: 0.1, duplication: 0.2, delay_max_s: 0.001, ..FaultConfig::default() }, ..FaultSchedule::default() }),
                     _ => { let to = bus.now_ns() + value % (2 * MS); events.extend(run(&mut bus, to)) }
                 }
             }
             let to = bus.now_ns() + 20 * MS;
             events.extend(run(&mut bus, to));
             prop_assert!(events.windows(2).all(|pair| pair[0].at_ns <= pair[1].at_ns));
-            let sent = events.iter().filter(|event| matches!(event.what, Happening::Sent { .. } | Happening::Failed { .. })).count();
+            let sent = events.iter().filter(|event| matches!(event.what, BusEvent::Sent { .. } | BusEvent::Failed { .. })).count();
             prop_assert!(sent <= 2 * queued, "{sent} of {queued}");
             Ok((events, bus.stats()))
         };
@@ -169,7 +169,7 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     bus.queue(a, one).unwrap();
     bus.queue(b, other).unwrap();
     let event = bus.advance_to(MS).expect("an error");
-    assert_eq!(event.what, Happening::Error { error: BusError::Collision, frame: one, senders: vec![a, b] });
+    assert_eq!(event.what, BusEvent::Error { error: BusError::Collision, frame: one, senders: vec![a, b] });
     assert_eq!([a, b].map(|member| bus.state(member).tec), [Some(8), Some(8)]);
     assert_eq!(bus.state(listener).rec, Some(1));
     let events = run(&mut bus, 20 * MS);
@@ -181,7 +181,7 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     let states: Vec<_> = events
         .iter()
         .filter_map(|event| match event.what {
-            Happening::State { member, state } if member == a => Some(state.errors),
+            BusEvent::State { member, state } if member == a => Some(state.errors),
             _ => None,
         })
         .collect();
@@ -199,7 +199,7 @@ fn d_05_who_sends_once_only_gives_up_after_a_collision() {
     bus.queue(b, other).unwrap();
     let events = run(&mut bus, MS);
     assert_eq!(errors(&events), [BusError::Collision]);
-    assert!(events.iter().any(|event| event.what == Happening::Failed { member: b, frame: other }));
+    assert!(events.iter().any(|event| event.what == BusEvent::Failed { member: b, frame: other }));
     assert_eq!(received(&events, listener), [one]);
     assert_eq!(bus.pending(b), 0);
 }
@@ -216,7 +216,7 @@ fn d_05_endless_collisions_end_in_bus_off() {
         let until = bus.now_ns() + 10 * MS;
         for event in run(&mut bus, until) {
             match event.what {
-                Happening::State { member, state } if state.errors == ErrorState::BusOff => off.push(member),
+                BusEvent::State { member, state } if state.errors == ErrorState::BusOff => off.push(member),
                 _ => {}
             }
         }
@@ -255,7 +255,7 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
     // Once passive, it leaves eight more bits to others before each try.
     let times: Vec<_> = events
         .iter()
-        .filter(|event| matches!(event.what, Happening::Error { .. }))
+        .filter(|event| matches!(event.what, BusEvent::Error { .. }))
         .map(|event| event.at_ns)
         .collect();
     let (active, passive) = (times[1] - times[0], times[101] - times[100]);
@@ -280,7 +280,7 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     bus.queue(a, frame(0x101, &[2])).unwrap();
     let events = run(&mut bus, 50 * MS);
     assert_eq!(errors(&events), [BusError::Disturbed; 32]);
-    let failed = events.iter().filter(|event| matches!(event.what, Happening::Failed { .. })).count();
+    let failed = events.iter().filter(|event| matches!(event.what, BusEvent::Failed { .. })).count();
     assert_eq!((failed, bus.state(a).errors), (2, ErrorState::BusOff));
     assert_eq!(bus.state(b).rec, Some(32));
     bus.set_disturbance(0.0);
@@ -289,11 +289,11 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     assert!(
         run(&mut bus, 51 * MS)
             .iter()
-            .all(|event| matches!(event.what, Happening::Error { .. } | Happening::State { .. }))
+            .all(|event| matches!(event.what, BusEvent::Error { .. } | BusEvent::State { .. }))
     );
     bus.recover(a);
     let events = run(&mut bus, 100 * MS);
-    let is_back = |event: &TimedEvent| matches!(event.what, Happening::State { member, .. } if member == a);
+    let is_back = |event: &TimedEvent| matches!(event.what, BusEvent::State { member, .. } if member == a);
     let back = events.iter().position(is_back).unwrap();
     // Nobody acknowledges the other one's frame: each try ends with 11 recessive bits.
     assert_eq!(errors(&events[..back]), [BusError::NotAcknowledged; 128]);
@@ -374,29 +374,38 @@ fn disturbed_frames_come_through_in_the_end() {
 fn faults_of_a_member_are_those_of_a_gateway_and_cost_no_counters() {
     let mut bus = TimedBus::new(1_000_000, 0);
     let (a, b) = (bus.join(), bus.join());
-    let receive =
-        Faults { loss: 0.2, duplication: 0.1, delay_min_s: 0.001, delay_max_s: 0.001, ..Faults::default() };
-    bus.set_faults(b, Plan { seed: 5, receive, ..Plan::default() });
+    let receive = FaultConfig {
+        loss: 0.2,
+        duplication: 0.1,
+        delay_min_s: 0.001,
+        delay_max_s: 0.001,
+        ..FaultConfig::default()
+    };
+    bus.set_faults(b, FaultSchedule { seed: 5, receive, ..FaultSchedule::default() });
     for n in 0..200_u16 {
         bus.queue(a, frame(0x100, &n.to_be_bytes())).unwrap();
     }
     let events = run(&mut bus, 100 * MS);
-    let counts = bus.fault_counts(b).1;
-    assert_eq!((counts.frames, bus.stats().frames), (200, 200));
-    assert!(counts.lost > 10 && counts.doubled > 5);
-    assert_eq!(received(&events, b).len() as u64, 200 - counts.lost + counts.doubled);
+    let stats = bus.fault_stats(b).1;
+    assert_eq!((stats.frames, bus.stats().frames), (200, 200));
+    assert!(stats.lost > 10 && stats.doubled > 5);
+    assert_eq!(received(&events, b).len() as u64, 200 - stats.lost + stats.doubled);
     assert_eq!((errors(&events), bus.state(b).rec), (vec![], Some(0)));
     // Each comes 1 ms after it was on the wire.
     let sent: Vec<_> =
-        events.iter().filter(|e| matches!(e.what, Happening::Sent { .. })).map(|e| e.at_ns).collect();
-    let heard = events.iter().filter(|e| matches!(e.what, Happening::Received { .. })).map(|e| e.at_ns);
+        events.iter().filter(|e| matches!(e.what, BusEvent::Sent { .. })).map(|e| e.at_ns).collect();
+    let heard = events.iter().filter(|e| matches!(e.what, BusEvent::Received { .. })).map(|e| e.at_ns);
     assert!(heard.into_iter().all(|at| sent.contains(&(at - MS))));
     // Corruption before the queue is a frame like any other on the wire.
     bus.set_faults(
         a,
-        Plan { seed: 5, send: Faults { corruption: 1.0, ..Faults::default() }, ..Plan::default() },
+        FaultSchedule {
+            seed: 5,
+            send: FaultConfig { corruption: 1.0, ..FaultConfig::default() },
+            ..FaultSchedule::default()
+        },
     );
-    bus.set_faults(b, Plan::default());
+    bus.set_faults(b, FaultSchedule::default());
     bus.queue(a, frame(0x100, &[0])).unwrap();
     let heard = received(&run(&mut bus, 200 * MS), b);
     assert_eq!(heard[0].data()[0].count_ones(), 1);
@@ -455,8 +464,8 @@ fn a_queue_without_end_and_a_time_without_end_are_refused() {
     let full = (0..).find_map(|_| bus.queue(a, frame(1, &[])).err()).unwrap();
     assert_eq!(full, QueueError::Full(65_536));
     bus.clear(a);
-    let late = Faults { delay_min_s: 1e19, ..Faults::default() };
-    bus.set_faults(a, Plan { send: late, ..Plan::default() });
+    let late = FaultConfig { delay_min_s: 1e19, ..FaultConfig::default() };
+    bus.set_faults(a, FaultSchedule { send: late, ..FaultSchedule::default() });
     bus.queue(a, frame(1, &[])).unwrap();
     assert_eq!(bus.advance_to(u64::MAX), None);
     assert!(bus.now_ns() > u64::MAX / 4);

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use can_link::{CanFrame, Happening, Id, MemberId, TimedBus};
+use can_link::{BusEvent, CanFrame, Id, MemberId, TimedBus};
 use ucom::node::Node;
 use ucom::{Format, Frame, FromBoard, Function, Profile, ToBoard};
 use ucom_host::files::{DbcBoard, dbc};
@@ -103,13 +103,13 @@ impl Bench {
         let due_ns = due.saturating_mul(NS_PER_US).min(self.bus.next_ns().unwrap_or(u64::MAX));
         while let Some(event) = self.bus.advance_to(due_ns) {
             match event.what {
-                Happening::Received { member, frame } if member == self.tool => self.tell_tool(&frame),
-                Happening::Received { member, frame } => {
+                BusEvent::Received { member, frame } if member == self.tool => self.tell_tool(&frame),
+                BusEvent::Received { member, frame } => {
                     if let Some(number) = self.boards.iter().position(|board| *board == member) {
                         self.chain.hear(number, frame.id().value(), Format::BUS, frame.data());
                     }
                 }
-                Happening::Sent { member, frame } => self.sent(member, &frame)?,
+                BusEvent::Sent { member, frame } => self.sent(member, &frame)?,
                 other => return Err(format!("nothing is disturbed here, and yet: {other:?}").into()),
             }
         }

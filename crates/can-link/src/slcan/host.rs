@@ -18,7 +18,7 @@ const ANSWER: Duration = Duration::from_millis(500);
 /// What an earlier user left on the line has come by then.
 const QUIET: Duration = Duration::from_millis(30);
 /// How long an adapter may refuse a frame because its queue is full, or keep its answer.
-const SEND_PATIENCE: Duration = Duration::from_secs(2);
+const SEND_TIMEOUT: Duration = Duration::from_secs(2);
 /// Pause before a refused frame is tried again.
 const RETRY: Duration = Duration::from_millis(1);
 /// Slices of waiting in which both directions get their turn.
@@ -258,7 +258,7 @@ impl SlcanBus {
     }
 
     fn write(&mut self, mut bytes: &[u8]) -> Result<(), CanError> {
-        let mut give_up = Instant::now() + SEND_PATIENCE;
+        let mut give_up = Instant::now() + SEND_TIMEOUT;
         while !bytes.is_empty() {
             match self.port.write(bytes, SLICE) {
                 Ok(0) if Instant::now() >= give_up => {
@@ -271,7 +271,7 @@ impl SlcanBus {
                 Ok(0) => {}
                 Ok(count) => {
                     bytes = &bytes[count..];
-                    give_up = Instant::now() + SEND_PATIENCE;
+                    give_up = Instant::now() + SEND_TIMEOUT;
                 }
                 Err(error) => return Err(self.broken("sending", error)),
             }
@@ -282,7 +282,7 @@ impl SlcanBus {
     /// Sees to the frame that is not confirmed yet: a refused one is written again. True when there is none.
     fn settle(&mut self, now: Instant) -> Result<bool, CanError> {
         let Some(frame) = &mut self.outstanding else { return Ok(true) };
-        let late = now.saturating_duration_since(frame.since) >= SEND_PATIENCE;
+        let late = now.saturating_duration_since(frame.since) >= SEND_TIMEOUT;
         if frame.refused {
             if late {
                 self.outstanding = None;
@@ -308,7 +308,7 @@ impl SlcanBus {
         } else if late {
             self.outstanding = None;
             let hint = "does anybody acknowledge on the bus? Unplug the adapter and try again";
-            let seconds = SEND_PATIENCE.as_secs();
+            let seconds = SEND_TIMEOUT.as_secs();
             return Err(CanError::NoAnswer { url: self.url.clone(), step: "sending a frame", seconds, hint });
         }
         Ok(self.outstanding.is_none())

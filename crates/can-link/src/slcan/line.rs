@@ -257,9 +257,9 @@ mod tests {
         }
 
         #[test]
-        fn rubbish_is_survived_and_what_follows_is_found(rubbish in prop::collection::vec(any::<u8>(), 0..2000)) {
+        fn noise_is_survived_and_what_follows_is_found(noise in prop::collection::vec(any::<u8>(), 0..2000)) {
             let mut lines = Lines::new();
-            let mut bytes = &rubbish[..];
+            let mut bytes = &noise[..];
             while let Some(piece) = lines.next(&mut bytes) {
                 if let Piece::Line(line) = piece {
                     let _ = (parse_frame(line), parse_state(line), parse_flags(line));

@@ -1,7 +1,7 @@
 //! The CAN of the Linux kernel.
 
 mod convert;
-mod insist;
+mod retry;
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use socketcan::{CanFdSocket, Socket, SocketOptions};
 
 use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
 use convert::{Heard, from_kernel, to_kernel};
-use insist::insist;
+use retry::retry_while_full;
 
 /// Error numbers of Linux.
 const EINVAL: i32 = 22;
@@ -90,7 +90,7 @@ fn hint(error: &io::Error, interface: &str) -> String {
 impl CanBus for SocketCanBus {
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
         let raw = to_kernel(frame);
-        let result = insist(|| self.socket.write_frame(&raw), std::thread::sleep);
+        let result = retry_while_full(|| self.socket.write_frame(&raw), std::thread::sleep);
         result.map_err(|source| match source.raw_os_error() {
             Some(EINVAL) if frame.is_fd() => CanError::NotCarried {
                 url: self.url.clone(),

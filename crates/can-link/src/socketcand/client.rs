@@ -9,13 +9,13 @@ use super::text::{CLASS_BUS_OFF, CLASS_RESTARTED, Reply, Splitter, has_form, pus
 use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
 
 /// How long connecting and each answer while opening may take.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 /// How long sending waits for a server that takes nothing.
-const SEND_PATIENCE: Duration = Duration::from_secs(10);
+const SEND_TIMEOUT: Duration = Duration::from_secs(10);
 /// After so long a wait for room to send, what the server has sent is read: it may wait for us.
 const SEND_SLICE: Duration = Duration::from_millis(20);
 /// How long the end waits for the server to take the last frames.
-const END_PATIENCE: Duration = Duration::from_millis(250);
+const END_TIMEOUT: Duration = Duration::from_millis(250);
 /// Bytes of one read.
 const READ: usize = 16 * 1024;
 /// Received frames that are kept while sending waits.
@@ -54,7 +54,7 @@ impl SocketcandBus {
             splitter: Splitter::new(),
             glued: Vec::new(),
             inbox: VecDeque::new(),
-            timeout: Some(PATIENCE),
+            timeout: Some(TIMEOUT),
             closed: false,
             errors: ErrorState::Unknown,
             times_bus_off: 0,
@@ -69,7 +69,7 @@ impl SocketcandBus {
 
     /// Messages of the server so far that were none of the protocol's raw mode.
     pub fn ignored(&self) -> u64 {
-        self.ignored + self.splitter.rubbish()
+        self.ignored + self.splitter.noise()
     }
 
     fn set_up(&mut self) -> io::Result<()> {
@@ -91,7 +91,7 @@ impl SocketcandBus {
 
     /// Waits for an answer; what follows it is kept.
     fn expect(&mut self, step: &'static str, answer: &Reply) -> Result<(), CanError> {
-        let end = Instant::now() + PATIENCE;
+        let end = Instant::now() + TIMEOUT;
         let mut buffer = [0; READ];
         loop {
             let left = end.saturating_duration_since(Instant::now());
@@ -104,7 +104,7 @@ impl SocketcandBus {
                 return Err(CanError::NoAnswer {
                     url: self.url.clone(),
                     step,
-                    seconds: PATIENCE.as_secs(),
+                    seconds: TIMEOUT.as_secs(),
                     hint,
                 });
             };
@@ -198,12 +198,12 @@ impl SocketcandBus {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
         }
-        let mut give_up = Instant::now() + SEND_PATIENCE;
+        let mut give_up = Instant::now() + SEND_TIMEOUT;
         while !bytes.is_empty() {
             match self.stream.write(bytes) {
                 Ok(count) => {
                     bytes = &bytes[count..];
-                    give_up = Instant::now() + SEND_PATIENCE;
+                    give_up = Instant::now() + SEND_TIMEOUT;
                 }
                 Err(error) if is_no_data(&error) && Instant::now() < give_up => {
                     // The socket may be set not to wait at all.
@@ -221,7 +221,7 @@ impl SocketcandBus {
 fn connect(host: &str, port: u16) -> io::Result<TcpStream> {
     let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
     for address in (host, port).to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, PATIENCE) {
+        match TcpStream::connect_timeout(&address, TIMEOUT) {
             Ok(stream) => return Ok(stream),
             Err(error) => last = error,
         }
@@ -278,7 +278,7 @@ impl Drop for SocketcandBus {
     fn drop(&mut self) {
         // Closing with unread bytes would cut the connection and with it frames that the server has yet to read.
         let _ = self.stream.shutdown(Shutdown::Write);
-        let end = Instant::now() + END_PATIENCE;
+        let end = Instant::now() + END_TIMEOUT;
         let mut buffer = [0; READ];
         while !self.closed {
             let left = end.saturating_duration_since(Instant::now());

@@ -15,7 +15,7 @@ use crate::{CanError, CanFrame, CanUrl, ErrorState, VirtualBus, VirtualHub};
 /// Clients at a time.
 const MOST_CLIENTS: usize = 64;
 /// How long the end waits for the clients' threads.
-const END_PATIENCE: Duration = Duration::from_secs(1);
+const END_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Tells clients of a server apart; never used twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -234,7 +234,7 @@ impl Drop for SocketcandServer {
     fn drop(&mut self) {
         self.inner.closing.store(true, Ordering::SeqCst);
         // The acceptor waits in the system: a connection wakes it.
-        let woken = TcpStream::connect_timeout(&reachable(self.address), END_PATIENCE).is_ok();
+        let woken = TcpStream::connect_timeout(&reachable(self.address), END_TIMEOUT).is_ok();
         if let Some(acceptor) = self.acceptor.take().filter(|_| woken) {
             let _ = acceptor.join();
         }
@@ -242,7 +242,7 @@ impl Drop for SocketcandServer {
         for client in clients.values() {
             let _ = client.stream.shutdown(Shutdown::Both);
         }
-        drop(self.inner.gone.wait_timeout_while(clients, END_PATIENCE, |clients| !clients.is_empty()));
+        drop(self.inner.gone.wait_timeout_while(clients, END_TIMEOUT, |clients| !clients.is_empty()));
     }
 }
 

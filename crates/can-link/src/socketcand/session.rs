@@ -20,9 +20,9 @@ const SEND_BUFFER: usize = 128 * 1024;
 /// Frames in one write.
 const BATCH: usize = 64;
 /// A client that takes nothing for so long is gone.
-const WRITE_PATIENCE: Duration = Duration::from_secs(30);
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// A client that asks for nothing and has not opened a bus is gone.
-const OPEN_PATIENCE: Duration = Duration::from_secs(30);
+const OPEN_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// What a client did, for a host that runs the bus itself.
 pub(super) enum Happened {
@@ -72,8 +72,8 @@ impl Session<'_> {
         socket2::SockRef::from(&stream).set_keepalive(true)?;
         // A wish: the system may have limits of its own.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
-        stream.set_write_timeout(Some(WRITE_PATIENCE))?;
-        stream.set_read_timeout(Some(OPEN_PATIENCE))?;
+        stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+        stream.set_read_timeout(Some(OPEN_TIMEOUT))?;
         let speaker = Speaker { stream: stream.try_clone()?, frames_from: Instant::now() };
         let out = Arc::new(Out { stream: Mutex::new(speaker) });
         say(&out, "< hi >")?;
@@ -87,13 +87,13 @@ impl Session<'_> {
                 Err(error) => return Err(error),
             };
             let mut bytes = &buffer[..count];
-            let rubbish = splitter.rubbish();
+            let noise = splitter.noise();
             while let Some(message) = splitter.next(&mut bytes) {
                 if !self.obey(Request::parse(message), &out)? {
                     return Ok(());
                 }
             }
-            self.not_understood(splitter.rubbish() - rubbish);
+            self.not_understood(splitter.noise() - noise);
             if self.opened.is_some() {
                 stream.set_read_timeout(None)?;
             }

@@ -19,17 +19,17 @@ pub(crate) struct Splitter {
     inside: bool,
     /// The message in `message` was handed out.
     complete: bool,
-    rubbish: u64,
+    noise: u64,
 }
 
 impl Splitter {
     pub(crate) fn new() -> Self {
-        Self { message: Vec::with_capacity(LONGEST), inside: false, complete: false, rubbish: 0 }
+        Self { message: Vec::with_capacity(LONGEST), inside: false, complete: false, noise: 0 }
     }
 
     /// Messages that were too long, not ASCII or never ended, so far.
-    pub(crate) fn rubbish(&self) -> u64 {
-        self.rubbish
+    pub(crate) fn noise(&self) -> u64 {
+        self.noise
     }
 
     /// Bytes that it holds at most.
@@ -49,7 +49,7 @@ impl Splitter {
             match byte {
                 b'<' => {
                     // A message within a message: the first one lost its end.
-                    self.rubbish += u64::from(self.inside);
+                    self.noise += u64::from(self.inside);
                     self.inside = true;
                     self.message.clear();
                 }
@@ -59,12 +59,12 @@ impl Splitter {
                         self.complete = true;
                         return str::from_utf8(&self.message).ok();
                     }
-                    self.rubbish += 1;
+                    self.noise += 1;
                     self.message.clear();
                 }
                 _ if !self.inside => {}
                 _ if self.message.len() == LONGEST => {
-                    self.rubbish += 1;
+                    self.noise += 1;
                     self.inside = false;
                     self.message.clear();
                 }
@@ -276,7 +276,7 @@ mod tests {
             let mut found = messages(&mut splitter, &stream[..cut]);
             found.extend(messages(&mut splitter, &stream[cut..]));
             assert_eq!(found, whole, "cut at {cut}");
-            assert_eq!(splitter.rubbish(), 2);
+            assert_eq!(splitter.noise(), 2);
         }
     }
 
@@ -289,7 +289,7 @@ mod tests {
         }
         assert_eq!(splitter.capacity(), LONGEST);
         assert_eq!(messages(&mut splitter, b"> < hi >"), [" hi "]);
-        assert_eq!(splitter.rubbish(), 1);
+        assert_eq!(splitter.noise(), 1);
     }
 
     /// As python-can 4.6.1 writes them: no leading zeros, two blanks without data.

@@ -1,4 +1,4 @@
-//! What happens on a bus in virtual time.
+//! The events of a bus in virtual time.
 
 use crate::{CanFrame, ControllerState};
 
@@ -7,18 +7,18 @@ use crate::{CanFrame, ControllerState};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MemberId(pub(super) usize);
 
-/// Something that happened, and when.
+/// An event and its time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimedEvent {
     /// Virtual time, ns.
     pub at_ns: u64,
-    /// What it was.
-    pub what: Happening,
+    /// The event.
+    pub what: BusEvent,
 }
 
-/// What happened.
+/// An event on the bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Happening {
+pub enum BusEvent {
     /// A member has heard a frame.
     Received {
         /// Who heard it.

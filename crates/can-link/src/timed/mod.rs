@@ -1,7 +1,7 @@
 //! A classic CAN bus in virtual time: deterministic, without threads and without a clock.
 
+mod arbitration;
 mod confinement;
-mod contest;
 mod event;
 mod outcome;
 mod wire;
@@ -10,10 +10,10 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::faulty::Line;
-use crate::{CanFrame, ControllerState, Counts, Plan};
+use crate::{CanFrame, ControllerState, FaultSchedule, FaultStats};
+use arbitration::{Arbitration, Starter};
 use confinement::{Counters, Recovery};
-use contest::{Contest, Starter};
-pub use event::{BusError, BusStats, Happening, MemberId, QueueError, TimedEvent};
+pub use event::{BusError, BusEvent, BusStats, MemberId, QueueError, TimedEvent};
 pub use wire::classic_frame_bits;
 use wire::{ERROR_FRAME, INTERMISSION, RECESSIVE_RUN, RECOVERIES, TO_ACKNOWLEDGE};
 
@@ -28,13 +28,13 @@ const QUEUE: usize = 65_536;
 /// seed give the same events.
 ///
 /// ```
-/// use can_link::{CanFrame, Happening, Id, TimedBus};
+/// use can_link::{CanFrame, BusEvent, Id, TimedBus};
 /// let mut bus = TimedBus::new(1_000_000, 1);
 /// let (tool, board) = (bus.join(), bus.join());
 /// bus.queue(tool, CanFrame::classic(Id::standard(0x281)?, &[])?)?;
 /// while let Some(event) = bus.advance_to(1_000_000) {
 ///     // It is the time of the event now: what is queued here competes from this moment on.
-///     if let Happening::Received { member, frame } = event.what {
+///     if let BusEvent::Received { member, frame } = event.what {
 ///         assert_eq!((member, frame.to_string()), (board, "281 #".to_owned()));
 ///     }
 /// }
@@ -51,7 +51,7 @@ pub struct TimedBus {
     transfer: Option<Transfer>,
     /// End of the intermission.
     free_from: u64,
-    events: VecDeque<Happening>,
+    events: VecDeque<BusEvent>,
     stats: BusStats,
     recovers_by_itself: bool,
 }
@@ -81,7 +81,7 @@ impl Member {
 
 struct Transfer {
     end: u64,
-    contest: Contest,
+    arbitration: Arbitration,
     /// What is wrong with it, if not a collision.
     error: Option<BusError>,
 }
@@ -149,7 +149,7 @@ impl TimedBus {
     /// Forgets what the member has queued and its error counters, as a reset does: it is on the bus again. A frame on the wire ends
     /// as it would have, but is not tried again.
     pub fn clear(&mut self, member: MemberId) {
-        let sends = self.transfer.as_ref().is_some_and(|transfer| transfer.contest.involves(member));
+        let sends = self.transfer.as_ref().is_some_and(|transfer| transfer.arbitration.involves(member));
         let number = member;
         let member = &mut self.members[number.0];
         member.queue.truncate(usize::from(sends));
@@ -164,7 +164,7 @@ impl TimedBus {
         let before = core::mem::take(&mut member.counters).state().errors;
         let state = member.counters.state();
         if state.errors != before {
-            self.events.push_back(Happening::State { member: number, state });
+            self.events.push_back(BusEvent::State { member: number, state });
         }
     }
 
@@ -179,17 +179,17 @@ impl TimedBus {
     }
 
     /// Faults between a member and the bus, as behind a gateway: the bus itself does not notice them.
-    pub fn set_faults(&mut self, member: MemberId, plan: Plan) {
-        let mut seeds = fastrand::Rng::with_seed(plan.seed);
-        let send = Line::new(plan.send, seeds.u64(..));
-        let receive = Line::new(plan.receive, seeds.u64(..));
+    pub fn set_faults(&mut self, member: MemberId, schedule: FaultSchedule) {
+        let mut seeds = fastrand::Rng::with_seed(schedule.seed);
+        let send = Line::new(schedule.send, seeds.u64(..));
+        let receive = Line::new(schedule.receive, seeds.u64(..));
         self.members[member.0].lines = Some(Box::new((send, receive)));
     }
 
     /// What these faults did so far to frames sent and received by the member.
-    pub fn fault_counts(&self, member: MemberId) -> (Counts, Counts) {
+    pub fn fault_stats(&self, member: MemberId) -> (FaultStats, FaultStats) {
         let lines = self.members[member.0].lines.as_deref();
-        lines.map_or_else(Default::default, |(send, receive)| (send.counts(), receive.counts()))
+        lines.map_or_else(Default::default, |(send, receive)| (send.stats(), receive.stats()))
     }
 
     /// Share of the frames in which a bit is disturbed on the wire, 0 to 1: they are destroyed by an error frame.
@@ -320,12 +320,12 @@ impl TimedBus {
             let Some(lines) = &mut member.lines else { continue };
             while let Some(frame) = lines.0.take(now) {
                 match off {
-                    true => self.events.push_back(Happening::Failed { member: MemberId(number), frame }),
+                    true => self.events.push_back(BusEvent::Failed { member: MemberId(number), frame }),
                     false => member.queue.push_back(frame),
                 }
             }
             while let Some(frame) = lines.1.take(now) {
-                self.events.push_back(Happening::Received { member: MemberId(number), frame });
+                self.events.push_back(BusEvent::Received { member: MemberId(number), frame });
             }
         }
         // Events of this moment come first: who reacts to them takes part in the next arbitration.
@@ -359,22 +359,22 @@ impl TimedBus {
             starts.then_some(Starter { member: MemberId(number), frame, counters: member.counters })
         };
         let starters: Vec<_> = self.members.iter().enumerate().filter_map(ready).collect();
-        let Some(contest) = Contest::of(&starters) else { return };
+        let Some(arbitration) = Arbitration::of(&starters) else { return };
         // Drawn for every frame: what happens to one does not change the luck of the others.
         let (luck, place) = (self.random.f64(), self.random.f64());
-        let (bits, error) = if contest.senders.is_empty() {
-            (contest.bits + ERROR_FRAME, None)
+        let (bits, error) = if arbitration.senders.is_empty() {
+            (arbitration.bits + ERROR_FRAME, None)
         } else if luck < self.disturbance {
-            ((place * f64::from(contest.bits)) as u32 + 1 + ERROR_FRAME, Some(BusError::Disturbed))
-        } else if !self.acknowledged(&contest.senders) {
-            (contest.bits + TO_ACKNOWLEDGE + ERROR_FRAME, Some(BusError::NotAcknowledged))
+            ((place * f64::from(arbitration.bits)) as u32 + 1 + ERROR_FRAME, Some(BusError::Disturbed))
+        } else if !self.acknowledged(&arbitration.senders) {
+            (arbitration.bits + TO_ACKNOWLEDGE + ERROR_FRAME, Some(BusError::NotAcknowledged))
         } else {
-            (classic_frame_bits(&contest.frame).unwrap_or(0) - INTERMISSION, None)
+            (classic_frame_bits(&arbitration.frame).unwrap_or(0) - INTERMISSION, None)
         };
         let end = self.now + self.bits_ns(bits);
         self.free_from = end + self.bits_ns(INTERMISSION);
         self.stats.busy_ns += self.free_from - self.now;
-        self.transfer = Some(Transfer { end, contest, error });
+        self.transfer = Some(Transfer { end, arbitration, error });
         self.wire_is_taken();
     }
 

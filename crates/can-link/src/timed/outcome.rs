@@ -2,21 +2,21 @@
 
 use super::confinement::Counters;
 use super::wire::SUSPENDED;
-use super::{BusError, Happening, MemberId, TimedBus, Transfer, time};
+use super::{BusError, BusEvent, MemberId, TimedBus, Transfer, time};
 use crate::{CanFrame, ErrorState};
 
 impl TimedBus {
     pub(super) fn finish(&mut self, transfer: Transfer) {
-        let Transfer { contest, mut error, .. } = transfer;
-        if !contest.collision.is_empty() {
+        let Transfer { arbitration, mut error, .. } = transfer;
+        if !arbitration.collision.is_empty() {
             self.stats.collisions += 1;
-            self.report(BusError::Collision, contest.frame, &contest.collision);
+            self.report(BusError::Collision, arbitration.frame, &arbitration.collision);
         }
-        for member in &contest.failed {
+        for member in &arbitration.failed {
             self.send_failed(*member, BusError::Collision);
         }
-        let frame = contest.frame;
-        let mut senders = contest.senders;
+        let frame = arbitration.frame;
+        let mut senders = arbitration.senders;
         let destroyed = senders.is_empty();
         // Whoever left cut its frame off.
         senders.retain(|member| !self.members[member.0].left);
@@ -34,7 +34,7 @@ impl TimedBus {
                     self.send_failed(*member, error);
                 }
             }
-            let involved = |number| contest.failed.contains(&number) || senders.contains(&number);
+            let involved = |number| arbitration.failed.contains(&number) || senders.contains(&number);
             for number in (0..self.members.len()).map(MemberId).filter(|number| !involved(*number)) {
                 self.count(number, Counters::heard_error);
             }
@@ -45,7 +45,7 @@ impl TimedBus {
         for member in &senders {
             self.members[member.0].queue.pop_front();
             self.members[member.0].last_try = false;
-            self.events.push_back(Happening::Sent { member: *member, frame });
+            self.events.push_back(BusEvent::Sent { member: *member, frame });
             self.count(*member, Counters::sent);
             self.suspend(*member);
         }
@@ -58,13 +58,13 @@ impl TimedBus {
             self.count(number, Counters::heard);
             match &mut self.members[number.0].lines {
                 Some(lines) => lines.1.put(now, frame),
-                None => self.events.push_back(Happening::Received { member: number, frame }),
+                None => self.events.push_back(BusEvent::Received { member: number, frame }),
             }
         }
     }
 
     fn report(&mut self, error: BusError, frame: CanFrame, senders: &[MemberId]) {
-        self.events.push_back(Happening::Error { error, frame, senders: senders.to_vec() });
+        self.events.push_back(BusEvent::Error { error, frame, senders: senders.to_vec() });
     }
 
     fn send_failed(&mut self, number: MemberId, error: BusError) {
@@ -84,7 +84,7 @@ impl TimedBus {
         };
         member.last_try = false;
         for frame in member.queue.drain(..give_up.min(member.queue.len())) {
-            self.events.push_back(Happening::Failed { member: number, frame });
+            self.events.push_back(BusEvent::Failed { member: number, frame });
         }
     }
 
@@ -106,7 +106,7 @@ impl TimedBus {
         how(&mut member.counters);
         let state = member.counters.state();
         if state.errors != before {
-            self.events.push_back(Happening::State { member: number, state });
+            self.events.push_back(BusEvent::State { member: number, state });
             if self.recovers_by_itself && state.errors == ErrorState::BusOff {
                 self.recover(number);
             }

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use can_link::{
-    BusError, BusStats, CanFrame, ClientEvent, ClientId, ErrorState, Happening, MemberId, SocketcandGateway,
+    BusError, BusEvent, BusStats, CanFrame, ClientEvent, ClientId, ErrorState, MemberId, SocketcandGateway,
     TimedBus, TimedEvent,
 };
 use cli_kit::{Output, Stop};
@@ -208,7 +208,7 @@ impl<'a> Server<'a> {
         self.chain.advance(event.at_ns / 1000);
         let place = |member: &MemberId| self.inside.iter().position(|m| m == member);
         match &event.what {
-            Happening::Received { member, frame } => match place(member) {
+            BusEvent::Received { member, frame } => match place(member) {
                 Some(i) => {
                     let format = Format {
                         extended: frame.is_extended(),
@@ -227,7 +227,7 @@ impl<'a> Server<'a> {
                     }
                 }
             },
-            Happening::Sent { member, frame } => {
+            BusEvent::Sent { member, frame } => {
                 let board = place(member);
                 if let (Some(i), Ok(protocol)) = (board, plain(frame)) {
                     self.chain.sent(i, &protocol);
@@ -239,20 +239,20 @@ impl<'a> Server<'a> {
                     self.carried = Some((event.at_ns, *frame, copies));
                 }
             }
-            Happening::Failed { member, frame } => {
+            BusEvent::Failed { member, frame } => {
                 if let (Some(i), Ok(frame)) = (place(member), plain(frame)) {
                     self.chain.not_sent(i, &frame);
                 }
             }
-            Happening::Error { error: BusError::Collision, frame, .. } => {
+            BusEvent::Error { error: BusError::Collision, frame, .. } => {
                 let time_s = event.at_ns as f64 * 1e-9;
                 let id = frame.id();
                 self.out.note(format!(
                     "{time_s:.3} s: two members send {id} at once with different data; both are destroyed (D-05)"
                 ));
             }
-            Happening::State { member, state } => self.is_in_state(*member, state.errors, event.at_ns),
-            Happening::Error { .. } => {}
+            BusEvent::State { member, state } => self.is_in_state(*member, state.errors, event.at_ns),
+            BusEvent::Error { .. } => {}
         }
     }
 

@@ -1,4 +1,4 @@
-//! Who sends when several start at once.
+//! Arbitration: which members go on sending when several start at once (ISO 11898-1).
 
 use super::confinement::Counters;
 use super::event::MemberId;
@@ -13,8 +13,8 @@ pub(super) struct Starter {
     pub(super) counters: Counters,
 }
 
-/// How the start of a frame ends.
-pub(super) struct Contest {
+/// Outcome of the arbitration at the start of a frame.
+pub(super) struct Arbitration {
     /// They send the same bits to the end; none when the frame is destroyed.
     pub(super) senders: Vec<MemberId>,
     /// What is on the wire.
@@ -27,7 +27,7 @@ pub(super) struct Contest {
     pub(super) failed: Vec<MemberId>,
 }
 
-impl Contest {
+impl Arbitration {
     /// The member has sent more than its arbitration.
     pub(super) fn involves(&self, member: MemberId) -> bool {
         self.senders.contains(&member) || self.failed.contains(&member)

@@ -8,10 +8,10 @@ const ENOBUFS: i32 = 105;
 /// Pause between two tries: a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
 /// A queue that has had no room for so long is that of a dead bus.
-const PATIENCE: Duration = Duration::from_secs(10);
+const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Writes until it works. A full queue is waited for; after 10 s without room it is an error that says what may be wrong.
-pub(super) fn insist(
+/// Writes, and tries again while the queue is full. After 10 s without room it returns an error with the likely causes.
+pub(super) fn retry_while_full(
     mut write: impl FnMut() -> io::Result<()>,
     mut pause: impl FnMut(Duration),
 ) -> io::Result<()> {
@@ -20,7 +20,7 @@ pub(super) fn insist(
         match write() {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) if is_full(&error) => {
-                if waited >= PATIENCE {
+                if waited >= TIMEOUT {
                     let cause = "the transmit queue has been full for 10 s: does anybody acknowledge on the bus, \
                                  has it this bit rate, is it terminated?";
                     return Err(io::Error::new(io::ErrorKind::TimedOut, cause));
@@ -54,7 +54,7 @@ mod tests {
             let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
             answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
         };
-        let result = insist(write, |pause| waited += pause);
+        let result = retry_while_full(write, |pause| waited += pause);
         (result, waited, tries)
     }
 
@@ -73,7 +73,7 @@ mod tests {
     fn a_dead_bus_is_an_error_after_a_while_and_other_errors_at_once() {
         let (result, waited, _) = run(vec![Some(ENOBUFS)]);
         assert!(result.unwrap_err().to_string().contains("acknowledge"));
-        assert_eq!(waited, PATIENCE);
+        assert_eq!(waited, TIMEOUT);
         let (result, waited, tries) = run(vec![Some(100), None]);
         assert_eq!((result.unwrap_err().raw_os_error(), waited, tries), (Some(100), Duration::ZERO, 1));
     }

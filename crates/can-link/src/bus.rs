@@ -96,7 +96,7 @@ mod tests {
 
     #[cfg(not(target_os = "linux"))]
     #[test]
-    fn what_only_linux_has_says_what_there_is() {
+    fn what_only_linux_has_names_what_there_is() {
         let message = open("socketcan:can0").err().expect("not here").to_string();
         assert!(message.contains("multicast:ADDR:PORT"), "{message}");
     }

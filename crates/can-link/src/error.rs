@@ -32,7 +32,7 @@ pub enum CanError {
         port: u16,
         /// What was tried.
         step: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// Sending or receiving failed.
@@ -42,7 +42,7 @@ pub enum CanError {
         url: String,
         /// What was tried.
         step: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// No connection to a server.
@@ -50,7 +50,7 @@ pub enum CanError {
     Connect {
         /// The bus.
         url: String,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// The other side refused to open the bus.
@@ -60,7 +60,7 @@ pub enum CanError {
         url: String,
         /// What was asked for.
         step: &'static str,
-        /// What the other side said.
+        /// The other side's answer.
         answer: String,
     },
     /// The other side speaks something else, or nothing.
@@ -96,7 +96,7 @@ pub enum CanError {
     Listen {
         /// The address asked for.
         address: String,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// A serial port could not be opened.
@@ -107,7 +107,7 @@ pub enum CanError {
     Port {
         /// The bus.
         url: String,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// A rate that the adapter's protocol does not have.
@@ -129,7 +129,7 @@ pub enum CanError {
         url: String,
         /// The likely cause and the next command.
         hint: String,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
 }

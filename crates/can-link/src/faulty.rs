@@ -34,7 +34,7 @@ pub struct FaultSchedule {
     pub seed: u64,
     /// What the member sends.
     pub send: FaultConfig,
-    /// What the member hears.
+    /// What the member receives.
     pub receive: FaultConfig,
 }
 
@@ -146,7 +146,7 @@ impl Line {
 pub struct Faulty<B> {
     bus: B,
     out: Line,
-    heard: Line,
+    received: Line,
     clock: Box<dyn FnMut() -> Duration + Send>,
 }
 
@@ -165,13 +165,13 @@ impl<B: CanBus> Faulty<B> {
     ) -> Self {
         let mut seeds = fastrand::Rng::with_seed(schedule.seed);
         let out = Line::new(schedule.send, seeds.u64(..));
-        let heard = Line::new(schedule.receive, seeds.u64(..));
-        Self { bus, out, heard, clock: Box::new(clock) }
+        let received = Line::new(schedule.receive, seeds.u64(..));
+        Self { bus, out, received, clock: Box::new(clock) }
     }
 
-    /// What happened so far to frames heard.
+    /// What happened so far to frames received.
     pub fn received_stats(&self) -> FaultStats {
-        self.heard.stats
+        self.received.stats
     }
 
     /// The bus without faults; frames under way are gone.
@@ -203,22 +203,22 @@ impl<B: CanBus> CanBus for Faulty<B> {
             self.send_due(now)?;
             // All that has arrived takes its place in the order before the first is handed out.
             while let Some(frame) = self.bus.receive(Duration::ZERO)? {
-                self.heard.put(now, frame);
+                self.received.put(now, frame);
             }
-            if let Some(frame) = self.heard.take(now) {
+            if let Some(frame) = self.received.take(now) {
                 return Ok(Some(frame));
             }
             let left = timeout.saturating_sub(now.saturating_sub(start).max(waited));
             if left.is_zero() {
                 return Ok(None);
             }
-            let due = [self.heard.next_due(), self.out.next_due()].into_iter().flatten().min();
+            let due = [self.received.next_due(), self.out.next_due()].into_iter().flatten().min();
             let until_due = due.map_or(left, |due| due.saturating_sub(now));
             let wait = left.min(until_due).max(Duration::from_micros(50));
             match self.bus.receive(wait)? {
                 Some(frame) => {
                     let now = (self.clock)();
-                    self.heard.put(now, frame);
+                    self.received.put(now, frame);
                 }
                 None => waited += wait,
             }
@@ -285,14 +285,14 @@ mod tests {
     fn faults_come_as_often_as_asked_for() {
         let receive = FaultConfig { loss: 0.1, corruption: 0.2, duplication: 0.3, ..FaultConfig::default() };
         let mut bench = bench(FaultConfig::default(), receive, 2);
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         for number in 0..4000 {
             bench.peer.send(&frame(number)).unwrap();
-            heard.extend(numbers(&mut bench.faulty));
+            received.extend(numbers(&mut bench.faulty));
         }
         let stats = bench.faulty.received_stats();
         assert_eq!(stats.frames, 4000);
-        assert_eq!(heard.len() as u64, 4000 - stats.lost + stats.doubled);
+        assert_eq!(received.len() as u64, 4000 - stats.lost + stats.doubled);
         // Six standard deviations and more.
         for (count, share) in [(stats.lost, 0.1), (stats.corrupted, 0.18), (stats.doubled, 0.27)] {
             assert!((count as f64 / 4000.0 - share).abs() < 0.05, "{stats:?}");
@@ -335,14 +335,14 @@ mod tests {
         for number in 0..100 {
             bench.peer.send(&frame(number)).unwrap();
         }
-        let mut heard = numbers(&mut bench.faulty);
-        let first = heard.len();
+        let mut received = numbers(&mut bench.faulty);
+        let first = received.len();
         bench.now_ms.store(5, Ordering::Relaxed);
-        heard.extend(numbers(&mut bench.faulty));
+        received.extend(numbers(&mut bench.faulty));
         assert_eq!(bench.faulty.received_stats().reordered as usize, 100 - first);
-        assert!((40..100).contains(&first) && !heard.is_sorted());
-        heard.sort();
-        assert_eq!(heard, (0..100).collect::<Vec<_>>());
+        assert!((40..100).contains(&first) && !received.is_sorted());
+        received.sort();
+        assert_eq!(received, (0..100).collect::<Vec<_>>());
     }
 
     #[test]
@@ -358,14 +358,14 @@ mod tests {
         };
         let run = |seed| {
             let mut bench = bench(faults, faults, seed);
-            let mut heard = Vec::new();
+            let mut received = Vec::new();
             for number in 0..300 {
                 bench.now_ms.store(number.into(), Ordering::Relaxed);
                 bench.faulty.send(&frame(number)).unwrap();
                 bench.peer.send(&frame(number)).unwrap();
-                heard.push((numbers(&mut bench.faulty), numbers(&mut bench.peer)));
+                received.push((numbers(&mut bench.faulty), numbers(&mut bench.peer)));
             }
-            heard
+            received
         };
         assert_eq!(run(7), run(7));
         assert_ne!(run(7), run(8));

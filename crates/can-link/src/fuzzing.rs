@@ -97,7 +97,7 @@ pub fn slcan_stream(data: &[u8]) {
     assert_eq!(adapter(&mut pieces(cuts, stream)), adapter(&mut std::iter::once(stream)));
 }
 
-/// The first bytes say how the rest is cut.
+/// The first bytes define how the rest is cut.
 fn parts(data: &[u8]) -> (&[u8], &[u8]) {
     data.split_at(data.len().min(4))
 }

@@ -22,7 +22,7 @@ pub struct MulticastBus {
     url: String,
     /// Listens at the group's port, which all members share.
     listener: UdpSocket,
-    /// Sends from a port of its own, so that its datagrams can be told from those of others.
+    /// Sends from a port of its own, so that its datagrams can be distinguished from those of others.
     sender: UdpSocket,
     own: SocketAddr,
     /// What the listener is set to: `None` does not wait.
@@ -68,11 +68,11 @@ impl MulticastBus {
         Ok(())
     }
 
-    /// The next datagram of somebody else.
+    /// The next datagram of another sender.
     fn next(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
             match self.listener.recv_from(buffer) {
-                // The scope of an IPv6 address is not always told.
+                // The scope of an IPv6 address is not always reported.
                 Ok((_, from)) if (from.ip(), from.port()) == (self.own.ip(), self.own.port()) => {}
                 Ok((len, _)) => return Ok(Some(len)),
                 Err(error) if is_no_data(&error) => return Ok(None),
@@ -99,7 +99,7 @@ fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<
     step("sharing the port", share_port(&listener))?;
     // More is better but not needed.
     let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
-    // Bound to the group, the listener hears nothing of other groups; Windows only binds to own addresses.
+    // Bound to the group, the listener receives nothing of other groups; Windows only binds to own addresses.
     let address = if cfg!(windows) { unspecified(group) } else { group };
     step("binding the port", listener.bind(&SocketAddr::new(address, port).into()))?;
 
@@ -212,7 +212,7 @@ mod tests {
     use crate::Id;
 
     /// Frames with a timeout that only a broken transport reaches.
-    fn heard(bus: &mut MulticastBus) -> Option<CanFrame> {
+    fn received(bus: &mut MulticastBus) -> Option<CanFrame> {
         bus.receive(Duration::from_secs(60)).unwrap()
     }
 
@@ -239,9 +239,9 @@ mod tests {
         b.sender.send(b"noise").unwrap();
         b.send(&frames[1]).unwrap();
         for frame in frames {
-            assert_eq!(heard(&mut b), Some(frame));
+            assert_eq!(received(&mut b), Some(frame));
         }
-        assert_eq!(heard(&mut a), Some(frames[1]), "of its own frames and of noise it hears nothing");
+        assert_eq!(received(&mut a), Some(frames[1]), "it receives neither its own frames nor noise");
         assert_eq!((a.ignored(), b.ignored()), (1, 0));
         assert_eq!(a.receive(Duration::ZERO).unwrap(), None);
         assert_eq!(b.receive(Duration::from_millis(2)).unwrap(), None);

@@ -5,7 +5,7 @@ use std::fmt;
 /// The error state of a CAN controller (ISO 11898-1, fault confinement).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ErrorState {
-    /// The adapter does not tell.
+    /// The adapter does not report it.
     #[default]
     Unknown,
     /// Error active: all is well.
@@ -48,9 +48,9 @@ impl fmt::Display for ErrorState {
 pub struct ControllerState {
     /// Where the counters put it.
     pub errors: ErrorState,
-    /// Transmit error counter, if the adapter tells.
+    /// Transmit error counter, if the adapter reports it.
     pub tec: Option<u16>,
-    /// Receive error counter, if the adapter tells.
+    /// Receive error counter, if the adapter reports it.
     pub rec: Option<u16>,
 }
 

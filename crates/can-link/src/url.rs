@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn other_texts_say_what_is_wrong() {
+    fn other_texts_are_errors_that_name_the_cause() {
         for (url, part) in [
             ("can0", "there are socketcan:can0"),
             ("usb:can0", "there are socketcan:can0"),

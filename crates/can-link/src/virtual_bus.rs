@@ -47,9 +47,9 @@ struct State {
     members: BTreeMap<u64, Member>,
 }
 
-/// What waits for a member, in the order in which it happened.
+/// What waits for a member, in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Heard {
+pub(crate) enum Received {
     /// A frame of another member.
     Frame(CanFrame),
     /// Its own controller is in this state now.
@@ -57,14 +57,14 @@ pub(crate) enum Heard {
 }
 
 struct Member {
-    waiting: VecDeque<Heard>,
+    waiting: VecDeque<Received>,
     /// Frames that wait at most.
     limit: usize,
     /// Nobody waits for it: it let a sender wait in vain and has taken nothing since, or is a guest.
     stalled: bool,
     /// No sender ever waits for it.
     guest: bool,
-    /// It hears nothing at present.
+    /// It receives nothing at present.
     deaf: bool,
     missed: u64,
 }
@@ -77,7 +77,7 @@ impl Member {
         self.waiting.len() >= self.limit
     }
 
-    fn hear(&mut self, frame: &CanFrame) {
+    fn deliver(&mut self, frame: &CanFrame) {
         if self.deaf {
             return;
         }
@@ -85,14 +85,14 @@ impl Member {
             self.stalled = true;
             self.missed += 1;
         } else {
-            self.waiting.push_back(Heard::Frame(*frame));
+            self.waiting.push_back(Received::Frame(*frame));
         }
     }
 
     /// States are few and are never missed.
     fn becomes(&mut self, state: ErrorState) {
         if !self.deaf {
-            self.waiting.push_back(Heard::State(state));
+            self.waiting.push_back(Received::State(state));
         }
     }
 }
@@ -121,7 +121,7 @@ impl VirtualHub {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
-    /// A new member; it hears what is sent from now on.
+    /// A new member; it receives what is sent from now on.
     pub fn join(&self) -> VirtualBus {
         self.add(Member::ORDINARY)
     }
@@ -143,7 +143,7 @@ impl VirtualHub {
     /// Gives a frame to one member, without waiting for it.
     pub(crate) fn deliver_to(&self, frame: &CanFrame, number: u64) {
         if let Some(member) = self.shared.state().members.get_mut(&number) {
-            member.hear(frame);
+            member.deliver(frame);
         }
         self.shared.changed.notify_all();
     }
@@ -161,7 +161,7 @@ impl VirtualHub {
         let mut state = self.shared.state();
         for (number, member) in &mut state.members {
             if Some(*number) != except {
-                member.hear(frame);
+                member.deliver(frame);
             }
         }
         drop(state);
@@ -202,7 +202,7 @@ impl VirtualBus {
         &self.membership.shared
     }
 
-    /// Tells it from other members of its hub.
+    /// Identifies it among the members of its hub.
     pub(crate) fn number(&self) -> u64 {
         self.membership.number
     }
@@ -212,7 +212,7 @@ impl VirtualBus {
         Self { membership: Arc::clone(&self.membership) }
     }
 
-    /// Starts or stops hearing; what waits is forgotten when it stops.
+    /// Stops or starts receiving; what waits is forgotten when it stops.
     pub(crate) fn set_deaf(&self, deaf: bool) {
         if let Some(member) = self.shared().state().members.get_mut(&self.number()) {
             member.deaf = deaf;
@@ -228,15 +228,15 @@ impl VirtualBus {
         self.shared().changed.notify_all();
     }
 
-    /// Waits for frames and states and moves at most `most` of them to `heard`; false when it has left the bus.
-    pub(crate) fn take_some(&self, most: usize, timeout: Duration, heard: &mut Vec<Heard>) -> bool {
+    /// Waits for frames and states and moves at most `most` of them to `received`; false when it has left the bus.
+    pub(crate) fn take_some(&self, most: usize, timeout: Duration, received: &mut Vec<Received>) -> bool {
         let mut state = self.shared().state();
         let deadline = Instant::now() + timeout;
         loop {
             let Some(member) = state.members.get_mut(&self.number()) else { return false };
             if !member.waiting.is_empty() {
                 let count = member.waiting.len().min(most);
-                heard.extend(member.waiting.drain(..count));
+                received.extend(member.waiting.drain(..count));
                 member.stalled = member.guest;
                 self.shared().changed.notify_all();
                 return true;
@@ -269,7 +269,7 @@ impl CanBus for VirtualBus {
         }
         for (number, member) in &mut state.members {
             if *number != self.number() {
-                member.hear(frame);
+                member.deliver(frame);
             }
         }
         shared.changed.notify_all();
@@ -283,14 +283,14 @@ impl CanBus for VirtualBus {
         let mut state = shared.state();
         loop {
             if let Some(member) = state.members.get_mut(&self.number())
-                && let Some(heard) = member.waiting.pop_front()
+                && let Some(received) = member.waiting.pop_front()
             {
                 member.stalled = member.guest;
                 shared.changed.notify_all();
-                match heard {
-                    Heard::Frame(frame) => return Ok(Some(frame)),
+                match received {
+                    Received::Frame(frame) => return Ok(Some(frame)),
                     // Only guests of a server have one, and it writes these out itself.
-                    Heard::State(_) => continue,
+                    Received::State(_) => continue,
                 }
             }
             let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));
@@ -374,7 +374,7 @@ mod tests {
         let hub = VirtualHub::with_timeout(Duration::MAX);
         let (mut a, mut slow) = (hub.join(), hub.join());
         let count = 5 * QUEUE as u32;
-        let heard = std::thread::spawn(move || {
+        let received = std::thread::spawn(move || {
             let next = |_| slow.receive(Duration::MAX).unwrap().unwrap();
             let frames: Vec<_> = (0..count).map(next).collect();
             (frames, slow.missed())
@@ -382,7 +382,7 @@ mod tests {
         for number in 0..count {
             a.send(&frame(number)).unwrap();
         }
-        let (frames, missed) = heard.join().unwrap();
+        let (frames, missed) = received.join().unwrap();
         assert_eq!(missed, 0);
         assert!(frames.into_iter().eq((0..count).map(frame)));
     }

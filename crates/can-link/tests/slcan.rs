@@ -87,7 +87,7 @@ fn check(url: &str, adapter: Running, mut node: VirtualBus) -> SlcanAdapter {
     }
     assert_eq!(bus.receive(Duration::ZERO).unwrap(), None);
     assert_eq!(bus.state().errors, ErrorState::Warning);
-    // The last frame is heard although nobody waits for it.
+    // The last frame is received although no sender waits for it.
     bus.send(&frame(3, &[])).unwrap();
     drop(bus);
     assert_eq!(take(&mut node), frame(3, &[]));
@@ -317,7 +317,7 @@ fn a_port_without_an_adapter_and_one_that_goes_are_told_apart() {
 #[test]
 fn the_adapter_answers_by_the_manual() {
     let mut adapter = SlcanAdapter::new();
-    let said = |adapter: &mut SlcanAdapter, text: &str, room: bool| {
+    let reply = |adapter: &mut SlcanAdapter, text: &str, room: bool| {
         adapter.input(text.as_bytes(), |_| room);
         String::from_utf8(adapter.take_output()).unwrap()
     };
@@ -344,11 +344,11 @@ fn the_adapter_answers_by_the_manual() {
         ("L\r", "\r"),
         ("t1000\r", "\u{7}"),
     ] {
-        assert_eq!(said(&mut adapter, text, true), answer, "{text:?}");
+        assert_eq!(reply(&mut adapter, text, true), answer, "{text:?}");
     }
-    adapter.heard(&frame(0x100, &[1]));
+    adapter.received(&frame(0x100, &[1]));
     assert_eq!(adapter.take_output(), b"t1001010000\r", "with a time stamp");
-    assert_eq!(said(&mut adapter, "C\rO\rt1000\r", false), "\r\r\u{7}", "no room");
-    assert_eq!(said(&mut adapter, &"x".repeat(100_000), true), "");
-    assert_eq!(said(&mut adapter, "\rt1000\r", true), "\u{7}z\r");
+    assert_eq!(reply(&mut adapter, "C\rO\rt1000\r", false), "\r\r\u{7}", "no room");
+    assert_eq!(reply(&mut adapter, &"x".repeat(100_000), true), "");
+    assert_eq!(reply(&mut adapter, "\rt1000\r", true), "\u{7}z\r");
 }

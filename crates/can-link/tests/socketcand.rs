@@ -43,12 +43,12 @@ impl Raw {
         String::from_utf8(buffer[..count].to_vec()).unwrap()
     }
 
-    fn say(&mut self, text: &str) {
+    fn write(&mut self, text: &str) {
         self.0.write_all(text.as_bytes()).unwrap();
     }
 
     fn ask(&mut self, text: &str) -> String {
-        self.say(text);
+        self.write(text);
         self.read()
     }
 
@@ -116,7 +116,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
             assert_eq!(client.read(), "< hi >");
             // None before raw mode.
             assert_eq!(client.ask("< open can0 >"), "< ok >");
-            client.say("< rawmode >");
+            client.write("< rawmode >");
             client.0.peek(&mut [0]).unwrap();
             // Long enough for frames that are not held back; on a busy computer sometimes too long for those that are.
             std::thread::sleep(Duration::from_millis(3));
@@ -136,7 +136,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
 }
 
 #[test]
-fn what_was_on_the_bus_before_raw_mode_is_not_heard() {
+fn what_was_on_the_bus_before_raw_mode_is_not_received() {
     let (server, hub) = bench();
     let mut node = hub.join();
     let mut client = Raw::connect(&server);
@@ -225,14 +225,14 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     let count = 100_000;
     let (done, waited) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
-        let mut heard = 0;
+        let mut received = 0;
         for number in 0..count {
             node.send(&numbered(number)).unwrap();
-            // Whoever reads hears all.
+            // A client that reads receives all.
             if number % 1000 == 999 {
-                while heard <= number {
-                    assert_eq!(take(&mut listener), numbered(heard));
-                    heard += 1;
+                while received <= number {
+                    assert_eq!(take(&mut listener), numbered(received));
+                    received += 1;
                 }
             }
         }
@@ -240,7 +240,7 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     });
     let mut node = waited.recv_timeout(10 * TIMEOUT).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
-    // It is still a client: it finds the oldest that waited, and with room again hears what is new.
+    // It is still a client: it finds the oldest that waited, and with room again receives what is new.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
     until(|| {
         sleeper.read();
@@ -253,7 +253,7 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
 }
 
 #[test]
-fn what_cannot_be_said_is_counted_and_what_is_not_understood_does_no_harm() {
+fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
     let (server, hub) = bench();
     let mut node = hub.join();
     let mut client = Raw::connect(&server);
@@ -265,9 +265,9 @@ fn what_cannot_be_said_is_counted_and_what_is_not_understood_does_no_harm() {
     assert_eq!(client.ask("< subscribe 0 0 123 >"), "< error unknown command >");
     assert_eq!(client.ask("< rawmode >"), "< ok >");
     // In raw mode no error texts: python-can would stumble over them.
-    client.say("< noise >< send 281 9 >< send xyz 0  ><<<>>> \u{e4} < \u{e4} >");
-    client.say(&"x".repeat(100_000));
-    client.say(&format!("< {}", "y".repeat(100_000)));
+    client.write("< noise >< send 281 9 >< send xyz 0  ><<<>>> \u{e4} < \u{e4} >");
+    client.write(&"x".repeat(100_000));
+    client.write(&format!("< {}", "y".repeat(100_000)));
     node.send(&CanFrame::fd(Id::standard(1).unwrap(), &[1; 12]).unwrap()).unwrap();
     node.send(&CanFrame::remote(Id::standard(1).unwrap(), 0).unwrap()).unwrap();
     assert_eq!(client.ask("< echo >"), "< echo >");
@@ -280,7 +280,7 @@ fn what_cannot_be_said_is_counted_and_what_is_not_understood_does_no_harm() {
     assert_eq!(client.ask("< bcmmode >"), "< ok >");
     node.send(&numbered(8)).unwrap();
     assert_eq!(client.ask("< echo >"), "< echo >");
-    client.say("< send 5 0  >");
+    client.write("< send 5 0  >");
     assert_eq!(take(&mut node), frame(5, &[]));
 }
 
@@ -296,7 +296,7 @@ fn an_unknown_bus_is_refused_with_what_there_is() {
 }
 
 #[test]
-fn the_client_says_when_the_server_goes_and_when_it_was_never_there() {
+fn the_client_reports_when_the_server_goes_and_when_it_was_never_there() {
     let (server, hub) = bench();
     let url = server.url("can0");
     let mut client = open(&url).unwrap();
@@ -325,9 +325,9 @@ fn the_client_refuses_what_the_protocol_cannot_carry() {
     }
 }
 
-/// Frames that a client sent before it ended are heard, even when it did not read what was sent to it.
+/// Frames that a client sent before it ended are delivered, even when it did not read what was sent to it.
 #[test]
-fn the_last_frames_of_a_client_are_heard() {
+fn the_last_frames_of_a_client_are_delivered() {
     let (server, hub) = bench();
     let mut node = hub.join();
     for number in 0..20 {
@@ -345,12 +345,12 @@ fn the_last_frames_of_a_client_are_heard() {
 /// A server that is no good: each must end in an error, none in a panic or a hang.
 #[test]
 fn servers_that_are_none_end_in_words() {
-    let end_with = |says: &'static [&'static str]| {
+    let end_with = |texts: &'static [&'static str]| {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = listener.local_addr().unwrap().port();
         let server = std::thread::spawn(move || {
             let (mut stream, _) = listener.accept().unwrap();
-            for text in says {
+            for text in texts {
                 stream.write_all(text.as_bytes()).unwrap();
                 std::thread::sleep(Duration::from_millis(2));
             }

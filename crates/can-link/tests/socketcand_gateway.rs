@@ -43,7 +43,7 @@ fn a_host_can_run_the_bus_itself() {
     a.send(&numbered(1)).unwrap();
     let event = gateway.next(TIMEOUT).unwrap();
     assert_eq!((event.channel, event.client, event.event), (0, id_a, ClientEvent::Frame(numbered(1))));
-    // Nobody has heard it yet: the host decides.
+    // No client has received it yet: the host decides.
     gateway.deliver(0, &numbered(2), None);
     gateway.deliver(0, &numbered(1), Some(id_a));
     gateway.deliver(0, &numbered(3), None);
@@ -117,7 +117,7 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
     assert_eq!(stats.frames, u64::from(2 * count));
 }
 
-/// A client is told that its own controller is bus-off and that it is back, between the frames before and after; others are not.
+/// A client receives reports that its own controller is bus-off and that it is back, between the frames before and after; others do not.
 #[test]
 fn a_client_is_told_of_its_own_bus_off() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();

@@ -1,4 +1,4 @@
-//! The bus in virtual time against what ISO 11898-1 says of a wire.
+//! The bus in virtual time against ISO 11898-1.
 
 use can_link::{
     BusError, BusEvent, CanFrame, ErrorState, FaultConfig, FaultSchedule, Id, MemberId, QueueError, TimedBus,
@@ -119,11 +119,11 @@ proptest! {
             time += 3 * 4000;
         }
         let events = run(&mut bus, time + MS);
-        let heard: Vec<_> = events.iter().filter_map(|event| match event.what {
+        let received: Vec<_> = events.iter().filter_map(|event| match event.what {
             BusEvent::Received { member, frame } if member == listener => Some((event.at_ns, frame)),
             _ => None,
         }).collect();
-        prop_assert_eq!(heard, expected);
+        prop_assert_eq!(received, expected);
         prop_assert_eq!(bus.stats().busy_ns, time);
         prop_assert!(errors(&events).is_empty());
     }
@@ -176,7 +176,7 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     // 16 failures make both passive at once; in the 17th collision the one with the dominant bit goes through.
     assert_eq!(bus.stats().collisions, 17);
     assert_eq!(received(&events, listener), [one, other]);
-    assert_eq!(received(&events, b), [one], "who fell out of it hears it");
+    assert_eq!(received(&events, b), [one], "the member that dropped out receives it");
     assert_eq!([a, b].map(|member| bus.state(member).tec), [Some(127), Some(135)]);
     let states: Vec<_> = events
         .iter()
@@ -260,7 +260,7 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
         .collect();
     let (active, passive) = (times[1] - times[0], times[101] - times[100]);
     assert_eq!(passive - active, 8000);
-    // One that hears and does not acknowledge does not help; the next does.
+    // A member that receives and does not acknowledge does not help; the next does.
     let mute = bus.join();
     bus.set_acknowledges(mute, false);
     assert!(received(&run(&mut bus, 101 * MS), mute).is_empty());
@@ -284,7 +284,7 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     assert_eq!((failed, bus.state(a).errors), (2, ErrorState::BusOff));
     assert_eq!(bus.state(b).rec, Some(32));
     bus.set_disturbance(0.0);
-    // It hears nothing and acknowledges nothing meanwhile.
+    // It receives nothing and acknowledges nothing meanwhile.
     bus.queue(b, frame(0x200, &[])).unwrap();
     assert!(
         run(&mut bus, 51 * MS)
@@ -333,8 +333,8 @@ fn recovery_on_a_busy_bus_takes_128_frames() {
         bus.queue(b, frame(0x200, &[0x55; 8])).unwrap();
     }
     let events = run(&mut bus, 100 * MS);
-    let heard = received(&events, c);
-    let first = heard.iter().position(|frame| frame.id() == Id::standard(1).unwrap()).unwrap();
+    let received = received(&events, c);
+    let first = received.iter().position(|frame| frame.id() == Id::standard(1).unwrap()).unwrap();
     assert_eq!(first, 128, "frames before the first one of the member that was bus-off");
     assert_eq!(bus.state(a).errors, ErrorState::Active);
 }
@@ -394,8 +394,8 @@ fn faults_of_a_member_are_those_of_a_gateway_and_cost_no_counters() {
     // Each comes 1 ms after it was on the wire.
     let sent: Vec<_> =
         events.iter().filter(|e| matches!(e.what, BusEvent::Sent { .. })).map(|e| e.at_ns).collect();
-    let heard = events.iter().filter(|e| matches!(e.what, BusEvent::Received { .. })).map(|e| e.at_ns);
-    assert!(heard.into_iter().all(|at| sent.contains(&(at - MS))));
+    let times = events.iter().filter(|e| matches!(e.what, BusEvent::Received { .. })).map(|e| e.at_ns);
+    assert!(times.into_iter().all(|at| sent.contains(&(at - MS))));
     // Corruption before the queue is a frame like any other on the wire.
     bus.set_faults(
         a,
@@ -407,8 +407,8 @@ fn faults_of_a_member_are_those_of_a_gateway_and_cost_no_counters() {
     );
     bus.set_faults(b, FaultSchedule::default());
     bus.queue(a, frame(0x100, &[0])).unwrap();
-    let heard = received(&run(&mut bus, 200 * MS), b);
-    assert_eq!(heard[0].data()[0].count_ones(), 1);
+    let frames = received(&run(&mut bus, 200 * MS), b);
+    assert_eq!(frames[0].data()[0].count_ones(), 1);
 }
 
 /// D-03 and the load of 11: at 1 Mbit/s a bus carries exactly the bits that its rate has.

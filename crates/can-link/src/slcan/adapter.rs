@@ -20,7 +20,7 @@ const MOST: usize = 64;
 /// let mut sent = Vec::new();
 /// adapter.input(b"S8\rO\rt28121122\r", |frame| { sent.push(*frame); true });
 /// assert_eq!(sent[0].to_string(), "281 # 11 22");
-/// adapter.heard(&sent[0]);
+/// adapter.received(&sent[0]);
 /// assert_eq!(adapter.take_output(), b"\r\rz\rt28121122\r");
 /// ```
 #[derive(Default)]
@@ -42,21 +42,21 @@ impl SlcanAdapter {
         Self::default()
     }
 
-    /// Bytes from the host. `send` gets its frames and tells whether the bus has room; without room the host is refused with
+    /// Bytes from the host. `send` gets its frames and returns whether the bus has room; without room the host is refused with
     /// a bell, as by an adapter whose queue is full.
     pub fn input(&mut self, mut bytes: &[u8], mut send: impl FnMut(&CanFrame) -> bool) {
         let mut lines = self.lines.take().unwrap_or_else(Lines::new);
         while let Some(piece) = lines.next(&mut bytes) {
             // The bell is the adapter's own.
             if let Piece::Line(line) = piece {
-                self.obey(line, &mut send);
+                self.execute(line, &mut send);
             }
         }
         self.lines = Some(lines);
     }
 
     /// A frame was on the bus.
-    pub fn heard(&mut self, frame: &CanFrame) {
+    pub fn received(&mut self, frame: &CanFrame) {
         if !self.open {
             return;
         }
@@ -97,7 +97,7 @@ impl SlcanAdapter {
         self.lost
     }
 
-    /// One turn between a host and a bus: what the host has written is obeyed, what is on the bus is told. The port's reads and
+    /// One turn between a host and a bus: what the host has written is carried out, what is on the bus is reported. The port's reads and
     /// writes must not wait for long.
     pub fn turn(
         &mut self,
@@ -119,7 +119,7 @@ impl SlcanAdapter {
         }
         for _ in 0..MOST {
             match bus.receive(std::time::Duration::ZERO).map_err(AdapterError::Bus)? {
-                Some(frame) => self.heard(&frame),
+                Some(frame) => self.received(&frame),
                 None => break,
             }
         }
@@ -130,10 +130,10 @@ impl SlcanAdapter {
         Ok(())
     }
 
-    fn obey(&mut self, line: &str, send: &mut impl FnMut(&CanFrame) -> bool) {
+    fn execute(&mut self, line: &str, send: &mut impl FnMut(&CanFrame) -> bool) {
         let Some((command, rest)) = line.split_at_checked(1) else {
             // An empty line, as hosts send them to clear what was typed before.
-            return self.say("\r");
+            return self.reply("\r");
         };
         let digit = rest.parse::<usize>().ok().filter(|_| rest.len() == 1);
         match command {
@@ -151,7 +151,7 @@ impl SlcanAdapter {
             "O" | "L" if !self.open && rest.is_empty() && self.rate.is_some() => {
                 self.open = true;
                 self.listen_only = command == "L";
-                self.say("\r");
+                self.reply("\r");
             }
             "C" if rest.is_empty() => {
                 self.yes_if(self.open);
@@ -161,15 +161,15 @@ impl SlcanAdapter {
                 self.yes_if(matches!(rest, "0" | "1"));
                 self.time_stamps = rest == "1";
             }
-            "V" => self.say("V1013\r"),
-            "N" => self.say("NSIM0\r"),
+            "V" => self.reply("V1013\r"),
+            "N" => self.reply("NSIM0\r"),
             "F" if self.open => {
                 let flags = flags(self.state);
-                self.say(&format!("F{flags:02X}\r"));
+                self.reply(&format!("F{flags:02X}\r"));
             }
             _ => match parse_frame(line) {
                 Some(frame) if self.open && !self.listen_only && send(&frame) => {
-                    self.say(if frame.is_extended() { "Z\r" } else { "z\r" });
+                    self.reply(if frame.is_extended() { "Z\r" } else { "z\r" });
                 }
                 _ => self.output.push(BELL),
             },
@@ -180,7 +180,7 @@ impl SlcanAdapter {
         self.output.push(if yes { b'\r' } else { BELL });
     }
 
-    fn say(&mut self, text: &str) {
+    fn reply(&mut self, text: &str) {
         self.output.extend_from_slice(text.as_bytes());
     }
 }

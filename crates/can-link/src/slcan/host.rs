@@ -10,9 +10,9 @@ use super::{BIT_RATES, DATA_RATES};
 use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState};
 
 /// How long an adapter may take to answer its first question; it may still be starting.
-const HELLO: Duration = Duration::from_secs(1);
+const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
 /// How often it is asked.
-const HELLOS: u32 = 3;
+const VERSION_QUESTIONS: u32 = 3;
 /// How long an adapter may take for other answers.
 const ANSWER: Duration = Duration::from_millis(500);
 /// What an earlier user left on the line has come by then.
@@ -24,7 +24,7 @@ const RETRY: Duration = Duration::from_millis(1);
 /// Slices of waiting in which both directions get their turn.
 const SLICE: Duration = Duration::from_millis(20);
 /// Received frames that are kept while something else is waited for.
-const INBOX: usize = 100_000;
+const RECEIVE_QUEUE: usize = 100_000;
 
 /// How to talk to an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl SlcanOptions {
     }
 }
 
-/// What an adapter says to what it is told.
+/// An adapter's answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     Yes,
@@ -74,8 +74,8 @@ pub struct SlcanBus {
     url: String,
     port: Port,
     lines: Lines,
-    inbox: VecDeque<CanFrame>,
-    /// The adapter answers what it is told.
+    receive_queue: VecDeque<CanFrame>,
+    /// The adapter answers commands.
     answers: bool,
     /// Confirmations of frames have come.
     confirms: bool,
@@ -124,7 +124,7 @@ impl SlcanBus {
             url,
             port,
             lines: Lines::new(),
-            inbox: VecDeque::new(),
+            receive_queue: VecDeque::new(),
             answers: true,
             confirms: false,
             last_answer: None,
@@ -135,7 +135,7 @@ impl SlcanBus {
             got_text: false,
             closed: false,
         };
-        bus.say_hello()?;
+        bus.check_presence()?;
         if let Some(code) = rate_code {
             bus.set("setting the bit rate", &format!("S{code}\r"))?;
         }
@@ -143,21 +143,21 @@ impl SlcanBus {
             bus.set("setting the data bit rate", &format!("Y{code}\r"))?;
         }
         bus.set("opening the channel", "O\r")?;
-        bus.inbox.clear();
+        bus.receive_queue.clear();
         Ok(bus)
     }
 
-    /// Closes what an earlier user left open, and sees whether anybody is there.
-    fn say_hello(&mut self) -> Result<(), CanError> {
+    /// Closes what an earlier user left open, and checks that an adapter answers.
+    fn check_presence(&mut self) -> Result<(), CanError> {
         // The first end of line is for what was typed before.
         self.write(b"\rC\r")?;
         let end = Instant::now() + ANSWER;
         while self.take_in(QUIET)? && Instant::now() < end {}
         let mut somebody = false;
-        for _ in 0..HELLOS {
+        for _ in 0..VERSION_QUESTIONS {
             self.got_text = false;
             self.write(b"V\r")?;
-            let end = Instant::now() + HELLO;
+            let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
                 // The version is a text: what was answered before belongs to earlier lines.
@@ -171,11 +171,11 @@ impl SlcanBus {
             }
         }
         let hint = "is it an SLCAN adapter, is its firmware the right one, and does the line have this rate (?baud=N)?";
-        let seconds = HELLO.as_secs() * u64::from(HELLOS);
+        let seconds = VERSION_TIMEOUT.as_secs() * u64::from(VERSION_QUESTIONS);
         Err(CanError::NoAnswer { url: self.url.clone(), step: "asking for the version", seconds, hint })
     }
 
-    /// Tells the adapter something; adapters that never answer are believed.
+    /// Sends a command. Of an adapter that never answers it is taken for carried out.
     fn set(&mut self, step: &'static str, line: &str) -> Result<(), CanError> {
         self.last_answer = None;
         self.write(line.as_bytes())?;
@@ -224,12 +224,12 @@ impl SlcanBus {
                 Piece::Line("" | "z" | "Z") => answers.push(Answer::Yes),
                 Piece::Line(line) => {
                     if let Some(frame) = parse_frame(line) {
-                        self.inbox.push_back(frame);
+                        self.receive_queue.push_back(frame);
                     } else if let Some(state) = parse_state(line) {
                         self.state = state;
                     } else if let Some(state) = parse_flags(line) {
                         self.got_flags = true;
-                        // Counters of a state that the adapter told by itself stay as long as they fit.
+                        // Counters of a state that the adapter reported by itself stay as long as they fit.
                         if self.state.errors != state.errors {
                             self.state = state;
                         }
@@ -265,7 +265,7 @@ impl SlcanBus {
                     return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
                 }
                 // It may be waiting for us.
-                Ok(0) if self.inbox.len() < INBOX => {
+                Ok(0) if self.receive_queue.len() < RECEIVE_QUEUE => {
                     self.take_in(SLICE)?;
                 }
                 Ok(0) => {}
@@ -317,7 +317,7 @@ impl SlcanBus {
     /// Until the last frame is confirmed.
     fn wait_for_confirmation(&mut self) -> Result<(), CanError> {
         while !self.settle(Instant::now())? {
-            if self.inbox.len() < INBOX {
+            if self.receive_queue.len() < RECEIVE_QUEUE {
                 let refused = self.outstanding.as_ref().is_some_and(|frame| frame.refused);
                 self.take_in(if refused { RETRY } else { SLICE })?;
             }
@@ -347,12 +347,12 @@ impl CanBus for SlcanBus {
         // What is there already is taken in even if nothing is waited for.
         let mut wait = Duration::ZERO;
         loop {
-            if let Some(frame) = self.inbox.pop_front() {
+            if let Some(frame) = self.receive_queue.pop_front() {
                 return Ok(Some(frame));
             }
             let waiting = !self.settle(Instant::now())?;
             let came = self.take_in(if waiting { wait.min(SLICE) } else { wait })?;
-            if came && !self.inbox.is_empty() {
+            if came && !self.receive_queue.is_empty() {
                 continue;
             }
             let left = deadline.map_or(timeout, |end| end.saturating_duration_since(Instant::now()));

@@ -132,7 +132,7 @@ pub(crate) fn parse_flags(line: &str) -> Option<ControllerState> {
     Some(ControllerState::without_counters(errors))
 }
 
-/// The answer to `F`. The protocol has no flag for bus-off: it is told as error passive.
+/// The answer to `F`. The protocol has no flag for bus-off, which is reported as error passive.
 pub(crate) fn flags(state: ControllerState) -> u8 {
     match state.errors {
         ErrorState::Unknown | ErrorState::Active => 0,
@@ -141,7 +141,7 @@ pub(crate) fn flags(state: ControllerState) -> u8 {
     }
 }
 
-/// A change of state that newer adapters tell by themselves, as Linux understands it: `s`, a letter, and the receive and the
+/// A change of state that newer adapters report by themselves, as Linux understands it: `s`, a letter, and the receive and the
 /// transmit error counter with three decimal digits each.
 pub(crate) fn parse_state(line: &str) -> Option<ControllerState> {
     let rest = line.strip_prefix('s').filter(|rest| rest.len() == 7 && rest.is_ascii())?;

@@ -1,4 +1,4 @@
-//! Frames to and from the kernel's, and what its error frames tell.
+//! Frames to and from the kernel's, and the state from its error frames.
 
 use socketcan::errors::ControllerProblems;
 use socketcan::id::FdFlags;
@@ -11,7 +11,7 @@ use crate::{CanFrame, ControllerState, ErrorState, Id};
 
 /// What came from the kernel.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Heard {
+pub(super) enum Received {
     Frame(CanFrame),
     State(ControllerState),
     Nothing,
@@ -35,7 +35,7 @@ pub(super) fn to_kernel(frame: &CanFrame) -> CanAnyFrame {
     raw.expect("a frame's length is one of its kind")
 }
 
-pub(super) fn from_kernel(raw: &CanAnyFrame, before: ControllerState) -> Heard {
+pub(super) fn from_kernel(raw: &CanAnyFrame, before: ControllerState) -> Received {
     let frame = match raw {
         CanAnyFrame::Normal(raw) => id(raw).and_then(|id| CanFrame::classic(id, raw.data()).ok()),
         CanAnyFrame::Remote(raw) => id(raw).and_then(|id| CanFrame::remote(id, raw.dlc()).ok()),
@@ -43,9 +43,9 @@ pub(super) fn from_kernel(raw: &CanAnyFrame, before: ControllerState) -> Heard {
             let frame = id(raw).and_then(|id| CanFrame::fd(id, raw.data()).ok());
             frame.map(|frame| frame.with_brs(raw.is_brs()))
         }
-        CanAnyFrame::Error(raw) => return Heard::State(state(*raw, before)),
+        CanAnyFrame::Error(raw) => return Received::State(state(*raw, before)),
     };
-    frame.map_or(Heard::Nothing, Heard::Frame)
+    frame.map_or(Received::Nothing, Received::Frame)
 }
 
 fn id(raw: &impl EmbeddedFrame) -> Option<Id> {
@@ -60,7 +60,7 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
     const WARNING: ControllerProblems = ControllerProblems::RX_WARNING.union(ControllerProblems::TX_WARNING);
     let error = raw.into_error();
-    let told = error.controller().and_then(|problems| {
+    let reported = error.controller().and_then(|problems| {
         if problems.intersects(PASSIVE) {
             Some(ErrorState::Passive)
         } else if problems.intersects(WARNING) {
@@ -74,17 +74,17 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     } else if error.is_restarted() {
         Some(ErrorState::Active)
     } else {
-        told
+        reported
     };
     let counters = error.counters();
     match (errors, counters) {
         (None, None) => before,
-        // Old counters say nothing of a new state.
+        // Old counters do not belong to a new state.
         (Some(errors), None) => ControllerState::without_counters(errors),
         (errors, Some((tec, rec))) => {
             let (tec, rec) = (u16::from(tec), u16::from(rec));
             let of_counters = ErrorState::of_counters(tec, rec);
-            // Eight bits cannot tell of bus-off: a controller that has left stays so until it says otherwise.
+            // Eight bits cannot express bus-off: a controller that has left stays so until it reports otherwise.
             let kept = if before.errors == ErrorState::BusOff { before.errors } else { of_counters };
             ControllerState { errors: errors.unwrap_or(kept), tec: Some(tec), rec: Some(rec) }
         }
@@ -107,7 +107,7 @@ mod tests {
         let data = [0, problems, 0, 0, 0, 0, tec, rec];
         let raw = CanErrorFrame::new_error(class, &data).unwrap();
         match from_kernel(&raw.into(), before) {
-            Heard::State(state) => state,
+            Received::State(state) => state,
             other => panic!("{other:?}"),
         }
     }
@@ -131,7 +131,7 @@ mod tests {
         }
         let passive = after(unknown, CONTROLLER | COUNTERS, 0x20, 136, 7);
         assert_eq!(passive, ControllerState::of_counters(136, 7));
-        // Counters alone tell the state, too; nothing else changes it.
+        // Counters alone give the state, too; nothing else changes it.
         assert_eq!(after(passive, COUNTERS, 0, 100, 0), ControllerState::of_counters(100, 0));
         assert_eq!(after(passive, BUS_ERROR, 0, 0, 0), passive);
         let off = after(passive, BUS_OFF | COUNTERS, 0, 248, 0);
@@ -157,7 +157,7 @@ mod tests {
             }
             .unwrap();
             let raw = to_kernel(&frame);
-            prop_assert_eq!(from_kernel(&raw, ControllerState::default()), Heard::Frame(frame));
+            prop_assert_eq!(from_kernel(&raw, ControllerState::default()), Received::Frame(frame));
             // As bytes of `struct can_frame`: identifier with its flags, length, data from byte 8 on.
             let word = frame.id().value() | u32::from(extended) << 31 | u32::from(frame.is_remote()) << 30;
             let (written, len, bytes) = match &raw {

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use socketcan::{CanFdSocket, Socket, SocketOptions};
 
 use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
-use convert::{Heard, from_kernel, to_kernel};
+use convert::{Received, from_kernel, to_kernel};
 use retry::retry_while_full;
 
 /// Error numbers of Linux.
@@ -39,7 +39,7 @@ impl SocketCanBus {
             hint: hint(&source, interface),
             source,
         };
-        // Any interface first: a kernel without CAN is told apart from a wrong name.
+        // Any interface first: a kernel without CAN gives another error than a wrong name.
         drop(CanFdSocket::open_iface(0).map_err(failed)?);
         let socket = CanFdSocket::open(interface).map_err(failed)?;
         // The kernel remembers here that the interface is down.
@@ -107,14 +107,14 @@ impl CanBus for SocketCanBus {
         loop {
             match read {
                 Ok(raw) => match from_kernel(&raw, self.state) {
-                    Heard::Frame(frame) => return Ok(Some(frame)),
-                    Heard::State(state) => {
+                    Received::Frame(frame) => return Ok(Some(frame)),
+                    Received::State(state) => {
                         let left =
                             state.errors == ErrorState::BusOff && self.state.errors != ErrorState::BusOff;
                         self.times_bus_off += u64::from(left);
                         self.state = state;
                     }
-                    Heard::Nothing => {}
+                    Received::Nothing => {}
                 },
                 Err(error) if is_no_data(&error) => {}
                 Err(error) => return Err(self.failed("receiving", error)),
@@ -152,7 +152,7 @@ mod tests {
 
     /// On any machine: a kernel without CAN and one without this interface both end in words with the next command.
     #[test]
-    fn what_cannot_be_opened_says_why_and_what_to_do() {
+    fn what_cannot_be_opened_names_the_cause_and_what_to_do() {
         let error = SocketCanBus::open("nocan17").err().expect("no such interface").to_string();
         assert!(error.contains("socketcan:nocan17"), "{error}");
         assert!(error.contains("modprobe") || error.contains("ip -brief link"), "{error}");

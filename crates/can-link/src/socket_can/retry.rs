@@ -41,7 +41,7 @@ fn is_full(error: &io::Error) -> bool {
 mod tests {
     use super::*;
 
-    /// EAGAIN, what a socket says that does not wait.
+    /// EAGAIN, the error of a socket that does not wait.
     const EAGAIN: i32 = 11;
 
     fn run(mut answers: Vec<Option<i32>>) -> (io::Result<()>, Duration, usize) {

@@ -19,11 +19,11 @@ const END_TIMEOUT: Duration = Duration::from_millis(250);
 /// Bytes of one read.
 const READ: usize = 16 * 1024;
 /// Received frames that are kept while sending waits.
-const INBOX: usize = 100_000;
+const RECEIVE_QUEUE: usize = 100_000;
 
 /// A bus behind a server of the socketcand protocol: classic data frames only.
 ///
-/// When the connection ends, [`CanBus::send`] and [`CanBus::receive`] say so with [`CanError::Closed`]; there is no
+/// When the connection ends, [`CanBus::send`] and [`CanBus::receive`] return [`CanError::Closed`]; there is no
 /// connecting again.
 pub struct SocketcandBus {
     url: String,
@@ -31,7 +31,7 @@ pub struct SocketcandBus {
     splitter: Splitter,
     /// Bytes that came together with an answer while opening.
     glued: Vec<u8>,
-    inbox: VecDeque<CanFrame>,
+    receive_queue: VecDeque<CanFrame>,
     /// What the socket is set to: `None` does not wait.
     timeout: Option<Duration>,
     closed: bool,
@@ -53,7 +53,7 @@ impl SocketcandBus {
             stream,
             splitter: Splitter::new(),
             glued: Vec::new(),
-            inbox: VecDeque::new(),
+            receive_queue: VecDeque::new(),
             timeout: Some(TIMEOUT),
             closed: false,
             errors: ErrorState::Unknown,
@@ -180,7 +180,7 @@ impl SocketcandBus {
         let mut bytes = &buffer[..count];
         while let Some(message) = self.splitter.next(&mut bytes) {
             match Reply::parse(message) {
-                Reply::Frame(frame) => self.inbox.push_back(frame),
+                Reply::Frame(frame) => self.receive_queue.push_back(frame),
                 Reply::ErrorFrame(class) if class & CLASS_BUS_OFF != 0 => {
                     self.errors = ErrorState::BusOff;
                     self.times_bus_off += 1;
@@ -207,7 +207,7 @@ impl SocketcandBus {
                 }
                 Err(error) if is_no_data(&error) && Instant::now() < give_up => {
                     // The socket may be set not to wait at all.
-                    if self.inbox.len() >= INBOX || !self.take_in(Some(SEND_SLICE))? {
+                    if self.receive_queue.len() >= RECEIVE_QUEUE || !self.take_in(Some(SEND_SLICE))? {
                         std::thread::sleep(Duration::from_micros(200));
                     }
                 }
@@ -250,7 +250,7 @@ impl CanBus for SocketcandBus {
         let deadline = Instant::now().checked_add(timeout);
         let mut wait = None;
         loop {
-            if let Some(frame) = self.inbox.pop_front() {
+            if let Some(frame) = self.receive_queue.pop_front() {
                 return Ok(Some(frame));
             }
             if self.take_in(wait)? {
@@ -264,7 +264,7 @@ impl CanBus for SocketcandBus {
         }
     }
 
-    /// The protocol only tells of bus-off and of the way back.
+    /// The protocol reports only bus-off and the way back.
     fn state(&mut self) -> ControllerState {
         ControllerState::without_counters(self.errors)
     }

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 use super::server::{Channel, Route};
-use super::session::Happened;
+use super::session::ClientAction;
 use super::{ClientId, ServerStats, SocketcandServer};
 use crate::{CanError, CanFrame, ErrorState, VirtualHub};
 
@@ -48,15 +48,15 @@ impl SocketcandGateway {
         let (sender, events) = sync_channel(WAITING);
         let channel = |(channel, name): (usize, &&str)| {
             let sender = sender.clone();
-            let tell = move |client, happened| {
-                let event = match happened {
-                    Happened::Joined => ClientEvent::Joined,
-                    Happened::Sent(frame) => ClientEvent::Frame(frame),
-                    Happened::Left => ClientEvent::Left,
+            let report = move |client, action| {
+                let event = match action {
+                    ClientAction::Joined => ClientEvent::Joined,
+                    ClientAction::Sent(frame) => ClientEvent::Frame(frame),
+                    ClientAction::Left => ClientEvent::Left,
                 };
                 sender.send(FromClient { channel, client, event }).is_ok()
             };
-            Channel { name: (*name).to_owned(), hub: VirtualHub::new(), route: Route::Host(Box::new(tell)) }
+            Channel { name: (*name).to_owned(), hub: VirtualHub::new(), route: Route::Host(Box::new(report)) }
         };
         let channels = channels.iter().enumerate().map(channel).collect();
         Ok(Self { events, server: SocketcandServer::listen(address, channels)? })
@@ -68,12 +68,12 @@ impl SocketcandGateway {
         self.events.recv_timeout(timeout).ok()
     }
 
-    /// A frame was on the bus: all clients of the channel hear it, except one (that sent it). Never waits.
+    /// A frame was on the bus: all clients of the channel receive it, except one (that sent it). Never waits.
     pub fn deliver(&self, channel: usize, frame: &CanFrame, except: Option<ClientId>) {
         self.server.deliver(channel, frame, except);
     }
 
-    /// Only this client hears a frame: for hosts where each client is a member of its own, such as of a
+    /// Only this client receives a frame: for hosts where each client is a member of its own, such as of a
     /// [`TimedBus`](crate::TimedBus). Never waits.
     pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
         self.server.deliver_to(client, frame);

@@ -17,7 +17,7 @@ const MOST_CLIENTS: usize = 64;
 /// How long the end waits for the clients' threads.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Tells clients of a server apart; never used twice.
+/// Identifies a client of a server; never used twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ClientId(u64);
 
@@ -53,7 +53,7 @@ pub(super) enum Route {
     /// Straight to the other members of the hub.
     Hub,
     /// To the host, which puts them on its bus and delivers them.
-    Host(Box<dyn Fn(ClientId, session::Happened) -> bool + Send + Sync>),
+    Host(Box<dyn Fn(ClientId, session::ClientAction) -> bool + Send + Sync>),
 }
 
 /// A bus of the server: clients are guests of the hub.

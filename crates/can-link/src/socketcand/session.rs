@@ -8,14 +8,14 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::server::{ClientId, Inner, Route};
 use super::text::{Request, Splitter, has_form, push_frame, push_state};
-use crate::virtual_bus::Heard;
+use crate::virtual_bus::Received;
 use crate::{CanBus, CanFrame, VirtualBus};
 
 /// No frame leaves so soon after the answer to `rawmode`: python-can compares all that one read gives with that answer.
 const HELD_BACK: Duration = Duration::from_millis(20);
 /// Frames that wait for a client: some seconds of a full bus.
 const WAITING: usize = 65_536;
-/// Bytes that wait in the system for a client; more would only delay what it hears.
+/// Bytes that wait in the system for a client; more would only delay what it receives.
 const SEND_BUFFER: usize = 128 * 1024;
 /// Frames in one write.
 const BATCH: usize = 64;
@@ -24,8 +24,8 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// A client that asks for nothing and has not opened a bus is gone.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// What a client did, for a host that runs the bus itself.
-pub(super) enum Happened {
+/// An action of a client, for a host that runs the bus itself.
+pub(super) enum ClientAction {
     Joined,
     Sent(CanFrame),
     Left,
@@ -33,17 +33,17 @@ pub(super) enum Happened {
 
 /// The socket as both threads write to it.
 struct Out {
-    stream: Mutex<Speaker>,
+    stream: Mutex<Output>,
 }
 
-struct Speaker {
+struct Output {
     stream: TcpStream,
     /// Frames wait until then.
     frames_from: Instant,
 }
 
 impl Out {
-    fn lock(&self) -> MutexGuard<'_, Speaker> {
+    fn lock(&self) -> MutexGuard<'_, Output> {
         self.stream.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -74,9 +74,9 @@ impl Session<'_> {
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(OPEN_TIMEOUT))?;
-        let speaker = Speaker { stream: stream.try_clone()?, frames_from: Instant::now() };
-        let out = Arc::new(Out { stream: Mutex::new(speaker) });
-        say(&out, "< hi >")?;
+        let output = Output { stream: stream.try_clone()?, frames_from: Instant::now() };
+        let out = Arc::new(Out { stream: Mutex::new(output) });
+        reply(&out, "< hi >")?;
         let mut splitter = Splitter::new();
         let mut buffer = [0; 4096];
         loop {
@@ -89,7 +89,7 @@ impl Session<'_> {
             let mut bytes = &buffer[..count];
             let noise = splitter.noise();
             while let Some(message) = splitter.next(&mut bytes) {
-                if !self.obey(Request::parse(message), &out)? {
+                if !self.execute(Request::parse(message), &out)? {
                     return Ok(());
                 }
             }
@@ -105,39 +105,39 @@ impl Session<'_> {
     }
 
     /// False ends the connection.
-    fn obey(&mut self, request: Request, out: &Arc<Out>) -> io::Result<bool> {
+    fn execute(&mut self, request: Request, out: &Arc<Out>) -> io::Result<bool> {
         match (request, &mut self.opened) {
-            (Request::Echo, _) => say(out, "< echo >")?,
+            (Request::Echo, _) => reply(out, "< echo >")?,
             (Request::Open(name), None) => return self.open(name, out),
             (Request::RawMode, Some((_, member))) => {
-                // From here on it hears the bus; what it hears waits.
+                // From here on it receives what is on the bus, which waits.
                 let member = member.second_handle();
-                let mut speaker = out.lock();
+                let mut output = out.lock();
                 member.set_deaf(false);
-                speaker.stream.write_all(b"< ok >")?;
-                speaker.frames_from = Instant::now() + HELD_BACK;
-                drop(speaker);
+                output.stream.write_all(b"< ok >")?;
+                output.frames_from = Instant::now() + HELD_BACK;
+                drop(output);
                 if self.writer.is_none() {
                     self.writer = Some(write_frames(self.inner, member, out)?);
                 }
             }
             (Request::BcmMode, Some((_, member))) => {
-                let mut speaker = out.lock();
+                let mut output = out.lock();
                 member.set_deaf(true);
-                speaker.stream.write_all(b"< ok >")?;
+                output.stream.write_all(b"< ok >")?;
             }
             (Request::Send(frame), Some((channel, member))) => {
                 self.inner.received.fetch_add(1, Ordering::Relaxed);
                 match &self.inner.channels[*channel].route {
                     Route::Hub => drop(member.send(&frame)),
-                    Route::Host(tell) => return Ok(tell(self.client, Happened::Sent(frame))),
+                    Route::Host(report) => return Ok(report(self.client, ClientAction::Sent(frame))),
                 }
             }
             // In raw mode python-can would take the first word of an error text for a number, and fail.
             _ => {
                 self.not_understood(1);
                 if self.writer.is_none() {
-                    say(out, "< error unknown command >")?;
+                    reply(out, "< error unknown command >")?;
                 }
             }
         }
@@ -150,25 +150,25 @@ impl Session<'_> {
             let names: Vec<_> = channels.iter().map(|channel| channel.name.as_str()).collect();
             let mut names = names.join(", ");
             names.truncate(names.floor_char_boundary(150));
-            say(out, &format!("< error no such bus; there is {names} >"))?;
+            reply(out, &format!("< error no such bus; there is {names} >"))?;
             return Ok(false);
         };
         let member = channels[number].hub.join_as_guest(WAITING);
         self.inner.set_opened(self.client, number, &member);
         self.opened = Some((number, member));
-        if let Route::Host(tell) = &channels[number].route
-            && !tell(self.client, Happened::Joined)
+        if let Route::Host(report) = &channels[number].route
+            && !report(self.client, ClientAction::Joined)
         {
             return Ok(false);
         }
-        say(out, "< ok >")?;
+        reply(out, "< ok >")?;
         Ok(true)
     }
 
     fn end(mut self) {
         if let Some((channel, member)) = self.opened.take() {
-            if let Route::Host(tell) = &self.inner.channels[channel].route {
-                tell(self.client, Happened::Left);
+            if let Route::Host(report) = &self.inner.channels[channel].route {
+                report(self.client, ClientAction::Left);
             }
             member.set_deaf(true);
             member.leave();
@@ -179,7 +179,7 @@ impl Session<'_> {
     }
 }
 
-fn say(out: &Out, text: &str) -> io::Result<()> {
+fn reply(out: &Out, text: &str) -> io::Result<()> {
     out.lock().stream.write_all(text.as_bytes())
 }
 
@@ -191,18 +191,18 @@ fn write_frames(
 ) -> io::Result<std::thread::JoinHandle<()>> {
     let (inner, out) = (Arc::clone(inner), Arc::clone(out));
     std::thread::Builder::new().name("socketcand frames".into()).spawn(move || {
-        let mut heard = Vec::with_capacity(BATCH);
+        let mut received = Vec::with_capacity(BATCH);
         let mut text = String::new();
-        while member.take_some(BATCH, Duration::from_secs(1), &mut heard) {
-            let (carried, not_carried) = write_batch(&heard, &mut text);
+        while member.take_some(BATCH, Duration::from_secs(1), &mut received) {
+            let (carried, not_carried) = write_batch(&received, &mut text);
             count(&inner.not_carried, not_carried);
-            if speak_frames(&out, &text).is_err() {
+            if write_text(&out, &text).is_err() {
                 // The reading thread ends with the socket.
                 let _ = out.lock().stream.shutdown(Shutdown::Both);
                 return;
             }
             count(&inner.sent, carried);
-            heard.clear();
+            received.clear();
         }
     })
 }
@@ -212,34 +212,34 @@ fn count(counter: &AtomicU64, number: usize) {
 }
 
 /// The lines of the frames and states that have a form; how many frames are there and how many are left out.
-fn write_batch(heard: &[Heard], text: &mut String) -> (usize, usize) {
+fn write_batch(received: &[Received], text: &mut String) -> (usize, usize) {
     text.clear();
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let (mut carried, mut not_carried) = (0, 0);
-    for heard in heard {
-        match heard {
-            Heard::Frame(frame) if has_form(frame) => {
+    for received in received {
+        match received {
+            Received::Frame(frame) if has_form(frame) => {
                 push_frame(text, frame, now);
                 carried += 1;
             }
-            Heard::Frame(_) => not_carried += 1,
-            Heard::State(state) => push_state(text, *state, now),
+            Received::Frame(_) => not_carried += 1,
+            Received::State(state) => push_state(text, *state, now),
         }
     }
     (carried, not_carried)
 }
 
-fn speak_frames(out: &Out, text: &str) -> io::Result<()> {
+fn write_text(out: &Out, text: &str) -> io::Result<()> {
     if text.is_empty() {
         return Ok(());
     }
     loop {
-        let mut speaker = out.lock();
-        let early = speaker.frames_from.saturating_duration_since(Instant::now());
+        let mut output = out.lock();
+        let early = output.frames_from.saturating_duration_since(Instant::now());
         if early.is_zero() {
-            return speaker.stream.write_all(text.as_bytes());
+            return output.stream.write_all(text.as_bytes());
         }
-        drop(speaker);
+        drop(output);
         std::thread::sleep(early);
     }
 }

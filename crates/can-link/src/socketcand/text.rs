@@ -115,7 +115,7 @@ fn send<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     CanFrame::classic(id, data.get(..len).filter(|_| data.len() == len)?).ok()
 }
 
-/// What a server says.
+/// A message of a server.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Reply<'a> {
     Hi,
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn what_servers_say_is_understood() {
+    fn messages_of_servers_are_understood() {
         for (text, reply) in [
             (" hi ", Reply::Hi),
             (" ok ", Reply::Ok),

@@ -38,11 +38,11 @@ impl Counters {
         }
     }
 
-    pub(crate) fn heard(&mut self) {
+    pub(crate) fn received(&mut self) {
         self.rec = if self.rec > 127 { 119 } else { self.rec.saturating_sub(1) };
     }
 
-    pub(crate) fn heard_error(&mut self) {
+    pub(crate) fn receive_error(&mut self) {
         self.rec = (self.rec + 1).min(255);
     }
 }
@@ -84,10 +84,10 @@ mod tests {
         assert!(!alone.passive());
         let mut listener = Counters::default();
         for _ in 0..1000 {
-            listener.heard_error();
+            listener.receive_error();
         }
         assert!(listener.passive() && !listener.bus_off());
-        listener.heard();
+        listener.received();
         assert_eq!(listener.state().rec, Some(119));
     }
 }

@@ -19,9 +19,9 @@ pub struct TimedEvent {
 /// An event on the bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BusEvent {
-    /// A member has heard a frame.
+    /// A member has received a frame.
     Received {
-        /// Who heard it.
+        /// The receiver.
         member: MemberId,
         /// The frame.
         frame: CanFrame,

@@ -121,7 +121,7 @@ impl TimedBus {
         self.recovers_by_itself = recovers;
     }
 
-    /// A new member. It acknowledges, hears what ends from now on, and tries again when sending fails.
+    /// A new member. It acknowledges, receives what ends from now on, and tries again when sending fails.
     pub fn join(&mut self) -> MemberId {
         self.members.push(Member {
             queue: VecDeque::new(),
@@ -173,7 +173,7 @@ impl TimedBus {
         self.members[member.0].one_shot = one_shot;
     }
 
-    /// A member that acknowledges what it hears, or does not.
+    /// A member that acknowledges what it receives, or does not.
     pub fn set_acknowledges(&mut self, member: MemberId, acknowledges: bool) {
         self.members[member.0].acknowledges = acknowledges;
     }
@@ -380,9 +380,9 @@ impl TimedBus {
 
     /// Senders do not acknowledge.
     fn acknowledged(&self, senders: &[MemberId]) -> bool {
-        let hears = |(number, member): (usize, &Member)| {
+        let acknowledges = |(number, member): (usize, &Member)| {
             member.on_bus() && member.acknowledges && !senders.contains(&MemberId(number))
         };
-        self.members.iter().enumerate().any(hears)
+        self.members.iter().enumerate().any(acknowledges)
     }
 }

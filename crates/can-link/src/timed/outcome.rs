@@ -36,7 +36,7 @@ impl TimedBus {
             }
             let involved = |number| arbitration.failed.contains(&number) || senders.contains(&number);
             for number in (0..self.members.len()).map(MemberId).filter(|number| !involved(*number)) {
-                self.count(number, Counters::heard_error);
+                self.count(number, Counters::receive_error);
             }
             return;
         }
@@ -55,7 +55,7 @@ impl TimedBus {
                 continue;
             }
             // Who fell out of a collision goes on as a listener, and so it does on the wire.
-            self.count(number, Counters::heard);
+            self.count(number, Counters::received);
             match &mut self.members[number.0].lines {
                 Some(lines) => lines.1.put(now, frame),
                 None => self.events.push_back(BusEvent::Received { member: number, frame }),

@@ -100,9 +100,9 @@ fn d46_errors_before_and_after_the_erase() {
     assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
 }
 
-/// A campaign: all boards of the inventory, one fails, the others are done; the next run only does the rest.
+/// An update session: all boards of the inventory, one fails, the others are done; the next run only does the rest.
 #[test]
-fn a_campaign_goes_on_and_is_resumed() {
+fn an_update_session_goes_on_and_is_resumed() {
     let mut sim = chain("3");
     let file = sim.file("app.bin", &image(4000, 5));
     sim.fault("silent board=2");
@@ -121,7 +121,7 @@ fn a_campaign_goes_on_and_is_resumed() {
 }
 
 fn file_in(sim: &Sim) -> String {
-    sim.file("campaign.bin", &image(4000, 6))
+    sim.file("session.bin", &image(4000, 6))
 }
 
 /// P-12: Ctrl-C in mid-block: SETSTATUS(04,00) leaves, exit code 5 after the erase, the board is usable.

@@ -39,7 +39,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         second: files.second,
         expect_program_id: args.expect_program_id,
         name_target: args.name_target,
-        // The other boards of a campaign are none the worse for one that fails.
+        // The other boards of an update session are none the worse for one that fails.
         keep_going: several,
         ..UpdateOptions::new(targets, files.image, day)
     };

@@ -10,7 +10,7 @@ use core::pin::pin;
 use core::task::Poll;
 
 use super::request::numbers;
-use super::shared::{Core, Filter, Forget, Heard, Inbox, Session};
+use super::shared::{Core, Filter, Forget, Heard, Mailbox, Session};
 use super::times::{MS, Times};
 use super::{Error, Event, ProcedureId};
 use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
@@ -92,40 +92,40 @@ impl Link {
     /// Hears these functions of these boards from now on, and their errors.
     pub(crate) fn listen(&self, boards: u32, functions: &[Function]) {
         self.with(|core| {
-            if let Some(inbox) = core.inboxes.get_mut(&self.id) {
-                inbox.filter = Filter::new(boards, functions);
-                inbox.heard.clear();
+            if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
+                mailbox.filter = Filter::new(boards, functions);
+                mailbox.heard.clear();
             }
         });
     }
 
-    /// The next frame of the inbox, or `None` when `until` has come first.
+    /// The next frame of the mailbox, or `None` when `until` has come first.
     pub(crate) async fn next(&self, until: u64) -> Option<Heard> {
-        self.next_of(until, |inbox| inbox.heard.pop_front()).await
+        self.next_of(until, |mailbox| mailbox.heard.pop_front()).await
     }
 
-    /// What `take` finds in the inbox, or `None` when `until` has come first.
-    pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Inbox) -> Option<T>) -> Option<T> {
+    /// What `take` finds in the mailbox, or `None` when `until` has come first.
+    pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Mailbox) -> Option<T>) -> Option<T> {
         poll_fn(|_| {
             self.with(|core| {
                 let fired = core.fired;
-                let Some(inbox) = core.inboxes.get_mut(&self.id) else { return Poll::Ready(None) };
-                if let Some(found) = take(inbox) {
-                    inbox.wake = None;
+                let Some(mailbox) = core.mailboxes.get_mut(&self.id) else { return Poll::Ready(None) };
+                if let Some(found) = take(mailbox) {
+                    mailbox.wake = None;
                     return Poll::Ready(Some(found));
                 }
                 if fired >= until {
-                    inbox.wake = None;
+                    mailbox.wake = None;
                     return Poll::Ready(None);
                 }
-                inbox.wake = Some(until);
+                mailbox.wake = Some(until);
                 Poll::Pending
             })
         })
         .await
     }
 
-    /// Waits; what is heard meanwhile stays in the inbox.
+    /// Waits; what is heard meanwhile stays in the mailbox.
     pub(crate) async fn sleep(&self, us: u64) {
         self.sleep_until(self.now() + us).await;
     }
@@ -135,12 +135,12 @@ impl Link {
         poll_fn(|_| {
             self.with(|core| {
                 let fired = core.fired;
-                let Some(inbox) = core.inboxes.get_mut(&self.id) else { return Poll::Ready(()) };
+                let Some(mailbox) = core.mailboxes.get_mut(&self.id) else { return Poll::Ready(()) };
                 if fired >= until {
-                    inbox.wake = None;
+                    mailbox.wake = None;
                     return Poll::Ready(());
                 }
-                inbox.wake = Some(until);
+                mailbox.wake = Some(until);
                 Poll::Pending
             })
         })
@@ -167,14 +167,14 @@ impl Link {
         let mut work = pin!(work);
         poll_fn(|context| {
             let ended = self.with(|core| {
-                let inbox = core.inboxes.get_mut(&self.id)?;
-                let gone = inbox.bus_gone.clone().map(|reason| Error::Bus { reason });
-                let cancelled = core::mem::take(&mut inbox.cancel).then_some(Error::Cancelled);
+                let mailbox = core.mailboxes.get_mut(&self.id)?;
+                let gone = mailbox.bus_gone.clone().map(|reason| Error::Bus { reason });
+                let cancelled = core::mem::take(&mut mailbox.cancel).then_some(Error::Cancelled);
                 let mut ended = gone.or(cancelled);
-                if ended.is_none() && !inbox.bears_shared_numbers {
-                    ended = core.holders.shared(inbox.claims);
+                if ended.is_none() && !mailbox.bears_shared_numbers {
+                    ended = core.holders.shared(mailbox.claims);
                     // What follows undoes something.
-                    inbox.bears_shared_numbers = ended.is_some();
+                    mailbox.bears_shared_numbers = ended.is_some();
                 }
                 if ended.is_some() {
                     core.forget_queued(self.id);
@@ -256,8 +256,8 @@ impl Link {
     /// From now on two boards with one number do not end this procedure, or do.
     pub(crate) fn bear_shared_numbers(&self, bears: bool) {
         self.with(|core| {
-            if let Some(inbox) = core.inboxes.get_mut(&self.id) {
-                inbox.bears_shared_numbers = bears;
+            if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
+                mailbox.bears_shared_numbers = bears;
             }
         });
     }

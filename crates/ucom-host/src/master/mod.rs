@@ -87,7 +87,7 @@ pub use stop::StopLevel;
 use io::{DescriptionKey, IoDescription, Kind, ParValue};
 use link::{Link, lock};
 use procedures::{Work, work};
-use shared::{Core, Inbox, Session};
+use shared::{Core, Mailbox, Session};
 use ucom::{BoardInfo, Foreign, Frame, Profile};
 
 /// A board as it answered PC_INFO.
@@ -120,13 +120,13 @@ impl Master {
         {
             let mut core = lock(&self.core);
             core.advance(now);
-            if let Some(other) = core.inboxes.values().find(|inbox| inbox.claims & claims != 0) {
+            if let Some(other) = core.mailboxes.values().find(|mailbox| mailbox.claims & claims != 0) {
                 let shared = other.claims & claims;
                 let boards = (0..32).filter(|b| shared >> b & 1 == 1).collect();
                 return Err(Error::Busy { boards, with: other.name });
             }
             let bears_shared_numbers = request.bears_shared_numbers();
-            core.inboxes.insert(id, Inbox { name, claims, bears_shared_numbers, ..Default::default() });
+            core.mailboxes.insert(id, Mailbox { name, claims, bears_shared_numbers, ..Default::default() });
         }
         self.next_id += 1;
         let link = Link { core: self.core.clone(), id };
@@ -137,8 +137,8 @@ impl Master {
 
     /// Ends a procedure; what it has to undo on the boards it still does, then [`Event::Done`] comes.
     pub fn cancel(&mut self, id: ProcedureId) {
-        if let Some(inbox) = lock(&self.core).inboxes.get_mut(&id) {
-            inbox.cancel = true;
+        if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
+            mailbox.cancel = true;
         }
         self.run();
     }
@@ -146,8 +146,8 @@ impl Master {
     /// The bus is gone: ends a procedure without another frame. [`Event::Done`] comes at once: an update's with what
     /// is known of each board, the conformance tests' with those that were done, any other's with [`Error::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
-        if let Some(inbox) = lock(&self.core).inboxes.get_mut(&id) {
-            inbox.bus_gone = Some(reason.into());
+        if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
+            mailbox.bus_gone = Some(reason.into());
         }
         self.run();
     }
@@ -186,7 +186,7 @@ impl Master {
         if !core.idle() {
             return Some(core.now);
         }
-        let waiting = core.inboxes.values().filter_map(|inbox| inbox.wake);
+        let waiting = core.mailboxes.values().filter_map(|mailbox| mailbox.wake);
         waiting.chain(core.duties_deadline()).min()
     }
 
@@ -209,7 +209,7 @@ impl Master {
             Poll::Ready(result) => {
                 let mut core = lock(&core);
                 core.forget_queued(*id);
-                core.inboxes.remove(id);
+                core.mailboxes.remove(id);
                 core.event(Event::Done { id: *id, result });
                 false
             }
@@ -250,7 +250,7 @@ impl Master {
 
     /// Sets an input of a described board: sent at once, and repeated while the board runs (D-34).
     pub fn set_input(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, Error> {
-        let index = self.edge(now, board, Kind::Ci, name)?;
+        let index = self.signal(now, board, Kind::Ci, name)?;
         let mut core = lock(&self.core);
         if let Some(data) = core.data.get_mut(&board)
             && let Some(place) = data.ci.get_mut(usize::from(index))
@@ -263,12 +263,12 @@ impl Master {
 
     /// Writes a parameter of a described board; there is no answer, the shadow takes it as assumed (D-35).
     pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, Error> {
-        let index = self.edge(now, board, Kind::Par, name)?;
+        let index = self.signal(now, board, Kind::Par, name)?;
         lock(&self.core).send_parameter(board, index, value);
         Ok(index)
     }
 
-    fn edge(&mut self, now: u64, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
+    fn signal(&mut self, now: u64, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
         lock(&self.core).advance(now);
         let description = self.description(board).ok_or(Error::NoApplication { board, valid: true })?;
         description.find(board, kind, name)

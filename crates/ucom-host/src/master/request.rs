@@ -58,7 +58,7 @@ impl InfoCollector {
     }
 }
 
-/// One PC_INFO, not repeated. The inbox must listen to DSP_INFO.
+/// One PC_INFO, not repeated. The mailbox must listen to DSP_INFO.
 pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::Info).await;

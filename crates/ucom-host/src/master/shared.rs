@@ -1,4 +1,4 @@
-//! What all procedures share: the clock, frames on their way out, inboxes, the boards as last seen.
+//! What all procedures share: the clock, frames on their way out, mailboxes, the boards as last seen.
 
 use super::boards::Boards;
 use super::error::LastHeard;
@@ -48,7 +48,7 @@ impl Filter {
 
 /// What a procedure has heard and waits for.
 #[derive(Debug, Default)]
-pub(crate) struct Inbox {
+pub(crate) struct Mailbox {
     pub name: &'static str,
     pub claims: u32,
     pub filter: Filter,
@@ -129,7 +129,7 @@ pub(crate) struct Core {
     pub data: BTreeMap<u8, ProcessData>,
     pub descriptions: BTreeMap<DescriptionKey, IoDescription>,
     pub statistics: Statistics,
-    pub inboxes: BTreeMap<ProcedureId, Inbox>,
+    pub mailboxes: BTreeMap<ProcedureId, Mailbox>,
     urgent: VecDeque<Frame>,
     normal: VecDeque<Outgoing>,
     /// Packages of inputs in `normal`, each once: the queue stays short on a bus that does not carry them all.
@@ -162,7 +162,7 @@ impl Core {
             data: BTreeMap::new(),
             descriptions: BTreeMap::new(),
             statistics: Statistics::new(profile.bitrate),
-            inboxes: BTreeMap::new(),
+            mailboxes: BTreeMap::new(),
             urgent: VecDeque::new(),
             normal: VecDeque::new(),
             waiting_inputs: BTreeSet::new(),
@@ -252,13 +252,13 @@ impl Core {
             let next = self.normal.pop_front()?;
             self.sent = next.serial;
             self.sent_at = self.now;
-            if let Some(inbox) = next.owner.and_then(|owner| self.inboxes.get_mut(&owner)) {
+            if let Some(mailbox) = next.owner.and_then(|owner| self.mailboxes.get_mut(&owner)) {
                 match next.forget {
                     Forget::Nothing => {}
-                    Forget::Answers => inbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
+                    Forget::Answers => mailbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
                     Forget::All => {
-                        inbox.heard.clear();
-                        inbox.raw.iter_mut().for_each(VecDeque::clear);
+                        mailbox.heard.clear();
+                        mailbox.raw.iter_mut().for_each(VecDeque::clear);
                     }
                 }
             }
@@ -336,9 +336,9 @@ impl Core {
     /// Gives a board's message to the procedures that want it.
     pub(crate) fn deliver(&mut self, from: u8, message: FromBoard) {
         let at = self.passed;
-        for inbox in self.inboxes.values_mut() {
-            if inbox.filter.takes(from, message.function()) && inbox.heard.len() < MAX_HEARD {
-                inbox.heard.push_back(Heard { at, from, message });
+        for mailbox in self.mailboxes.values_mut() {
+            if mailbox.filter.takes(from, message.function()) && mailbox.heard.len() < MAX_HEARD {
+                mailbox.heard.push_back(Heard { at, from, message });
             }
         }
     }
@@ -346,7 +346,7 @@ impl Core {
     /// Gives a frame as it is to the procedures that want it so.
     pub(crate) fn deliver_raw(&mut self, frame: &Frame) {
         let at = self.now;
-        for raw in self.inboxes.values_mut().filter_map(|inbox| inbox.raw.as_mut()) {
+        for raw in self.mailboxes.values_mut().filter_map(|mailbox| mailbox.raw.as_mut()) {
             if raw.len() < MAX_HEARD {
                 raw.push_back((at, *frame));
             }
@@ -355,7 +355,7 @@ impl Core {
 
     /// The procedure that has claimed a board.
     pub(crate) fn owner(&self, board: u8) -> Option<ProcedureId> {
-        self.inboxes.iter().find(|(_, inbox)| inbox.claims >> board & 1 == 1).map(|(id, _)| *id)
+        self.mailboxes.iter().find(|(_, mailbox)| mailbox.claims >> board & 1 == 1).map(|(id, _)| *id)
     }
 
     pub(crate) fn last_heard(&self, board: u8) -> Option<LastHeard> {

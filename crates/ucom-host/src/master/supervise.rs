@@ -291,7 +291,7 @@ impl Core {
         if unnumbered {
             // Without a number a board can only complain (D-06).
             if let FromBoard::Error(code) = message {
-                let during = self.inboxes.keys().next().copied();
+                let during = self.mailboxes.keys().next().copied();
                 self.event(Event::BoardError { board: from, code, during });
             } else {
                 self.statistics.undecodable += 1;

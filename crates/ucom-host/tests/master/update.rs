@@ -274,9 +274,9 @@ fn u2_running_boards() {
     assert_eq!(update(&mut bench, forced).boards[0].outcome, UpdateOutcome::Verified);
 }
 
-/// U-3, U-10: a campaign skips boards that are done; `start` ends with the application running.
+/// U-3, U-10: an update session skips boards that are done; `start` ends with the application running.
 #[test]
-fn campaign_skips_and_starts() {
+fn update_session_skips_and_starts() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     assert_eq!(update(&mut bench, options(&[2], 128)).boards[0].outcome, UpdateOutcome::Verified);
     let all = UpdateOptions { start: true, ..options(&[1, 2, 3], 128) };

@@ -123,9 +123,9 @@ fn an_abandoned_update_sends_nothing() {
     assert!(error.to_string().contains("the adapter is gone"));
 }
 
-/// P-12: cancelled before the erase a campaign ends with 4: boards that are done stay done, the others have what they had.
+/// P-12: cancelled before the erase an update session ends with 4: boards that are done stay done, the others have what they had.
 #[test]
-fn p12_a_cancelled_campaign() {
+fn p12_a_cancelled_update_session() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let begun = |b: &Bench| count(b, "2C2#") >= 3;
     let report = ended(&mut bench, options(&[1, 2, 3], 128), begun, |b, id| b.master.cancel(id));

@@ -22,8 +22,8 @@ pub(super) struct Bench<'a> {
 impl Core {
     /// Keeps every frame for a procedure, or no more.
     pub(crate) fn tap(&mut self, id: ProcedureId, on: bool) {
-        if let Some(inbox) = self.inboxes.get_mut(&id) {
-            inbox.raw = on.then(Default::default);
+        if let Some(mailbox) = self.mailboxes.get_mut(&id) {
+            mailbox.raw = on.then(Default::default);
         }
     }
 }
@@ -31,7 +31,7 @@ impl Core {
 impl Link {
     /// The next frame as it is, or `None` when `until` has come first.
     async fn next_raw(&self, until: u64) -> Option<(u64, Frame)> {
-        self.next_of(until, |inbox| inbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
+        self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }
 }
 

@@ -1,6 +1,6 @@
 //! One board: attempts, each from its exloader to the read-back (U-4 to U-10).
-use super::campaign::{Campaign, Stage};
 use super::plan::UpdatePlan;
+use super::session::{Stage, UpdateSession};
 use super::transfer::{Attempt, Broken, Transferred};
 use super::{UpdateFailure, UpdateOutcome};
 use crate::master::Error;
@@ -20,18 +20,23 @@ pub(super) async fn shows(link: &Link, board: u8, plan: &UpdatePlan) -> bool {
 }
 
 /// One board, from attempt number `first` on.
-pub(super) async fn one(link: &Link, run: &mut Campaign, board: u8, first: u32) -> Result<(), Error> {
-    let plan = run.plan(link, Some(board))?;
+pub(super) async fn one(
+    link: &Link,
+    session: &mut UpdateSession,
+    board: u8,
+    first: u32,
+) -> Result<(), Error> {
+    let plan = session.plan(link, Some(board))?;
     let profile = link.profile();
     let mut gap_us = u64::from(profile.prog_frame_gap_us);
     let since = link.now();
     for number in first..=profile.prog_attempts.max(first) {
-        run.begin(board);
-        if let Some(result) = run.result(board) {
+        session.begin(board);
+        if let Some(result) = session.result(board) {
             result.attempts = number;
         }
-        let again = attempt(link, run, board, &plan, number, gap_us).await;
-        if let Some(result) = run.result(board) {
+        let again = attempt(link, session, board, &plan, number, gap_us).await;
+        if let Some(result) = session.result(board) {
             result.time_us = link.now().saturating_sub(since);
         }
         match again {
@@ -46,15 +51,15 @@ pub(super) async fn one(link: &Link, run: &mut Campaign, board: u8, first: u32) 
             link.note(format!("board {board}: attempt {number} failed, once more"));
         }
     }
-    run.active.retain(|b| *b != board);
+    session.active.retain(|b| *b != board);
     Ok(())
 }
 
 /// The board that was checked, in its exloader with programming enabled.
 ///
 /// Asked before each XRESET: since the check, or the attempt before, another board may have been put in its place.
-pub(super) async fn enter(link: &Link, run: &Campaign, board: u8) -> Result<(), Error> {
-    let flash_number = run.flash_number(board);
+pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Result<(), Error> {
+    let flash_number = session.flash_number(board);
     if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
         && seen.flash_number != wanted
     {
@@ -82,42 +87,42 @@ async fn leave_programming(link: &Link, board: u8) {
 /// One attempt with one board; `Some`: it failed in a way that another attempt may heal (the result says how).
 async fn attempt(
     link: &Link,
-    run: &mut Campaign,
+    session: &mut UpdateSession,
     board: u8,
     plan: &UpdatePlan,
     number: u32,
     gap_us: u64,
 ) -> Option<Broken> {
-    if let Err(error) = enter(link, run, board).await {
-        run.fail_with(board, error);
+    if let Err(error) = enter(link, session, board).await {
+        session.fail_with(board, error);
         return None;
     }
     let to = link.board(board).ok()?;
     let since = link.now();
     let boards = vec![board];
     let attempt = Attempt { link, plan, to, boards, number, gap_us, since };
-    let Transferred { broken, .. } = attempt.run(|_, _| run.reach(board, Stage::Erased)).await;
-    judge(link, run, board, plan, number, broken.first().map(|(_, b)| *b)).await
+    let Transferred { broken, .. } = attempt.run(|_, _| session.reach(board, Stage::Erased)).await;
+    judge(link, session, board, plan, number, broken.first().map(|(_, b)| *b)).await
 }
 
 /// Read-back, or what an early end means.
 pub(super) async fn judge(
     link: &Link,
-    run: &mut Campaign,
+    session: &mut UpdateSession,
     board: u8,
     plan: &UpdatePlan,
     attempts: u32,
     broken: Option<Broken>,
 ) -> Option<Broken> {
-    let erased = run.may_be_erased(board);
+    let erased = session.may_be_erased(board);
     let failure = match broken {
         None => {
-            verify(link, run, board, plan).await;
+            verify(link, session, board, plan).await;
             return None;
         }
         Some(Broken::NoFinish { .. }) if shows(link, board, plan).await => {
             // U-9: only DSP_PROGFINISHED was lost.
-            verify(link, run, board, plan).await;
+            verify(link, session, board, plan).await;
             return None;
         }
         Some(Broken::NoFinish { waited_ms }) => {
@@ -136,69 +141,69 @@ pub(super) async fn judge(
     leave_programming(link, board).await;
     // Another board that has taken the number since complains of program data, or takes them out of turn.
     if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
-        run.fail_with(board, error);
+        session.fail_with(board, error);
         return None;
     }
-    run.fail(board, failure);
+    session.fail(board, failure);
     // U-7: the image or the board is wrong, another attempt would end the same.
     let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
     broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
 }
 
 /// U-10: the board must show the new program; then, if wanted, it must run.
-pub(super) async fn verify(link: &Link, run: &mut Campaign, board: u8, plan: &UpdatePlan) {
-    run.reach(board, Stage::Written);
+pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) {
+    session.reach(board, Stage::Written);
     let known = match confirmed(link, board).await {
         Ok(seen) => seen.info,
         // The board said that it is done; only the read-back is missing.
-        Err(e) => return run.fail_with(board, e),
+        Err(e) => return session.fail_with(board, e),
     };
     // Whoever shares the number was written, too, or is what has just answered.
     if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
-        return run.fail_with(board, error);
+        return session.fail_with(board, error);
     }
-    if let Some(result) = run.result(board) {
+    if let Some(result) = session.result(board) {
         result.after = Some(known);
     }
     let BoardInfo { program_id, date, status, .. } = known;
     let outcome = match plan.expected {
         Some(_) if has(&known, plan) => {
-            run.reach(board, Stage::Verified);
+            session.reach(board, Stage::Verified);
             UpdateOutcome::Verified
         }
         Some(wanted) => {
             let (wanted_id, wanted_date) = (wanted.program_id, wanted.date);
             let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
-            return run.fail(board, failure);
+            return session.fail(board, failure);
         }
         // Nobody knows what the board must show; it must show an application at least, and not run another one.
         None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
-        None => return run.fail(board, UpdateFailure::NotValid { program_id, date, status }),
+        None => return session.fail(board, UpdateFailure::NotValid { program_id, date, status }),
     };
-    run.end(board, outcome, None);
-    if run.options.start {
-        start(link, run, board, &known).await;
+    session.end(board, outcome, None);
+    if session.options.start {
+        start(link, session, board, &known).await;
     }
 }
 
 /// Starts the application of a board that shows `known`, and sees that it runs.
-pub(super) async fn start(link: &Link, run: &mut Campaign, board: u8, known: &BoardInfo) {
-    run.begin(board);
-    run.starting = Some(board);
+pub(super) async fn start(link: &Link, session: &mut UpdateSession, board: u8, known: &BoardInfo) {
+    session.begin(board);
+    session.starting = Some(board);
     let started = match start_application(link, board).await {
         Ok(_) => info(link, board).await,
         Err(e) => Err(e),
     };
     match started {
         Ok(seen) if identity(&seen.info) == identity(known) && seen.info.status.has(Status::MSTART) => {
-            run.end(board, UpdateOutcome::Running, None);
+            session.end(board, UpdateOutcome::Running, None);
         }
         Ok(seen) => {
             let what = "the application does not run";
             let error = Error::NotReached { board, what, waited_ms: 0, status: seen.info.status };
-            run.fail(board, UpdateFailure::NotRunning(Box::new(error)));
+            session.fail(board, UpdateFailure::NotRunning(Box::new(error)));
         }
-        Err(e) => run.fail(board, UpdateFailure::NotRunning(Box::new(e))),
+        Err(e) => session.fail(board, UpdateFailure::NotRunning(Box::new(e))),
     }
-    run.starting = None;
+    session.starting = None;
 }

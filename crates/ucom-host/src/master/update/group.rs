@@ -1,7 +1,7 @@
 //! Several boards at once, by broadcast PC_PROG: each board with PROG = 1 takes it, so all others must be known not to.
 use super::board::{enter, has, judge, one, verify};
-use super::campaign::{Campaign, Stage};
 use super::procedure::refuse;
+use super::session::{Stage, UpdateSession};
 use super::transfer::{Attempt, Broken, Transferred};
 use crate::master::Error;
 use crate::master::link::Link;
@@ -13,26 +13,26 @@ use ucom::{Sequence, Status, ToBoard};
 /// All open boards at once by broadcast; those that fall behind get attempts of their own.
 ///
 /// Where the broadcast could reach a board that must not have it, boards stay open and are updated one by one.
-pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> {
+pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
         return Ok(());
     };
-    let selected = run.open();
+    let selected = session.open();
     if let Err(error) = silence_others(link, &selected).await {
-        refuse(run, &error);
+        refuse(session, &error);
         return Ok(());
     }
-    let plan = run.plan(link, None)?;
+    let plan = session.plan(link, None)?;
     let since = link.now();
-    let (boards, stray) = gather(link, run, &selected).await;
+    let (boards, stray) = gather(link, session, &selected).await;
     if stray {
         link.note("a board that does not answer may listen: no broadcast, the others one by one".into());
         // Those that came up stay at work: a cancel takes them out of programming.
         return Ok(());
     }
     for board in &boards {
-        if let Some(result) = run.result(*board) {
+        if let Some(result) = session.result(*board) {
             result.attempts = 1;
         }
     }
@@ -41,14 +41,14 @@ pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> 
     let attempt =
         Attempt { link, plan: &plan, to: broadcast, boards, number: 1, gap_us, since: since_transfer };
     let erasing = |boards: &[u8], left: &[(u8, Broken)]| {
-        boards.iter().for_each(|board| run.reach(*board, Stage::Erased));
+        boards.iter().for_each(|board| session.reach(*board, Stage::Erased));
         let listening = left.iter().filter(|(_, why)| !why.ended_transfer());
-        listening.for_each(|(board, _)| run.reach(*board, Stage::MaybeErased));
+        listening.for_each(|(board, _)| session.reach(*board, Stage::MaybeErased));
     };
     let Transferred { finished, broken } = attempt.run(erasing).await;
     for board in finished {
-        judge(link, run, board, &plan, 1, None).await;
-        if let Some(result) = run.result(board) {
+        judge(link, session, board, &plan, 1, None).await;
+        if let Some(result) = session.result(board) {
             result.time_us = link.now().saturating_sub(since);
         }
     }
@@ -56,22 +56,24 @@ pub(super) async fn group(link: &Link, run: &mut Campaign) -> Result<(), Error> 
         if !why.ended_transfer()
             && let Ok(seen) = confirmed(link, board).await
         {
-            let had = run.before(board).is_some_and(|before| has(&before, &plan));
+            let had = session.before(board).is_some_and(|before| has(&before, &plan));
             if has(&seen.info, &plan) && !had {
                 // A board whose READY was lost may have gone on with the others and be done. One that had this program
                 // before proves nothing by it.
-                verify(link, run, board, &plan).await;
+                verify(link, session, board, &plan).await;
                 continue;
             }
-            let same = run.before(board).is_some_and(|before| identity(&before) == identity(&seen.info));
+            let same = session.before(board).is_some_and(|before| identity(&before) == identity(&seen.info));
             if same && seen.info.has_application() {
-                run.proved_untouched(board);
-            } else if run.stage(board) == Stage::MaybeErased {
-                run.reach(board, Stage::Erased);
+                session.proved_untouched(board);
+            } else if session.stage(board) == Stage::MaybeErased {
+                session.reach(board, Stage::Erased);
             }
         }
-        if judge(link, run, board, &plan, 1, Some(why)).await.is_some() && link.profile().prog_attempts > 1 {
-            one(link, run, board, 2).await?;
+        if judge(link, session, board, &plan, 1, Some(why)).await.is_some()
+            && link.profile().prog_attempts > 1
+        {
+            one(link, session, board, 2).await?;
         }
     }
     Ok(())
@@ -100,15 +102,15 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
 
 /// The selected boards in their exloaders. `true`: one failed, and did not say that it left programming either: it would
 /// be erased by the group's frames unnoticed.
-async fn gather(link: &Link, run: &mut Campaign, selected: &[u8]) -> (Vec<u8>, bool) {
+async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {
-        run.active.push(*board);
-        match enter(link, run, *board).await {
+        session.active.push(*board);
+        match enter(link, session, *board).await {
             Ok(()) => boards.push(*board),
             Err(error) => {
                 stray |= set_status(link, *board, Status::PROG, Status(0)).await.is_err();
-                run.fail_with(*board, error);
+                session.fail_with(*board, error);
             }
         }
     }

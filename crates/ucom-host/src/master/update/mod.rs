@@ -1,12 +1,12 @@
 //! Firmware update: the image twice in blocks of 64 bytes, checked first, written then, read back last (D-40 to D-46).
 
 mod board;
-mod campaign;
 mod failure;
 mod group;
 mod plan;
 mod procedure;
 mod report;
+mod session;
 mod transfer;
 
 pub use failure::UpdateFailure;

@@ -1,4 +1,4 @@
-//! What an update knows of its boards at any moment: what must survive a cancel or a bus that fails.
+//! The update session: the state of all boards of an update, which survives a cancel and a bus that fails.
 
 use super::plan::UpdatePlan;
 use super::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateResult};
@@ -8,7 +8,7 @@ use crate::master::link::Link;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Header};
 
-/// How far the memory of a board has changed. It only grows, but for [`Campaign::proved_untouched`].
+/// How far the memory of a board has changed. It only grows, but for [`UpdateSession::proved_untouched`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
     /// It has what it had.
@@ -24,8 +24,8 @@ pub(super) enum Stage {
     Verified,
 }
 
-/// All boards of an update.
-pub(super) struct Campaign {
+/// The state of all boards of an update.
+pub(super) struct UpdateSession {
     pub options: UpdateOptions,
     pub results: Vec<UpdateResult>,
     /// Boards between XRESET and their end.
@@ -39,7 +39,7 @@ pub(super) struct Campaign {
     stages: BTreeMap<u8, Stage>,
 }
 
-impl Campaign {
+impl UpdateSession {
     pub fn new(options: UpdateOptions) -> Self {
         let results = options.targets.iter().map(|t| UpdateResult::new(t.board)).collect();
         let (active, to_start, programming) = (Vec::new(), Vec::new(), Vec::new());

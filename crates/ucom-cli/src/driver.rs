@@ -12,11 +12,11 @@ use ucom_host::master::{
 
 use crate::args::{Boards, LinkArgs};
 use crate::bus_off;
+use crate::cleanup::CleanupList;
 use crate::commands::conformance::told;
 use crate::failure::{FAULT, Failure, NO_LINK, exit};
 use crate::link::Link;
 use crate::pump::{LOOK, Pump};
-use crate::signal::Undone;
 
 /// The PC side on an open bus.
 pub struct Driver {
@@ -25,7 +25,7 @@ pub struct Driver {
     link: Link,
     pump: Pump,
     stop: Stop,
-    undone: Undone,
+    cleanup: CleanupList,
     notes: Lines,
     lost: RefCell<Vec<Loss>>,
 }
@@ -44,10 +44,10 @@ impl Driver {
 
     /// The same with another profile than the command line's.
     pub fn with_profile(args: &LinkArgs, profile: Profile) -> Result<Self, Failure> {
-        let undone = Undone::default();
-        let (stop, notes) = (undone.listen()?, Lines::stderr()?);
+        let cleanup = CleanupList::default();
+        let (stop, notes) = (cleanup.listen()?, Lines::stderr()?);
         let (master, link, pump) = (Master::new(profile), args.open()?, Pump::default());
-        Ok(Self { master, link, pump, stop, undone, notes, lost: RefCell::default() })
+        Ok(Self { master, link, pump, stop, cleanup, notes, lost: RefCell::default() })
     }
 
     /// µs since the bus was opened.
@@ -101,13 +101,13 @@ impl Driver {
         can_be_cancelled: bool,
         see: &mut dyn FnMut(&Event),
     ) -> Result<Outcome, Failure> {
-        self.undone.begin(&request);
+        self.cleanup.begin(&request);
         let times_off = self.link.times_bus_off();
         let result = match self.master.start(self.link.now_us(), request.clone()) {
             Ok(id) => self.finish(id, can_be_cancelled, see),
             Err(error) => Err(error.into()),
         };
-        self.undone.end(&request, result.is_ok());
+        self.cleanup.end(&request, result.is_ok());
         // Who does not answer may never have been asked.
         result.map_err(|failure| match self.link.times_bus_off() > times_off && failure.exit == NO_LINK {
             true => {
@@ -162,7 +162,7 @@ impl Driver {
 
     /// What was started has been stopped.
     pub fn nothing_is_left(&self) {
-        self.undone.forget();
+        self.cleanup.forget();
     }
 
     /// A line on stderr.

@@ -4,13 +4,13 @@
 mod args;
 mod bus_off;
 mod cache;
+mod cleanup;
 mod commands;
 mod driver;
 mod failure;
 mod link;
 mod pump;
 mod shape;
-mod signal;
 mod values;
 mod words;
 mod written;
@@ -23,7 +23,7 @@ use cli_kit::Output;
 use args::Cli;
 
 /// At the end, a reader that takes nothing for so long is not waited for.
-const PATIENCE: Duration = Duration::from_secs(1);
+const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
 fn main() -> ExitCode {
     let cli: Cli = match cli_kit::usage::parse("ucom", "UCOM_JSON") {
@@ -38,7 +38,7 @@ fn main() -> ExitCode {
             Some(why) => {
                 let exit = if acts { failure::FAULT } else { failure::USAGE };
                 let text = format!("ucom: the result could not be printed: {why}");
-                signal::say_at_most(PATIENCE, move || out.note(text));
+                cleanup::print_within(PRINT_TIMEOUT, move || out.note(text));
                 ExitCode::from(exit)
             }
         },
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
                 // Nobody reads what stands in stdout already.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 let exit = failure.exit;
-                signal::say_at_most(PATIENCE, move || {
+                cleanup::print_within(PRINT_TIMEOUT, move || {
                     out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
                 });
                 return ExitCode::from(exit);

@@ -11,9 +11,9 @@ use ucom_host::files::recording::{CandumpReader, Record, RecordedFrame, Recordin
 
 use super::record::tell_broken_off;
 use crate::args::{DecodeArgs, LinkArgs};
+use crate::cleanup::CleanupList;
 use crate::failure::Failure;
 use crate::link::{protocol_frame, recorded};
-use crate::signal::Undone;
 use crate::words::Decoder;
 
 /// Lines that are read before they are decoded, at most.
@@ -29,7 +29,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     let stdin = args.file.as_os_str() == "-";
     let mut profile = link.profile()?;
-    let stop = Undone::default().listen()?;
+    let stop = CleanupList::default().listen()?;
     let records: Box<dyn Iterator<Item = Result<Record, Failure>>> = if stdin {
         Box::new(heard(&stop)?)
     } else {
@@ -62,7 +62,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
 }
 
 fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = Undone::default().listen()?;
+    let stop = CleanupList::default().listen()?;
     let mut decoder = Decoder::new(link.profile()?);
     let mut bus = link.open()?;
     while left > 0 && !stop.asked() && !Output::gone() {

@@ -14,10 +14,10 @@ use ucom_host::master::{Master, counted};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
+use crate::cleanup::CleanupList;
 use crate::driver::shared_numbers;
 use crate::failure::{FAULT, Failure};
 use crate::link::{Link, protocol_frame, recorded, replayed};
-use crate::signal::Undone;
 use crate::words::Decoder;
 
 /// So often what was recorded reaches the file: a recorder that is killed loses no more.
@@ -61,7 +61,7 @@ pub fn tell_broken_off(recording: &Recording, file: &Path, out: &Output) {
 
 /// Records until Ctrl-C, so long, or so many frames.
 pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = Undone::default().listen()?;
+    let stop = CleanupList::default().listen()?;
     let profile = link.profile()?;
     let stdout = args.file.as_os_str() == "-";
     let format = RecordingFormat::of_path(&args.file);
@@ -155,11 +155,11 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let intrusive = |record: &Record| is_intrusive(&record.frame);
     let (guarded, due): (Vec<&Record>, Vec<&Record>) =
         recording.records.iter().partition(|record| !args.intrusive && intrusive(record));
-    let undone = Undone::default();
-    let stop = undone.listen()?;
+    let cleanup = CleanupList::default();
+    let stop = cleanup.listen()?;
     let mut bus = link.open()?;
     if args.intrusive {
-        undone.begin_other("what the boards took of the recording is not known", "ucom scan");
+        cleanup.begin_other("what the boards took of the recording is not known", "ucom scan");
     }
     let sent = play(&due, args.speed, &mut bus, &stop, out)?;
     let value = json!({ "sent": sent, "left_out": guarded.len(), "frames": recording.records.len(), "broken_off": recording.broken_off });

@@ -16,9 +16,9 @@ use ucom_host::master::counted;
 use ucom_sim::{ChainConfig, ChainSim, Fault};
 
 use crate::args::{LinkArgs, SimArgs};
+use crate::cleanup::CleanupList;
 use crate::failure::Failure;
 use crate::link::to_wire;
-use crate::signal::Undone;
 
 /// The name of the bus.
 const CHANNEL: &str = "can0";
@@ -29,7 +29,7 @@ const CATCH_UP_US: u64 = 200_000;
 
 /// Serves a simulated chain until SIGINT or SIGTERM.
 pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = Undone::default().listen()?;
+    let stop = CleanupList::default().listen()?;
     let profile = link.profile()?;
     let config = config(args, &profile)?;
     let faults = match &args.faults {

@@ -12,7 +12,7 @@ use crate::failure::{FAULT, Failure};
 /// Steps that wait to be drawn; more are left out.
 const WAITING: usize = 4;
 /// At the end, a terminal that takes nothing for so long is not waited for.
-const PATIENCE: Duration = Duration::from_secs(1);
+const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// What is drawn next.
 struct Step {
@@ -71,7 +71,7 @@ impl<'a> Bar<'a> {
         let Self { steps, ended, .. } = self;
         drop(steps);
         // The thread never sends; it ends.
-        let _ = ended.recv_timeout(PATIENCE);
+        let _ = ended.recv_timeout(PRINT_TIMEOUT);
     }
 }
 

@@ -1,5 +1,5 @@
-//! Ctrl-C: the first one cancels, and what is begun is brought to an end; the second one ends the process at once, and says
-//! what is left undone.
+//! The cleanup list, for Ctrl-C: the first one cancels, and what is begun is brought to an end; the second one ends the process
+//! at once, and prints what is left undone and the command that does it.
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -10,20 +10,20 @@ use cli_kit::Stop;
 use cli_kit::exit::FAULT;
 use ucom_host::master::{Request, StopLevel};
 
-/// What is left undone if the process ends now: what, and the next command.
-type Left = (String, String);
+/// What is left undone if the process ends now, and the next command.
+type Cleanup = (String, String);
 
-/// Who does not read what is said is not waited for longer.
-const PATIENCE: Duration = Duration::from_millis(300);
+/// A reader that does not take what is printed is not waited for longer.
+const PRINT_TIMEOUT: Duration = Duration::from_millis(300);
 
-/// What a command has begun, as the thread that hears Ctrl-C sees it.
+/// What a command has begun and would leave undone, as the thread that receives Ctrl-C sees it.
 #[derive(Clone, Debug, Default)]
-pub struct Undone(Arc<Mutex<State>>);
+pub struct CleanupList(Arc<Mutex<State>>);
 
 #[derive(Debug, Default)]
 struct State {
     /// What the requests under way leave undone, the outermost first.
-    now: Vec<Option<Left>>,
+    now: Vec<Option<Cleanup>>,
     /// Boards that run, by a request that has ended.
     running: Vec<u8>,
     /// Boards that were started by requests that have ended.
@@ -35,7 +35,7 @@ struct State {
 impl State {
     fn words(&self) -> String {
         // What is done with boards that run does not hide that they do.
-        let runs = (!self.running.is_empty()).then(|| left_running(&self.running));
+        let runs = (!self.running.is_empty()).then(|| cleanup_of_running(&self.running));
         let under_way = self.now.iter().flatten().next().cloned().filter(|_| runs.is_none());
         let started: Vec<String> =
             self.started.iter().filter(|b| !self.running.contains(b)).map(u8::to_string).collect();
@@ -43,26 +43,26 @@ impl State {
             let what = format!("started before and not stopped: {}", started.join(", "));
             (what, format!("ucom stop {}", started.join(",")))
         });
-        let left: Vec<Left> = [runs, under_way, started].into_iter().flatten().collect();
-        if left.is_empty() {
+        let steps: Vec<Cleanup> = [runs, under_way, started].into_iter().flatten().collect();
+        if steps.is_empty() {
             let what = if self.changed { "what was begun is complete" } else { "nothing was changed" };
             return format!("ucom: ended at once; {what}\n");
         }
         let lines =
-            left.iter().map(|(what, next)| format!("ucom: ended at once: {what}\n      next: {next}\n"));
+            steps.iter().map(|(what, next)| format!("ucom: ended at once: {what}\n      next: {next}\n"));
         lines.collect()
     }
 }
 
-impl Undone {
-    /// From now on Ctrl-C is heard.
+impl CleanupList {
+    /// Handles Ctrl-C from now on.
     pub fn listen(&self) -> std::io::Result<Stop> {
-        let undone = self.clone();
+        let cleanup = self.clone();
         Stop::listen_with(move || {
-            let words = undone.lock().words();
+            let words = cleanup.lock().words();
             // Files that were made and not written.
             cli_kit::output_file::abandon();
-            say_at_most(PATIENCE, move || {
+            print_within(PRINT_TIMEOUT, move || {
                 let _ = std::io::stderr().write_all(words.as_bytes());
             });
             FAULT
@@ -78,10 +78,10 @@ impl Undone {
 
     /// A request begins.
     pub fn begin(&self, request: &Request) {
-        let left = left_by(request);
+        let cleanup = cleanup_of(request);
         let mut state = self.lock();
-        state.changed |= left.is_some();
-        state.now.push(left);
+        state.changed |= cleanup.is_some();
+        state.now.push(cleanup);
     }
 
     /// The request that began last has ended: boards that it started or that run are undone until they are stopped.
@@ -112,20 +112,20 @@ impl Undone {
     }
 }
 
-/// Prints in a thread of its own, and waits for that no longer than `patience`: a pipe that nobody reads (`2>&1 | less`)
+/// Prints in a thread of its own, and waits for that no longer than `timeout`: a pipe that nobody reads (`2>&1 | less`)
 /// does not keep the process from ending.
-pub fn say_at_most(patience: Duration, say: impl FnOnce() + Send + 'static) {
-    let (said, heard) = std::sync::mpsc::channel();
+pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
+    let (done, printed) = std::sync::mpsc::channel();
     let spawned = std::thread::Builder::new().name("last words".into()).spawn(move || {
-        say();
-        let _ = said.send(());
+        print();
+        let _ = done.send(());
     });
     if spawned.is_ok() {
-        let _ = heard.recv_timeout(patience);
+        let _ = printed.recv_timeout(timeout);
     }
 }
 
-fn left_running(boards: &[u8]) -> Left {
+fn cleanup_of_running(boards: &[u8]) -> Cleanup {
     let list = |separator: &str| boards.iter().map(u8::to_string).collect::<Vec<_>>().join(separator);
     let what = match boards.len() {
         1 => "may run; without heartbeats it becomes safe by itself",
@@ -139,7 +139,7 @@ fn several(count: usize, list: &str) -> String {
 }
 
 /// What a request may leave undone; `None`: it changes nothing.
-fn left_by(request: &Request) -> Option<Left> {
+fn cleanup_of(request: &Request) -> Option<Cleanup> {
     let (what, next) = match request {
         Request::Scan | Request::Info { .. } | Request::Describe { .. } | Request::InitialInputs { .. } => {
             return None;
@@ -158,7 +158,7 @@ fn left_by(request: &Request) -> Option<Left> {
             format!("ucom stop {board}"),
         ),
         Request::Run(options) => {
-            return Some(left_running(&options.boards.iter().map(|b| b.board).collect::<Vec<_>>()));
+            return Some(cleanup_of_running(&options.boards.iter().map(|b| b.board).collect::<Vec<_>>()));
         }
         Request::Update(options) if options.dry_run => return None,
         Request::Update(options) => {
@@ -198,63 +198,63 @@ mod tests {
     /// What was begun is undone until its end, also while something inside it goes on.
     #[test]
     fn what_is_left_undone() {
-        let undone = Undone::default();
-        assert!(undone.lock().words().contains("nothing was changed"));
+        let cleanup = CleanupList::default();
+        assert!(cleanup.lock().words().contains("nothing was changed"));
         let board = |board| RunBoard { board, ..Default::default() };
         let run = Request::Run(RunOptions { boards: vec![board(1), board(3)], ..Default::default() });
-        undone.begin(&run);
-        undone.end(&run, true);
-        undone.begin(&stop(1));
-        let words = undone.lock().words();
+        cleanup.begin(&run);
+        cleanup.end(&run, true);
+        cleanup.begin(&stop(1));
+        let words = cleanup.lock().words();
         assert!(words.contains("boards 1, 3 may run") && words.contains("ucom stop 1,3"), "{words}");
-        undone.end(&stop(1), true);
-        let words = undone.lock().words();
+        cleanup.end(&stop(1), true);
+        let words = cleanup.lock().words();
         assert!(words.contains("board 3 may run") && words.contains("ucom stop 3\n"), "{words}");
-        undone.forget();
-        undone.begin(&Request::Scan);
-        let words = undone.lock().words();
+        cleanup.forget();
+        cleanup.begin(&Request::Scan);
+        let words = cleanup.lock().words();
         assert!(words.contains("what was begun is complete"), "{words}");
     }
 
     /// Boards that earlier requests of the same command have started are named, whatever is under way.
     #[test]
     fn boards_started_before_are_named() {
-        let undone = Undone::default();
+        let cleanup = CleanupList::default();
         for board in [1, 2] {
             let start = Request::Start { board, force: false };
-            undone.begin(&start);
-            undone.end(&start, true);
+            cleanup.begin(&start);
+            cleanup.end(&start, true);
         }
-        undone.begin(&Request::Info { board: 3 });
-        let words = undone.lock().words();
+        cleanup.begin(&Request::Info { board: 3 });
+        let words = cleanup.lock().words();
         assert!(words.contains(": 1, 2\n") && words.contains("ucom stop 1,2"), "{words}");
-        undone.end(&Request::Info { board: 3 }, false);
-        undone.begin(&stop(1));
-        undone.end(&stop(1), true);
-        assert!(undone.lock().words().contains("ucom stop 2\n"));
+        cleanup.end(&Request::Info { board: 3 }, false);
+        cleanup.begin(&stop(1));
+        cleanup.end(&stop(1), true);
+        assert!(cleanup.lock().words().contains("ucom stop 2\n"));
     }
 
-    /// A dry run changes nothing, and says so.
+    /// A dry run changes nothing, which the message states.
     #[test]
     fn a_dry_run_leaves_nothing_undone() {
         for dry_run in [true, false] {
-            let undone = Undone::default();
+            let cleanup = CleanupList::default();
             let image = UpdateImage { bytes: vec![7; 64], address_words: 0 };
             let targets = vec![UpdateTarget { board: 4, flash_number: None }];
             let options = UpdateOptions { dry_run, ..UpdateOptions::new(targets, image, 0) };
-            undone.begin(&Request::Update(options));
-            let words = undone.lock().words();
+            cleanup.begin(&Request::Update(options));
+            let words = cleanup.lock().words();
             assert_eq!(words.contains("nothing was changed"), dry_run, "{words}");
             assert_eq!(words.contains("board 4 may be without a valid application"), !dry_run, "{words}");
         }
     }
 
-    /// Words that nobody takes do not keep the process.
+    /// Words without a reader do not keep the process.
     #[test]
-    fn words_that_nobody_takes_are_not_waited_for() {
+    fn words_without_a_reader_are_not_waited_for() {
         let (never, reader) = std::sync::mpsc::channel::<()>();
         let since = std::time::Instant::now();
-        say_at_most(Duration::from_millis(20), move || {
+        print_within(Duration::from_millis(20), move || {
             let _ = reader.recv();
         });
         assert!(since.elapsed() < Duration::from_secs(5));

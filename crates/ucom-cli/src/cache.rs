@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ucom::{BoardInfo, Profile};
-use ucom_host::files::{BoardEdges, EdgeTable};
+use ucom_host::files::{BoardSignals, SignalTable};
 use ucom_host::master::io::{DescriptionKey, IoDescription};
 use ucom_host::master::{Outcome, Request};
 
@@ -12,8 +12,8 @@ use crate::commands::seen;
 use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
 
-/// The edge table that is taken without being named.
-const EDGES: &str = "ucom-edges.toml";
+/// The signal table that is taken without being named.
+const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 /// A board, its names, and what its words mean.
 #[derive(Clone, Debug)]
@@ -25,8 +25,8 @@ pub struct Known {
     /// Its names.
     pub names: IoDescription,
     /// Types, scales and units.
-    pub edges: BoardEdges,
-    /// Where edge table and program do not fit.
+    pub signals: BoardSignals,
+    /// Where signal table and program do not fit.
     strays: Vec<String>,
 }
 
@@ -46,15 +46,15 @@ pub fn of_several(failure: Failure, boards: &Boards) -> Failure {
 }
 
 impl LinkArgs {
-    /// The edge table; without a file an empty one.
-    pub fn edges(&self) -> Result<EdgeTable, Failure> {
-        let here = Path::new(EDGES);
+    /// The signal table; without a file an empty one.
+    pub fn signal_table(&self) -> Result<SignalTable, Failure> {
+        let here = Path::new(SIGNAL_TABLE);
         let path = match &self.edges {
             Some(path) => path,
             None if here.exists() => here,
-            None => return Ok(EdgeTable::default()),
+            None => return Ok(SignalTable::default()),
         };
-        EdgeTable::read(path).map_err(|e| Failure::usage(e).hint("ucom help edges shows the form"))
+        SignalTable::read(path).map_err(|e| Failure::usage(e).hint("ucom help edges shows the form"))
     }
 }
 
@@ -73,16 +73,16 @@ impl CacheArgs {
 
     /// A board with its names. They are known from before, or its application runs and is asked; what cannot be kept is
     /// read anew next time: that is no error.
-    pub fn known(&self, driver: &mut Driver, table: &EdgeTable, board: u8) -> Result<Known, Failure> {
+    pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, Failure> {
         let info = seen(driver, board)?.info;
         if let Some(names) = self.kept(driver, &info) {
-            return Ok(with_edges(board, info, names, table, driver.master.profile()).told(driver));
+            return Ok(with_signals(board, info, names, table, driver.master.profile()).told(driver));
         }
         self.described(driver, table, board)
     }
 
     /// The same for a board whose application must run: it is asked, for what is kept may be of another application.
-    pub fn described(&self, driver: &mut Driver, table: &EdgeTable, board: u8) -> Result<Known, Failure> {
+    pub fn described(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, Failure> {
         let info = seen(driver, board)?.info;
         let names = match driver.run(Request::Describe { board, fresh: self.fresh })? {
             Outcome::Description { description, .. } => description,
@@ -93,7 +93,7 @@ impl CacheArgs {
         {
             let _ = std::fs::create_dir_all(directory).and_then(|()| std::fs::write(file, text));
         }
-        Ok(with_edges(board, info, names, table, driver.master.profile()).told(driver))
+        Ok(with_signals(board, info, names, table, driver.master.profile()).told(driver))
     }
 
     /// What is known of a program without asking for it.
@@ -114,37 +114,37 @@ impl CacheArgs {
 
 impl Known {
     /// The same board by the names that it has told since.
-    pub fn renamed(self, names: IoDescription, table: &EdgeTable, profile: Profile) -> Self {
-        if self.names == names { self } else { with_edges(self.board, self.info, names, table, profile) }
+    pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
+        if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }
 }
 
 impl Known {
-    /// Says where edge table and program do not fit.
+    /// Says where signal table and program do not fit.
     fn told(self, driver: &Driver) -> Self {
         for stray in &self.strays {
-            driver.note(format!("edge table: {stray}"));
+            driver.note(format!("signal table: {stray}"));
         }
         self
     }
 }
 
-fn with_edges(
+fn with_signals(
     board: u8,
     info: BoardInfo,
     names: IoDescription,
-    table: &EdgeTable,
+    table: &SignalTable,
     profile: Profile,
 ) -> Known {
     let who = format!("program 0x{:04X} (board {board})", info.program_id);
     let program = table.program(info.program_id).filter(|_| info.has_application());
     let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
     let mut strays: Vec<String> = strays.iter().map(|stray| format!("{who} has no {stray}")).collect();
-    let mut edges = BoardEdges::new(&names, program, &profile);
+    let mut signals = BoardSignals::new(&names, program, &profile);
     // Who gives a table thinks in its units: numbers for a program that is not in it would be sent as they are.
     if table.is_given() && program.is_none() && info.has_application() {
         strays.push(format!("it knows nothing of {who}"));
-        edges = edges.raw_only();
+        signals = signals.raw_only();
     }
-    Known { board, info, names, edges, strays }
+    Known { board, info, names, signals, strays }
 }

@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use ucom_host::files::EdgeTable;
-use ucom_host::files::edges::ValueError;
+use ucom_host::files::SignalTable;
+use ucom_host::files::signals::ValueError;
 use ucom_host::master::io::Kind;
 use ucom_host::master::{Outcome, Request, Setting, StopLevel};
 
@@ -13,25 +13,25 @@ use crate::cache::Known;
 use crate::driver::{Driver, unexpected};
 use crate::failure::{Failure, REFUSED};
 
-/// A word for an edge.
+/// A word for a signal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Word {
     /// Place in the buffer.
     pub index: u16,
-    /// The whole text of the edge.
+    /// The whole text of the signal.
     pub name: String,
     /// What is sent.
     pub word: u16,
-    /// The value in the edge's unit, with the unit.
+    /// The value in the signal's unit, with the unit.
     pub text: String,
     /// `0.04 → 0.0` where what was given lies between two words.
     pub rounded: Option<String>,
 }
 
 impl Word {
-    /// As the library takes it; by number, which always means this edge.
+    /// As the library takes it; by number, which always means this signal.
     pub fn setting(&self, known: &Known, kind: Kind) -> Setting {
-        // A text that means another edge cannot be its name, and numbers may be names.
+        // A text that means another signal cannot be its name, and numbers may be names.
         let by_name = known.names.find(known.board, kind, &self.name) == Ok(self.index);
         let name = if by_name { self.name.clone() } else { format!("##{}", self.index) };
         Setting { name, value: self.word }
@@ -43,13 +43,13 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
     let word = |a: &Assignment| {
         let index = known.names.find(known.board, kind, &a.name)?;
         let name = known.names.names(kind).get(usize::from(index)).cloned().unwrap_or_default();
-        let Some(edge) = known.edges.get(kind, index.into()) else {
+        let Some(signal) = known.signals.get(kind, index.into()) else {
             return Err(Failure::usage(format!("board {} has no {} {index}", known.board, kind.name())));
         };
-        let word = edge.word(&a.value).map_err(|e| {
+        let word = signal.word(&a.value).map_err(|e| {
             let hint = match e {
                 ValueError::Meaning { .. } => format!(
-                    "add program 0x{:04X} to the edge table (ucom help edges), or give the word as 0x0000",
+                    "add program 0x{:04X} to the signal table (ucom help edges), or give the word as 0x0000",
                     known.info.program_id
                 ),
                 _ => format!(
@@ -60,8 +60,8 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
             let said = format!("board {}: {} `{}`: {e}", known.board, kind.name(), a.name);
             Failure::new(REFUSED, "value", said).hint(hint)
         })?;
-        let rounded = edge.rounded(&a.value, word).map(|sent| format!("{} → {sent}", a.value));
-        Ok(Word { index, name, word, text: edge.text_with_unit(word), rounded })
+        let rounded = signal.rounded(&a.value, word).map(|sent| format!("{} → {sent}", a.value));
+        Ok(Word { index, name, word, text: signal.text_with_unit(word), rounded })
     };
     let all = values.iter().map(word).collect::<Result<Vec<_>, _>>()?;
     let earlier = |(i, word): &(usize, &Word)| all.iter().take(*i).any(|other| other.index == word.index);
@@ -124,7 +124,7 @@ impl Prepared {
         &mut self,
         driver: &mut Driver,
         cache: &CacheArgs,
-        table: &EdgeTable,
+        table: &SignalTable,
         board: u8,
         force: bool,
     ) -> Result<(), Failure> {

@@ -1,4 +1,4 @@
-//! Parameter files and edge tables against `ucom sim`.
+//! Parameter files and signal tables against `ucom sim`.
 #![cfg(unix)]
 
 mod common;
@@ -10,7 +10,7 @@ const TABLE: &str = "[program.ci]\nset_position = { scale = 0.01, unit = \"deg\"
                      [program.so]\nposition = { scale = 0.01, unit = \"deg\" }\nnobody = {}\n\
                      [program.par]\nkd = { scale = 0.1, unit = \"mA s/deg\" }\nmin_position = { scale = 0.5 }\n";
 
-/// A chain with numbers, an edge table of the first board, and all applications up.
+/// A chain with numbers, a signal table of the first board, and all applications up.
 fn started() -> (Sim, String) {
     let sim = Sim::start(&["--boards", "2"]);
     sim.ucom(&["init"]).ends(0);
@@ -21,9 +21,9 @@ fn started() -> (Sim, String) {
     (sim, table)
 }
 
-/// D-11: values are in the units of the edge table, both ways; the word itself can always be given.
+/// D-11: values are in the units of the signal table, both ways; the word itself can always be given.
 #[test]
-fn d11_values_have_the_units_of_the_edge_table() {
+fn d11_values_have_the_units_of_the_signal_table() {
     let (sim, table) = started();
     let mut peer = sim.peer();
     let ucom = |words: &[&str]| sim.ucom(&[&["--json", "--edges", &table], words].concat());
@@ -191,7 +191,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     assert!(apply(&good.replace("board: 2", "board: 7")).ends(4).err.contains("board 7: it does not answer"));
     assert!(apply(&of_second("kp: [1")).ends(2).err.contains("line"));
     assert!(apply(&of_second("kp: x")).ends(2).err.contains("board 2, `kp`"));
-    // An edge by number without quotation marks is a comment.
+    // A signal by number without quotation marks is a comment.
     let empty = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      #0: 5\n";
     assert!(apply(empty).ends(2).err.contains("no value in it"));
     sim.ucom(&["par", "3", "--apply", &file]).ends(2);

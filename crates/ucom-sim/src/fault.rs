@@ -42,7 +42,7 @@ pub enum FaultKind {
 pub enum Trigger {
     /// So many µs after the start.
     At(u64),
-    /// When the so manieth frame with this identifier was on the bus.
+    /// When the n-th frame with this identifier was on the bus.
     Frame {
         /// Identifier.
         id: u16,

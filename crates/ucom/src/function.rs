@@ -4,8 +4,8 @@ use core::fmt;
 
 use crate::frame::Foreign;
 
-/// Position of a board in the chain, 0..31. What 0 means depends on the sender (D-04): from the PC it is
-/// broadcast, from a board "I have no number yet".
+/// The node address, which the manual calls sequence number and this project number for short: the position of a board in
+/// the chain, 0..31. What 0 means depends on the sender (D-04): from the PC it is broadcast, from a board "I have no number yet".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(u8);
 

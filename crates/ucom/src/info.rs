@@ -72,7 +72,7 @@ impl Dimensions {
         Some(Self { ci: endian.word([c0, c1]), so: endian.word([s0, s1]), par: endian.word([p0, p1]) })
     }
 
-    /// Strings in a complete description: the board's and one for each edge.
+    /// Strings in a complete description: the board's and one for each signal.
     pub const fn strings(&self) -> u32 {
         1 + self.ci as u32 + self.so as u32 + self.par as u32
     }

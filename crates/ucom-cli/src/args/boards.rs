@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use ucom_host::files::Given;
+use ucom_host::files::SignalValue;
 
 /// Which boards are meant: numbers, a list, ranges, or all.
 #[derive(Clone, Debug, Eq, PartialEq)]
@@ -67,8 +67,8 @@ pub struct Assignment {
     pub board: Option<u8>,
     /// Name or index.
     pub name: String,
-    /// The value; what word it becomes is the edge's matter.
-    pub value: Given,
+    /// The value; what word it becomes is the signal's matter.
+    pub value: SignalValue,
 }
 
 impl FromStr for Assignment {
@@ -147,14 +147,14 @@ mod tests {
     #[test]
     fn assignments_are_names_with_values() {
         let parsed = |text: &str| text.parse::<Assignment>().unwrap();
-        let number = |value: f64, unit: &str| Given::Number { value, unit: unit.into() };
+        let number = |value: f64, unit: &str| SignalValue::Number { value, unit: unit.into() };
         assert_eq!(parsed("kp=120"), Assignment { board: None, name: "kp".into(), value: number(120.0, "") });
         assert_eq!(
             parsed("2.set_position=-20.5deg"),
             Assignment { board: Some(2), name: "set_position".into(), value: number(-20.5, "deg") }
         );
-        assert_eq!(parsed("0=0xFFFF").value, Given::Raw(65535));
-        assert_eq!(parsed("brake=off").value, Given::Switch(false));
+        assert_eq!(parsed("0=0xFFFF").value, SignalValue::Raw(65535));
+        assert_eq!(parsed("brake=off").value, SignalValue::Switch(false));
         for wrong in ["kp", "kp=", "kp=x", "kp=0x12345", "=3", "1.=3", "kp=1,5"] {
             assert!(wrong.parse::<Assignment>().is_err(), "{wrong}");
         }

@@ -138,7 +138,7 @@ pub enum Command {
     /// Names of inputs, outputs and parameters, and initial inputs
     #[command(
         after_help = "Examples:\n  ucom io 1\n  ucom --json io all\n  ucom io 1 --fresh\n  ucom io all --template ucom-edges.toml\n\n\
-                            A template begins an edge table: types, scales and units of all names; `ucom help edges`."
+                            A template begins a signal table: types, scales and units of all names; `ucom help edges`."
     )]
     Io(IoArgs),
     /// Controller inputs by name: show the initial ones, or set some
@@ -227,7 +227,7 @@ pub enum Command {
         after_help = "Examples:\n  ucom dbc --out chain.dbc\n  ucom dbc 1-4 > chain.dbc\n  ucom dbc none > messages.dbc"
     )]
     Dbc(DbcArgs),
-    /// A page about profiles, edge tables, parameter files, simulated chains or faults
+    /// A page about profiles, signal tables, parameter files, simulated chains or faults
     #[command(after_help = "Examples:\n  ucom help profile\n  ucom help params\n  ucom help faults")]
     Help {
         /// The page; without it this program's own help
@@ -283,8 +283,9 @@ pub enum Topic {
     Sim,
     /// Fault files.
     Faults,
-    /// Edge tables: types, scales and units of process data.
-    Edges,
+    /// Signal tables: types, scales and units of process data.
+    #[value(name = "edges")]
+    Signals,
     /// Parameter files.
     Params,
 }

@@ -109,7 +109,7 @@ pub struct IoArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Begin an edge table of all names, TOML; - is stdout
+    /// Begin a signal table of all names, TOML; - is stdout
     #[arg(long, env = "UCOM_TEMPLATE", value_name = "FILE")]
     pub template: Option<PathBuf>,
     #[command(flatten)]

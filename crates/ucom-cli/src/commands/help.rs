@@ -13,7 +13,7 @@ pub fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {
         Some(Topic::Profile) => ucom_host::profile_help(),
         Some(Topic::Sim) => ucom_sim::help(),
         Some(Topic::Faults) => ucom_sim::FAULT_HELP.to_owned(),
-        Some(Topic::Edges) => ucom_host::files::edges::EDGE_HELP.to_owned(),
+        Some(Topic::Signals) => ucom_host::files::signals::SIGNAL_HELP.to_owned(),
         Some(Topic::Params) => ucom_host::files::params::PARAMS_HELP.to_owned(),
         None => Cli::command().render_long_help().to_string(),
     };

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use cli_kit::{Output, table};
 use serde_json::{Value, json};
-use ucom_host::files::{DbcBoard, Edge, EdgeTable, EdgeType, dbc as dbc_text};
+use ucom_host::files::{DbcBoard, Signal, SignalTable, SignalType, dbc as dbc_text};
 use ucom_host::master::io::{IoDescription, Kind};
 use ucom_host::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel, counted};
 
@@ -19,7 +19,7 @@ use crate::values::{Prepared, Word, only, tell_rounded, with_names, words};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let edges = link.edges()?;
+    let signals = link.signal_table()?;
     let file = args.template.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose();
     // What is there is a table that somebody has filled in.
     let file = file.map_err(|e| match e.code == "exists" {
@@ -29,7 +29,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = Driver::open(link)?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
-        let known = args.cache.known(&mut driver, &edges, board);
+        let known = args.cache.known(&mut driver, &signals, board);
         let known = known.map_err(|e| of_several(e, &args.boards))?;
         // Without a started application there is nobody to ask for them.
         let initial = match args.template {
@@ -38,7 +38,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         };
         // Whoever tells its inputs has told its names before.
         let known = match driver.master.description(board) {
-            Some(names) if initial.is_some() => known.renamed(names, &edges, driver.master.profile()),
+            Some(names) if initial.is_some() => known.renamed(names, &signals, driver.master.profile()),
             _ => known,
         };
         boards.push((known, initial));
@@ -51,7 +51,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             }
         }
         let ids: Vec<u16> = programs.iter().map(|(id, _)| *id).collect();
-        let text = EdgeTable::template(&programs);
+        let text = SignalTable::template(&programs);
         return deliver(file, &text, json!({ "programs": ids }), out, |file| {
             format!(
                 "{file}: a table of {} to be looked over; `ucom help edges` explains it",
@@ -67,11 +67,11 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 type Described = (Known, Option<Vec<u16>>);
 
 fn io_value((known, initial): &Described) -> Value {
-    let inputs = known.edges.all(Kind::Ci);
+    let inputs = known.signals.all(Kind::Ci);
     let initial =
         initial.as_ref().map(|words| words.iter().zip(inputs).map(|(w, e)| e.json(*w)).collect::<Vec<_>>());
     let d = &known.names;
-    let edges = |kind| known.edges.all(kind).iter().map(edge_value).collect::<Vec<_>>();
+    let signals = |kind| known.signals.all(kind).iter().map(signal_value).collect::<Vec<_>>();
     json!({
         "board": known.board,
         "description": d.description,
@@ -80,46 +80,48 @@ fn io_value((known, initial): &Described) -> Value {
         "par": d.par,
         "initial_ci": initial,
         "units": units(&d.ci, inputs),
-        "edges": { "ci": edges(Kind::Ci), "so": edges(Kind::So), "par": edges(Kind::Par) },
+        "edges": { "ci": signals(Kind::Ci), "so": signals(Kind::So), "par": signals(Kind::Par) },
     })
 }
 
-/// What is known of an edge's words; null without a table.
-fn edge_value(edge: &Edge) -> Value {
-    if !edge.known {
+/// What is known of a signal's words; null without a table.
+fn signal_value(signal: &Signal) -> Value {
+    if !signal.known {
         return Value::Null;
     }
     json!({
-        "type": type_name(edge),
-        "scale": edge.scale,
-        "offset": edge.offset,
-        "unit": edge.unit,
-        "min": edge.min,
-        "max": edge.max,
+        "type": type_name(signal),
+        "scale": signal.scale,
+        "offset": signal.offset,
+        "unit": signal.unit,
+        "min": signal.min,
+        "max": signal.max,
     })
 }
 
-fn type_name(edge: &Edge) -> &'static str {
-    match edge.kind {
-        EdgeType::Int16 => "int16",
-        EdgeType::Uint16 => "uint16",
-        EdgeType::Hex => "hex",
-        EdgeType::Bool => "bool",
+fn type_name(signal: &Signal) -> &'static str {
+    match signal.kind {
+        SignalType::Int16 => "int16",
+        SignalType::Uint16 => "uint16",
+        SignalType::Hex => "hex",
+        SignalType::Bool => "bool",
     }
 }
 
 fn io_text((known, initial): &Described) -> String {
     let mut rows = Vec::new();
     for (kind, word) in [(Kind::Ci, "input"), (Kind::So, "output"), (Kind::Par, "parameter")] {
-        for (i, (name, edge)) in known.names.names(kind).iter().zip(known.edges.all(kind)).enumerate() {
+        for (i, (name, signal)) in known.names.names(kind).iter().zip(known.signals.all(kind)).enumerate() {
             let initial = initial.as_ref().filter(|_| kind == Kind::Ci).and_then(|words| words.get(i));
             let initial =
-                initial.map_or_else(String::new, |w| format!("initially {}", edge.text_with_unit(*w)));
-            let (low, high) = edge.limits();
-            let means = match (edge.known, edge.kind) {
+                initial.map_or_else(String::new, |w| format!("initially {}", signal.text_with_unit(*w)));
+            let (low, high) = signal.limits();
+            let means = match (signal.known, signal.kind) {
                 (false, _) => String::new(),
-                (true, EdgeType::Bool | EdgeType::Hex) => type_name(edge).into(),
-                (true, _) => format!("{} {low}..{high} {}", type_name(edge), edge.unit).trim_end().to_owned(),
+                (true, SignalType::Bool | SignalType::Hex) => type_name(signal).into(),
+                (true, _) => {
+                    format!("{} {low}..{high} {}", type_name(signal), signal.unit).trim_end().to_owned()
+                }
             };
             rows.push(vec![word.into(), i.to_string(), name.clone(), means, initial]);
         }
@@ -137,14 +139,14 @@ fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
 
 /// Shows initial inputs, or sets some; with `--for` the board moves under supervision.
 pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let edges = link.edges()?;
+    let signals = link.signal_table()?;
     let mut driver = Driver::open(link)?;
     let board = args.board;
     only(&[board], &args.values, "set")?;
     if let Some(duration) = args.duration {
-        return move_for(&mut driver, args, duration, &edges, out);
+        return move_for(&mut driver, args, duration, &signals, out);
     }
-    let known = args.cache.described(&mut driver, &edges, board)?;
+    let known = args.cache.described(&mut driver, &signals, board)?;
     if args.values.is_empty() {
         let words = initial(&mut driver, board)?;
         print_words("initial_ci", &known, Kind::Ci, &words, out);
@@ -159,8 +161,8 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     }
     arrived(&mut driver, board)?;
     let value = |w: &Word| {
-        let edge = known.edges.get(Kind::Ci, w.index.into());
-        json!({ "name": w.name, "index": w.index, "value": edge.map(|e| e.json(w.word)) })
+        let signal = known.signals.get(Kind::Ci, w.index.into());
+        json!({ "name": w.name, "index": w.index, "value": signal.map(|e| e.json(w.word)) })
     };
     let set: Vec<Value> = words.iter().map(value).collect();
     out.result(&json!({ "board": board, "set": set, "running": running }), || {
@@ -180,13 +182,13 @@ fn move_for(
     driver: &mut Driver,
     args: &CiArgs,
     duration: Duration,
-    edges: &EdgeTable,
+    signals: &SignalTable,
     out: &Output,
 ) -> Result<(), Failure> {
     let (board, force) = (args.board, args.force.force);
     let prepared = with_names(&args.cache, |cache| {
         let mut prepared = Prepared::default();
-        prepared.add(driver, cache, edges, board, force)?;
+        prepared.add(driver, cache, signals, board, force)?;
         let Some(known) = prepared.known.get(&board) else { return Ok(prepared) };
         let words = words(known, Kind::Ci, &args.values).inspect_err(|_| prepared.undo(driver))?;
         tell_rounded(driver, board, Kind::Ci, &words);
@@ -238,14 +240,14 @@ fn move_for(
 }
 
 fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output) {
-    let (names, edges) = (known.names.names(kind), known.edges.all(kind));
+    let (names, signals) = (known.names.names(kind), known.signals.all(kind));
     let value =
-        json!({ "board": known.board, key: named(names, edges, words), "units": units(names, edges) });
+        json!({ "board": known.board, key: named(names, signals, words), "units": units(names, signals) });
     out.result(&value, || {
         let row = |(i, word): (usize, &u16)| {
             let name = names.get(i).cloned().unwrap_or_default();
-            let edge = edges.get(i);
-            let (text, unit) = edge.map_or_else(Default::default, |e| (e.text(*word), e.unit.clone()));
+            let signal = signals.get(i);
+            let (text, unit) = signal.map_or_else(Default::default, |e| (e.text(*word), e.unit.clone()));
             vec![i.to_string(), name, text, unit]
         };
         let rows: Vec<Vec<String>> = words.iter().enumerate().map(row).collect();
@@ -256,13 +258,13 @@ fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output
 /// Writes a DBC file with the boards' names.
 pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let file = args.out.as_deref().map(|file| open_output(file, args.force.force)).transpose()?;
-    let (profile, edges) = (link.profile()?, link.edges()?);
+    let (profile, signals) = (link.profile()?, link.signal_table()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {
         let mut driver = Driver::open(link)?;
         for number in driver.numbers(&args.boards)? {
-            let known = args.cache.known(&mut driver, &edges, number)?;
-            boards.push(DbcBoard::new(number, &known.names, &known.edges));
+            let known = args.cache.known(&mut driver, &signals, number)?;
+            boards.push(DbcBoard::new(number, &known.names, &known.signals));
         }
     }
     let text = dbc_text(&boards, profile.endian);

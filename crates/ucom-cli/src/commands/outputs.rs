@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use cli_kit::{Lines, Output};
 use serde_json::{Map, Value, json};
-use ucom_host::files::Edge;
+use ucom_host::files::Signal;
 use ucom_host::master::Event;
 use ucom_host::master::io::{Kind, Snapshot, short};
 
@@ -14,7 +14,7 @@ use crate::cache::Known;
 use crate::driver::{Driver, nothing_shared};
 use crate::failure::{Failure, NO_LINK};
 
-/// Keys for so many values: the short names; the whole text where another edge has the same one, with its place where
+/// Keys for so many values: the short names; the whole text where another signal has the same one, with its place where
 /// that does not help either.
 fn keys(names: &[String], count: usize) -> Vec<String> {
     let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
@@ -27,18 +27,19 @@ fn keys(names: &[String], count: usize) -> Vec<String> {
     (0..count).map(key).collect()
 }
 
-/// Values by the names of their edges, in their units where an edge table knows them (D-11).
-pub fn named(names: &[String], edges: &[Edge], words: &[u16]) -> Value {
-    let value = |i: usize, word: u16| edges.get(i).map_or_else(|| json!(word as i16), |edge| edge.json(word));
+/// Values by the names of their signals, in their units where a signal table knows them (D-11).
+pub fn named(names: &[String], signals: &[Signal], words: &[u16]) -> Value {
+    let value =
+        |i: usize, word: u16| signals.get(i).map_or_else(|| json!(word as i16), |signal| signal.json(word));
     let values = words.iter().enumerate().map(|(i, word)| value(i, *word));
     Value::Object(keys(names, words.len()).into_iter().zip(values).collect::<Map<_, _>>())
 }
 
-/// The units of such values, by the same keys, as far as an edge table tells them.
-pub fn units(names: &[String], edges: &[Edge]) -> Value {
-    let pairs = keys(names, names.len()).into_iter().zip(edges);
-    let told = pairs.filter(|(_, edge)| edge.known && !edge.unit.is_empty());
-    Value::Object(told.map(|(key, edge)| (key, json!(edge.unit))).collect::<Map<_, _>>())
+/// The units of such values, by the same keys, as far as a signal table tells them.
+pub fn units(names: &[String], signals: &[Signal]) -> Value {
+    let pairs = keys(names, names.len()).into_iter().zip(signals);
+    let told = pairs.filter(|(_, signal)| signal.known && !signal.unit.is_empty());
+    Value::Object(told.map(|(key, signal)| (key, json!(signal.unit))).collect::<Map<_, _>>())
 }
 
 /// Waits for the reader of stdout as long as it reads.
@@ -53,10 +54,10 @@ pub fn finish(stdout: &mut Lines, driver: &Driver) {
 pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = Driver::open(link)?;
     let boards = driver.numbers(&args.boards)?;
-    let edges = link.edges()?;
+    let signals = link.signal_table()?;
     let mut all = BTreeMap::new();
     for board in boards {
-        let known = args.cache.known(&mut driver, &edges, board)?;
+        let known = args.cache.known(&mut driver, &signals, board)?;
         driver.master.watch(board, Some(known.names.dimensions().so), true);
         all.insert(board, known);
     }
@@ -101,12 +102,12 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 }
 
 fn head(all: &BTreeMap<u8, Known>) -> Result<String, Failure> {
-    let column = |(name, edge): (&String, &Edge)| match (edge.known, edge.unit.as_str()) {
+    let column = |(name, signal): (&String, &Signal)| match (signal.known, signal.unit.as_str()) {
         (true, unit) if !unit.is_empty() => quoted(&format!("{} [{unit}]", short(name))),
         _ => quoted(short(name)),
     };
     let columns = |known: &Known| {
-        known.names.so.iter().zip(known.edges.all(Kind::So)).map(column).collect::<Vec<_>>().join(",")
+        known.names.so.iter().zip(known.signals.all(Kind::So)).map(column).collect::<Vec<_>>().join(",")
     };
     let mut heads = all.values().map(columns);
     let first = heads.next().unwrap_or_default();
@@ -134,15 +135,15 @@ fn row(
 ) -> String {
     let time_s = snapshot.time_us.saturating_sub(start_us) as f64 * 1e-6;
     let Some(known) = all.get(&board) else { return String::new() };
-    let (names, edges) = (&known.names.so, known.edges.all(Kind::So));
+    let (names, signals) = (&known.names.so, known.signals.all(Kind::So));
     if args.csv {
-        let list: Vec<String> = snapshot.words.iter().zip(edges).map(|(w, e)| e.text(*w)).collect();
+        let list: Vec<String> = snapshot.words.iter().zip(signals).map(|(w, e)| e.text(*w)).collect();
         return format!("{time_s:.6},{board},{}", list.join(","));
     }
-    let so = named(names, edges, &snapshot.words);
-    let value = json!({ "time_s": time_s, "board": board, "so": so, "units": units(names, edges) });
+    let so = named(names, signals, &snapshot.words);
+    let value = json!({ "time_s": time_s, "board": board, "so": so, "units": units(names, signals) });
     out.words(&value, || {
-        let pairs = names.iter().zip(edges).zip(&snapshot.words);
+        let pairs = names.iter().zip(signals).zip(&snapshot.words);
         let pairs: Vec<String> =
             pairs.map(|((n, e), w)| format!("{} {:>6}", short(n), e.text_with_unit(*w))).collect();
         format!("{time_s:9.3} s  board {board}  {}", pairs.join("  "))

@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use ucom::Status;
 use ucom_host::files::params::{
     ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, ParamsWord, SavedBoard,
-    SavedEdge, check_board, check_identity, params_text,
+    SavedSignal, check_board, check_identity, params_text,
 };
-use ucom_host::files::{EdgeTable, Inventory};
+use ucom_host::files::{Inventory, SignalTable};
 use ucom_host::master::io::{Kind, ParValue};
 use ucom_host::master::{AdminChange, Outcome, Request, counted};
 
@@ -29,7 +29,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     if args.dry_run {
         return Err(Failure::usage("--dry-run goes with --apply FILE"));
     }
-    let edges = link.edges()?;
+    let signals = link.signal_table()?;
     let file = args.save.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose()?;
     let mut driver = Driver::open(link)?;
     let boards = driver.numbers(&args.boards)?;
@@ -38,8 +38,8 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     for board in &boards {
         let values = for_board(&args.values, *board);
         let known = match values.is_empty() {
-            true => args.cache.known(&mut driver, &edges, *board),
-            false => args.cache.described(&mut driver, &edges, *board),
+            true => args.cache.known(&mut driver, &signals, *board),
+            false => args.cache.described(&mut driver, &signals, *board),
         };
         let known = known.map_err(|e| of_several(e, &args.boards))?;
         let words = words(&known, Kind::Par, &values)?;
@@ -127,10 +127,10 @@ pub fn file_or_stdout(file: &Path, force: bool) -> Result<Option<OutputFile>, Fa
 fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
     let value = |p: &Parameters| {
         let list = rows(driver, p).map(|(i, name, assumed)| {
-            let edge = p.known.edges.get(Kind::Par, i);
-            let json = |word: u16| edge.map(|e| e.json(word));
+            let signal = p.known.signals.get(Kind::Par, i);
+            let json = |word: u16| signal.map(|e| e.json(word));
             let last = p.history.last(i).map(|w| json!({ "value": json(w.word), "at": w.when() }));
-            let unit = edge.map(|e| &e.unit).filter(|u| !u.is_empty());
+            let unit = signal.map(|e| &e.unit).filter(|u| !u.is_empty());
             json!({ "index": i, "name": name, "assumed": assumed.and_then(json), "last_written": last, "unit": unit })
         });
         json!({ "board": p.known.board, "par": list.collect::<Vec<_>>() })
@@ -144,7 +144,7 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
         let mut text = String::new();
         for p in all {
             let row = |(i, name, assumed): (usize, &String, Option<u16>)| {
-                let shown = |word: u16| p.known.edges.get(Kind::Par, i).map_or_else(String::new, |e| e.text_with_unit(word));
+                let shown = |word: u16| p.known.signals.get(Kind::Par, i).map_or_else(String::new, |e| e.text_with_unit(word));
                 let value = assumed.map_or_else(|| "unknown".into(), |w| format!("{} (assumed)", shown(w)));
                 let last = p.history.last(i).map(|w| format!("{} on {}", shown(w.word), w.when()));
                 vec![i.to_string(), name.clone(), value, last.unwrap_or_else(|| "-".into())]
@@ -172,12 +172,12 @@ fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, 
 fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Output) -> Result<(), Failure> {
     let names = inventory(&args.inventory)?;
     let board = |p: &Parameters| {
-        let par = p.known.edges.all(Kind::Par).iter().enumerate().map(|(i, edge)| {
+        let par = p.known.signals.all(Kind::Par).iter().enumerate().map(|(i, signal)| {
             let last = p.history.last(i);
             let remark = last.map_or_else(String::new, |w| format!("written {}", w.when()));
-            SavedEdge { edge: edge.clone(), word: last.map(|w| w.word), remark }
+            SavedSignal { signal: signal.clone(), word: last.map(|w| w.word), remark }
         });
-        let ci = p.known.edges.all(Kind::Ci).iter();
+        let ci = p.known.signals.all(Kind::Ci).iter();
         SavedBoard {
             number: p.known.board,
             flash_number: p.known.info.flash_number,
@@ -185,7 +185,9 @@ fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Outp
             program_id: p.known.info.program_id,
             description: p.known.names.clone(),
             par: par.collect(),
-            ci: ci.map(|edge| SavedEdge { edge: edge.clone(), word: None, remark: String::new() }).collect(),
+            ci: ci
+                .map(|signal| SavedSignal { signal: signal.clone(), word: None, remark: String::new() })
+                .collect(),
         }
     };
     let saved: Vec<SavedBoard> = all.iter().map(board).collect();
@@ -292,7 +294,7 @@ impl Applied {
         let (mut all, mut problems) = (Vec::new(), Vec::new());
         for board in &self.boards {
             let Some(known) = known(board.number) else { continue };
-            match check_board(board, &known.names, &known.edges) {
+            match check_board(board, &known.names, &known.signals) {
                 Ok((ci, par)) => {
                     let words = |list: Vec<ParamsWord>| list.into_iter().map(word).collect();
                     all.push((board.number, (words(ci), words(par))));
@@ -319,7 +321,7 @@ fn word(w: ParamsWord) -> Word {
 
 /// Checks a whole file, then writes its parameters.
 fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let edges = link.edges()?;
+    let signals = link.signal_table()?;
     let meant = |n: u8| match &args.boards {
         Boards::All => true,
         Boards::None => false,
@@ -336,7 +338,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     let mut driver = Driver::open(link)?;
     file.identities(&mut driver)?;
-    let known = file.numbers().into_iter().map(|board| described(args, &mut driver, &edges, board));
+    let known = file.numbers().into_iter().map(|board| described(args, &mut driver, &signals, board));
     let known = known.collect::<Result<Vec<Known>, Failure>>()?;
     let checked = file.words(|number| known.iter().find(|k| k.board == number))?;
     let mut all = Vec::new();
@@ -355,19 +357,24 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
 }
 
 /// Names of a board that parameters can be written to: its application runs. To check, what is known will do.
-fn described(args: &ParArgs, driver: &mut Driver, edges: &EdgeTable, board: u8) -> Result<Known, Failure> {
+fn described(
+    args: &ParArgs,
+    driver: &mut Driver,
+    signals: &SignalTable,
+    board: u8,
+) -> Result<Known, Failure> {
     if args.dry_run {
-        args.cache.known(driver, edges, board)
+        args.cache.known(driver, signals, board)
     } else {
-        args.cache.described(driver, edges, board)
+        args.cache.described(driver, signals, board)
     }
 }
 
 fn report(all: &[Parameters], inputs: usize, dry_run: bool, out: &Output) {
     let value = |p: &Parameters| {
         let par = p.words.iter().map(|w| {
-            let edge = p.known.edges.get(Kind::Par, w.index.into());
-            json!({ "index": w.index, "name": w.name, "value": edge.map(|e| e.json(w.word)), "word": w.word })
+            let signal = p.known.signals.get(Kind::Par, w.index.into());
+            json!({ "index": w.index, "name": w.name, "value": signal.map(|e| e.json(w.word)), "word": w.word })
         });
         json!({ "board": p.known.board, "par": par.collect::<Vec<_>>() })
     };

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use cli_kit::{Lines, Output};
 use serde_json::json;
-use ucom_host::files::EdgeTable;
+use ucom_host::files::SignalTable;
 use ucom_host::master::io::Kind;
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel, counted};
 
@@ -47,11 +47,11 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     if let Some(file) = &file {
         file.identities(&mut driver)?;
     }
-    let edges = link.edges()?;
+    let signals = link.signal_table()?;
     let mut stdout = Lines::stdout()?;
     let (report, prepared) = with_names(&args.cache, |cache| {
         let mut prepared = Prepared::default();
-        let report = start(&mut driver, args, cache, &boards, &edges, file.as_ref(), &mut prepared);
+        let report = start(&mut driver, args, cache, &boards, &signals, file.as_ref(), &mut prepared);
         // What the procedure began it has taken back itself.
         let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
         Ok((report, prepared))
@@ -99,12 +99,12 @@ fn start(
     args: &RunArgs,
     cache: &CacheArgs,
     boards: &[u8],
-    edges: &EdgeTable,
+    signals: &SignalTable,
     file: Option<&Applied>,
     prepared: &mut Prepared,
 ) -> Result<RunReport, Failure> {
     for board in boards {
-        prepared.add(driver, cache, edges, *board, args.force.force)?;
+        prepared.add(driver, cache, signals, *board, args.force.force)?;
     }
     let plans = plans(driver, args, prepared, file)?;
     let options = RunOptions { boards: plans.clone(), active: args.active, force: args.force.force };
@@ -182,8 +182,8 @@ fn supervise(
             said = Instant::now();
             for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
                 let Some(known) = prepared.known.get(&board) else { continue };
-                let so = named(&known.names.so, known.edges.all(Kind::So), &snapshot.words);
-                let units = units(&known.names.so, known.edges.all(Kind::So));
+                let so = named(&known.names.so, known.signals.all(Kind::So), &snapshot.words);
+                let units = units(&known.names.so, known.signals.all(Kind::So));
                 let time_s = snapshot.time_us as f64 * 1e-6;
                 let value = json!({
                     "event": "so", "board": board, "time_s": time_s, "age_s": age_s, "stale": stale,

@@ -6,11 +6,11 @@ use ucom::Profile;
 use crate::ProfileFile;
 use crate::master::io::{IoDescription, Kind};
 
-use super::edges::{BoardEdges, EdgeTable, Given};
 use super::image::{Format, Gaps, Image, ImageOptions};
 use super::inventory::Inventory;
-use super::params::{ParamsFile, SavedBoard, SavedEdge, check_board, params_text};
+use super::params::{ParamsFile, SavedBoard, SavedSignal, check_board, params_text};
 use super::recording::{CandumpWriter, FZI_HEADER, FziWriter, McapWriter, Recording, read_mcap};
+use super::signals::{BoardSignals, SignalTable, SignalValue};
 
 /// Images in every form; the first byte chooses.
 pub fn image(data: &[u8]) {
@@ -70,30 +70,31 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Edge tables: for every edge of one, what is shown of a word gives that word again, unless a limit forbids it.
+/// Signal tables: for every signal of one, what is shown of a word gives that word again, unless a limit forbids it.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    let Ok(table) = EdgeTable::parse(text) else { return };
+    let Ok(table) = SignalTable::parse(text) else { return };
     for id in [0x1234, 1, 0, 0xFFFF] {
         let Some(program) = table.program(id) else { continue };
         for kind in [Kind::Ci, Kind::So, Kind::Par] {
             for (i, name) in program.names(kind).enumerate() {
-                let Some(edge) = program.edge(kind, i, name) else { continue };
+                let Some(signal) = program.signal(kind, i, name) else { continue };
                 for word in [0, 1, 0x7FFF, 0x8000, 0xFFFF] {
-                    let given: Given = edge.text_with_unit(word).parse().expect("what is shown can be given");
-                    let (again, text) = (edge.word(&given), edge.text(word));
-                    let limited = edge.min.is_some() || edge.max.is_some();
+                    let given: SignalValue =
+                        signal.text_with_unit(word).parse().expect("what is shown can be given");
+                    let (again, text) = (signal.word(&given), signal.text(word));
+                    let limited = signal.min.is_some() || signal.max.is_some();
                     // Offsets that are far larger than the scale leave no digits for it.
-                    let coarse = edge.offset.abs() > edge.scale.abs() * 1e9;
-                    // A scaled edge without a unit takes only words themselves.
-                    let no_unit = edge.unit.is_empty() && (edge.scale != 1.0 || edge.offset != 0.0);
-                    if no_unit && matches!(again, Err(super::edges::ValueError::NoUnit { .. })) {
+                    let coarse = signal.offset.abs() > signal.scale.abs() * 1e9;
+                    // A scaled signal without a unit takes only words themselves.
+                    let no_unit = signal.unit.is_empty() && (signal.scale != 1.0 || signal.offset != 0.0);
+                    if no_unit && matches!(again, Err(super::signals::ValueError::NoUnit { .. })) {
                         continue;
                     }
-                    let same = again.as_ref().is_ok_and(|w| edge.text(*w) == text);
+                    let same = again.as_ref().is_ok_and(|w| signal.text(*w) == text);
                     assert!(
-                        same || limited || coarse || edge.kind == super::EdgeType::Bool,
-                        "{edge:?} {word} {text} {again:?}"
+                        same || limited || coarse || signal.kind == super::SignalType::Bool,
+                        "{signal:?} {word} {text} {again:?}"
                     );
                 }
             }
@@ -111,15 +112,15 @@ pub fn params(data: &[u8]) {
             |list: &[super::params::ParamsEntry]| list.iter().map(|e| e.name.clone()).collect::<Vec<_>>();
         let description =
             IoDescription { ci: names(&board.ci), par: names(&board.par), ..Default::default() };
-        let edges = BoardEdges::new(&description, None, &profile);
-        let Ok((_, par)) = check_board(board, &description, &edges) else { continue };
+        let signals = BoardSignals::new(&description, None, &profile);
+        let Ok((_, par)) = check_board(board, &description, &signals) else { continue };
         let word = |i: usize| par.iter().find(|w| usize::from(w.index) == i).map(|w| w.word);
-        let saved = |(i, edge): (usize, &super::Edge)| SavedEdge {
-            edge: edge.clone(),
+        let saved = |(i, signal): (usize, &super::Signal)| SavedSignal {
+            signal: signal.clone(),
             word: word(i),
             remark: String::new(),
         };
-        let all = edges.all(Kind::Par).iter().enumerate().map(saved).collect();
+        let all = signals.all(Kind::Par).iter().enumerate().map(saved).collect();
         let saved = SavedBoard {
             number: board.number,
             description: description.clone(),
@@ -128,7 +129,7 @@ pub fn params(data: &[u8]) {
         };
         let again = ParamsFile::parse(&params_text(&[saved])).expect("our own form");
         let again = again.board(board.number).expect("the same board");
-        let (_, words) = check_board(again, &description, &edges).expect("our own names and values");
+        let (_, words) = check_board(again, &description, &signals).expect("our own names and values");
         let pairs =
             |list: &[super::params::ParamsWord]| list.iter().map(|w| (w.index, w.word)).collect::<Vec<_>>();
         let mut before = pairs(&par);

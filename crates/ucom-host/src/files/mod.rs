@@ -1,7 +1,6 @@
 //! Files of the PC side: images, recordings, inventories, meanings of words, parameters, signal databases.
 
 pub mod dbc;
-pub mod edges;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
@@ -9,12 +8,13 @@ pub mod image;
 pub mod inventory;
 pub mod params;
 pub mod recording;
+pub mod signals;
 mod text;
 
-pub use dbc::{DbcBoard, DbcEdge, dbc};
-pub use edges::{BoardEdges, Edge, EdgeTable, EdgeType, Given};
+pub use dbc::{DbcBoard, NamedSignal, dbc};
 pub use image::{Image, ImageError, ImageOptions};
 pub use inventory::{Inventory, InventoryBoard, InventoryError};
 pub use params::{ParamsError, ParamsFile};
 pub use recording::{Recording, RecordingError};
+pub use signals::{BoardSignals, Signal, SignalTable, SignalType, SignalValue};
 pub use text::{TextError, write_text};

@@ -197,7 +197,7 @@ pub enum Error {
         /// Their numbers.
         boards: Vec<u8>,
     },
-    /// Who reports is not who has a number: numbering anew would mean other boards than before.
+    /// The boards that report are not those that have a number: a new address assignment would mean other boards than before.
     #[error(
         "boards that report: {reports}, with a number: {boards}, or two share a flash id: not as `ucom init` leaves a chain"
     )]
@@ -234,9 +234,9 @@ pub enum Error {
         /// It has one, but it is not running.
         valid: bool,
     },
-    /// No edge of that name.
+    /// No signal of that name.
     #[error("board {board} has no {kind} `{name}`{}", Near(near))]
-    NoEdge {
+    NoSignal {
         /// Its number.
         board: u8,
         /// `CI`, `SO` or `PAR`.

@@ -10,7 +10,7 @@ impl Error {
             Self::Device { .. } | Self::AdminRefused { .. } | Self::StatusNotTaken { .. } => {
                 ErrorKind::Device
             }
-            Self::NoEdge { .. } | Self::NoBoard { .. } => ErrorKind::Usage,
+            Self::NoSignal { .. } | Self::NoBoard { .. } => ErrorKind::Usage,
             Self::Plan(e) => e.kind(),
             Self::NoAnswer { .. } | Self::Incomplete { .. } | Self::NotReached { .. } | Self::Bus { .. } => {
                 ErrorKind::NoLink
@@ -58,7 +58,7 @@ impl Error {
             Self::Busy { .. } => "busy",
             Self::NoBoard { .. } => "no-board",
             Self::NoApplication { .. } => "no-application",
-            Self::NoEdge { .. } => "no-edge",
+            Self::NoSignal { .. } => "no-edge",
             Self::StaleNames { .. } => "stale-names",
             Self::Plan(_) => "plan",
             Self::Update { .. } => "update",
@@ -118,7 +118,7 @@ impl Error {
             Self::NoBoard { .. } => "`ucom scan` lists the boards".into(),
             Self::NoApplication { board, valid: true } => format!("`ucom start {board}`"),
             Self::NoApplication { board, valid: false } => format!("`ucom update {board} IMAGE`"),
-            Self::NoEdge { board, .. } => format!("`ucom io {board}` lists the names"),
+            Self::NoSignal { board, .. } => format!("`ucom io {board}` lists the names"),
             Self::StaleNames { board } => format!("`ucom io {board} --fresh` reads them anew"),
             Self::Plan(e) => e.hint().into(),
             Self::Update { failure, .. } => failure.hint(),

@@ -18,7 +18,7 @@ use ucom::{Admin, BoardInfo, BufferPackage, Dimensions, Status, ToBoard};
 /// A value for an input or a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// The edge's text, or its number.
+    /// The signal's text, or its number.
     pub name: String,
     /// The word.
     pub value: u16,

@@ -137,9 +137,9 @@ fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     assert_eq!(states(&mut bench, &[1, 3]), before);
 }
 
-/// A board without its number: numbering anew would test another board than the one that is meant, so nothing is done.
+/// A board without its number: a new address assignment would test another board than the one that is meant, so nothing is done.
 #[test]
-fn numbering_is_refused_when_a_board_has_no_number() {
+fn address_assignment_is_refused_when_a_board_has_no_number() {
     let mut bench = chain();
     let (mask, value) = (Status::INIT, Status(0));
     bench.go(Request::SetStatus { board: 1, mask, value, force: false }, 20).unwrap();

@@ -69,7 +69,7 @@ fn d34_d35_inputs_and_parameters() {
     assert_eq!(bench.board(0).application.ci, [7, 77]);
     assert_eq!(bench.board(0).application.par, [0, 5, 0]);
     assert_eq!(bench.master.parameters(1), [ParValue::Unknown, ParValue::Assumed(5), ParValue::Unknown]);
-    assert!(matches!(bench.master.set_input(now, 1, "nonsense", 1), Err(Error::NoEdge { .. })));
+    assert!(matches!(bench.master.set_input(now, 1, "nonsense", 1), Err(Error::NoSignal { .. })));
     let stop = Request::Stop { board: 1, level: StopLevel::Application, force: false };
     bench.go(stop, 10).unwrap();
     bench.go(Request::Start { board: 1, force: false }, 10).unwrap();

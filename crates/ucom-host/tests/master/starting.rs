@@ -55,7 +55,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
     for known in [false, true] {
         let before = bench.count("301#");
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
-        assert!(matches!(error, Error::NoEdge { board: 4, .. }), "{error}");
+        assert!(matches!(error, Error::NoSignal { board: 4, .. }), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
         // The names of board 4 are those of board 1, once that has been asked.
         assert_eq!(bench.count("301#") - before, usize::from(!known));

@@ -9,18 +9,18 @@ mod tests;
 
 use std::fmt::Write;
 
-use super::edges::{BoardEdges, Edge, EdgeType};
+use super::signals::{BoardSignals, Signal, SignalType};
 use crate::master::io::{IoDescription, Kind, short};
 use names::Names;
 use ucom::{Endian, Function, Sender, Sequence, Status};
 
 /// An input, output or parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DbcEdge {
-    /// What its signal is called; becomes an identifier.
+pub struct NamedSignal {
+    /// The signal's name; becomes an identifier.
     pub name: String,
     /// What its word means (D-11).
-    pub edge: Edge,
+    pub signal: Signal,
 }
 
 /// A board whose process data are known.
@@ -29,26 +29,28 @@ pub struct DbcBoard {
     /// Its number.
     pub number: u8,
     /// The controller inputs, one each.
-    pub ci: Vec<DbcEdge>,
+    pub ci: Vec<NamedSignal>,
     /// The sensor outputs.
-    pub so: Vec<DbcEdge>,
+    pub so: Vec<NamedSignal>,
     /// The parameters.
-    pub par: Vec<DbcEdge>,
+    pub par: Vec<NamedSignal>,
 }
 
 impl DbcBoard {
     /// A board with its names and what their words mean.
-    pub fn new(number: u8, description: &IoDescription, edges: &BoardEdges) -> Self {
+    pub fn new(number: u8, description: &IoDescription, signals: &BoardSignals) -> Self {
         let of = |kind: Kind| {
-            let pairs = description.names(kind).iter().zip(edges.all(kind));
-            pairs.map(|(name, edge)| DbcEdge { name: short(name).into(), edge: edge.clone() }).collect()
+            let pairs = description.names(kind).iter().zip(signals.all(kind));
+            pairs
+                .map(|(name, signal)| NamedSignal { name: short(name).into(), signal: signal.clone() })
+                .collect()
         };
         Self { number, ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
     }
 }
 
 /// One signal of a message.
-struct Signal {
+struct DbcSignal {
     name: String,
     /// First byte.
     byte: usize,
@@ -59,12 +61,12 @@ struct Signal {
     /// ` M` or ` m3`, or nothing.
     multiplex: String,
     /// Scale, offset and unit, where they are known.
-    edge: Option<Edge>,
+    signal: Option<Signal>,
 }
 
-impl Signal {
+impl DbcSignal {
     fn field(name: &str, byte: usize, bits: usize) -> Self {
-        Self { name: name.into(), byte, bit: 0, bits, signed: false, multiplex: String::new(), edge: None }
+        Self { name: name.into(), byte, bit: 0, bits, signed: false, multiplex: String::new(), signal: None }
     }
 
     fn line(&self, endian: Endian, receiver: &str) -> String {
@@ -77,13 +79,13 @@ impl Signal {
             (false, 64) => (0, 0),
             (false, bits) => (0, (1_i64 << bits) - 1),
         };
-        let Self { name, multiplex, bits, edge, .. } = self;
-        let (scale, offset, unit) = edge.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
+        let Self { name, multiplex, bits, signal, .. } = self;
+        let (scale, offset, unit) = signal.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
         // The shortest number that says the limit: what calculating loses is not written.
         let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
-        let (low, high) = match edge {
-            Some(edge) if edge.known && edge.kind != EdgeType::Hex => {
-                let (low, high) = edge.limits();
+        let (low, high) = match signal {
+            Some(signal) if signal.known && signal.kind != SignalType::Hex => {
+                let (low, high) = signal.limits();
                 (limit(low), limit(high))
             }
             _ => (low.to_string(), high.to_string()),
@@ -148,65 +150,65 @@ pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
 }
 
 /// The fields of a function whose layout is the same for all boards.
-fn fields(function: Function) -> Vec<Signal> {
+fn fields(function: Function) -> Vec<DbcSignal> {
     let status = |byte| {
         let bits = Status::NAMES.iter().enumerate();
-        bits.map(move |(i, (name, _))| Signal {
+        bits.map(move |(i, (name, _))| DbcSignal {
             bit: 7 - i,
-            ..Signal::field(&name.to_ascii_lowercase(), byte, 1)
+            ..DbcSignal::field(&name.to_ascii_lowercase(), byte, 1)
         })
     };
-    let word = |name: &str, byte| Signal::field(name, byte, 16);
+    let word = |name: &str, byte| DbcSignal::field(name, byte, 16);
     match function {
-        Function::Error => vec![Signal::field("code", 0, 8)],
-        Function::InitAck => vec![Signal::field("sequence", 0, 8)],
+        Function::Error => vec![DbcSignal::field("code", 0, 8)],
+        Function::InitAck => vec![DbcSignal::field("sequence", 0, 8)],
         Function::SetStatus => {
-            let mut signals = vec![Signal::field("mask", 0, 8)];
+            let mut signals = vec![DbcSignal::field("mask", 0, 8)];
             signals.extend(status(1));
             signals
         }
         Function::DspInfo => {
-            let mut signals = vec![word("flash_number", 0), Signal::field("sequence", 2, 8)];
+            let mut signals = vec![word("flash_number", 0), DbcSignal::field("sequence", 2, 8)];
             signals.extend(status(3));
             signals.extend([word("program_id", 4), word("flash_date", 6)]);
             signals
         }
         Function::Report0 | Function::Report1 | Function::Report2 | Function::Report3 => {
-            vec![Signal::field("ucom_id", 0, 8)]
+            vec![DbcSignal::field("ucom_id", 0, 8)]
         }
         Function::DumpIo => vec![word("ci", 0), word("so", 2), word("par", 4)],
         Function::Admin => {
             let names = ["run", "active", "debug", "global_debug"];
-            names.iter().enumerate().map(|(i, name)| Signal::field(name, i, 8)).collect()
+            names.iter().enumerate().map(|(i, name)| DbcSignal::field(name, i, 8)).collect()
         }
         Function::Prog | Function::Debug => {
-            (0..8).map(|i| Signal::field(&format!("byte_{i}"), i, 8)).collect()
+            (0..8).map(|i| DbcSignal::field(&format!("byte_{i}"), i, 8)).collect()
         }
         _ => Vec::new(),
     }
 }
 
 /// The signals of a buffer: the offset selects, three words each.
-fn multiplexed(edges: &[DbcEdge], kind: &str) -> Vec<Signal> {
-    let offset = Signal { multiplex: " M".into(), ..Signal::field("offset", 0, 16) };
-    let mut signals = vec![offset];
+fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
+    let offset = DbcSignal { multiplex: " M".into(), ..DbcSignal::field("offset", 0, 16) };
+    let mut fields = vec![offset];
     let mut names = Names::without(&["offset"]);
-    for (i, edge) in edges.iter().enumerate().take(1 << 16) {
-        signals.push(Signal {
-            name: names.name(&edge.name, &format!("{kind}_{i}")),
+    for (i, named) in signals.iter().enumerate().take(1 << 16) {
+        fields.push(DbcSignal {
+            name: names.name(&named.name, &format!("{kind}_{i}")),
             byte: 2 + 2 * (i % 3),
             bit: 0,
             bits: 16,
-            signed: edge.edge.signed(),
+            signed: named.signal.signed(),
             multiplex: format!(" m{}", i - i % 3),
-            edge: Some(edge.edge.clone()),
+            signal: Some(named.signal.clone()),
         });
     }
-    signals
+    fields
 }
 
-fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<Signal>, endian: Endian) {
-    // What boards without any edge never send needs no selector.
+fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<DbcSignal>, endian: Endian) {
+    // What boards without any signal never send needs no selector.
     let signals = if signals.len() == 1 && signals[0].multiplex == " M" { Vec::new() } else { signals };
     let length = match function {
         Function::Ci | Function::So | Function::Par | Function::DspCi => 8,

@@ -7,9 +7,9 @@ use super::*;
 use ucom::{BufferPackage, Frame, Packages};
 
 fn boards() -> Vec<DbcBoard> {
-    let edge = Edge::bare(&ucom::Profile::default());
+    let signal = Signal::bare(&ucom::Profile::default());
     let texts = |list: &[&str]| {
-        list.iter().map(|t| DbcEdge { name: (*t).to_owned(), edge: edge.clone() }).collect::<Vec<_>>()
+        list.iter().map(|t| NamedSignal { name: (*t).to_owned(), signal: signal.clone() }).collect::<Vec<_>>()
     };
     vec![
         DbcBoard {
@@ -81,16 +81,16 @@ fn p21_so_frames_decode_by_name() {
     }
 }
 
-/// D-11: type, scale, offset, unit and limits of the edge table are those of the signals.
+/// D-11: type, scale, offset, unit and limits of the signal table are those of the DBC signals.
 #[test]
 fn d11_signals_carry_scale_offset_and_unit() {
     let table = "[[program]]\nprogram_id = 1\nso.angle = { scale = 0.01, unit = \"deg\", min = -60, max = 60 }\n\
                  so.warm = { type = \"uint16\", scale = -0.1, offset = -40, unit = \"°C\" }\nso.bits = { type = \"hex\" }\n";
-    let table = crate::files::EdgeTable::parse(table).unwrap();
+    let table = crate::files::SignalTable::parse(table).unwrap();
     let names = ["angle [x]", "warm", "bits", "bare"].map(str::to_owned).to_vec();
     let description = IoDescription { so: names, ..Default::default() };
-    let edges = BoardEdges::new(&description, table.program(1), &ucom::Profile::default());
-    let text = dbc(&[DbcBoard::new(1, &description, &edges)], Endian::Little);
+    let signals = BoardSignals::new(&description, table.program(1), &ucom::Profile::default());
+    let text = dbc(&[DbcBoard::new(1, &description, &signals)], Endian::Little);
     let dbc = Dbc::try_from(text.as_str()).expect("a DBC file");
     let signals = &message(&dbc, Function::So.id(Sequence::new(1).unwrap())).signals;
     let seen: Vec<_> = signals[1..]
@@ -112,11 +112,11 @@ fn d11_signals_carry_scale_offset_and_unit() {
 fn d11_ranges_of_signals_are_short() {
     let table = "[[program]]\nprogram_id = 1\nso.tenths = { scale = 0.1 }\nso.odd = { scale = 0.1, min = -0.125, max = 7.25 }\n\
                  so.bits = { type = \"hex\" }\nso.switch = { type = \"bool\" }\n";
-    let table = crate::files::EdgeTable::parse(table).unwrap();
+    let table = crate::files::SignalTable::parse(table).unwrap();
     let names = ["tenths", "odd", "bits", "switch"].map(str::to_owned).to_vec();
     let description = IoDescription { so: names, ..Default::default() };
-    let edges = BoardEdges::new(&description, table.program(1), &ucom::Profile::default());
-    let text = dbc(&[DbcBoard::new(1, &description, &edges)], Endian::Little);
+    let signals = BoardSignals::new(&description, table.program(1), &ucom::Profile::default());
+    let text = dbc(&[DbcBoard::new(1, &description, &signals)], Endian::Little);
     for range in ["(0.1,0) [-3276.8|3276.7]", "(0.1,0) [-0.125|7.25]", "(1,0) [0|65535]", "(1,0) [0|1]"] {
         assert!(text.contains(range), "{range}: {text}");
     }
@@ -157,7 +157,7 @@ fn every_message_has_a_name_and_an_identifier_of_its_own() {
 }
 
 #[test]
-fn so_without_edges_has_no_selector() {
+fn so_without_signals_has_no_selector() {
     let text = dbc(&boards(), Endian::Little);
     let dbc = Dbc::try_from(text.as_str()).unwrap();
     assert!(message(&dbc, Function::So.id(Sequence::MAX)).signals.is_empty());

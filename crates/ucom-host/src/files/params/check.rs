@@ -1,7 +1,7 @@
 //! A file against the boards that are there: every mistake with its place, before anything is sent.
 
 use super::{ParamsBoard, ParamsEntry, Place};
-use crate::files::edges::{BoardEdges, ValueError};
+use crate::files::signals::{BoardSignals, ValueError};
 use crate::master::Error;
 use crate::master::io::{IoDescription, Kind};
 use std::collections::BTreeMap;
@@ -21,11 +21,11 @@ pub struct ParamsTarget<'a> {
 pub struct ParamsWord {
     /// Place in the buffer.
     pub index: u16,
-    /// The whole text of the edge.
+    /// The whole text of the signal.
     pub name: String,
     /// The word.
     pub word: u16,
-    /// The value in the edge's unit, with the unit.
+    /// The value in the signal's unit, with the unit.
     pub text: String,
     /// `0.04 → 0.0` where the value lies between two words.
     pub rounded: Option<String>,
@@ -46,7 +46,7 @@ impl core::fmt::Display for ParamsProblem {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { place, board, kind } = self;
         // The library's own words for a name that is not there begin with the board.
-        let board = if matches!(kind, ParamsProblemKind::NoEdge(_)) {
+        let board = if matches!(kind, ParamsProblemKind::NoSignal(_)) {
             String::new()
         } else {
             format!("board {board}: ")
@@ -86,10 +86,10 @@ pub enum ParamsProblemKind {
         /// The board's; `None`: it has no application.
         found: Option<u16>,
     },
-    /// No edge has this name.
+    /// No signal has this name.
     #[error("{0}")]
-    NoEdge(Error),
-    /// Two entries mean the same edge.
+    NoSignal(Error),
+    /// Two entries mean the same signal.
     #[error("{kind} `{name}` is given twice, first in line {first}")]
     Twice {
         /// `CI` or `PAR`.
@@ -139,11 +139,11 @@ pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<Par
 pub fn check_board(
     board: &ParamsBoard,
     description: &IoDescription,
-    edges: &BoardEdges,
+    signals: &BoardSignals,
 ) -> Result<(Vec<ParamsWord>, Vec<ParamsWord>), Vec<ParamsProblem>> {
     let mut problems = Vec::new();
     let mut words =
-        |kind, entries| check_entries(board.number, kind, entries, description, edges, &mut problems);
+        |kind, entries| check_entries(board.number, kind, entries, description, signals, &mut problems);
     let (ci, par) = (words(Kind::Ci, &board.ci), words(Kind::Par, &board.par));
     if problems.is_empty() { Ok((ci, par)) } else { Err(problems) }
 }
@@ -153,7 +153,7 @@ fn check_entries(
     kind: Kind,
     entries: &[ParamsEntry],
     description: &IoDescription,
-    edges: &BoardEdges,
+    signals: &BoardSignals,
     problems: &mut Vec<ParamsProblem>,
 ) -> Vec<ParamsWord> {
     let mut lines: BTreeMap<u16, u32> = BTreeMap::new();
@@ -163,7 +163,7 @@ fn check_entries(
         let index = match description.find(board, kind, name) {
             Ok(index) => index,
             Err(e) => {
-                say(ParamsProblemKind::NoEdge(e));
+                say(ParamsProblemKind::NoSignal(e));
                 continue;
             }
         };
@@ -171,14 +171,14 @@ fn check_entries(
             say(ParamsProblemKind::Twice { kind: kind.name(), name: name.clone(), first });
             continue;
         }
-        let Some(edge) = edges.get(kind, index.into()) else { continue };
-        match edge.word(given) {
+        let Some(signal) = signals.get(kind, index.into()) else { continue };
+        match signal.word(given) {
             Ok(word) => words.push(ParamsWord {
                 index,
                 name: description.names(kind).get(usize::from(index)).cloned().unwrap_or_default(),
                 word,
-                text: edge.text_with_unit(word),
-                rounded: edge.rounded(given, word).map(|sent| format!("{given} → {sent}")),
+                text: signal.text_with_unit(word),
+                rounded: signal.rounded(given, word).map(|sent| format!("{given} → {sent}")),
             }),
             Err(problem) => say(ParamsProblemKind::Value { kind: kind.name(), name: name.clone(), problem }),
         }

@@ -8,9 +8,9 @@ mod read;
 mod write;
 
 pub use check::{ParamsProblem, ParamsProblemKind, ParamsTarget, ParamsWord, check_board, check_identity};
-pub use write::{SavedBoard, SavedEdge, params_text};
+pub use write::{SavedBoard, SavedSignal, params_text};
 
-use super::edges::Given;
+use super::signals::SignalValue;
 use super::text::{TextError, read_text};
 use std::path::{Path, PathBuf};
 
@@ -46,10 +46,10 @@ pub struct ParamsBoard {
 /// A value of a parameter file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsEntry {
-    /// Name or number of the edge.
+    /// Name or number of the signal.
     pub name: String,
     /// The value.
-    pub given: Given,
+    pub given: SignalValue,
     /// Where it stands in the file.
     pub place: Place,
 }

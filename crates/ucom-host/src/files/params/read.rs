@@ -4,7 +4,7 @@ use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
 use super::{ParamsBoard, ParamsEntry, ParamsError, ParamsFile, Place};
-use crate::files::edges::Given;
+use crate::files::signals::SignalValue;
 
 /// More boards than a bus has, and more values than a buffer.
 const MAX_NODES: usize = 400_000;
@@ -69,8 +69,8 @@ fn wrong(place: Place, what: String) -> ParamsError {
 /// A number of 16 bits, decimal or with 0x.
 fn number(text: &Spanned<String>, what: &str) -> Result<u16, ParamsError> {
     let number = match text.value.trim().parse() {
-        Ok(Given::Raw(word)) => Some(word),
-        Ok(Given::Number { value, unit }) if unit.is_empty() && value.fract() == 0.0 => {
+        Ok(SignalValue::Raw(word)) => Some(word),
+        Ok(SignalValue::Number { value, unit }) if unit.is_empty() && value.fract() == 0.0 => {
             Some(value).filter(|v| (0.0..=65535.0).contains(v)).map(|v| v as u16)
         }
         _ => None,

@@ -1,7 +1,7 @@
 //! Files read, checked and written.
 
 use super::*;
-use crate::files::edges::{BoardEdges, Edge, EdgeTable, EdgeType};
+use crate::files::signals::{BoardSignals, Signal, SignalTable, SignalType};
 use crate::master::io::{IoDescription, Kind};
 use proptest::prelude::*;
 use std::panic;
@@ -22,11 +22,11 @@ fn description() -> IoDescription {
     }
 }
 
-fn edges() -> BoardEdges {
+fn signals() -> BoardSignals {
     let table = "[[program]]\nprogram_id = 0x1234\n[program.ci]\nset_position = { scale = 0.01, unit = \"deg\", min = -60, max = 60 }\n\
                  [program.par]\ncurrent_max = { type = \"uint16\", scale = 0.001, unit = \"A\", max = 2 }\nmode = { type = \"hex\" }\n";
-    let table = EdgeTable::parse(table).unwrap();
-    BoardEdges::new(&description(), table.program(0x1234), &Profile::default())
+    let table = SignalTable::parse(table).unwrap();
+    BoardSignals::new(&description(), table.program(0x1234), &Profile::default())
 }
 
 fn info() -> BoardInfo {
@@ -38,12 +38,12 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn values_become_words_of_their_edges() {
+fn values_become_words_of_their_signals() {
     let file = ParamsFile::parse(GOOD).unwrap();
     let board = file.board(1).unwrap();
     let target = ParamsTarget { info: &info(), name: None };
     assert_eq!(check_identity(board, &target), []);
-    let (ci, par) = check_board(board, &description(), &edges()).unwrap();
+    let (ci, par) = check_board(board, &description(), &signals()).unwrap();
     let words = |list: &[ParamsWord]| list.iter().map(|w| (w.index, w.word)).collect::<Vec<_>>();
     assert_eq!(words(&ci), [(0, -1550_i16 as u16)]);
     assert_eq!(words(&par), [(0, 120), (1, 1500), (2, 16)]);
@@ -82,7 +82,7 @@ fn another_board_or_program_is_a_problem_with_its_line() {
 fn names_and_ranges_are_checked_with_their_place() {
     let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 4000\n    kp: 70000\n    current_max: 3 A\n    mode: on\n  ci:\n    set_position: 61 deg\n";
     let file = ParamsFile::parse(text).unwrap();
-    let problems = check_board(file.board(1).unwrap(), &description(), &edges()).unwrap_err();
+    let problems = check_board(file.board(1).unwrap(), &description(), &signals()).unwrap_err();
     let said: Vec<String> = problems.iter().map(ToString::to_string).collect();
     assert_eq!(
         said,
@@ -135,10 +135,10 @@ fn what_is_no_parameter_file_is_refused_with_its_place() {
 }
 
 fn saved() -> SavedBoard {
-    let edges = edges();
+    let signals = signals();
     let all = |kind: Kind, words: &[Option<u16>]| {
-        let edges = edges.all(kind).iter().cloned().zip(words);
-        edges.map(|(edge, word)| SavedEdge { edge, word: *word, remark: "once".into() }).collect()
+        let signals = signals.all(kind).iter().cloned().zip(words);
+        signals.map(|(signal, word)| SavedSignal { signal, word: *word, remark: "once".into() }).collect()
     };
     SavedBoard {
         number: 1,
@@ -158,7 +158,7 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     let file = ParamsFile::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let board = file.board(1).unwrap();
     assert_eq!(board.name.as_deref(), Some("neck: \"yaw\""));
-    let (ci, par) = check_board(board, &description(), &edges()).unwrap();
+    let (ci, par) = check_board(board, &description(), &signals()).unwrap();
     assert!(ci.is_empty());
     assert_eq!(par.iter().map(|w| (w.index, w.word)).collect::<Vec<_>>(), [(0, 120), (2, 0x8001)]);
     assert!(text.contains("# current_max:  # 0.000..2.000 A; once"), "{text}");
@@ -166,7 +166,7 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
 }
 
-/// D-11, D-35: with another edge table, or none, a saved file means the same word or is refused; never another word.
+/// D-11, D-35: with another signal table, or none, a saved file means the same word or is refused; never another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };
@@ -179,21 +179,22 @@ fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
         "{ type = \"hex\" }",
         "{}",
     ];
-    let edges = tables.map(|edge| {
-        let table = format!("[[program]]\nprogram_id = 7\npar.kd = {edge}\n");
-        let table = if edge.is_empty() { EdgeTable::default() } else { EdgeTable::parse(&table).unwrap() };
-        BoardEdges::new(&description, table.program(7), &profile)
+    let signals = tables.map(|signal| {
+        let table = format!("[[program]]\nprogram_id = 7\npar.kd = {signal}\n");
+        let table =
+            if signal.is_empty() { SignalTable::default() } else { SignalTable::parse(&table).unwrap() };
+        BoardSignals::new(&description, table.program(7), &profile)
     });
-    for (i, saved) in edges.iter().enumerate() {
+    for (i, saved) in signals.iter().enumerate() {
         for word in [4_u16, 0xFFFE, 0x7FFF, 0x8000] {
-            let edge = saved.get(Kind::Par, 0).unwrap().clone();
-            let par = vec![SavedEdge { edge, word: Some(word), remark: String::new() }];
+            let signal = saved.get(Kind::Par, 0).unwrap().clone();
+            let par = vec![SavedSignal { signal, word: Some(word), remark: String::new() }];
             let description = description.clone();
             let board = SavedBoard { number: 1, program_id: 7, description, par, ..Default::default() };
             let text = params_text(&[board]);
             let file = ParamsFile::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
-            for (k, edges) in edges.iter().enumerate() {
-                match check_board(&file.boards[0], &file_names(), edges) {
+            for (k, signals) in signals.iter().enumerate() {
+                match check_board(&file.boards[0], &file_names(), signals) {
                     Ok((_, par)) => assert_eq!(par[0].word, word, "{text}, table {k}"),
                     Err(e) => assert!(i != k, "{e:?}: {text}"),
                 }
@@ -224,16 +225,16 @@ proptest! {
     #[test]
     fn a_saved_file_gives_the_same_words(par in names(), words in prop::collection::vec(any::<Option<u16>>(), 8), kind in 0..4_usize, text in any::<String>()) {
         let description = IoDescription { description: text.clone(), par, ..Default::default() };
-        let kind = [EdgeType::Int16, EdgeType::Uint16, EdgeType::Hex, EdgeType::Bool][kind];
-        let edge = Edge { kind, known: true, ..Edge::bare(&Profile::default()) };
-        let value = |w: &Option<u16>| w.map(|w| if kind == EdgeType::Bool { w & 1 } else { w });
-        let par: Vec<_> = description.par.iter().zip(&words).map(|(_, w)| SavedEdge { edge: edge.clone(), word: value(w), remark: text.clone() }).collect();
+        let kind = [SignalType::Int16, SignalType::Uint16, SignalType::Hex, SignalType::Bool][kind];
+        let signal = Signal { kind, known: true, ..Signal::bare(&Profile::default()) };
+        let value = |w: &Option<u16>| w.map(|w| if kind == SignalType::Bool { w & 1 } else { w });
+        let par: Vec<_> = description.par.iter().zip(&words).map(|(_, w)| SavedSignal { signal: signal.clone(), word: value(w), remark: text.clone() }).collect();
         let board = SavedBoard { number: 3, flash_number: 9, name: text, program_id: 7, description: description.clone(), par: par.clone(), ci: Vec::new() };
         let written = params_text(&[board]);
         let file = ParamsFile::parse(&written).map_err(|e| TestCaseError::fail(format!("{e}\n{written}")))?;
-        let mut edges = BoardEdges::new(&description, None, &Profile::default());
-        edges.replace_par(edge);
-        let (_, words) = check_board(file.board(3).unwrap(), &description, &edges).map_err(|e| TestCaseError::fail(format!("{e:?}\n{written}")))?;
+        let mut signals = BoardSignals::new(&description, None, &Profile::default());
+        signals.replace_par(signal);
+        let (_, words) = check_board(file.board(3).unwrap(), &description, &signals).map_err(|e| TestCaseError::fail(format!("{e:?}\n{written}")))?;
         let got: Vec<_> = words.iter().map(|w| (usize::from(w.index), w.word)).collect();
         let wanted: Vec<_> = par.iter().enumerate().filter_map(|(i, s)| Some((i, s.word?))).collect();
         prop_assert_eq!(got, wanted, "{}", written);

@@ -1,6 +1,6 @@
 //! The text of a parameter file: values that are wanted, and every other name as a comment.
 
-use crate::files::edges::{Edge, EdgeType, Given};
+use crate::files::signals::{Signal, SignalType, SignalValue};
 use crate::files::text::quoted;
 use crate::master::io::{IoDescription, Kind, short};
 use std::fmt::Write;
@@ -16,19 +16,19 @@ pub struct SavedBoard {
     pub name: String,
     /// Its program.
     pub program_id: u16,
-    /// The names of its edges.
+    /// The names of its signals.
     pub description: IoDescription,
     /// Parameters, in the order of the buffer.
-    pub par: Vec<SavedEdge>,
+    pub par: Vec<SavedSignal>,
     /// Inputs, in the order of the buffer.
-    pub ci: Vec<SavedEdge>,
+    pub ci: Vec<SavedSignal>,
 }
 
-/// What is written of one edge.
+/// What is written of one signal.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SavedEdge {
+pub struct SavedSignal {
     /// Its meaning.
-    pub edge: Edge,
+    pub signal: Signal,
     /// The word that is wanted; `None`: the name becomes a comment.
     pub word: Option<u16>,
     /// For a wanted word when it was written, for others what is known beside.
@@ -57,12 +57,12 @@ pub fn params_text(boards: &[SavedBoard]) -> String {
             board.program_id,
             comment(&board.description.description)
         );
-        for (kind, title, edges) in [(Kind::Par, "par", &board.par), (Kind::Ci, "ci", &board.ci)] {
-            if edges.is_empty() {
+        for (kind, title, signals) in [(Kind::Par, "par", &board.par), (Kind::Ci, "ci", &board.ci)] {
+            if signals.is_empty() {
                 continue;
             }
             let _ = writeln!(text, "    {title}:");
-            for (i, saved) in edges.iter().enumerate() {
+            for (i, saved) in signals.iter().enumerate() {
                 line(&mut text, board, kind, i, saved);
             }
         }
@@ -70,17 +70,17 @@ pub fn params_text(boards: &[SavedBoard]) -> String {
     text
 }
 
-fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &SavedEdge) {
+fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &SavedSignal) {
     let key = key(&board.description, kind, i);
-    let (low, high) = saved.edge.limits();
-    let unit = if saved.edge.unit.is_empty() { String::new() } else { format!(" {}", saved.edge.unit) };
+    let (low, high) = saved.signal.limits();
+    let unit = if saved.signal.unit.is_empty() { String::new() } else { format!(" {}", saved.signal.unit) };
     let remark = if saved.remark.is_empty() { String::new() } else { format!("; {}", saved.remark) };
     let limits = format!("{low}..{high}{unit}{remark}");
     let _ = match saved.word {
         Some(word) => {
-            let value = value(&saved.edge, word);
-            let meaning = if value.starts_with("0x") && saved.edge.kind != EdgeType::Hex {
-                format!("{}; ", saved.edge.text_with_unit(word))
+            let value = value(&saved.signal, word);
+            let meaning = if value.starts_with("0x") && saved.signal.kind != SignalType::Hex {
+                format!("{}; ", saved.signal.text_with_unit(word))
             } else {
                 String::new()
             };
@@ -90,19 +90,19 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// What a word is written as. A file is read again with another edge table, or with none; a bare number would then be another
+/// What a word is written as. A file is read again with another signal table, or with none; a bare number would then be another
 /// word. So there is a unit behind each number, which whoever does not know it refuses, or it is the word itself.
-fn value(edge: &Edge, word: u16) -> String {
+fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
-    let text = match edge.kind {
-        EdgeType::Bool if edge.known && word <= 1 => return edge.text(word),
-        EdgeType::Int16 | EdgeType::Uint16 if edge.known && !edge.unit.is_empty() => {
-            edge.text_with_unit(word)
+    let text = match signal.kind {
+        SignalType::Bool if signal.known && word <= 1 => return signal.text(word),
+        SignalType::Int16 | SignalType::Uint16 if signal.known && !signal.unit.is_empty() => {
+            signal.text_with_unit(word)
         }
         _ => return raw,
     };
     // A digit that rounding has lost, or a limit that the word does not keep.
-    if text.parse::<Given>().map(|given| edge.word(&given)) != Ok(Ok(word)) {
+    if text.parse::<SignalValue>().map(|given| signal.word(&given)) != Ok(Ok(word)) {
         return raw;
     }
     let plain = |c: char| c.is_ascii_alphanumeric() || " .-/%^*_°µ²³Ω".contains(c);
@@ -116,11 +116,11 @@ fn comment(words: &str) -> String {
     if one_line.trim().is_empty() { String::new() } else { format!("   # {}", one_line.trim()) }
 }
 
-/// The name of an edge, as short as it can be and still mean this one.
+/// The name of a signal, as short as it can be and still mean this one.
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);
-    // A board may call another edge "#1": further signs make the number different from every name.
+    // A board may call another signal "#1": further signs make the number different from every name.
     let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
     let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
     let name = names.chain(numbers).find(|name| means(name)).unwrap_or_default();

@@ -1,6 +1,6 @@
 //! Whether boards do what the protocol page says: the acceptance tests of the board side, against boards that are there.
 //!
-//! By default only what changes nothing is asked. More is allowed by [`ConformanceOptions`]: numbering the chain anew,
+//! By default only what changes nothing is asked. More is allowed by [`ConformanceOptions`]: a new address assignment,
 //! running applications with safe outputs, programming. Each test is a short conversation in frames of its own making, so that
 //! the procedures of this crate are not their own judges.
 

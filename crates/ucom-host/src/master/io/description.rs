@@ -45,7 +45,7 @@ impl DescriptionKey {
     }
 }
 
-/// The application's description of itself and of every edge; kept under a [`DescriptionKey`].
+/// The application's description of itself and of every signal; kept under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
     /// The application; may differ from the board's own description in DSP_INFO.
@@ -74,7 +74,7 @@ impl IoDescription {
         }
     }
 
-    /// Place of an edge: by its text, in any case when only one fits, with or without the unit in brackets behind it, or by
+    /// Place of a signal: by its text, in any case when only one fits, with or without the unit in brackets behind it, or by
     /// its number (`#3` or `3`).
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
         let names = self.names(kind);
@@ -95,7 +95,7 @@ impl IoDescription {
         near.retain(|(likeness, _)| *likeness > 0.6);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
         let near = near.into_iter().take(3).map(|(_, n)| n.clone()).collect();
-        Err(Error::NoEdge { board, kind: kind.name(), name: name.into(), near })
+        Err(Error::NoSignal { board, kind: kind.name(), name: name.into(), near })
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edges_are_found_by_name_or_number() {
+    fn signals_are_found_by_name_or_number() {
         let texts = |list: &[&str]| list.iter().map(|t| (*t).to_owned()).collect();
         let io = IoDescription { ci: texts(&["Target", "target speed", "x", "x"]), ..Default::default() };
         assert_eq!(io.find(1, Kind::Ci, "Target"), Ok(0));
@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(io.find(1, Kind::Ci, "#3"), Ok(3));
         let units = IoDescription { par: texts(&["kp [mA/deg]", "kp_2 [mA]", "KD"]), ..Default::default() };
         assert_eq!((units.find(1, Kind::Par, "KP"), units.find(1, Kind::Par, "kd")), (Ok(0), Ok(2)));
-        assert!(io.find(1, Kind::Ci, "x").is_err(), "two edges have this name");
+        assert!(io.find(1, Kind::Ci, "x").is_err(), "two signals have this name");
         let text = io.find(1, Kind::Ci, "traget").unwrap_err().to_string();
         assert!(text.contains("board 1 has no CI `traget`; there is `Target`"), "{text}");
     }

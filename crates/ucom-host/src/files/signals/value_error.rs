@@ -1,5 +1,5 @@
-//! Why a value cannot be written to an edge.
-/// Why a value cannot be written to an edge.
+//! Why a value cannot be written to a signal.
+/// Why a value cannot be written to a signal.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ValueError {
     /// Too large or too small.
@@ -14,12 +14,12 @@ pub enum ValueError {
         /// Their unit.
         unit: String,
     },
-    /// Given in another unit than the edge's.
+    /// Given in another unit than the signal's.
     #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]
     Unit {
         /// What was given.
         given: String,
-        /// The edge's unit.
+        /// The signal's unit.
         unit: String,
     },
     /// A number alone, where it could be the word or a value in the signal's unit.
@@ -27,7 +27,7 @@ pub enum ValueError {
     NoUnit {
         /// What was given.
         given: String,
-        /// The edge's unit; empty: the table scales it and names none.
+        /// The signal's unit; empty: the table scales it and names none.
         unit: String,
     },
     /// Between two words.
@@ -44,13 +44,13 @@ pub enum ValueError {
     },
     /// A number or a switch, and nobody knows what it means here.
     #[error(
-        "{given}: the edge table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
+        "{given}: the signal table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
     )]
     Meaning {
         /// What was given.
         given: String,
     },
-    /// On or off, but the edge is a number.
+    /// On or off, but the signal is a number.
     #[error("{given}: it is a number")]
     NoSwitch {
         /// What was given.

@@ -5,12 +5,12 @@ use core::str::FromStr;
 /// Longest unit, in bytes.
 const UNIT_MAX: usize = 32;
 
-/// A value before it is known which edge it is for.
+/// A value before it is known which signal it is for.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Given {
-    /// `0x05DC`: the word itself, whatever the edge's type and scale.
+pub enum SignalValue {
+    /// `0x05DC`: the word itself, whatever the signal's type and scale.
     Raw(u16),
-    /// `15.5 deg`: in the unit of the edge. `15.5`: where the edge has no unit; without a table, the word as a number.
+    /// `15.5 deg`: in the unit of the signal. `15.5`: where the signal has no unit; without a table, the word as a number.
     Number {
         /// The number.
         value: f64,
@@ -23,7 +23,7 @@ pub enum Given {
 
 /// A text that is no value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum GivenError {
+pub enum SignalValueError {
     /// Hexadecimal, but no word of 16 bits.
     #[error("\"{0}\" is no word of 16 bits; they are 0x0000 to 0xFFFF")]
     Hex(String),
@@ -34,10 +34,10 @@ pub enum GivenError {
     Form(String),
 }
 
-impl FromStr for Given {
-    type Err = GivenError;
+impl FromStr for SignalValue {
+    type Err = SignalValueError;
 
-    fn from_str(text: &str) -> Result<Self, GivenError> {
+    fn from_str(text: &str) -> Result<Self, SignalValueError> {
         let text = text.trim();
         match text.to_ascii_lowercase().as_str() {
             "on" | "true" | "yes" => return Ok(Self::Switch(true)),
@@ -47,9 +47,9 @@ impl FromStr for Given {
         if let Some(digits) = text.strip_prefix("0x").or(text.strip_prefix("0X")) {
             let hex = digits.chars().all(|c| c.is_ascii_hexdigit());
             let word = u16::from_str_radix(digits, 16).ok().filter(|_| hex);
-            return word.map(Self::Raw).ok_or_else(|| GivenError::Hex(text.into()));
+            return word.map(Self::Raw).ok_or_else(|| SignalValueError::Hex(text.into()));
         }
-        let wrong = || GivenError::Form(text.into());
+        let wrong = || SignalValueError::Form(text.into());
         // Words like "inf" and "nan" are numbers for Rust, not for people.
         if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || text.len() > 64 {
             return Err(wrong());
@@ -87,7 +87,7 @@ fn number(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|n| n.is_finite() && begins)
 }
 
-impl fmt::Display for Given {
+impl fmt::Display for SignalValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Raw(word) => write!(f, "0x{word:04X}"),
@@ -112,20 +112,20 @@ mod tests {
 
     use super::*;
 
-    fn number(value: f64, unit: &str) -> Result<Given, GivenError> {
-        Ok(Given::Number { value, unit: unit.into() })
+    fn number(value: f64, unit: &str) -> Result<SignalValue, SignalValueError> {
+        Ok(SignalValue::Number { value, unit: unit.into() })
     }
 
     #[test]
     fn d11_values_are_words_numbers_with_units_and_switches() {
-        let given = |text: &str| text.parse::<Given>();
-        assert_eq!(given("0x05DC"), Ok(Given::Raw(1500)));
+        let given = |text: &str| text.parse::<SignalValue>();
+        assert_eq!(given("0x05DC"), Ok(SignalValue::Raw(1500)));
         assert_eq!(given(" -20 "), number(-20.0, ""));
         assert_eq!(given("15.5deg"), number(15.5, "deg"));
         assert_eq!(given("1e3 mA/deg"), number(1000.0, "mA/deg"));
         assert_eq!(given("3 °C"), number(3.0, "°C"));
         assert_eq!(given("5 e"), number(5.0, "e"));
-        assert_eq!(given("Off"), Ok(Given::Switch(false)));
+        assert_eq!(given("Off"), Ok(SignalValue::Switch(false)));
         for wrong in [
             "", "x", "0x10000", "0x", "0x-1", "0x+1", "nan", "inf", "-inf", "1e999", "--3", "1.2.3", "1,5",
             "1 000", "0o10", "-0x10", "0b11", "1:30", "0xFFFFF", "1'000",
@@ -143,8 +143,8 @@ mod tests {
     proptest! {
         #[test]
         fn any_text_is_a_value_or_an_error(text in any::<String>()) {
-            if let Ok(given) = text.parse::<Given>() {
-                prop_assert_eq!(given.to_string().parse::<Given>(), Ok(given));
+            if let Ok(given) = text.parse::<SignalValue>() {
+                prop_assert_eq!(given.to_string().parse::<SignalValue>(), Ok(given));
             }
         }
     }

@@ -1,38 +1,38 @@
 //! The file: TOML, by Program ID.
 
-use super::Edge;
-use super::form::{File, FileEdge, LARGEST, people};
+use super::Signal;
+use super::form::{File, FileSignal, LARGEST, people};
 use crate::files::text::{TextError, quoted, read_text};
 use crate::master::io::{IoDescription, Kind, short};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The page about these files.
-pub const EDGE_HELP: &str = include_str!("help.txt");
+pub const SIGNAL_HELP: &str = include_str!("help.txt");
 
 /// Tables of several programs.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct EdgeTable {
-    programs: Vec<ProgramEdges>,
+pub struct SignalTable {
+    programs: Vec<ProgramSignals>,
     given: bool,
 }
 
-/// What is known of one program's edges.
+/// What is known of one program's signals.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ProgramEdges {
+pub struct ProgramSignals {
     /// Program IDs of the versions that it fits.
     pub program_ids: Vec<u16>,
     /// For people.
     pub name: String,
-    ci: BTreeMap<String, Edge>,
-    so: BTreeMap<String, Edge>,
-    par: BTreeMap<String, Edge>,
+    ci: BTreeMap<String, Signal>,
+    so: BTreeMap<String, Signal>,
+    par: BTreeMap<String, Signal>,
 }
 
-/// Why a file is no edge table.
+/// Why a file is no signal table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum EdgeTableError {
+pub enum SignalTableError {
     /// The file cannot be read.
     #[error(transparent)]
     Text(#[from] TextError),
@@ -52,14 +52,14 @@ pub enum EdgeTableError {
         id: u16,
     },
     /// A number that makes no sense.
-    #[error("program 0x{id:04X}, {kind} `{edge}`: {what}")]
-    Edge {
+    #[error("program 0x{id:04X}, {kind} `{signal}`: {what}")]
+    Signal {
         /// The first Program ID.
         id: u16,
         /// `CI`, `SO` or `PAR`.
         kind: &'static str,
-        /// The edge.
-        edge: String,
+        /// The signal.
+        signal: String,
         /// What is wrong, with the limit.
         what: String,
     },
@@ -69,37 +69,37 @@ pub enum EdgeTableError {
         /// The file.
         path: PathBuf,
         /// What is wrong in it.
-        source: Box<EdgeTableError>,
+        source: Box<SignalTableError>,
     },
 }
 
-impl EdgeTable {
+impl SignalTable {
     /// Reads TOML.
-    pub fn parse(text: &str) -> Result<Self, EdgeTableError> {
-        let file: File = toml::from_str(text).map_err(|e| EdgeTableError::Form(people(&e.to_string())))?;
+    pub fn parse(text: &str) -> Result<Self, SignalTableError> {
+        let file: File = toml::from_str(text).map_err(|e| SignalTableError::Form(people(&e.to_string())))?;
         let mut table = Self { programs: Vec::new(), given: true };
         for (i, program) in file.program.into_iter().enumerate() {
             let Some(&id) = program.program_id.first() else {
-                return Err(EdgeTableError::NoId { number: i + 1 });
+                return Err(SignalTableError::NoId { number: i + 1 });
             };
             for (n, id) in program.program_id.iter().enumerate() {
                 if table.program(*id).is_some()
                     || program.program_id.iter().take(n).any(|before| before == id)
                 {
-                    return Err(EdgeTableError::Twice { id: *id });
+                    return Err(SignalTableError::Twice { id: *id });
                 }
             }
-            let edges = |kind: Kind, list: BTreeMap<String, FileEdge>| {
-                let one = |(edge, of): (String, FileEdge)| match of.check() {
-                    Ok(checked) => Ok((edge, checked)),
-                    Err(what) => Err(EdgeTableError::Edge { id, kind: kind.name(), edge, what }),
+            let signals = |kind: Kind, list: BTreeMap<String, FileSignal>| {
+                let one = |(signal, of): (String, FileSignal)| match of.check() {
+                    Ok(checked) => Ok((signal, checked)),
+                    Err(what) => Err(SignalTableError::Signal { id, kind: kind.name(), signal, what }),
                 };
                 list.into_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>()
             };
-            table.programs.push(ProgramEdges {
-                ci: edges(Kind::Ci, program.ci)?,
-                so: edges(Kind::So, program.so)?,
-                par: edges(Kind::Par, program.par)?,
+            table.programs.push(ProgramSignals {
+                ci: signals(Kind::Ci, program.ci)?,
+                so: signals(Kind::So, program.so)?,
+                par: signals(Kind::Par, program.par)?,
                 program_ids: program.program_id,
                 name: program.name,
             });
@@ -108,9 +108,9 @@ impl EdgeTable {
     }
 
     /// Reads a file.
-    pub fn read(path: &Path) -> Result<Self, EdgeTableError> {
+    pub fn read(path: &Path) -> Result<Self, SignalTableError> {
         let text = read_text(path)?;
-        Self::parse(&text).map_err(|e| EdgeTableError::In { path: path.into(), source: Box::new(e) })
+        Self::parse(&text).map_err(|e| SignalTableError::In { path: path.into(), source: Box::new(e) })
     }
 
     /// Whether it was read from anything; otherwise nobody has said what words mean.
@@ -119,7 +119,7 @@ impl EdgeTable {
     }
 
     /// What is known of a program.
-    pub fn program(&self, id: u16) -> Option<&ProgramEdges> {
+    pub fn program(&self, id: u16) -> Option<&ProgramSignals> {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
@@ -149,7 +149,7 @@ impl EdgeTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Two edges of one name, and a third that is called by the number of the second: nothing to be done.
+                    // Two signals of one name, and a third that is called by the number of the second: nothing to be done.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", told(name));
                     }
@@ -174,20 +174,20 @@ fn told(name: &str) -> String {
     };
     let scale = scale.filter(|n: &f64| (1.0 / LARGEST..=LARGEST).contains(n));
     keys.extend(scale.map(|n| format!("scale = {n}")));
-    let told = FileEdge { unit: unit.into(), ..Default::default() };
+    let told = FileSignal { unit: unit.into(), ..Default::default() };
     if told.check().is_ok() && !unit.is_empty() {
         keys.push(format!("unit = {}", quoted(unit)));
     }
     keys.join(", ")
 }
 
-impl ProgramEdges {
-    /// Which edges of one kind are known, by the table's own names.
+impl ProgramSignals {
+    /// Which signals of one kind are known, by the table's own names.
     pub fn names(&self, kind: Kind) -> impl Iterator<Item = &String> {
         self.of(kind).keys()
     }
 
-    fn of(&self, kind: Kind) -> &BTreeMap<String, Edge> {
+    fn of(&self, kind: Kind) -> &BTreeMap<String, Signal> {
         match kind {
             Kind::Ci => &self.ci,
             Kind::So => &self.so,
@@ -195,13 +195,13 @@ impl ProgramEdges {
         }
     }
 
-    /// What is known of an edge: by its whole text, its text without the unit in brackets, or its number. Small and
+    /// What is known of a signal: by its whole text, its text without the unit in brackets, or its number. Small and
     /// capital letters are the same where names stay distinct by that, as they are for names that people give.
-    pub fn edge(&self, kind: Kind, index: usize, name: &str) -> Option<&Edge> {
+    pub fn signal(&self, kind: Kind, index: usize, name: &str) -> Option<&Signal> {
         let all = self.of(kind);
         let like = |wanted: &str| {
             let mut found = all.iter().filter(|(key, _)| key.trim().eq_ignore_ascii_case(wanted.trim()));
-            found.next().filter(|_| found.next().is_none()).map(|(_, edge)| edge)
+            found.next().filter(|_| found.next().is_none()).map(|(_, signal)| signal)
         };
         all.get(name)
             .or_else(|| all.get(short(name)))
@@ -233,7 +233,7 @@ mod tests {
     use std::panic;
 
     use super::*;
-    use crate::files::edges::BoardEdges;
+    use crate::files::signals::BoardSignals;
     use ucom::Profile;
 
     fn texts(list: &[&str]) -> Vec<String> {
@@ -254,21 +254,21 @@ mod tests {
     fn d11_tables_are_found_by_program_and_name() {
         let text = "[[program]]\nprogram_id = [0x1234, 0x4B3F]\n[program.ci]\nset_position = { scale = 0.01, unit = \"deg\" }\n\
                     [program.so]\n\"#2\" = { type = \"hex\" }\n\"y\" = { type = \"bool\" }\n";
-        let table = EdgeTable::parse(text).unwrap();
+        let table = SignalTable::parse(text).unwrap();
         assert!(table.program(0x1235).is_none());
         let program = table.program(0x4B3F).unwrap();
-        let edges = BoardEdges::new(&description(), Some(program), &Profile::default());
-        assert_eq!(edges.get(Kind::Ci, 0).unwrap().text_with_unit(1500), "15.00 deg");
-        assert_eq!(edges.get(Kind::Ci, 1).unwrap().text(1500), "1500");
-        assert_eq!(edges.get(Kind::So, 2).unwrap().text(1500), "0x05DC");
+        let signals = BoardSignals::new(&description(), Some(program), &Profile::default());
+        assert_eq!(signals.get(Kind::Ci, 0).unwrap().text_with_unit(1500), "15.00 deg");
+        assert_eq!(signals.get(Kind::Ci, 1).unwrap().text(1500), "1500");
+        assert_eq!(signals.get(Kind::So, 2).unwrap().text(1500), "0x05DC");
         assert_eq!(program.strays(&description()), ["SO `y`"]);
     }
 
     #[test]
     fn d11_what_makes_no_sense_is_refused_with_its_place() {
-        let refused = |edge: &str| {
-            let text = format!("[[program]]\nprogram_id = 1\n[program.par]\nkp = {{ {edge} }}\n");
-            EdgeTable::parse(&text).unwrap_err().to_string()
+        let refused = |signal: &str| {
+            let text = format!("[[program]]\nprogram_id = 1\n[program.par]\nkp = {{ {signal} }}\n");
+            SignalTable::parse(&text).unwrap_err().to_string()
         };
         assert_eq!(
             refused("scale = 0"),
@@ -286,7 +286,7 @@ mod tests {
         assert!(refused("scales = 2").contains("line 4") && refused("type = \"int8\"").contains("line 4"));
         let said = refused("scale = \"x\"");
         assert!(said.contains("expected a number") && !said.contains("f64"), "{said}");
-        let form = |text: &str| EdgeTable::parse(text).unwrap_err().to_string();
+        let form = |text: &str| SignalTable::parse(text).unwrap_err().to_string();
         assert!(form("[[program]]\nname = \"x\"").contains("program 1 has no program_id"));
         assert!(form("[[program]]\nprogram_id = [1, 1]").contains("0x0001 is given twice"));
         assert!(form("[[program]]\nprogram_id = 1\n[[program]]\nprogram_id = 1").contains("given twice"));
@@ -298,28 +298,28 @@ mod tests {
     fn d11_names_of_the_table_are_found_in_any_case() {
         let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\
                     STIFFNES = {}\n";
-        let table = EdgeTable::parse(text).unwrap();
+        let table = SignalTable::parse(text).unwrap();
         let program = table.program(1).unwrap();
-        let edges = BoardEdges::new(&description(), Some(program), &Profile::default());
-        assert_eq!(edges.get(Kind::Ci, 0).unwrap().unit, "deg");
+        let signals = BoardSignals::new(&description(), Some(program), &Profile::default());
+        assert_eq!(signals.get(Kind::Ci, 0).unwrap().unit, "deg");
         assert_eq!(program.strays(&description()), ["CI `STIFFNES`"]);
-        assert!(table.is_given() && !EdgeTable::default().is_given());
+        assert!(table.is_given() && !SignalTable::default().is_given());
     }
 
-    /// A template is a table, and it names every edge.
+    /// A template is a table, and it names every signal.
     #[test]
-    fn a_template_is_a_table_of_all_edges() {
-        let text = EdgeTable::template(&[(0x1234, &description())]);
-        let table = EdgeTable::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    fn a_template_is_a_table_of_all_signals() {
+        let text = SignalTable::template(&[(0x1234, &description())]);
+        let table = SignalTable::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
         let program = table.program(0x1234).unwrap();
         assert!(program.strays(&description()).is_empty());
         for kind in [Kind::Ci, Kind::So, Kind::Par] {
             for (i, name) in description().names(kind).iter().enumerate() {
-                assert!(program.edge(kind, i, name).is_some(), "{name}\n{text}");
+                assert!(program.signal(kind, i, name).is_some(), "{name}\n{text}");
             }
         }
-        let edge = program.edge(Kind::Ci, 0, "set_position [0.01 deg]").unwrap();
-        assert_eq!((edge.scale, edge.unit.as_str()), (0.01, "deg"));
-        assert_eq!(program.edge(Kind::Par, 0, "kp").unwrap().unit, "mA/deg");
+        let signal = program.signal(Kind::Ci, 0, "set_position [0.01 deg]").unwrap();
+        assert_eq!((signal.scale, signal.unit.as_str()), (0.01, "deg"));
+        assert_eq!(program.signal(Kind::Par, 0, "kp").unwrap().unit, "mA/deg");
     }
 }

@@ -3,13 +3,13 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::value_error::space;
-use super::{Given, ValueError};
+use super::{SignalValue, ValueError};
 use ucom::Profile;
 
 /// What kind of number a word is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum EdgeType {
+pub enum SignalType {
     /// Signed.
     #[default]
     Int16,
@@ -21,11 +21,11 @@ pub enum EdgeType {
     Bool,
 }
 
-/// What the word of an edge means: `word × scale + offset`, in a unit.
+/// What the word of a signal means: `word × scale + offset`, in a unit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Edge {
+pub struct Signal {
     /// What kind of number the word is.
-    pub kind: EdgeType,
+    pub kind: SignalType,
     /// Units for each step of the word.
     pub scale: f64,
     /// What the word 0 means, in units.
@@ -45,10 +45,10 @@ pub struct Edge {
 /// What calculating with fractions may lose, as a share.
 const SLACK: f64 = 1e-9;
 
-impl Edge {
-    /// An edge that no table knows: a bare word, signed or not by the profile.
+impl Signal {
+    /// A signal that no table knows: a bare word, signed or not by the profile.
     pub fn bare(profile: &Profile) -> Self {
-        let kind = if profile.pd_signed { EdgeType::Int16 } else { EdgeType::Uint16 };
+        let kind = if profile.pd_signed { SignalType::Int16 } else { SignalType::Uint16 };
         Self {
             kind,
             scale: 1.0,
@@ -67,15 +67,15 @@ impl Edge {
 
     /// Whether the word is a signed number.
     pub fn signed(&self) -> bool {
-        self.kind == EdgeType::Int16
+        self.kind == SignalType::Int16
     }
 
     /// Range of the word as a number.
     fn words(&self) -> (i32, i32) {
         match self.kind {
-            EdgeType::Int16 => (-32768, 32767),
-            EdgeType::Uint16 | EdgeType::Hex => (0, 65535),
-            EdgeType::Bool => (0, 1),
+            SignalType::Int16 => (-32768, 32767),
+            SignalType::Uint16 | SignalType::Hex => (0, 65535),
+            SignalType::Bool => (0, 1),
         }
     }
 
@@ -101,11 +101,11 @@ impl Edge {
         if zero { text.trim_start_matches('-').into() } else { text }
     }
 
-    /// The word as a value in the edge's unit, without the unit: `15.50`, `-20`, `0x00FF`, `on`.
+    /// The word as a value in the signal's unit, without the unit: `15.50`, `-20`, `0x00FF`, `on`.
     pub fn text(&self, word: u16) -> String {
         match self.kind {
-            EdgeType::Bool => if word == 0 { "off" } else { "on" }.into(),
-            EdgeType::Hex => format!("0x{word:04X}"),
+            SignalType::Bool => if word == 0 { "off" } else { "on" }.into(),
+            SignalType::Hex => format!("0x{word:04X}"),
             _ => self.written(self.scaled(self.number(word))),
         }
     }
@@ -115,11 +115,11 @@ impl Edge {
         self.text(word) + &space(&self.unit)
     }
 
-    /// The value for programs: a number in the edge's unit, or true and false.
+    /// The value for programs: a number in the signal's unit, or true and false.
     pub fn json(&self, word: u16) -> Value {
         match self.kind {
-            EdgeType::Bool => json!(word != 0),
-            EdgeType::Hex => json!(word),
+            SignalType::Bool => json!(word != 0),
+            SignalType::Hex => json!(word),
             _ if self.plain() => json!(self.number(word)),
             _ => self.text(word).parse::<f64>().map_or(Value::Null, |n| json!(n)),
         }
@@ -135,7 +135,7 @@ impl Edge {
 
     /// The same as text.
     pub fn limits(&self) -> (String, String) {
-        if self.kind == EdgeType::Hex {
+        if self.kind == SignalType::Hex {
             return ("0x0000".into(), "0xFFFF".into());
         }
         let text = |limit: f64, own: Option<f64>| {
@@ -168,26 +168,26 @@ impl Edge {
     }
 
     /// What is sent instead of a value that lies between two words, with the unit; `None`: the value itself.
-    pub fn rounded(&self, given: &Given, word: u16) -> Option<String> {
-        let Given::Number { value, .. } = given else { return None };
+    pub fn rounded(&self, given: &SignalValue, word: u16) -> Option<String> {
+        let SignalValue::Number { value, .. } = given else { return None };
         let sent = self.scaled(self.number(word));
         let same = (sent - value).abs() <= SLACK * (value.abs() + self.scale.abs());
         (!same).then(|| self.text_with_unit(word))
     }
 
-    /// The word for a value. Between two words the nearer one is taken where the edge has a scale, but never one beyond
+    /// The word for a value. Between two words the nearer one is taken where the signal has a scale, but never one beyond
     /// the limits.
     ///
     /// # Errors
-    /// A value outside of the limits, in another unit, between two words of an edge without scale, or of another type.
-    pub fn word(&self, given: &Given) -> Result<u16, ValueError> {
+    /// A value outside of the limits, in another unit, between two words of a signal without scale, or of another type.
+    pub fn word(&self, given: &SignalValue) -> Result<u16, ValueError> {
         let text = || given.to_string();
         let number = match (given, self.kind) {
-            (Given::Raw(word), EdgeType::Bool) if *word > 1 => {
+            (SignalValue::Raw(word), SignalType::Bool) if *word > 1 => {
                 return Err(ValueError::Switch { given: text() });
             }
             // The word itself goes whatever the scale is; limits hold for it, too.
-            (Given::Raw(word), _) => {
+            (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {
                     return Err(self.outside(given));
@@ -195,9 +195,9 @@ impl Edge {
                 number
             }
             _ if self.raw_only => return Err(ValueError::Meaning { given: text() }),
-            (Given::Switch(on), EdgeType::Bool) => i32::from(*on),
-            (Given::Switch(_), _) => return Err(ValueError::NoSwitch { given: text() }),
-            (Given::Number { value, unit }, kind) => {
+            (SignalValue::Switch(on), SignalType::Bool) => i32::from(*on),
+            (SignalValue::Switch(_), _) => return Err(ValueError::NoSwitch { given: text() }),
+            (SignalValue::Number { value, unit }, kind) => {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
@@ -206,7 +206,7 @@ impl Edge {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }
                 let steps = (value - self.offset) / self.scale;
-                if kind == EdgeType::Bool && steps != 0.0 && steps != 1.0 {
+                if kind == SignalType::Bool && steps != 0.0 && steps != 1.0 {
                     return Err(ValueError::Switch { given: text() });
                 }
                 if self.plain() && steps.fract() != 0.0 {
@@ -224,7 +224,7 @@ impl Edge {
         Ok(number as u16)
     }
 
-    fn outside(&self, given: &Given) -> ValueError {
+    fn outside(&self, given: &SignalValue) -> ValueError {
         let (min, max) = self.limits();
         ValueError::Range { given: given.to_string(), min, max, unit: self.unit.clone() }
     }
@@ -236,27 +236,27 @@ mod tests {
 
     use super::*;
 
-    fn edge(kind: EdgeType, scale: f64, offset: f64, unit: &str) -> Edge {
-        Edge { kind, scale, offset, unit: unit.into(), known: true, ..Edge::bare(&Profile::default()) }
+    fn signal(kind: SignalType, scale: f64, offset: f64, unit: &str) -> Signal {
+        Signal { kind, scale, offset, unit: unit.into(), known: true, ..Signal::bare(&Profile::default()) }
     }
 
-    fn word(edge: &Edge, text: &str) -> Result<u16, ValueError> {
-        edge.word(&text.parse().unwrap())
+    fn word(signal: &Signal, text: &str) -> Result<u16, ValueError> {
+        signal.word(&text.parse().unwrap())
     }
 
     #[test]
     fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
-        let edge = Edge::bare(&Profile::default());
-        assert_eq!((edge.text(0xFFEC), edge.json(0xFFEC)), ("-20".into(), json!(-20)));
-        let unsigned = Edge::bare(&Profile { pd_signed: false, ..Profile::default() });
+        let signal = Signal::bare(&Profile::default());
+        assert_eq!((signal.text(0xFFEC), signal.json(0xFFEC)), ("-20".into(), json!(-20)));
+        let unsigned = Signal::bare(&Profile { pd_signed: false, ..Profile::default() });
         assert_eq!(unsigned.text(0xFFEC), "65516");
         assert_eq!(
-            (word(&edge, "32767"), word(&edge, "-32768"), word(&edge, "0xFFEC")),
+            (word(&signal, "32767"), word(&signal, "-32768"), word(&signal, "0xFFEC")),
             (Ok(32767), Ok(32768), Ok(65516))
         );
         // A number that would come back as another one is refused.
         for wrong in ["32768", "40000", "65535", "-32769", "1.5", "3 deg", "on"] {
-            assert!(word(&edge, wrong).is_err(), "{wrong}");
+            assert!(word(&signal, wrong).is_err(), "{wrong}");
         }
         assert_eq!((word(&unsigned, "65535"), word(&unsigned, "0")), (Ok(65535), Ok(0)));
         assert!(word(&unsigned, "-1").is_err() && word(&unsigned, "65536").is_err());
@@ -265,16 +265,16 @@ mod tests {
     /// Where a table was given that does not know the program, numbers mean nothing.
     #[test]
     fn d11_without_meaning_only_the_word_itself_is_taken() {
-        let edge = Edge { raw_only: true, ..Edge::bare(&Profile::default()) };
-        assert_eq!(word(&edge, "0x9C40"), Ok(0x9C40));
+        let signal = Signal { raw_only: true, ..Signal::bare(&Profile::default()) };
+        assert_eq!(word(&signal, "0x9C40"), Ok(0x9C40));
         for wrong in ["3", "on"] {
-            assert!(matches!(word(&edge, wrong), Err(ValueError::Meaning { .. })), "{wrong}");
+            assert!(matches!(word(&signal, wrong), Err(ValueError::Meaning { .. })), "{wrong}");
         }
     }
 
     #[test]
     fn d11_scale_offset_and_unit() {
-        let angle = edge(EdgeType::Int16, 0.01, 0.0, "deg");
+        let angle = signal(SignalType::Int16, 0.01, 0.0, "deg");
         assert_eq!(word(&angle, "15.5deg"), Ok(1550));
         assert_eq!(word(&angle, "-15.504 deg"), Ok(-1550_i16 as u16));
         assert_eq!(angle.text_with_unit(0xFFFF), "-0.01 deg");
@@ -288,9 +288,9 @@ mod tests {
         let said = word(&angle, "400 deg").unwrap_err().to_string();
         assert_eq!(said, "400 deg is outside -327.68..327.67 deg");
         assert!(word(&angle, "15 rad").unwrap_err().to_string().contains("its unit is deg"));
-        let warm = edge(EdgeType::Uint16, 0.1, -40.0, "°C");
+        let warm = signal(SignalType::Uint16, 0.1, -40.0, "°C");
         assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
-        let down = edge(EdgeType::Int16, -0.5, 0.0, "");
+        let down = signal(SignalType::Int16, -0.5, 0.0, "");
         assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
         // It would be the word where the table is missing; without a unit there is only the word to be given.
         let said = word(&down, "2").unwrap_err().to_string();
@@ -300,41 +300,44 @@ mod tests {
         );
         assert_eq!(word(&down, "0x0002"), Ok(2));
         // A number that the table does not scale is the word with it and without.
-        assert_eq!(word(&edge(EdgeType::Int16, 1.0, 0.0, ""), "2"), Ok(2));
+        assert_eq!(word(&signal(SignalType::Int16, 1.0, 0.0, ""), "2"), Ok(2));
     }
 
     #[test]
     fn d11_limits_of_the_table_hold_for_every_form() {
-        let edge = Edge { min: Some(0.0), max: Some(10.0), ..edge(EdgeType::Int16, 0.01, 0.0, "A") };
-        assert_eq!(word(&edge, "10 A"), Ok(1000));
-        assert_eq!(word(&edge, "10.01 A").unwrap_err().to_string(), "10.01 A is outside 0.00..10.00 A");
-        assert!(word(&edge, "0x03E9").is_err() && word(&edge, "-0.01A").is_err());
+        let signal = Signal { min: Some(0.0), max: Some(10.0), ..signal(SignalType::Int16, 0.01, 0.0, "A") };
+        assert_eq!(word(&signal, "10 A"), Ok(1000));
+        assert_eq!(word(&signal, "10.01 A").unwrap_err().to_string(), "10.01 A is outside 0.00..10.00 A");
+        assert!(word(&signal, "0x03E9").is_err() && word(&signal, "-0.01A").is_err());
     }
 
     /// No value beyond a limit is taken, and no word beyond it is sent, whatever the steps are.
     #[test]
     fn d11_rounding_never_leaves_the_limits() {
-        let coarse = Edge { max: Some(150.0), ..edge(EdgeType::Int16, 100.0, 0.0, "mA") };
+        let coarse = Signal { max: Some(150.0), ..signal(SignalType::Int16, 100.0, 0.0, "mA") };
         for wrong in ["199.9mA", "150.1mA", "0x0002"] {
             let said = word(&coarse, wrong).unwrap_err().to_string();
-            assert_eq!(said, format!("{} is outside -3276800..150 mA", wrong.parse::<Given>().unwrap()));
+            assert_eq!(
+                said,
+                format!("{} is outside -3276800..150 mA", wrong.parse::<SignalValue>().unwrap())
+            );
         }
         assert_eq!(
             (word(&coarse, "150mA"), word(&coarse, "149mA"), word(&coarse, "40mA")),
             (Ok(1), Ok(1), Ok(0))
         );
-        let down = Edge { min: Some(-150.0), ..edge(EdgeType::Int16, -100.0, 0.0, "A") };
+        let down = Signal { min: Some(-150.0), ..signal(SignalType::Int16, -100.0, 0.0, "A") };
         assert_eq!((word(&down, "-150A"), word(&down, "-151A").is_err()), (Ok(1), true));
         // What fractions lose is no violation.
-        let tenths = Edge { max: Some(0.3), ..edge(EdgeType::Int16, 0.1, 0.0, "A") };
+        let tenths = Signal { max: Some(0.3), ..signal(SignalType::Int16, 0.1, 0.0, "A") };
         assert_eq!((word(&tenths, "0.3A"), word(&tenths, "0x0003")), (Ok(3), Ok(3)));
-        let odd = Edge { min: Some(-0.125), max: Some(3276.65), ..edge(EdgeType::Int16, 0.1, 0.0, "") };
+        let odd = Signal { min: Some(-0.125), max: Some(3276.65), ..signal(SignalType::Int16, 0.1, 0.0, "") };
         assert_eq!(odd.limits(), ("-0.125".into(), "3276.65".into()));
     }
 
     #[test]
     fn a_rounded_value_is_told() {
-        let tenths = edge(EdgeType::Int16, 0.1, 0.0, "A");
+        let tenths = signal(SignalType::Int16, 0.1, 0.0, "A");
         let told = |text: &str| {
             let given = text.parse().unwrap();
             tenths.rounded(&given, tenths.word(&given).unwrap())
@@ -345,13 +348,13 @@ mod tests {
 
     #[test]
     fn d11_switches_and_bits() {
-        let switch = edge(EdgeType::Bool, 1.0, 0.0, "");
+        let switch = signal(SignalType::Bool, 1.0, 0.0, "");
         assert_eq!((word(&switch, "on"), word(&switch, "0"), word(&switch, "1")), (Ok(1), Ok(0), Ok(1)));
         for wrong in ["2", "0x0007"] {
             assert!(word(&switch, wrong).unwrap_err().to_string().contains("on or off"), "{wrong}");
         }
         assert_eq!((switch.text(1), switch.json(0)), ("on".into(), json!(false)));
-        let bits = edge(EdgeType::Hex, 1.0, 0.0, "");
+        let bits = signal(SignalType::Hex, 1.0, 0.0, "");
         assert_eq!(
             (bits.text(0x8001), word(&bits, "0x8001"), word(&bits, "32769")),
             ("0x8001".into(), Ok(0x8001), Ok(0x8001))
@@ -364,13 +367,13 @@ mod tests {
         #[test]
         fn d11_the_sent_word_keeps_the_limits(scale in prop::sample::select(vec![-7.0, -0.3, 0.01, 0.3, 1.5, 100.0]), offset in -50..50_i32, a in -2000..2000_i32, b in -2000..2000_i32, value in -2500..2500_i32) {
             let (min, max) = (f64::from(a.min(b)) / 8.0, f64::from(a.max(b)) / 8.0);
-            let edge = Edge { min: Some(min), max: Some(max), ..edge(EdgeType::Int16, scale, f64::from(offset), "u") };
+            let signal = Signal { min: Some(min), max: Some(max), ..signal(SignalType::Int16, scale, f64::from(offset), "u") };
             let value = f64::from(value) / 8.0;
             let means = |w: i32| f64::from(w) * scale + f64::from(offset);
             let inside = |x: f64| (min - 1e-6..=max + 1e-6).contains(&x);
             let best = (-32768..=32767).map(means).filter(|x| inside(*x)).map(|x| (x - value).abs()).fold(f64::INFINITY, f64::min);
             prop_assume!(best.is_finite());
-            match edge.word(&Given::Number { value, unit: "u".into() }) {
+            match signal.word(&SignalValue::Number { value, unit: "u".into() }) {
                 Ok(word) => {
                     let sent = means(i32::from(word as i16));
                     prop_assert!(inside(value) && inside(sent), "{value} {sent}");
@@ -383,15 +386,15 @@ mod tests {
         /// What is shown of a word gives that word again.
         #[test]
         fn d11_text_gives_the_word_again(w: u16, kind in 0..4_usize, exponent in -6..4_i32, mantissa in 1..100_u32, negative: bool, offset in -1000..1000_i32) {
-            let kind = [EdgeType::Int16, EdgeType::Uint16, EdgeType::Hex, EdgeType::Bool][kind];
+            let kind = [SignalType::Int16, SignalType::Uint16, SignalType::Hex, SignalType::Bool][kind];
             let sign = if negative { -1.0 } else { 1.0 };
             let scale = sign * f64::from(mantissa) * 10_f64.powi(exponent);
-            let edge = match kind {
-                EdgeType::Hex | EdgeType::Bool => edge(kind, 1.0, 0.0, ""),
-                _ => edge(kind, scale, f64::from(offset) / 10.0, "u"),
+            let signal = match kind {
+                SignalType::Hex | SignalType::Bool => signal(kind, 1.0, 0.0, ""),
+                _ => signal(kind, scale, f64::from(offset) / 10.0, "u"),
             };
-            let w = if kind == EdgeType::Bool { w & 1 } else { w };
-            prop_assert_eq!(edge.word(&edge.text_with_unit(w).parse().unwrap()), Ok(w), "{}", edge.text(w));
+            let w = if kind == SignalType::Bool { w & 1 } else { w };
+            prop_assert_eq!(signal.word(&signal.text_with_unit(w).parse().unwrap()), Ok(w), "{}", signal.text(w));
         }
     }
 }

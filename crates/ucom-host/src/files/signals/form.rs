@@ -1,10 +1,10 @@
-//! The TOML of an edge table, and what its numbers may be.
+//! The TOML of a signal table, and what its numbers may be.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-use super::given::may_follow;
-use super::{Edge, EdgeType};
+use super::value::may_follow;
+use super::{Signal, SignalType};
 
 /// Largest scale and offset; smallest scale is its inverse. Keeps what is shown within what a number can hold.
 pub(super) const LARGEST: f64 = 1e9;
@@ -24,18 +24,18 @@ pub(super) struct FileProgram {
     #[serde(default)]
     pub(super) name: String,
     #[serde(default)]
-    pub(super) ci: BTreeMap<String, FileEdge>,
+    pub(super) ci: BTreeMap<String, FileSignal>,
     #[serde(default)]
-    pub(super) so: BTreeMap<String, FileEdge>,
+    pub(super) so: BTreeMap<String, FileSignal>,
     #[serde(default)]
-    pub(super) par: BTreeMap<String, FileEdge>,
+    pub(super) par: BTreeMap<String, FileSignal>,
 }
 
 #[derive(Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(super) struct FileEdge {
+pub(super) struct FileSignal {
     #[serde(rename = "type")]
-    pub(super) kind: EdgeType,
+    pub(super) kind: SignalType,
     pub(super) scale: f64,
     pub(super) offset: f64,
     pub(super) unit: String,
@@ -43,9 +43,9 @@ pub(super) struct FileEdge {
     pub(super) max: Option<f64>,
 }
 
-impl Default for FileEdge {
+impl Default for FileSignal {
     fn default() -> Self {
-        Self { kind: EdgeType::Int16, scale: 1.0, offset: 0.0, unit: String::new(), min: None, max: None }
+        Self { kind: SignalType::Int16, scale: 1.0, offset: 0.0, unit: String::new(), min: None, max: None }
     }
 }
 
@@ -75,10 +75,10 @@ fn one_or_many<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<
     deserializer.deserialize_any(Ids)
 }
 
-impl FileEdge {
-    pub(super) fn check(self) -> Result<Edge, String> {
+impl FileSignal {
+    pub(super) fn check(self) -> Result<Signal, String> {
         let Self { kind, scale, offset, unit, min, max } = self;
-        if matches!(kind, EdgeType::Hex | EdgeType::Bool) {
+        if matches!(kind, SignalType::Hex | SignalType::Bool) {
             if scale != 1.0 || offset != 0.0 || min.is_some() || max.is_some() {
                 return Err("hex and bool have no scale, offset, min and max".into());
             }
@@ -101,21 +101,21 @@ impl FileEdge {
         if !may_follow(&unit) || unit.trim() != unit {
             return Err(format!("unit {unit:?} cannot stand behind a number"));
         }
-        let edge = Edge { kind, scale, offset, unit, min: None, max: None, known: true, raw_only: false };
-        let ((low, high), (least, most)) = (edge.range(), edge.limits());
+        let signal = Signal { kind, scale, offset, unit, min: None, max: None, known: true, raw_only: false };
+        let ((low, high), (least, most)) = (signal.range(), signal.limits());
         let beyond = |x: &f64| !(low - 0.5 * scale.abs()..=high + 0.5 * scale.abs()).contains(x);
         for (key, limit) in [("min", min), ("max", max)] {
             if let Some(limit) = limit.filter(beyond) {
                 return Err(format!("{key} = {limit} is outside {least}..{most}, what the word can hold"));
             }
         }
-        let edge = Edge { min, max, ..edge };
-        let (from, to) = edge.allowed();
+        let signal = Signal { min, max, ..signal };
+        let (from, to) = signal.allowed();
         if from > to {
-            let (min, max) = edge.limits();
+            let (min, max) = signal.limits();
             return Err(format!("no word lies between min = {min} and max = {max}"));
         }
-        Ok(edge)
+        Ok(signal)
     }
 }
 
@@ -124,9 +124,9 @@ pub(super) fn people(words: &str) -> String {
     let terms = [
         ("duplicate key", "the same key is given twice"),
         ("expected f64", "expected a number, as 0.1"),
-        ("expected struct FileEdge", "expected an edge, as { scale = 0.1 }"),
+        ("expected struct FileSignal", "expected a signal, as { scale = 0.1 }"),
         ("expected struct FileProgram", "expected a program, as [[program]]"),
-        ("expected a map", "expected edges by their names"),
+        ("expected a map", "expected signals by their names"),
         ("expected a sequence", "expected a list: [[program]] has two brackets"),
         ("expected a string", "expected a text in quotation marks"),
     ];

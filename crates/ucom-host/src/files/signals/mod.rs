@@ -1,0 +1,66 @@
+//! Signal tables: type, scale, offset, unit and limits of a program's inputs, outputs and parameters (D-11), as `SG_` lines
+//! hold them in a DBC file. A file beside the tool, as boards send no more than a text for each signal.
+
+mod form;
+mod signal;
+mod table;
+mod value;
+mod value_error;
+
+use crate::master::io::{IoDescription, Kind};
+pub use signal::{Signal, SignalType};
+pub use table::{ProgramSignals, SIGNAL_HELP, SignalTable, SignalTableError};
+use ucom::Profile;
+pub use value::{SignalValue, SignalValueError};
+pub use value_error::ValueError;
+
+/// The signals of one board, each with its meaning.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoardSignals {
+    ci: Vec<Signal>,
+    so: Vec<Signal>,
+    par: Vec<Signal>,
+}
+
+impl BoardSignals {
+    /// Those of a description; what the table does not know is a bare word.
+    pub fn new(description: &IoDescription, program: Option<&ProgramSignals>, profile: &Profile) -> Self {
+        let of = |kind: Kind| {
+            let names = description.names(kind).iter().enumerate();
+            let signal = |(i, name): (usize, &String)| {
+                let known = program.and_then(|p| p.signal(kind, i, name));
+                known.cloned().unwrap_or_else(|| Signal::bare(profile))
+            };
+            names.map(signal).collect()
+        };
+        Self { ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
+    }
+
+    /// For a program that the given table does not know: only words themselves can be given, as numbers may be meant in
+    /// units that nobody here knows.
+    pub fn raw_only(mut self) -> Self {
+        for signal in self.ci.iter_mut().chain(&mut self.so).chain(&mut self.par) {
+            signal.raw_only = true;
+        }
+        self
+    }
+
+    /// All of one kind, in the order of the buffer.
+    pub fn all(&self, kind: Kind) -> &[Signal] {
+        match kind {
+            Kind::Ci => &self.ci,
+            Kind::So => &self.so,
+            Kind::Par => &self.par,
+        }
+    }
+
+    /// One signal; `None` beyond the dimension.
+    pub fn get(&self, kind: Kind, index: usize) -> Option<&Signal> {
+        self.all(kind).get(index)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn replace_par(&mut self, signal: Signal) {
+        self.par.fill(signal);
+    }
+}

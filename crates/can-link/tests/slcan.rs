@@ -285,7 +285,7 @@ fn what_cannot_be_set_is_an_error_that_lists_what_can() {
 }
 
 #[test]
-fn a_port_without_an_adapter_and_one_that_goes_are_told_apart() {
+fn a_port_without_an_adapter_and_one_that_goes_are_distinguished() {
     let (device, mute) = served(|mut stream| stream.read_to_end(&mut Vec::new()).map(|_| ()));
     let error = SlcanBus::open(&options(&device, None, None)).err().unwrap();
     assert!(matches!(error, CanError::NoAnswer { .. }) && error.to_string().contains("baud"), "{error}");

@@ -119,7 +119,7 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
 
 /// A client receives reports that its own controller is bus-off and that it is back, between the frames before and after; others do not.
 #[test]
-fn a_client_is_told_of_its_own_bus_off() {
+fn a_client_receives_its_own_bus_off() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();
     let mut own = open(&gateway.url("can0")).unwrap();
     let client = gateway.next(TIMEOUT).unwrap().client;

@@ -217,7 +217,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_told_apart_and_a_begun_one_waits() {
+    fn keys_are_distinguished_and_a_begun_one_waits() {
         let keys = |bytes: &'static [u8]| parse(bytes);
         assert_eq!(
             keys(b"s \x1B[Bq"),

@@ -166,7 +166,7 @@ mod tests {
 
     use super::*;
 
-    /// Takes a line only when it is told to; an error once the other side has gone.
+    /// Takes a line only on command; an error once the other side has gone.
     struct Slow(SyncSender<Vec<u8>>);
 
     impl Write for Slow {

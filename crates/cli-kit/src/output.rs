@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use crate::bar::{self, suspended};
 use crate::lines::Lines;
 
-/// Why the first result that was lost could not be printed. A command goes on without its output; its exit code says so in the end.
+/// Why the first result that was lost could not be printed. A command goes on without its output; its exit code shows it in the end.
 static LOST: OnceLock<String> = OnceLock::new();
 /// A write to stdout has failed, for whatever reason.
 static GONE: AtomicBool = AtomicBool::new(false);
@@ -152,7 +152,7 @@ impl Output {
         self.warn(message, hint);
     }
 
-    /// What is wrong and what to do next, as it is said at the end of a command; on a terminal broken between words.
+    /// What is wrong and what to do next, as it is printed at the end of a command; on a terminal broken between words.
     pub fn warn(&self, message: &str, hint: &str) {
         let width = bar::stderr_width();
         self.note(hanging(&format!("{}: ", self.program), message, width));

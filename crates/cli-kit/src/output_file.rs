@@ -46,7 +46,7 @@ pub struct OutputFile {
 
 impl OutputFile {
     /// Opens `path` for writing. A file that is there is refused without `force`, and one of `others` (what the command reads, and
-    /// its other outputs) always. To say that nothing was sent is left to commands that send.
+    /// its other outputs) always. To report that nothing was sent is left to commands that send.
     pub fn open(path: &Path, force: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             let message =
@@ -204,7 +204,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_full_disk_is_an_error_that_says_so() {
+    fn a_full_disk_is_an_error_of_its_own() {
         let failure =
             OutputFile::open(Path::new("/dev/full"), false, &[]).unwrap().write("text").unwrap_err();
         assert!(failure.message.contains("No space left"), "{}", failure.message);

@@ -14,7 +14,7 @@ fn signals() -> impl Iterator<Item = i32> {
     [SIGINT, SIGTERM].into_iter().chain(hangup)
 }
 
-/// This process was started with SIGHUP ignored, where the system says so.
+/// This process was started with SIGHUP ignored, where the system reports it.
 #[cfg(unix)]
 fn hangup_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

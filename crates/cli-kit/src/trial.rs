@@ -15,8 +15,8 @@ pub use screen::Picture;
 #[cfg(unix)]
 pub use terminal::Terminal;
 
-/// What a command said and how it ended.
-pub struct Said {
+/// The output of a command and how it ended.
+pub struct CommandOutput {
     /// Its exit code; −1 when a signal ended it.
     pub code: i32,
     /// Its stdout.
@@ -25,7 +25,7 @@ pub struct Said {
     pub err: String,
 }
 
-impl Said {
+impl CommandOutput {
     /// Its result: the last line of its stdout as one JSON object; panics if it is none.
     pub fn json(&self) -> Value {
         let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
@@ -55,7 +55,7 @@ pub fn program(path: &str, prefix: &str) -> Command {
 }
 
 /// Runs a command with these words, and this text on its stdin, to its end.
-pub fn run(mut command: Command, words: &[&str], stdin: &str) -> Said {
+pub fn run(mut command: Command, words: &[&str], stdin: &str) -> CommandOutput {
     let pipes = command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = pipes.spawn().expect("it starts");
     // A command that ends without reading its stdin closes it.
@@ -63,11 +63,15 @@ pub fn run(mut command: Command, words: &[&str], stdin: &str) -> Said {
     ended(child)
 }
 
-/// What a started command said, once it has ended.
-pub fn ended(child: Child) -> Said {
+/// The output of a started command, once it has ended.
+pub fn ended(child: Child) -> CommandOutput {
     let output = child.wait_with_output().expect("it ends");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    Said { code: output.status.code().unwrap_or(-1), out: text(&output.stdout), err: text(&output.stderr) }
+    CommandOutput {
+        code: output.status.code().unwrap_or(-1),
+        out: text(&output.stdout),
+        err: text(&output.stderr),
+    }
 }
 
 /// Sends a signal to a process of the test, as `kill` names it: `-INT`.

@@ -39,8 +39,8 @@ pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     lines
 }
 
-/// Draws, on a terminal that is too small, one sentence with the size that is needed. The keys work all the same, and the words say
-/// which stops. Returns whether it was so.
+/// Draws, on a terminal that is too small, one sentence with the size that is needed. The keys work all the same, and the words name
+/// the one that stops. Returns whether it was so.
 pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     let area = frame.area();
     if area.width >= LEAST.0 && area.height >= LEAST.1 {
@@ -65,7 +65,7 @@ pub struct Trouble {
     /// The next command; empty: none.
     pub next: String,
     /// What became of the last key.
-    pub said: String,
+    pub message: String,
 }
 
 impl Trouble {
@@ -79,7 +79,7 @@ impl Trouble {
             let next = format!("next: {}", self.next.replace('`', ""));
             foot.extend(wrapped(&next, width).into_iter().map(|line| Line::from(line).bold()));
         }
-        foot.extend(wrapped(&self.said, width).into_iter().map(Line::from));
+        foot.extend(wrapped(&self.message, width).into_iter().map(Line::from));
         let causes = self.causes.iter().map(|cause| (true, cause));
         let warnings = self.warnings.iter().map(|warning| (false, warning));
         let blocks: Vec<Vec<Line<'static>>> = causes
@@ -181,7 +181,7 @@ mod tests {
             ],
             warnings: vec!["joint 6: y".into()],
             next: "`jtc recover`".into(),
-            said: String::new(),
+            message: String::new(),
         };
         let all = ["joint 3 does not", "answer", "joint 4:", "over-current", "joint 5: x", "joint 6: y"];
         let (head, rest) = trouble.lines(20, 20);

@@ -7,12 +7,12 @@ use std::io::Write;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use cli_kit::trial::Said;
+use cli_kit::trial::CommandOutput;
 use common::{Sim, command, jtc, motion};
 use serde_json::Value;
 
 /// The events of a command, and its result.
-fn stream(said: &Said) -> (Vec<Value>, Value) {
+fn stream(said: &CommandOutput) -> (Vec<Value>, Value) {
     let events = said.events();
     for event in &events {
         assert!(event["time_s"].is_f64() && event["event"].is_string(), "{event}");

@@ -1,27 +1,27 @@
-//! The controller of this computer has left the bus (bus-off, ISO 11898-1): said in words, with the next command.
+//! The controller of this computer has left the bus (bus-off, ISO 11898-1): the message and the next command.
 
-/// On a bad wire it leaves the bus all the time: said again no sooner than after this, µs.
+/// On a bad wire it leaves the bus all the time: reported again no sooner than after this, µs.
 const AGAIN_US: u64 = 5_000_000;
 
 /// The likely causes.
 pub const WHY: &str =
     "too many of its frames failed: a wrong bit rate, no termination, or CAN_H and CAN_L swapped or shorted";
 
-/// What has been said of it.
+/// What has been reported of it.
 #[derive(Debug, Default)]
 pub struct BusOff {
-    said: u64,
-    said_us: Option<u64>,
+    reported: u64,
+    reported_us: Option<u64>,
 }
 
 impl BusOff {
-    /// What is to be said when it has left the bus so often; `None`: nothing new, or it was said a moment ago.
+    /// What is to be reported when it has left the bus so often; `None`: nothing new, or it was reported a moment ago.
     pub fn look(&mut self, times: u64, now_us: u64, url: &str) -> Option<String> {
-        let new = times.saturating_sub(self.said);
-        if new == 0 || self.said_us.is_some_and(|at| now_us.saturating_sub(at) < AGAIN_US) {
+        let new = times.saturating_sub(self.reported);
+        if new == 0 || self.reported_us.is_some_and(|at| now_us.saturating_sub(at) < AGAIN_US) {
             return None;
         }
-        (self.said, self.said_us) = (times, Some(now_us));
+        (self.reported, self.reported_us) = (times, Some(now_us));
         let often = if new == 1 { String::new() } else { format!(" ({new} times)") };
         Some(format!(
             "the CAN controller of this computer is bus-off{often}: {WHY}; what it was sending is lost\n  next: {}",
@@ -30,7 +30,7 @@ impl BusOff {
     }
 }
 
-/// What brings it back and finds the cause. Only the kernel's interfaces stay away until they are told otherwise.
+/// What brings it back and finds the cause. Only the kernel's interfaces stay away until a command brings them back.
 pub fn next(url: &str) -> String {
     match url.strip_prefix("socketcan:") {
         Some(interface) => format!(
@@ -46,18 +46,18 @@ mod tests {
 
     /// Once at first, then no more often than every 5 s, and no time it happened is left out.
     #[test]
-    fn it_is_said_once_and_counted() {
+    fn it_is_reported_once_and_counted() {
         let mut off = BusOff::default();
         let url = "socketcand:127.0.0.1:29536/can0";
         assert_eq!(off.look(0, 0, url), None);
-        let said = off.look(1, 10, url).expect("said at once");
-        assert!(said.contains("is bus-off:") && said.contains("next: ucom doctor"), "{said}");
+        let message = off.look(1, 10, url).expect("reported at once");
+        assert!(message.contains("is bus-off:") && message.contains("next: ucom doctor"), "{message}");
         assert_eq!(off.look(1, 20_000_000, url), None);
-        let said = off.look(2, 20_000_000, url).expect("said again");
-        assert!(!said.contains("times"), "{said}");
+        let message = off.look(2, 20_000_000, url).expect("reported again");
+        assert!(!message.contains("times"), "{message}");
         assert_eq!(off.look(7, 21_000_000, url), None);
-        let said = off.look(9, 25_000_000, url).expect("said again");
-        assert!(said.contains("(7 times)"), "{said}");
+        let message = off.look(9, 25_000_000, url).expect("reported again");
+        assert!(message.contains("(7 times)"), "{message}");
     }
 
     #[test]

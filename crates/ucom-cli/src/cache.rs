@@ -76,7 +76,7 @@ impl CacheArgs {
     pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, Failure> {
         let info = seen(driver, board)?.info;
         if let Some(names) = self.kept(driver, &info) {
-            return Ok(with_signals(board, info, names, table, driver.master.profile()).told(driver));
+            return Ok(with_signals(board, info, names, table, driver.master.profile()).with_notes(driver));
         }
         self.described(driver, table, board)
     }
@@ -93,7 +93,7 @@ impl CacheArgs {
         {
             let _ = std::fs::create_dir_all(directory).and_then(|()| std::fs::write(file, text));
         }
-        Ok(with_signals(board, info, names, table, driver.master.profile()).told(driver))
+        Ok(with_signals(board, info, names, table, driver.master.profile()).with_notes(driver))
     }
 
     /// What is known of a program without asking for it.
@@ -113,15 +113,15 @@ impl CacheArgs {
 }
 
 impl Known {
-    /// The same board by the names that it has told since.
+    /// The same board by the names that it has sent since.
     pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
         if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }
 }
 
 impl Known {
-    /// Says where signal table and program do not fit.
-    fn told(self, driver: &Driver) -> Self {
+    /// Prints where signal table and program do not fit.
+    fn with_notes(self, driver: &Driver) -> Self {
         for stray in &self.strays {
             driver.note(format!("signal table: {stray}"));
         }

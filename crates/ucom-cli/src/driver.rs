@@ -13,7 +13,7 @@ use ucom_host::master::{
 use crate::args::{Boards, LinkArgs};
 use crate::bus_off;
 use crate::cleanup::CleanupList;
-use crate::commands::conformance::told;
+use crate::commands::conformance::progress_line;
 use crate::failure::{FAULT, Failure, NO_LINK, exit};
 use crate::link::Link;
 use crate::pump::{LOOK, Pump};
@@ -138,7 +138,7 @@ impl Driver {
                     Event::Done { id: done, result } if done == id => {
                         return match (result, broken) {
                             (Err(Error::Bus { .. }), Some(failure)) => Err(failure),
-                            // What became of boards is told also when the bus fails.
+                            // What became of boards is reported also when the bus fails.
                             (result, Some(_)) | (result @ Ok(Outcome::Update(_)), None) => Ok(result?),
                             (result, None) => {
                                 let sent = self.pump.flush(&mut self.master, &mut self.link);
@@ -146,7 +146,7 @@ impl Driver {
                             }
                         };
                     }
-                    other => self.tell(&other, Some(id)),
+                    other => self.print_event(&other, Some(id)),
                 }
             }
             if let Some(failure) = broken {
@@ -170,7 +170,7 @@ impl Driver {
         self.notes.push(text);
     }
 
-    /// How often a board was lost or one of these has rebooted, by what was told; a failure if that was so.
+    /// How often a board was lost or one of these has rebooted, by what was reported; a failure if that was so.
     pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), Failure> {
         let lost = self.lost.borrow();
         let rebooted = lost.iter().filter(|l| l.rebooted && boards.contains(&l.board)).count();
@@ -190,7 +190,7 @@ impl Driver {
     }
 
     /// Words for what happens beside a procedure.
-    pub fn tell(&self, event: &Event, during: Option<ProcedureId>) {
+    pub fn print_event(&self, event: &Event, during: Option<ProcedureId>) {
         if let Event::Supervision {
             board,
             change: change @ (Supervision::Lost | Supervision::Rebooted { .. }),
@@ -251,11 +251,11 @@ impl Driver {
     }
 }
 
-/// Words for an event; `None` where they would only repeat what a procedure says itself.
+/// Words for an event; `None` where they would only repeat what a procedure reports itself.
 pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     Some(match event {
         Event::Note { text, .. } => text.clone(),
-        Event::Tested { test, .. } => told(test),
+        Event::Tested { test, .. } => progress_line(test),
         Event::BoardError { board, code, during: at } if *at != during || during.is_none() => {
             format!("board {board} reports {code}: {} {}", code.meaning(), code.reaction())
         }
@@ -272,7 +272,7 @@ pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
                 format!("a board with UCoM id 0x{ucom_id:02X} has rebooted")
             }
         },
-        Event::Debug { board, text } => format!("board {board} says: {text}"),
+        Event::Debug { board, text } => format!("board {board} sends: {text}"),
         Event::Foreign(kind) => format!("frames of another protocol are on the bus: {kind}"),
         Event::CompetingMaster { function, to } => {
             format!("another PC talks on the bus: {} to {to}", function.name())

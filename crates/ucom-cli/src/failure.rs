@@ -18,7 +18,7 @@ pub struct Failure {
     pub message: String,
     /// The next command or act; empty when there is none.
     pub hint: String,
-    /// The result was printed already: only the exit code is left to say.
+    /// The result was printed already: only the exit code is left.
     pub printed: bool,
 }
 

@@ -34,7 +34,7 @@ impl LinkArgs {
     pub fn url(&self) -> Result<&str, Failure> {
         self.bus.as_deref().ok_or_else(|| {
             Failure::usage("which bus? there is neither --bus URL nor UCOM_BUS")
-                .hint("as --bus socketcan:can0; ucom sim makes a simulated one and says its URL")
+                .hint("as --bus socketcan:can0; ucom sim makes a simulated one and prints its URL")
         })
     }
 
@@ -102,7 +102,7 @@ impl Link {
         self.bus.times_bus_off()
     }
 
-    /// What is to be said of the controller of this computer: that it has left the bus, and what to do.
+    /// What is to be reported of the controller of this computer: that it has left the bus, and what to do.
     pub fn news(&mut self) -> Option<String> {
         let (times, now_us) = (self.bus.times_bus_off(), self.now_us());
         self.bus_off.look(times, now_us, &self.url)

@@ -12,7 +12,7 @@ use crate::failure::Failure;
 pub const LOOK: Duration = Duration::from_millis(50);
 /// Most frames that are handed over, and the longest time that it takes, before it is looked at what is to be sent: a
 /// flooded bus must not stop heartbeats.
-const MOST_HEARD: usize = 2000;
+const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
 /// Most frames that are sent before it is looked at what has arrived.
 const MOST_SENT: usize = 64;
@@ -33,7 +33,7 @@ pub trait Line {
 #[derive(Debug, Default)]
 pub struct Pump {
     /// Everything that arrived up to then has been handed over, µs.
-    heard_us: u64,
+    received_us: u64,
 }
 
 impl Pump {
@@ -46,7 +46,7 @@ impl Pump {
         patience: Duration,
     ) -> Result<(), Failure> {
         let due = master.next_deadline().map_or(u64::MAX, |at| at.saturating_sub(line.now_us()));
-        self.hear(master, line, patience.min(LOOK).min(Duration::from_micros(due)))?;
+        self.receive(master, line, patience.min(LOOK).min(Duration::from_micros(due)))?;
         self.send(master, line).map(drop)
     }
 
@@ -57,9 +57,14 @@ impl Pump {
         Ok(())
     }
 
-    fn hear(&mut self, master: &mut Master, line: &mut impl Line, mut wait: Duration) -> Result<(), Failure> {
+    fn receive(
+        &mut self,
+        master: &mut Master,
+        line: &mut impl Line,
+        mut wait: Duration,
+    ) -> Result<(), Failure> {
         let mut first = None;
-        for _ in 0..MOST_HEARD {
+        for _ in 0..MOST_RECEIVED {
             let asked = line.now_us();
             match line.receive(wait)? {
                 Some(frame) => {
@@ -71,21 +76,21 @@ impl Pump {
                 }
                 // Nothing was there at that time.
                 None if wait.is_zero() => {
-                    self.heard_us = asked;
+                    self.received_us = asked;
                     return Ok(());
                 }
                 None => {}
             }
             wait = Duration::ZERO;
         }
-        self.heard_us = self.heard_us.max(line.now_us().saturating_sub(BEHIND_US));
+        self.received_us = self.received_us.max(line.now_us().saturating_sub(BEHIND_US));
         Ok(())
     }
 
     /// Sends what is due; `true`: there may be more.
     fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, Failure> {
         for _ in 0..MOST_SENT {
-            let Some(frame) = master.poll_behind(line.now_us(), self.heard_us) else { return Ok(false) };
+            let Some(frame) = master.poll_behind(line.now_us(), self.received_us) else { return Ok(false) };
             line.send(&frame)?;
         }
         Ok(true)
@@ -181,7 +186,7 @@ mod tests {
             let end = self.now + timeout.as_micros() as u64;
             let next = self.next_at().filter(|at| *at <= end);
             self.now = next.map_or(end, |at| at.max(self.now)) + 5;
-            let heard = next.map(|at| {
+            let received = next.map(|at| {
                 if self.coming.front().is_some_and(|(first, _)| *first == at) {
                     return Ok(self.coming.pop_front().unwrap().1);
                 }
@@ -189,7 +194,7 @@ mod tests {
                 Ok(frame("385#0000640065006600"))
             });
             self.lose();
-            Ok(heard)
+            Ok(received)
         }
     }
 

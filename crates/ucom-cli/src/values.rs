@@ -57,8 +57,8 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
                     known.board
                 ),
             };
-            let said = format!("board {}: {} `{}`: {e}", known.board, kind.name(), a.name);
-            Failure::new(REFUSED, "value", said).hint(hint)
+            let message = format!("board {}: {} `{}`: {e}", known.board, kind.name(), a.name);
+            Failure::new(REFUSED, "value", message).hint(hint)
         })?;
         let rounded = signal.rounded(&a.value, word).map(|sent| format!("{} → {sent}", a.value));
         Ok(Word { index, name, word, text: signal.text_with_unit(word), rounded })
@@ -72,8 +72,8 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
     Ok(all)
 }
 
-/// Says which values lie between two words and go as the nearer one.
-pub fn tell_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
+/// Prints which values lie between two words and go as the nearer one.
+pub fn print_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     for word in words {
         if let Some(rounded) = &word.rounded {
             driver.note(format!("board {board}: {} `{}`: {rounded}", kind.name(), word.name));
@@ -97,7 +97,7 @@ pub fn only(boards: &[u8], values: &[Assignment], to: &str) -> Result<(), Failur
     }
 }
 
-/// Does something by names that may be kept from before; when a board turns out to have others, once more by those it tells.
+/// Does something by names that may be kept from before; when a board turns out to have others, once more by those that it sends.
 pub fn with_names<T>(
     cache: &CacheArgs,
     mut act: impl FnMut(&CacheArgs) -> Result<T, Failure>,
@@ -110,7 +110,7 @@ pub fn with_names<T>(
     }
 }
 
-/// Boards with their names, whose applications were started where only they could tell the names.
+/// Boards with their names, whose applications were started where only they could send the names.
 #[derive(Default)]
 pub struct Prepared {
     /// By number.
@@ -130,7 +130,7 @@ impl Prepared {
     ) -> Result<(), Failure> {
         let known = match cache.known(driver, table, board) {
             Err(e) if e.code == "no-application" => {
-                // Before it is told to: a start that is cancelled may have reached it.
+                // Before it is commanded to: a start that is cancelled may have reached it.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
                     // Refused means that nothing was sent; taking that back would speak on another PC's bus.
@@ -149,7 +149,7 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops what was started only to be asked, once: a refusal leaves the boards as they were. What cannot be stopped is said.
+    /// Stops what was started only to be asked, once: a refusal leaves the boards as they were. What cannot be stopped is reported.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

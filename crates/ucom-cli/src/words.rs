@@ -1,4 +1,4 @@
-//! Frames in words. Answers of several frames are followed, so that a package of a string is told from a head.
+//! Frames in words. Answers of several frames are followed, so that a package of a string is distinguished from a head.
 
 use std::collections::BTreeMap;
 
@@ -14,9 +14,9 @@ use crate::shape::date;
 pub struct Described {
     /// Function, or why it is foreign.
     pub name: String,
-    /// `PC`, `board 3`, or both where the identifier does not tell.
+    /// `PC`, `board 3`, or both where the identifier does not show it.
     pub who: String,
-    /// What it says.
+    /// Its contents.
     pub text: String,
     /// The same for programs.
     pub value: Value,
@@ -62,8 +62,8 @@ impl Decoder {
         };
         let who = self.who(from_pc, sequence);
         let (text, value) = match from_pc {
-            Some(true) => self.pc_says(frame),
-            _ => self.board_says(now_us, function, sequence, frame),
+            Some(true) => self.pc_message(frame),
+            _ => self.board_message(now_us, function, sequence, frame),
         };
         let name = function.name().to_owned();
         Described { name, who, text, value }
@@ -82,7 +82,7 @@ impl Decoder {
         }
     }
 
-    fn pc_says(&self, frame: &Frame) -> (String, Value) {
+    fn pc_message(&self, frame: &Frame) -> (String, Value) {
         let (_, message) = match ToBoard::decode(frame, &self.profile) {
             Ok(message) => message,
             Err(e) => return (e.to_string(), json!({ "malformed": e.to_string() })),
@@ -100,7 +100,7 @@ impl Decoder {
         }
     }
 
-    fn board_says(
+    fn board_message(
         &mut self,
         now_us: u64,
         function: Function,
@@ -118,7 +118,7 @@ impl Decoder {
             ),
             FromBoard::InitAck(number) => (format!("is number {number}"), json!({ "number": number })),
             FromBoard::Report(report) => {
-                let odd = if report.agrees() { "" } else { ", identifier says otherwise" };
+                let odd = if report.agrees() { "" } else { ", identifier differs" };
                 (format!("flash id 0x{:02X}{odd}", report.ucom_id), json!({ "flash_id": report.ucom_id }))
             }
             FromBoard::So(p) | FromBoard::Ci(p) => package(&p),

@@ -75,7 +75,7 @@ mod tests {
     use ucom::Status;
 
     #[test]
-    fn moments_are_told_in_utc() {
+    fn moments_are_printed_in_utc() {
         assert_eq!(Written { word: 0, at: 1_234_567_890 }.when(), "2009-02-13 23:31 UTC");
     }
 

@@ -24,21 +24,21 @@ fn bus_off_is_not_for_ever() {
 
 /// A client learns of its own bus-off, not only the simulator's stderr: as an error frame, and `ucom` in words with what to do.
 #[test]
-fn who_is_bus_off_is_told() {
+fn the_bus_off_controller_is_named() {
     let mut sim = Sim::start(&["--boards", "2"]);
     sim.ucom(&["init"]).ends(0);
     let (mut sender, mut listener) = (sim.peer(), sim.peer());
     sim.fault("disturbed share=1 for_s=60");
-    let said = sim.ucom(&["info", "1"]).ends(3);
-    assert!(said.err.contains("the CAN controller of this computer is bus-off"), "{}", said.err);
-    assert!(said.err.contains("next: ucom doctor"), "{}", said.err);
-    let said = sim.ucom(&["--json", "info", "1"]).ends(3).json();
-    assert!(said["error"]["message"].as_str().unwrap().contains("was bus-off meanwhile"), "{said}");
-    assert!(said["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{said}");
-    let said = sim.ucom(&["--json", "send", "201#"]).ends(3).json();
-    assert_eq!(said["error"]["code"], "bus-off", "{said}");
-    let said = sim.ucom(&["--json", "doctor"]).ends(3).json();
-    assert!(said["findings"].to_string().contains("has left the bus"), "{said}");
+    let output = sim.ucom(&["info", "1"]).ends(3);
+    assert!(output.err.contains("the CAN controller of this computer is bus-off"), "{}", output.err);
+    assert!(output.err.contains("next: ucom doctor"), "{}", output.err);
+    let output = sim.ucom(&["--json", "info", "1"]).ends(3).json();
+    assert!(output["error"]["message"].as_str().unwrap().contains("was bus-off meanwhile"), "{output}");
+    assert!(output["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{output}");
+    let output = sim.ucom(&["--json", "send", "201#"]).ends(3).json();
+    assert_eq!(output["error"]["code"], "bus-off", "{output}");
+    let output = sim.ucom(&["--json", "doctor"]).ends(3).json();
+    assert!(output["findings"].to_string().contains("has left the bus"), "{output}");
     sender.send("202#");
     assert_eq!(sender.all(500), [""; 0]);
     assert_eq!((sender.times_bus_off(), listener.times_bus_off()), (1, 0));

@@ -23,8 +23,8 @@ fn p1_scan_only_asks() {
     assert_eq!(scan["reports"], json!([0x04, 0x21, 0x42, 0x63, 0x7F]));
     assert_eq!(scan["boards"], json!([]));
     let asks = |f: &String| f == "240#" || f.starts_with("20") || f.starts_with("21");
-    let heard = peer.all(200);
-    let of_pc = heard.iter().filter(|f| !f.starts_with('4')).collect::<Vec<_>>();
+    let received = peer.all(200);
+    let of_pc = received.iter().filter(|f| !f.starts_with('4')).collect::<Vec<_>>();
     assert!(of_pc.iter().all(|f| asks(f)) && !of_pc.is_empty(), "{of_pc:?}");
     sim.ucom(&["init"]).ends(0);
     peer.all(100);
@@ -40,8 +40,8 @@ fn p1_scan_only_asks() {
 #[test]
 fn p2_init_of_chains_and_their_inventory() {
     let sim = Sim::start(&["--boards", "0"]);
-    let said = sim.ucom(&["--json", "init"]).ends(3);
-    assert_eq!(said.json()["ok"], false);
+    let output = sim.ucom(&["--json", "init"]).ends(3);
+    assert_eq!(output.json()["ok"], false);
     drop(sim);
 
     let sim = Sim::start(&["--boards", "31"]);
@@ -62,15 +62,15 @@ fn p2_init_of_chains_and_their_inventory() {
     assert!(inventory.contains("flash_number = 0x0023"), "{inventory}");
     // Somebody swapped two boards.
     std::fs::write(sim.path("inventory.toml"), inventory.replace("0x0023", "0x0055")).unwrap();
-    let said = sim.ucom(&["--json", "init"]).ends(1);
-    let text = said.json()["findings"][0].as_str().unwrap().to_owned();
+    let output = sim.ucom(&["--json", "init"]).ends(1);
+    let text = output.json()["findings"][0].as_str().unwrap().to_owned();
     assert!(text.contains("0x0023") && text.contains("0x0055"), "{text}");
     sim.ucom(&["init", "--renew"]).ends(0);
 }
 
 /// D-24, 5.4: a broken wire is named with its place.
 #[test]
-fn a_broken_init_wire_is_told_with_its_place() {
+fn a_broken_init_wire_is_reported_with_its_place() {
     let mut sim = Sim::start(&["--boards", "4"]);
     sim.fault("wire-broken board=2");
     let init = sim.ucom(&["--json", "init"]).ends(1).json();
@@ -110,8 +110,8 @@ fn status_bits_are_set_and_cleared_by_name() {
 fn names_inputs_and_motion() {
     let sim = Sim::start(&["--boards", "2"]);
     sim.ucom(&["init"]).ends(0);
-    let said = sim.ucom(&["--json", "io", "1"]).ends(4);
-    assert!(said.json()["error"]["hint"].as_str().unwrap().contains("ucom start 1"), "{}", said.out);
+    let output = sim.ucom(&["--json", "io", "1"]).ends(4);
+    assert!(output.json()["error"]["hint"].as_str().unwrap().contains("ucom start 1"), "{}", output.out);
     sim.ucom(&["start", "1"]).ends(0);
     let io = sim.ucom(&["--json", "io", "1"]).ends(0).json();
     assert_eq!(io["boards"][0]["ci"][0], "set_position [0.01 deg]");
@@ -128,10 +128,14 @@ fn names_inputs_and_motion() {
         (par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()),
         (json!(150), json!(null))
     );
-    let said = sim.ucom(&["--json", "ci", "1", "set_positon=3"]).ends(2);
-    assert!(said.json()["error"]["message"].as_str().unwrap().contains("set_position"), "{}", said.out);
-    let said = sim.ucom(&["--json", "ci", "1", "2.set_position=3"]).ends(2);
-    assert!(said.json()["error"]["message"].as_str().unwrap().contains("not among those"), "{}", said.out);
+    let output = sim.ucom(&["--json", "ci", "1", "set_positon=3"]).ends(2);
+    assert!(output.json()["error"]["message"].as_str().unwrap().contains("set_position"), "{}", output.out);
+    let output = sim.ucom(&["--json", "ci", "1", "2.set_position=3"]).ends(2);
+    assert!(
+        output.json()["error"]["message"].as_str().unwrap().contains("not among those"),
+        "{}",
+        output.out
+    );
 }
 
 /// P-17, D-08, D-50: while one PC runs the boards a second one is refused; when it dies the boards become safe.
@@ -151,12 +155,12 @@ fn p17_one_master_at_a_time_and_none_is_safe() {
         (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
         (Some("running"), Some("exloader"))
     );
-    let said = sim.ucom(&["--json", "reset"]).ends(4);
-    assert_eq!(said.json()["error"]["code"], "foreign-master", "{}", said.out);
+    let output = sim.ucom(&["--json", "reset"]).ends(4);
+    assert_eq!(output.json()["error"]["code"], "foreign-master", "{}", output.out);
     let so = sim.ucom(&["--json", "so", "1", "--count", "1"]).ends(0).json();
     assert!(so["so"]["current"].is_i64(), "the board still runs: {so}");
     sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
-    // kill -9: nobody says stop, the board itself must.
+    // kill -9: nobody sends a stop, the board itself must stop.
     signal(&run, "-KILL");
     ended(run);
     peer.wait("601#00000000");
@@ -174,8 +178,8 @@ fn run_stops_in_order() {
     peer.wait("602#01000000");
     std::thread::sleep(std::time::Duration::from_millis(1200));
     signal(&run, "-INT");
-    let said = ended(run).ends(0);
-    assert!(said.out.contains("\"running\"") && said.out.contains("\"stopped\""), "{}", said.out);
+    let output = ended(run).ends(0);
+    assert!(output.out.contains("\"running\"") && output.out.contains("\"stopped\""), "{}", output.out);
     let status = sim.ucom(&["--json", "status"]).ends(0).json();
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
     assert_eq!(status["boards"][1]["status_byte"], 0x1B);
@@ -187,8 +191,8 @@ fn p19_load_is_refused() {
     let sim = Sim::start(&["--boards", "3"]);
     sim.ucom(&["init"]).ends(0);
     let profile = sim.file("slow.toml", b"load.limit = 1\n");
-    let said = sim.ucom(&["--json", "run", "all", "--profile", &profile, "--for", "1"]).ends(4);
-    assert_eq!(said.json()["error"]["code"], "load", "{}", said.out);
+    let output = sim.ucom(&["--json", "run", "all", "--profile", &profile, "--for", "1"]).ends(4);
+    assert_eq!(output.json()["error"]["code"], "load", "{}", output.out);
 }
 
 #[test]
@@ -221,9 +225,9 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
         let mut peer = sim.peer();
         let replay = sim.ucom(&["--json", "replay", &sim.path(name), "--speed", "4"]).ends(0).json();
         assert!(replay["left_out"].as_u64().unwrap() > 5, "{replay}");
-        let heard = peer.all(300);
+        let received = peer.all(300);
         assert!(
-            heard.iter().any(|f| f == "0C2#02") && heard.iter().all(|f| f != "000#" && f != "282#"),
+            received.iter().any(|f| f == "0C2#02") && received.iter().all(|f| f != "000#" && f != "282#"),
             "{name}"
         );
     }
@@ -258,8 +262,8 @@ fn an_interrupted_motion_is_stopped() {
     let since = std::time::Instant::now();
     peer.wait("601#00000000");
     assert!(since.elapsed() < std::time::Duration::from_millis(1000), "{:?}", since.elapsed());
-    let said = ended(moving);
-    assert_eq!(said.code, 0, "{}", said.err);
+    let output = ended(moving);
+    assert_eq!(output.code, 0, "{}", output.err);
 }
 
 /// D-15, D-34: an input that is set without a running loop of ours goes alone; those beside it are not written.
@@ -302,7 +306,7 @@ fn d36_one_image_on_boards_that_differ() {
     sim.ucom(&["ci", "7", &format!("{name}=1"), "--for", "0.5"]).ends(0);
 }
 
-/// Nothing is half done because one of several boards is not there, and what was done is said.
+/// Nothing is half done because one of several boards is not there, and what was done is reported.
 #[test]
 fn several_boards_are_changed_only_when_all_answer() {
     let sim = Sim::start(&["--boards", "2"]);
@@ -316,17 +320,17 @@ fn several_boards_are_changed_only_when_all_answer() {
     ] {
         sim.ucom(words).ends(3);
     }
-    let heard = peer.all(100);
-    assert!(!heard.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{heard:?}");
+    let received = peer.all(100);
+    assert!(!received.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{received:?}");
     // The number goes, and no status that nobody has sent is shown.
-    let said = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
-    assert!(said.out.contains("forgotten its number") && !said.out.contains("0x"), "{}", said.out);
+    let output = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
+    assert!(output.out.contains("forgotten its number") && !output.out.contains("0x"), "{}", output.out);
     sim.ucom(&["init"]).ends(0);
-    let said = sim.ucom(&["--json", "status", "1", "--clear", "INIT"]).ends(0).json();
-    assert_eq!(said["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
+    let output = sim.ucom(&["--json", "status", "1", "--clear", "INIT"]).ends(0).json();
+    assert_eq!(output["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
     // The next board has lost its start signal by that.
-    let said = sim.ucom(&["--json", "io", "all"]).ends(4).json();
-    assert!(said["error"]["hint"].as_str().unwrap().contains("start all"), "{said}");
+    let output = sim.ucom(&["--json", "io", "all"]).ends(4).json();
+    assert!(output["error"]["hint"].as_str().unwrap().contains("start all"), "{output}");
 }
 
 /// D-T21: two boards with one flash number report at the same moment with the same bits: one frame, and one board too many.
@@ -339,12 +343,12 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
     peer.send("240#");
     let reports: Vec<String> = peer.all(600).into_iter().filter(|f| f.starts_with("441#")).collect();
     assert_eq!(reports, ["441#21"]);
-    let said = sim.ucom(&["init"]);
-    assert_ne!(said.code, 0);
-    assert!(said.out.contains("more boards than reports"), "{}", said.out);
+    let output = sim.ucom(&["init"]);
+    assert_ne!(output.code, 0);
+    assert!(output.out.contains("more boards than reports"), "{}", output.out);
 }
 
-/// Single frames leave as they are; what changes boards only when that is said, and then all or none.
+/// Single frames leave as they are; what changes boards only when that is reported, and then all or none.
 #[test]
 fn single_frames_can_be_sent() {
     let sim = Sim::start(&["--boards", "1"]);
@@ -363,7 +367,7 @@ fn single_frames_can_be_sent() {
     sim.ucom(&["send", "xyz"]).ends(2);
 }
 
-/// A name that is given twice is a mistake: which of the two is meant nobody can tell.
+/// A name that is given twice is a mistake: which of the two is meant is open.
 #[test]
 fn a_name_given_twice_is_refused() {
     let sim = Sim::start(&["--boards", "1"]);
@@ -371,18 +375,22 @@ fn a_name_given_twice_is_refused() {
     sim.ucom(&["start", "1"]).ends(0);
     let mut peer = sim.peer();
     for words in [["par", "1", "kp=5", "KP=6"], ["ci", "1", "set_position=5", "0=6"]] {
-        let said = sim.ucom(&words).ends(2);
-        assert!(said.err.contains("is given twice"), "{words:?}: {}", said.err);
+        let output = sim.ucom(&words).ends(2);
+        assert!(output.err.contains("is given twice"), "{words:?}: {}", output.err);
     }
     assert!(peer.all(100).iter().all(|f| !f.starts_with("3C1#") && !f.starts_with("341#")));
 }
 
-/// Boards without a number give away how they report, and nothing else; that is said.
+/// Boards without a number give away how they report, and nothing else; that is reported.
 #[test]
-fn a_probe_of_boards_without_numbers_says_how_little_it_is() {
+fn a_probe_of_boards_without_numbers_reports_how_little_it_is() {
     let sim = Sim::start(&["--boards", "2"]);
     let file = sim.path("found.toml");
-    let said = sim.ucom(&["probe", "--out", &file]).ends(0);
-    assert!(said.err.contains("only reports were measured") && said.err.contains("--init"), "{}", said.err);
+    let output = sim.ucom(&["probe", "--out", &file]).ends(0);
+    assert!(
+        output.err.contains("only reports were measured") && output.err.contains("--init"),
+        "{}",
+        output.err
+    );
     assert!(std::fs::metadata(file).is_ok());
 }

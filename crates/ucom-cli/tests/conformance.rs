@@ -19,15 +19,15 @@ fn simulated_boards_conform() {
         let ucom = |words: &[&str]| sim.ucom(&[&["--json", "--profile", file], words].concat());
         ucom(&["init"]).ends(0);
         ucom(&["start", "1"]).ends(0);
-        let said = ucom(&["conformance"]).ends(0).json();
-        assert_eq!((&said["passed"], &said["failed"]), (&json!(5), &json!(0)), "{said}");
-        let first = &said["tests"][0];
+        let output = ucom(&["conformance"]).ends(0).json();
+        assert_eq!((&output["passed"], &output["failed"]), (&json!(5), &json!(0)), "{output}");
+        let first = &output["tests"][0];
         assert_eq!(
             (&first["id"], &first["verdict"], &first["sent"][0]),
             (&json!("D-T2"), &json!("pass"), &json!("240#"))
         );
-        let said = ucom(&["conformance", "2", "--run", "--only", "D-T12,d-t15"]).ends(0).json();
-        assert_eq!(said["passed"], 2, "{said}");
+        let output = ucom(&["conformance", "2", "--run", "--only", "D-T12,d-t15"]).ends(0).json();
+        assert_eq!(output["passed"], 2, "{output}");
         ucom(&["conformance", "--only", "D-T99"]).ends(2);
         ucom(&["conformance", "1", "--init"]).ends(2);
         // One board that is named, and the one that is meant.
@@ -36,8 +36,8 @@ fn simulated_boards_conform() {
         let image = image.to_str().unwrap();
         ucom(&["conformance", "--program", image]).ends(2);
         ucom(&["conformance", "1,2", "--program", image]).ends(2);
-        let said = ucom(&["conformance", "2", "--program", image, "--flash-id", "0xEEEE"]).ends(4).json();
-        assert_eq!(said["error"]["code"], "wrong-board", "{said}");
+        let output = ucom(&["conformance", "2", "--program", image, "--flash-id", "0xEEEE"]).ends(4).json();
+        assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     }
 }
 
@@ -47,9 +47,9 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
     let sim = Sim::start(&["--boards", "2"]);
     sim.ucom(&["init"]).ends(0);
     let mut peer = sim.peer();
-    let said = sim.ucom(&["--json", "status", "1", "--raw", "00:40"]).ends(0).json();
+    let output = sim.ucom(&["--json", "status", "1", "--raw", "00:40"]).ends(0).json();
     assert_eq!(
-        said["boards"],
+        output["boards"],
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
     );
     assert_eq!(peer.wait("1C1#"), "1C1#0040");
@@ -58,9 +58,9 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);
     // Without INIT the number is gone, as expected.
-    let said = sim.ucom(&["--json", "status", "2", "--raw", "0x08:0x00"]).ends(0).json();
+    let output = sim.ucom(&["--json", "status", "2", "--raw", "0x08:0x00"]).ends(0).json();
     assert_eq!(
-        (&said["boards"][0]["after"], &said["boards"][0]["as_expected"]),
+        (&output["boards"][0]["after"], &output["boards"][0]["as_expected"]),
         (&json!(null), &json!(true))
     );
     sim.ucom(&["status", "1", "--raw", "0:0", "--set", "ASTART"]).ends(2);

@@ -12,7 +12,7 @@ use common::Sim;
 use serde_json::json;
 
 /// D-50: nobody reads stdout, whose pipe is full from the start: heartbeats go out, boards keep running and are stopped at
-/// the end, and what was not printed is told.
+/// the end, and what was not printed is reported.
 #[test]
 fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     let sim = Sim::start(&["--boards", "1"]);
@@ -27,7 +27,7 @@ fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     peer.wait("601#01010000");
     let (since, mut last, mut longest, mut outputs) = (Instant::now(), Instant::now(), Duration::ZERO, 0);
     while since.elapsed() < Duration::from_millis(3_500) {
-        match peer.hear(50).as_deref() {
+        match peer.receive(50).as_deref() {
             Some("680#") => {
                 longest = longest.max(last.elapsed());
                 last = Instant::now();
@@ -38,14 +38,14 @@ fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
         }
     }
     assert!(longest < Duration::from_millis(1_400) && outputs > 200, "{longest:?}, {outputs} outputs");
-    let said = ended(child).ends(0);
-    assert!(said.err.contains("lines were dropped"), "{}", said.err);
+    let output = ended(child).ends(0);
+    assert!(output.err.contains("lines were dropped"), "{}", output.err);
     drop(reader);
     let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
 }
 
-/// A reader that takes nothing does not keep `so` from hearing Ctrl-C; one that has gone ends it.
+/// A reader that takes nothing does not keep `so` from receiving Ctrl-C; one that has gone ends it.
 #[test]
 fn outputs_that_nobody_reads() {
     let sim = Sim::start(&["--boards", "1"]);
@@ -75,9 +75,9 @@ fn outputs_that_nobody_reads() {
     ended(run).ends(0);
 }
 
-/// The first Ctrl-C cancels; the second one ends at once with 5 and says what is left undone and what to do.
+/// The first Ctrl-C cancels; the second one ends at once with 5 and shows what is left undone and what to do.
 #[test]
-fn a_second_ctrl_c_ends_at_once_and_says_what_is_left() {
+fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     let sim = Sim::start(&["--boards", "2"]);
     sim.ucom(&["init"]).ends(0);
     let image = sim.file("image.bin", &vec![7; 60_000]);
@@ -95,11 +95,11 @@ fn a_second_ctrl_c_ends_at_once_and_says_what_is_left() {
         std::thread::sleep(Duration::from_millis(300));
         signal(&child, "-INT");
         let since = Instant::now();
-        let said = ended(child);
+        let output = ended(child);
         sim.signal("-CONT");
         assert!(since.elapsed() < Duration::from_millis(700), "{:?}", since.elapsed());
-        let said = said.ends(5);
-        assert!(said.err.contains(what) && said.err.contains(next), "{}", said.err);
+        let output = output.ends(5);
+        assert!(output.err.contains(what) && output.err.contains(next), "{}", output.err);
         sim.ucom(&["init", "--renew", "--force"]).ends(0);
     }
 }
@@ -126,8 +126,8 @@ fn d51_losses_during_the_start_count() {
     // Boards send a heartbeat a second; this PC is less patient.
     let profile = sim.file("p.toml", b"alive.dsp_period = 20\nalive.dsp_lost = 40\n");
     let words = ["--json", "--profile", &profile, "run", "all", "--on-lost", "report", "--for", "0.01"];
-    let said = sim.ucom(&words).ends(5);
-    assert!(said.out.contains("\"stopped\"") && said.err.contains("a board was lost"), "{}", said.err);
+    let output = sim.ucom(&words).ends(5);
+    assert!(output.out.contains("\"stopped\"") && output.err.contains("a board was lost"), "{}", output.err);
 }
 
 /// P-19: a refusal or a failure leaves applications as they were found.
@@ -158,15 +158,15 @@ fn a_reset_of_nobody_is_refused() {
     let sim = Sim::start(&["--boards", "2"]);
     sim.ucom(&["init"]).ends(0);
     let mut peer = sim.peer();
-    let said = sim.ucom(&["--json", "reset", "5"]).ends(3);
-    assert!(said.json()["error"]["hint"].as_str().unwrap().contains("ucom scan"), "{}", said.out);
+    let output = sim.ucom(&["--json", "reset", "5"]).ends(3);
+    assert!(output.json()["error"]["hint"].as_str().unwrap().contains("ucom scan"), "{}", output.out);
     assert!(peer.all(100).iter().all(|f| f != "005#"));
     assert_eq!(sim.ucom(&["--json", "reset", "2"]).ends(0).json()["reports"], json!([0x22]));
     sim.ucom(&["info", "2"]).ends(3);
     sim.ucom(&["info", "1"]).ends(0);
 }
 
-/// D-26, D-51: a board that has rebooted under way is one that was lost, and is not said to be stopped: 5, and its number.
+/// D-26, D-51: a board that has rebooted under way is one that was lost, and is not reported to be stopped: 5, and its number.
 #[test]
 fn d26_a_board_that_reboots_under_way_fails_the_run() {
     let mut sim = Sim::start(&["--boards", "2"]);
@@ -178,11 +178,12 @@ fn d26_a_board_that_reboots_under_way_fails_the_run() {
     sim.fault("crash board=2");
     std::thread::sleep(Duration::from_millis(500));
     signal(&child, "-INT");
-    let said = ended(child).ends(5);
-    let events: Vec<serde_json::Value> = said.out.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let output = ended(child).ends(5);
+    let events: Vec<serde_json::Value> =
+        output.out.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     let stopped = events.iter().find(|e| e["event"] == "stopped").unwrap();
-    assert_eq!(stopped["not_stopped"], json!([2]), "{}", said.out);
-    assert!(said.err.contains("has rebooted"), "{}", said.err);
+    assert_eq!(stopped["not_stopped"], json!([2]), "{}", output.out);
+    assert!(output.err.contains("has rebooted"), "{}", output.err);
     let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
 }
@@ -199,8 +200,8 @@ fn d26_a_reboot_counts_even_if_the_board_answers() {
     peer.send("442#22");
     std::thread::sleep(Duration::from_millis(300));
     signal(&child, "-INT");
-    let said = ended(child).ends(5);
-    assert!(said.err.contains("a board has rebooted"), "{}", said.err);
+    let output = ended(child).ends(5);
+    assert!(output.err.contains("a board has rebooted"), "{}", output.err);
 }
 
 /// A board that does not answer keeps no other one from being stopped: the stop is broadcast before any question.
@@ -212,24 +213,24 @@ fn a_stop_of_all_does_not_hang_on_one_board() {
     sim.peer().wait("603#01010000");
     let mut peer = sim.peer();
     sim.fault("silent board=1");
-    let said = sim.ucom(&["--json", "stop", "1,2,3"]).ends(3);
-    let value = said.json();
-    assert_eq!(value["failed"][0]["board"], 1, "{}", said.out);
+    let output = sim.ucom(&["--json", "stop", "1,2,3"]).ends(3);
+    let value = output.json();
+    assert_eq!(value["failed"][0]["board"], 1, "{}", output.out);
     let stopped: Vec<_> = value["boards"].as_array().unwrap().iter().map(|b| b["number"].clone()).collect();
     assert_eq!(stopped, [2, 3]);
-    let heard = peer.all(50);
-    let first = heard.iter().position(|f| f == "603#00000000").unwrap();
+    let received = peer.all(50);
+    let first = received.iter().position(|f| f == "603#00000000").unwrap();
     assert!(
-        heard.iter().position(|f| f == "201#").unwrap() > first,
-        "board 3 is told before board 1 is asked"
+        received.iter().position(|f| f == "201#").unwrap() > first,
+        "board 3 gets its stop before board 1 is asked"
     );
 
     let mut peer = sim.peer();
     sim.ucom(&["stop", "all"]).ends(0);
-    let heard = peer.all(50);
-    assert_eq!(heard.iter().filter(|f| *f == "600#00000000").count(), 3);
-    let told = heard.iter().position(|f| f == "600#00000000").unwrap();
-    assert!(heard.iter().position(|f| f == "240#").unwrap() > told, "before it asks who is there");
+    let received = peer.all(50);
+    assert_eq!(received.iter().filter(|f| *f == "600#00000000").count(), 3);
+    let stopped = received.iter().position(|f| f == "600#00000000").unwrap();
+    assert!(received.iter().position(|f| f == "240#").unwrap() > stopped, "before it asks who is there");
     signal(&run, "-INT");
     ended(run).ends(5);
 }
@@ -244,11 +245,11 @@ fn a_start_for_names_that_is_cancelled_is_undone() {
         let child = sim.spawn(words);
         peer.wait("301#");
         signal(&child, "-INT");
-        let said = ended(child);
-        assert_ne!(said.code, 0);
+        let output = ended(child);
+        assert_ne!(output.code, 0);
         let status = sim.ucom(&["--json", "status", "1,2"]).ends(0).json();
         let bytes = [0, 1].map(|i| status["boards"][i]["status_byte"].as_u64());
-        assert_eq!(bytes, [Some(0x1B); 2], "{words:?}: {}", said.err);
+        assert_eq!(bytes, [Some(0x1B); 2], "{words:?}: {}", output.err);
     }
 }
 
@@ -305,8 +306,8 @@ fn a_lost_result_of_what_acts_is_a_fault() {
         // Something is on the bus to be printed.
         std::thread::sleep(Duration::from_millis(300));
         peer.send("641#0000");
-        let said = ended(child).ends(code);
-        assert!(said.err.contains("No space left"), "{words:?}: {}", said.err);
+        let output = ended(child).ends(code);
+        assert!(output.err.contains("No space left"), "{words:?}: {}", output.err);
     }
     let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
     assert_eq!(status["boards"][0]["status_byte"], 0x1B, "stopped all the same");
@@ -338,7 +339,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         &["replay", &log],
         &["sim", "--listen", "127.0.0.1:0"],
     ] {
-        // Nobody reads what it prints, and its pipe is full: the first one is heard and not obeyed.
+        // Nobody reads what it prints, and its pipe is full: the first one is received and not obeyed.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
         let mut command = sim.command();
@@ -351,14 +352,19 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
         signal(&child, "-INT");
-        let said = ended(child);
+        let output = ended(child);
         // Who could obey the first one at once has ended by itself.
-        let alike = said.code == 5 && said.err.contains("ended at once; nothing was changed");
-        assert!(alike || (words[0] == "replay" && said.code == 0), "{words:?}: {} {}", said.code, said.err);
+        let alike = output.code == 5 && output.err.contains("ended at once; nothing was changed");
+        assert!(
+            alike || (words[0] == "replay" && output.code == 0),
+            "{words:?}: {} {}",
+            output.code,
+            output.err
+        );
     }
 }
 
-/// A decoder that waits for its stdin hears Ctrl-C all the same; what came before is decoded.
+/// A decoder that waits for its stdin receives Ctrl-C all the same; what came before is decoded.
 #[test]
 fn a_decoder_of_stdin_hears_ctrl_c() {
     let sim = Sim::start(&["--boards", "0"]);
@@ -367,7 +373,7 @@ fn a_decoder_of_stdin_hears_ctrl_c() {
     std::thread::sleep(Duration::from_millis(500));
     signal(&child, "-INT");
     let kept_open = child.stdin.take();
-    let said = ended(child).ends(0);
-    assert!(said.out.contains("PC_REPORT"), "{}", said.out);
+    let output = ended(child).ends(0);
+    assert!(output.out.contains("PC_REPORT"), "{}", output.out);
     drop(kept_open);
 }

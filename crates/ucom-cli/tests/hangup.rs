@@ -22,8 +22,8 @@ fn a_hangup_stops_in_order() {
     let child = sim.spawn(&["update", "1", &image]);
     sim.peer().wait("2C1#");
     signal(&child, "-HUP");
-    let said = ended(child);
-    assert!([4, 5].contains(&said.code), "{}: {}", said.code, said.err);
+    let output = ended(child);
+    assert!([4, 5].contains(&output.code), "{}: {}", output.code, output.err);
     let status = sim.ucom(&["--json", "status"]).ends(0).json();
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2]);
 }
@@ -54,20 +54,20 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
             signal(&child, name);
             let recorded = ended(child).ends(0).json();
             assert!(recorded["frames"].as_u64().unwrap() >= 5, "{name} {ending}: {recorded}");
-            let said = sim.ucom(&["decode", &file]).ends(0);
+            let output = sim.ucom(&["decode", &file]).ends(0);
             assert_eq!(
-                said.out.lines().count() as u64,
+                output.out.lines().count() as u64,
                 recorded["frames"].as_u64().unwrap(),
                 "{name} {ending}"
             );
-            assert!(said.err.is_empty(), "{name} {ending}: {}", said.err);
+            assert!(output.err.is_empty(), "{name} {ending}: {}", output.err);
         }
         signal(&view, name);
         ended(view).ends(0);
     }
 }
 
-/// A recorder that is killed at once loses no more than a second, in each form; that the rest is missing is told where the form
+/// A recorder that is killed at once loses no more than a second, in each form; that the rest is missing is reported where the form
 /// shows it.
 #[test]
 fn a_killed_recorder_leaves_what_was_recorded() {
@@ -81,11 +81,11 @@ fn a_killed_recorder_leaves_what_was_recorded() {
         std::thread::sleep(Duration::from_millis(3_300));
         signal(&child, "-KILL");
         ended(child);
-        let said = sim.ucom(&["decode", &file]).ends(0);
+        let output = sim.ucom(&["decode", &file]).ends(0);
         // Two packages every 10 ms and more, for more than a second.
-        let frames = said.out.lines().count();
-        assert!(frames > 200, "{ending}: {frames} frames; {}", said.err);
-        assert!(ending != "mcap" || said.err.contains("broken off"), "{ending}: {}", said.err);
+        let frames = output.out.lines().count();
+        assert!(frames > 200, "{ending}: {frames} frames; {}", output.err);
+        assert!(ending != "mcap" || output.err.contains("broken off"), "{ending}: {}", output.err);
     }
     signal(&run, "-INT");
     ended(run).ends(0);

@@ -22,23 +22,23 @@ fn d40_a_text_is_never_flashed() {
     let mut peer = sim.peer();
     for (name, content, place) in &files {
         let file = sim.file(name, content.as_bytes());
-        let said = sim.ucom(&["--json", "update", "1", &file, "--flash-id", "0x21"]).ends(2);
-        assert!(said.out.contains(place) && said.out.contains("--raw"), "{name}: {}", said.out);
+        let output = sim.ucom(&["--json", "update", "1", &file, "--flash-id", "0x21"]).ends(2);
+        assert!(output.out.contains(place) && output.out.contains("--raw"), "{name}: {}", output.out);
     }
     let other = sim.file("app.img", &image(500, 1));
-    let said = sim.ucom(&["update", "1", &other, "--flash-id", "0x21"]).ends(2);
-    assert!(said.err.contains("--raw"), "{}", said.err);
+    let output = sim.ucom(&["update", "1", &other, "--flash-id", "0x21"]).ends(2);
+    assert!(output.err.contains("--raw"), "{}", output.err);
     assert!(peer.all(50).is_empty(), "nothing was sent");
-    let said = sim.ucom(&["update", "1", &other, "--flash-id", "0x21", "--raw", "--dry-run"]).ends(0);
-    let shown = said.err.contains("app.img: raw bytes, 500 bytes")
-        && said.err.contains("onto board 1 (flash number 0x0021)");
-    assert!(shown, "{}", said.err);
+    let output = sim.ucom(&["update", "1", &other, "--flash-id", "0x21", "--raw", "--dry-run"]).ends(0);
+    let shown = output.err.contains("app.img: raw bytes, 500 bytes")
+        && output.err.contains("onto board 1 (flash number 0x0021)");
+    assert!(shown, "{}", output.err);
     let file = sim.file("good.hex", hex.as_bytes());
-    let said = sim.ucom(&["update", "1", &file, "--flash-id", "0x21"]).ends(0);
-    assert!(said.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", said.err);
+    let output = sim.ucom(&["update", "1", &file, "--flash-id", "0x21"]).ends(0);
+    assert!(output.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", output.err);
 }
 
-/// S-records of the boards' tool chain count words, those of other tools bytes: the records tell, or `--addresses` does.
+/// S-records of the boards' tool chain count words, those of other tools bytes: the records show which, or `--addresses` does.
 #[test]
 fn s_records_count_words_or_bytes() {
     let sim = Sim::start(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -60,18 +60,18 @@ fn s_records_count_words_or_bytes() {
         let file = sim.file(name, text.as_bytes());
         sim.ucom(&[&["update", "1", &file, "--flash-id", "0x21", "--dry-run"], more].concat()).ends(code).err
     };
-    let said = update("words.s19", file(8, 4), &[], 0);
-    assert!(said.contains("64 bytes from word 0x40, addresses in words"), "{said}");
-    let said = update("bytes.s19", file(16, 4), &[], 0);
-    assert!(said.contains("64 bytes from word 0x20, addresses in bytes"), "{said}");
-    assert!(said.contains("only so the records follow each other"), "{said}");
+    let output = update("words.s19", file(8, 4), &[], 0);
+    assert!(output.contains("64 bytes from word 0x40, addresses in words"), "{output}");
+    let output = update("bytes.s19", file(16, 4), &[], 0);
+    assert!(output.contains("64 bytes from word 0x20, addresses in bytes"), "{output}");
+    assert!(output.contains("only so the records follow each other"), "{output}");
     // Two records may have a hole between them that is meant.
     peer.all(100);
-    let said = update("two.s19", file(16, 2), &[], 2);
-    assert!(said.contains("0x48") && said.contains("--addresses byte"), "{said}");
+    let output = update("two.s19", file(16, 2), &[], 2);
+    assert!(output.contains("0x48") && output.contains("--addresses byte"), "{output}");
     assert!(peer.all(50).is_empty(), "nothing was sent");
-    let said = update("two.s19", file(16, 2), &["--addresses", "byte"], 0);
-    assert!(said.contains("32 bytes from word 0x20, addresses in bytes"), "{said}");
-    let said = update("bytes.s19", file(16, 4), &["--addresses", "word"], 2);
-    assert!(said.contains("are in no record"), "{said}");
+    let output = update("two.s19", file(16, 2), &["--addresses", "byte"], 0);
+    assert!(output.contains("32 bytes from word 0x20, addresses in bytes"), "{output}");
+    let output = update("bytes.s19", file(16, 4), &["--addresses", "word"], 2);
+    assert!(output.contains("are in no record"), "{output}");
 }

@@ -1,4 +1,4 @@
-//! Boards that leave their control loop by themselves while `ucom run` supervises them (D-37): said at once, as an event of
+//! Boards that leave their control loop by themselves while `ucom run` supervises them (D-37): reported at once, as an event of
 //! `--json`, by values that are stale, and by exit code 5.
 
 mod common;
@@ -73,7 +73,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!(so["stale"], true, "{so}");
     let so = run.until(of(2, "so"));
     assert_eq!(so["stale"], false, "{so}");
-    // Old values grow older, and are never told with a new time.
+    // Old values grow older, and are never shown with a new time.
     let (first, second) = (run.until(of(1, "so")), run.until(of(1, "so")));
     assert_eq!((first["time_s"].clone(), &second["stale"]), (second["time_s"].clone(), &Value::Bool(true)));
     assert!(second["age_s"].as_f64() > first["age_s"].as_f64(), "{first} {second}");

@@ -9,13 +9,13 @@ use common::{ucom, ucom_with};
 fn wrong_usage_and_unreadable_input_end_with_2() {
     ucom(&["scann"]).ends(2);
     ucom(&["info", "32", "--bus", "virtual:x"]).ends(2);
-    let said = ucom(&["--json", "scan"]).ends(2);
-    assert!(said.json()["error"]["message"].as_str().unwrap().contains("UCOM_BUS"), "{}", said.out);
+    let output = ucom(&["--json", "scan"]).ends(2);
+    assert!(output.json()["error"]["message"].as_str().unwrap().contains("UCOM_BUS"), "{}", output.out);
     ucom(&["scan", "--bus", "can0"]).ends(2);
     ucom(&["sim", "--profile", "/nowhere.toml"]).ends(2);
     ucom(&["sim", "--chain", "/nowhere.toml"]).ends(2);
-    let said = ucom(&["sim", "--boards", "1", "--flash-ids", "1,2"]).ends(2);
-    assert!(said.err.contains("2 boards"), "{}", said.err);
+    let output = ucom(&["sim", "--boards", "1", "--flash-ids", "1,2"]).ends(2);
+    assert!(output.err.contains("2 boards"), "{}", output.err);
     ucom(&["update", "1", "/nowhere.hex", "--bus", "virtual:x"]).ends(2);
     ucom(&["status", "1", "--set", "MCARUN", "--bus", "virtual:x"]).ends(2);
     ucom(&["status", "1", "--set", "PROG", "--clear", "PROG", "--bus", "virtual:x"]).ends(2);
@@ -24,42 +24,42 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
 
 #[test]
 fn a_bus_that_is_not_there_ends_with_3() {
-    let said = ucom(&["--json", "scan", "--bus", "socketcand:127.0.0.1:1/can0"]).ends(3);
-    let error = &said.json()["error"];
+    let output = ucom(&["--json", "scan", "--bus", "socketcand:127.0.0.1:1/can0"]).ends(3);
+    let error = &output.json()["error"];
     assert_eq!((error["code"].as_str(), error["exit"].as_u64()), (Some("bus"), Some(3)));
 }
 
 #[test]
 fn nobody_on_the_bus_ends_with_3_and_says_what_to_do() {
-    let said = ucom(&["--json", "scan", "--bus", "virtual:empty"]).ends(3);
-    assert!(said.json()["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{}", said.out);
-    let said = ucom(&["--json", "info", "all", "--bus", "virtual:empty"]).ends(3);
-    assert_eq!(said.json()["error"]["code"], "no-boards");
-    let said = ucom(&["--json", "doctor", "--bus", "virtual:empty"]).ends(3);
-    assert_eq!(said.json()["healthy"], false);
+    let output = ucom(&["--json", "scan", "--bus", "virtual:empty"]).ends(3);
+    assert!(output.json()["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{}", output.out);
+    let output = ucom(&["--json", "info", "all", "--bus", "virtual:empty"]).ends(3);
+    assert_eq!(output.json()["error"]["code"], "no-boards");
+    let output = ucom(&["--json", "doctor", "--bus", "virtual:empty"]).ends(3);
+    assert_eq!(output.json()["healthy"], false);
 }
 
 /// C-3: the frame `000#` is a frame.
 #[test]
-fn decode_tells_names_of_frames() {
-    let said = ucom_with(&["decode"], "000#\n141#2100011934126E38\n2A1#\n").ends(0);
-    let lines: Vec<&str> = said.out.lines().collect();
-    assert!(lines[0].contains("PC_RESET") && lines[0].contains("all"), "{}", said.out);
+fn decode_prints_names_of_frames() {
+    let output = ucom_with(&["decode"], "000#\n141#2100011934126E38\n2A1#\n").ends(0);
+    let lines: Vec<&str> = output.out.lines().collect();
+    assert!(lines[0].contains("PC_RESET") && lines[0].contains("all"), "{}", output.out);
     assert!(
         lines[1].contains("DSP_INFO")
             && lines[1].contains("0x1234")
             && lines[1].contains("EXLRUN INIT IPINIT")
     );
-    assert!(lines[2].contains("foreign") && lines[2].contains("bit 5"), "{}", said.out);
-    let said = ucom_with(&["--json", "decode", "-"], "(1.5) can0 1C1#0202\n").ends(0);
-    let value = said.json();
+    assert!(lines[2].contains("foreign") && lines[2].contains("bit 5"), "{}", output.out);
+    let output = ucom_with(&["--json", "decode", "-"], "(1.5) can0 1C1#0202\n").ends(0);
+    let value = output.json();
     assert_eq!((value["function"].as_str(), value["mask"].as_u64()), (Some("PC_SETSTATUS"), Some(2)));
     // A string is followed over its packages.
     let text = "141#2100011934126E38\n141#0200\n141#55436F4D32206865\n141#61642070616E\n";
-    let said = ucom_with(&["decode"], text).ends(0);
-    assert!(said.out.lines().last().unwrap().contains("\"UCoM2 head pan\""), "{}", said.out);
-    let said = ucom_with(&["decode"], "hello\n").ends(2);
-    assert!(said.err.contains("line 1"), "{}", said.err);
+    let output = ucom_with(&["decode"], text).ends(0);
+    assert!(output.out.lines().last().unwrap().contains("\"UCoM2 head pan\""), "{}", output.out);
+    let output = ucom_with(&["decode"], "hello\n").ends(2);
+    assert!(output.err.contains("line 1"), "{}", output.err);
     ucom_with(&["decode"], "").ends(2);
 }
 
@@ -79,8 +79,8 @@ fn pages_completions_and_manual_are_made() {
 
 #[test]
 fn a_dbc_without_boards_needs_no_bus() {
-    let said = ucom(&["dbc", "none"]).ends(0);
-    assert!(said.out.starts_with("VERSION") && said.out.contains("BO_ "), "{}", said.out);
+    let output = ucom(&["dbc", "none"]).ends(0);
+    assert!(output.out.starts_with("VERSION") && output.out.contains("BO_ "), "{}", output.out);
 }
 
 /// A result that went nowhere is no success; a reader that has gone is none that was kept waiting.
@@ -120,15 +120,15 @@ fn files_are_kept_and_nothing_is_made_up() {
         // A recording would bring its own profile with it.
         &["--json", "record", &new, "--for", "0.1"],
     ] {
-        let said = ucom(&[words, &bus].concat()).ends(4);
-        let error = &said.json()["error"];
-        assert_eq!(error["code"], "exists", "{words:?}: {}", said.out);
-        assert!(error["hint"].as_str().unwrap().contains("--force"), "{words:?}: {}", said.out);
+        let output = ucom(&[words, &bus].concat()).ends(4);
+        let error = &output.json()["error"];
+        assert_eq!(error["code"], "exists", "{words:?}: {}", output.out);
+        assert!(error["hint"].as_str().unwrap().contains("--force"), "{words:?}: {}", output.out);
     }
     // Nobody is there: also with --force there is nothing to write.
     for words in [&["--json", "probe", "--out", &toml, "--force"][..], &["--json", "probe"]] {
-        let said = ucom(&[words, &bus].concat()).ends(3);
-        assert_eq!(said.json()["error"]["code"], "no-boards", "{}", said.out);
+        let output = ucom(&[words, &bus].concat()).ends(3);
+        assert_eq!(output.json()["error"]["code"], "no-boards", "{}", output.out);
     }
     kept.iter().for_each(|name| assert_eq!(std::fs::read_to_string(file(name)).unwrap(), "mine", "{name}"));
     ucom(&[&["dbc", "none", "--out", &dbc, "--force"][..], &bus].concat()).ends(0);
@@ -144,26 +144,26 @@ fn wrong_usage_is_json_where_that_is_asked_for() {
         assert_eq!((error["code"].as_str(), error["exit"].as_u64()), (Some("usage"), Some(2)), "{words:?}");
         assert!(!error["message"].as_str().unwrap().is_empty(), "{words:?}");
     }
-    let said = ucom(&["ci", "2,3", "x=1"]).ends(2);
-    assert!(said.err.contains("one board at a time"), "{}", said.err);
+    let output = ucom(&["ci", "2,3", "x=1"]).ends(2);
+    assert!(output.err.contains("one board at a time"), "{}", output.err);
     assert!(ucom(&["--json", "--help"]).ends(0).out.contains("Usage"));
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("x.asc");
-    let said = ucom(&["record", file.to_str().unwrap(), "--bus", "virtual:x"]).ends(2);
-    assert!(said.err.contains(".asc") && !file.exists(), "{}", said.err);
+    let output = ucom(&["record", file.to_str().unwrap(), "--bus", "virtual:x"]).ends(2);
+    assert!(output.err.contains(".asc") && !file.exists(), "{}", output.err);
 }
 
-/// A recording whose writer was killed: what is whole is told, and that it is not all.
+/// A recording whose writer was killed: what is whole is reported, and that it is not all.
 #[test]
 fn a_recording_that_is_cut_off_is_decoded_up_to_there() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("cut.log");
     std::fs::write(&file, "(1.000000) can0 240#\n(2.000000) can0 441#21\n(3.000000) can0 141#2100").unwrap();
-    let said = ucom(&["--json", "decode", file.to_str().unwrap()]).ends(0);
-    assert_eq!(said.out.lines().count(), 2, "{}", said.out);
+    let output = ucom(&["--json", "decode", file.to_str().unwrap()]).ends(0);
+    assert_eq!(output.out.lines().count(), 2, "{}", output.out);
     assert!(
-        said.err.contains("line 3") && said.err.contains("the 2 frames before are whole"),
+        output.err.contains("line 3") && output.err.contains("the 2 frames before are whole"),
         "{}",
-        said.err
+        output.err
     );
 }

@@ -27,8 +27,8 @@ fn d11_values_have_the_units_of_the_signal_table() {
     let (sim, table) = started();
     let mut peer = sim.peer();
     let ucom = |words: &[&str]| sim.ucom(&[&["--json", "--edges", &table], words].concat());
-    let said = ucom(&["ci", "1", "set_position=-15.5deg"]).ends(0).json();
-    assert_eq!(said["set"][0]["value"], json!(-15.5));
+    let output = ucom(&["ci", "1", "set_position=-15.5deg"]).ends(0).json();
+    assert_eq!(output["set"][0]["value"], json!(-15.5));
     assert!(peer.wait("341#").starts_with("341#0000F2F9"), "-1550");
     let refused = ucom(&["ci", "1", "set_position=61deg"]).ends(4).json();
     assert_eq!(
@@ -56,8 +56,8 @@ fn d11_values_have_the_units_of_the_signal_table() {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
     // Scaled without a unit: a bare number would be the word where the table is missing.
-    let said = ucom(&["par", "1", "min_position=2"]).ends(4).json();
-    assert!(said["error"]["message"].as_str().unwrap().contains("names no unit"), "{said}");
+    let output = ucom(&["par", "1", "min_position=2"]).ends(4).json();
+    assert!(output["error"]["message"].as_str().unwrap().contains("names no unit"), "{output}");
     ucom(&["par", "1", "min_position=0x0004"]).ends(0);
     // A number that would wrap is refused as any other value.
     assert!(sim.ucom(&["ci", "1", "set_position=40000"]).ends(4).err.contains("outside -32768..32767"));
@@ -65,7 +65,7 @@ fn d11_values_have_the_units_of_the_signal_table() {
     assert!(dbc.err.contains("has no SO `nobody`"), "{}", dbc.err);
     let dbc = dbc.out;
     assert!(dbc.contains("set_position m0 : 16|16@1- (0.01,0) [-60|60] \"deg\""), "{dbc}");
-    // A table that makes no sense is told with its place.
+    // A table that makes no sense is reported with its place.
     let wrong = sim.file("wrong.toml", b"[[program]]\nprogram_id = 1\npar.kp = { scales = 1 }\n");
     assert!(sim.ucom(&["--edges", &wrong, "io", "1"]).ends(2).err.contains("line 3"));
 }
@@ -80,12 +80,12 @@ fn d11_a_table_without_the_program_refuses_bare_numbers() {
     for words in
         [["ci", "1", "set_position=15"], ["par", "1", "kp=12"], ["run", "1", "--ci=1.set_position=15"]]
     {
-        let said = ucom(&words).ends(4).err;
-        assert!(said.contains("it knows nothing of program 0x") && said.contains("0x0000"), "{said}");
+        let output = ucom(&words).ends(4).err;
+        assert!(output.contains("it knows nothing of program 0x") && output.contains("0x0000"), "{output}");
     }
     let file = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      kp: 12\n";
-    let said = ucom(&["par", "--apply", &sim.file("bare.yaml", file.as_bytes())]).ends(4).err;
-    assert!(said.contains("line 6"), "{said}");
+    let output = ucom(&["par", "--apply", &sim.file("bare.yaml", file.as_bytes())]).ends(4).err;
+    assert!(output.contains("line 6"), "{output}");
     assert!(!peer.all(100).iter().any(|f| f.starts_with("341#") || f.starts_with("3C1#")));
     ucom(&["par", "1", "kp=0x000C"]).ends(0);
     assert_eq!(peer.wait("3C1#"), "3C1#00000C00");
@@ -122,8 +122,8 @@ fn outputs_are_opened_before_anything_is_sent() {
         &["record", &nowhere],
         &["init", "--force", "--inventory", &nowhere],
     ] {
-        let said = sim.ucom(words).ends(2);
-        assert!(said.err.contains("nothing was sent"), "{words:?}: {}", said.err);
+        let output = sim.ucom(words).ends(2);
+        assert!(output.err.contains("nothing was sent"), "{words:?}: {}", output.err);
     }
     assert_eq!(peer.all(100), [""; 0]);
     // Nobody is board 9: the files that were opened for it are gone.
@@ -138,17 +138,17 @@ fn outputs_are_opened_before_anything_is_sent() {
 fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     let (mut sim, _) = started();
     sim.fault("crash board=2 on_id=0x3C2 on_count=1");
-    let said = sim.ucom(&["--json", "par", "all", "kp=3"]).ends(5).json();
-    let message = said["error"]["message"].as_str().unwrap_or_default();
-    assert!(message.contains("board 2") && message.contains("unknown"), "{said}");
-    assert!(message.contains("written before: board 1"), "{said}");
+    let output = sim.ucom(&["--json", "par", "all", "kp=3"]).ends(5).json();
+    let message = output["error"]["message"].as_str().unwrap_or_default();
+    assert!(message.contains("board 2") && message.contains("unknown"), "{output}");
+    assert!(message.contains("written before: board 1"), "{output}");
 }
 
 /// D-35: what was written before is remembered, and never taken for what is there.
 #[test]
 fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     let (sim, _) = started();
-    let first = |said: cli_kit::trial::Said| said.ends(0).json()["par"][0].clone();
+    let first = |output: cli_kit::trial::CommandOutput| output.ends(0).json()["par"][0].clone();
     let wrote = first(sim.ucom(&["--json", "par", "1", "kp=120"]));
     assert_eq!((&wrote["assumed"], &wrote["last_written"]["value"]), (&json!(120), &json!(120)));
     let later = first(sim.ucom(&["--json", "par", "1"]));
@@ -172,11 +172,11 @@ fn a_file_is_applied_whole_or_not_at_all() {
     // The mistake is in the second board: the first gets nothing either.
     let end = good.rfind("kp: 0x0078").unwrap();
     let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 10..]);
-    let said = apply(&of_second("kq: 1")).ends(4);
+    let output = apply(&of_second("kq: 1")).ends(4);
     assert!(
-        said.err.contains("bad.yaml: line 21") && said.err.contains("there is `kp [mA/deg]`"),
+        output.err.contains("bad.yaml: line 21") && output.err.contains("there is `kp [mA/deg]`"),
         "{}",
-        said.err
+        output.err
     );
     assert!(apply(&of_second("kp: 70000")).ends(4).err.contains("70000 is outside"));
     assert!(
@@ -197,12 +197,12 @@ fn a_file_is_applied_whole_or_not_at_all() {
     sim.ucom(&["par", "3", "--apply", &file]).ends(2);
     sim.ucom(&["par", "1", "kp=1", "--apply", &file]).ends(2);
     sim.ucom(&["par", "1", "--dry-run"]).ends(2);
-    let heard = peer.all(100);
-    assert!(!heard.iter().any(|f| f.starts_with("3C")), "{heard:?}");
-    let said = sim.ucom(&["--json", "par", "--apply", &file]).ends(0).json();
-    assert_eq!((&said["written"], &said["boards"][1]["par"][0]["word"]), (&json!(true), &json!(120)));
-    let heard = peer.all(100);
-    let written: Vec<&String> = heard.iter().filter(|f| f.starts_with("3C")).collect();
+    let received = peer.all(100);
+    assert!(!received.iter().any(|f| f.starts_with("3C")), "{received:?}");
+    let output = sim.ucom(&["--json", "par", "--apply", &file]).ends(0).json();
+    assert_eq!((&output["written"], &output["boards"][1]["par"][0]["word"]), (&json!(true), &json!(120)));
+    let received = peer.all(100);
+    let written: Vec<&String> = received.iter().filter(|f| f.starts_with("3C")).collect();
     assert_eq!(written, ["3C1#00007800", "3C2#00007800"]);
 }
 
@@ -220,10 +220,10 @@ fn a_run_takes_parameters_and_first_inputs_from_a_file() {
         sim.file("run.yaml", text.as_bytes())
     };
     let mut peer = sim.peer();
-    let said = sim.ucom(&["--json", "run", "1", "--params", &file("70000"), "--for", "1"]).ends(4);
-    assert_eq!(said.json()["error"]["code"], "params");
-    let heard = peer.all(100);
-    assert!(!heard.iter().any(|f| ["301", "341", "3C1", "541"].contains(&&f[..3])), "{heard:?}");
+    let output = sim.ucom(&["--json", "run", "1", "--params", &file("70000"), "--for", "1"]).ends(4);
+    assert_eq!(output.json()["error"]["code"], "params");
+    let received = peer.all(100);
+    assert!(!received.iter().any(|f| ["301", "341", "3C1", "541"].contains(&&f[..3])), "{received:?}");
     // Without known names the application is started to be asked, and stopped again.
     let words = ["--json", "run", "1", "--fresh", "--params", &file("70000"), "--for", "1"];
     assert_eq!(sim.ucom(&words).ends(4).json()["error"]["code"], "params");
@@ -231,13 +231,13 @@ fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     assert_eq!(sim.ucom(&["--json", "status", "1"]).ends(0).json()["boards"][0]["status_byte"], 0x1B);
     peer.all(100);
     sim.ucom(&["run", "1", "--params", &file("1500"), "--par", "1.kd=6", "--for", "1"]).ends(0);
-    let heard = peer.all(100);
+    let received = peer.all(100);
     let at = |start: &str| {
-        let found = heard.iter().position(|f| f.starts_with(start));
-        found.unwrap_or_else(|| panic!("no {start} in {heard:?}"))
+        let found = received.iter().position(|f| f.starts_with(start));
+        found.unwrap_or_else(|| panic!("no {start} in {received:?}"))
     };
-    assert!(at("341#0000DC05") < at("3C1#00007900") && at("3C1#01000600") < at("541#"), "{heard:?}");
-    assert!(!heard.iter().any(|f| f.starts_with("3C1#01000500")), "{heard:?}");
+    assert!(at("341#0000DC05") < at("3C1#00007900") && at("3C1#01000600") < at("541#"), "{received:?}");
+    assert!(!received.iter().any(|f| f.starts_with("3C1#01000500")), "{received:?}");
 }
 
 #[test]
@@ -260,8 +260,8 @@ fn a_run_of_all_boards_misses_those_of_the_file() {
     };
     let file = sim.file("absent.yaml", format!("boards:\n{}{}", board(1), board(31)).as_bytes());
     let mut peer = sim.peer();
-    let said = sim.ucom(&["--json", "run", "all", "--params", &file, "--for", "0.2"]).ends(4).json();
-    assert!(said["error"]["message"].as_str().unwrap().contains("31"), "{said}");
+    let output = sim.ucom(&["--json", "run", "all", "--params", &file, "--for", "0.2"]).ends(4).json();
+    assert!(output["error"]["message"].as_str().unwrap().contains("31"), "{output}");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
     // Named boards are those of the command line.
     sim.ucom(&["run", "1", "--params", &file, "--for", "0.2"]).ends(0);

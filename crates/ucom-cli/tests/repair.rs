@@ -29,16 +29,16 @@ fn rebooted() -> Sim {
 fn d21_a_board_gets_its_number_back() {
     let sim = rebooted();
     let mut peer = sim.peer();
-    let said = sim.ucom(&["--json", "repair", "2"]).ends(0).json();
-    assert_eq!((&said["repaired"], &said["board"]["number"]), (&true.into(), &2.into()), "{said}");
+    let output = sim.ucom(&["--json", "repair", "2"]).ends(0).json();
+    assert_eq!((&output["repaired"], &output["board"]["number"]), (&true.into(), &2.into()), "{output}");
     let sent: Vec<String> =
         peer.all(100).into_iter().filter(|f| ["1C2#", "282#"].iter().any(|s| f.starts_with(s))).collect();
     assert_eq!(sent, ["1C2#0200", "1C2#0200", "1C2#0200", "282#", "1C2#0202"]);
     let all = sim.ucom(&["--json", "scan"]).ends(0).json();
     assert_eq!(all["boards"].as_array().unwrap().len(), 3, "{all}");
     // A board that is well stays so, and so do its neighbours.
-    let said = sim.ucom(&["repair", "2"]).ends(0);
-    assert!(said.out.contains("board 2 has its number"), "{}", said.out);
+    let output = sim.ucom(&["repair", "2"]).ends(0);
+    assert!(output.out.contains("board 2 has its number"), "{}", output.out);
     assert_eq!(sim.ucom(&["--json", "scan"]).ends(0).json()["boards"], all["boards"]);
 }
 
@@ -46,17 +46,17 @@ fn d21_a_board_gets_its_number_back() {
 #[test]
 fn repairs_that_are_refused() {
     let sim = rebooted();
-    let said = sim.ucom(&["--json", "repair", "1", "--flash-id", "0x77"]).ends(4).json();
-    assert_eq!(said["error"]["code"], "wrong-board", "{said}");
+    let output = sim.ucom(&["--json", "repair", "1", "--flash-id", "0x77"]).ends(4).json();
+    assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     // The board that would take the number is not the one that is meant: it does not keep it.
-    let said = sim.ucom(&["--json", "repair", "2", "--flash-id", "0x77"]).ends(4).json();
-    assert_eq!(said["error"]["code"], "wrong-board", "{said}");
+    let output = sim.ucom(&["--json", "repair", "2", "--flash-id", "0x77"]).ends(4).json();
+    assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     assert_eq!(sim.ucom(&["--json", "scan"]).ends(0).json()["boards"].as_array().unwrap().len(), 2);
-    let said = sim.ucom(&["repair", "9"]).ends(2);
-    assert!(said.err.contains("--flash-id"), "{}", said.err);
+    let output = sim.ucom(&["repair", "9"]).ends(2);
+    assert!(output.err.contains("--flash-id"), "{}", output.err);
     sim.ucom(&["repair", "2", "--inventory", "/nowhere.toml"]).ends(2);
     sim.ucom(&["repair", "2"]).ends(0);
     // All have their numbers: nobody takes this one.
-    let said = sim.ucom(&["--json", "repair", "9", "--flash-id", "0x77"]).ends(3).json();
-    assert_eq!(said["error"]["code"], "no-answer", "{said}");
+    let output = sim.ucom(&["--json", "repair", "9", "--flash-id", "0x77"]).ends(3).json();
+    assert_eq!(output["error"]["code"], "no-answer", "{output}");
 }

@@ -40,8 +40,8 @@ fn d24_every_command_names_it_and_changes_nothing() {
     ];
     for words in commands {
         let mut peer = sim.peer();
-        let said = sim.ucom(&[&["--json"], words].concat()).ends(4);
-        let (out, err) = (said.out.clone(), said.err.clone());
+        let output = sim.ucom(&[&["--json"], words].concat()).ends(4);
+        let (out, err) = (output.out.clone(), output.err.clone());
         let both = out.contains("flash numbers 0x0021 and 0x0042") && out.contains("number-shared");
         assert!(both && out.contains("ucom init"), "{words:?}: {out} {err}");
         let changes = |f: &String| {
@@ -61,16 +61,16 @@ fn d24_every_command_names_it_and_changes_nothing() {
     sim.ucom(&["info", "all"]).ends(0);
 }
 
-/// D-24: a stop is not refused; it says at its end that two boards were stopped.
+/// D-24: a stop is not refused; it reports at its end that two boards were stopped.
 #[test]
 fn d24_stop_stops_both_and_says_so() {
     let sim = sharing();
     for words in [["--json", "stop", "1"], ["--json", "stop", "all"]] {
         let mut peer = sim.peer();
-        let said = sim.ucom(&words).ends(0);
-        assert_eq!(said.json()["shared_numbers"][0]["board"], 1, "{words:?}");
-        assert_eq!(said.json()["shared_numbers"][0]["flash_numbers"], serde_json::json!([0x21, 0x42]));
-        assert!(said.err.contains("both were told to stop"), "{}", said.err);
+        let output = sim.ucom(&words).ends(0);
+        assert_eq!(output.json()["shared_numbers"][0]["board"], 1, "{words:?}");
+        assert_eq!(output.json()["shared_numbers"][0]["flash_numbers"], serde_json::json!([0x21, 0x42]));
+        assert!(output.err.contains("both were commanded to stop"), "{}", output.err);
         let all = peer.all(50);
         let first = all.iter().find(|f| !f.starts_with("680"));
         assert!(first.is_some_and(|f| f.starts_with("60") && f.ends_with("#00000000")), "{all:?}");

@@ -17,7 +17,7 @@ use test_kit::page::{Page, Printed, blurred};
 const BUS: &str = "socketcand:localhost:29536/can0";
 
 #[test]
-fn the_page_of_troubles_says_what_ucom_prints() {
+fn the_page_of_troubles_has_what_ucom_prints() {
     let mut page = Page::new("troubles.md", "ucom");
     bus(&mut page);
     boards(&mut page);

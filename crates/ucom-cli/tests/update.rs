@@ -69,8 +69,8 @@ fn d46_refusals_change_nothing() {
     sim.ucom(&["update", "1", &sim.file("half.hex", b":10000000"), "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &file, "--date", "yesterday"]).ends(2);
     // A list needs to know who is who.
-    let said = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
-    assert_eq!(said.json()["error"]["code"], "no-inventory");
+    let output = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
+    assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.ucom(&["--json", "update", "all", &file, "--dry-run"]).ends(0).json();
     assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
     // While a board runs.
@@ -137,8 +137,8 @@ fn p12_cancel_leaves_the_board_usable() {
     }
     signal(&update, "-INT");
     peer.wait("1C1#0400");
-    let said = ended(update).ends(5);
-    assert_eq!(said.json()["boards"][0]["outcome"], "incomplete", "{}", said.out);
+    let output = ended(update).ends(5);
+    assert_eq!(output.json()["boards"][0]["outcome"], "incomplete", "{}", output.out);
     let info = sim.ucom(&["--json", "info", "1"]).ends(0).json();
     assert_eq!(info["boards"][0]["application"], false);
     sim.ucom(&["update", "1", &sim.file("small.bin", &image(2000, 8))]).ends(0);
@@ -187,8 +187,8 @@ fn d46_a_bus_that_fails_leaves_the_report() {
             peer.wait("182#");
         }
         let dir = sim.kill();
-        let said = ended(update).ends(code);
-        let report = said.json();
+        let output = ended(update).ends(code);
+        let report = output.json();
         assert_eq!(report["exit"], code);
         assert_eq!(report["boards"][0]["outcome"], "verified", "{report}");
         assert_eq!(report["boards"][1]["outcome"], outcome, "{report}");
@@ -208,9 +208,9 @@ fn d46_a_bus_that_fails_is_told_in_words() {
         peer.wait("181#");
     }
     let dir = sim.kill();
-    let said = ended(update).ends(5);
+    let output = ended(update).ends(5);
     for word in ["incomplete", "the bus failed", "run the update again"] {
-        assert!(said.out.contains(word), "{word}: {}", said.out);
+        assert!(output.out.contains(word), "{word}: {}", output.out);
     }
     drop(dir);
 }
@@ -265,7 +265,7 @@ fn d46_a_group_is_one_transfer() {
     assert_eq!(program_id(&sim, "3"), before);
 }
 
-/// Two images: each goes where the profile's plan says, and the report has both; what does not fit is refused.
+/// Two images: each goes where the profile's plan sends it, and the report has both; what does not fit is refused.
 #[test]
 fn d40_two_images_by_plan() {
     let files = tempfile::tempdir().unwrap();
@@ -305,16 +305,16 @@ fn d40_two_images_by_plan() {
                 && images[1]["program_id"] != report["program_id"]
         );
         // One of them is missing, or another option than this plan's is given.
-        let said = sim.ucom(&["--profile", &profile, "update", "1", &app]).ends(2);
-        assert!(said.err.contains(option) && said.err.contains(plan), "{}", said.err);
-        let said = sim.ucom(&["--profile", &profile, "update", "1", &app, "--second", &other]).ends(2);
-        assert!(said.err.contains("raw") && said.err.contains(plan), "{}", said.err);
-        let said = sim.ucom(&["update", "1", &app, option, &other]).ends(2);
-        assert!(said.err.contains("verify-write"), "{}", said.err);
+        let output = sim.ucom(&["--profile", &profile, "update", "1", &app]).ends(2);
+        assert!(output.err.contains(option) && output.err.contains(plan), "{}", output.err);
+        let output = sim.ucom(&["--profile", &profile, "update", "1", &app, "--second", &other]).ends(2);
+        assert!(output.err.contains("raw") && output.err.contains(plan), "{}", output.err);
+        let output = sim.ucom(&["update", "1", &app, option, &other]).ends(2);
+        assert!(output.err.contains("verify-write"), "{}", output.err);
     }
 }
 
-/// U-10 with raw files: written, not verified, and said so; verified against a Program ID that is named.
+/// U-10 with raw files: written, not verified, and output so; verified against a Program ID that is named.
 #[test]
 fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -338,9 +338,9 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     };
     let (first, second) = (sim.file("1.bin", &cycle(1, 0x3AC1)), sim.file("2.bin", &cycle(2, 0x3AC1)));
     let words = ["--profile", profile, "update", "1", &first, "--second", &second];
-    let said = sim.ucom(&words).ends(5);
+    let output = sim.ucom(&words).ends(5);
     for word in ["written", "NOT verified", "0x4B3F, 2009-06-01", "--expect-program-id", "--unverified"] {
-        assert!(said.out.contains(word), "{word}: {}", said.out);
+        assert!(output.out.contains(word), "{word}: {}", output.out);
     }
     let with = |more: &[&'static str]| {
         let words: Vec<&str> = ["--json"].iter().chain(&words).chain(more).copied().collect();
@@ -368,16 +368,20 @@ fn all_is_the_inventory_too() {
     for board in ["2", "4"] {
         sim.ucom(&["reset", board]).ends(0);
     }
-    let said = sim.ucom(&["--json", "update", "all", &file_in(&sim)]).ends(3);
-    let report = said.json();
+    let output = sim.ucom(&["--json", "update", "all", &file_in(&sim)]).ends(3);
+    let report = output.json();
     let outcomes: Vec<&str> =
         report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
     assert_eq!(outcomes, ["verified", "not-started", "verified", "not-started"], "{report}");
     assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
-    assert!(said.err.contains("has no number"), "{}", said.err);
-    // Those who only act on who is there say who is not.
-    let said = sim.ucom(&["start", "all"]).ends(0);
-    assert!(said.err.contains("0x42") || said.err.matches("has no number").count() == 2, "{}", said.err);
+    assert!(output.err.contains("has no number"), "{}", output.err);
+    // Commands that act on the boards that are there name those that are not.
+    let output = sim.ucom(&["start", "all"]).ends(0);
+    assert!(
+        output.err.contains("0x42") || output.err.matches("has no number").count() == 2,
+        "{}",
+        output.err
+    );
 }
 
 /// Ctrl-C while it is still asked who is there: nothing was erased, exit code 4, outcome `cancelled`.
@@ -402,7 +406,7 @@ fn a_named_program_id_is_compared_with_the_image() {
     let sim = chain("1");
     let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
     let file = sim.file("golden.bin", &golden);
-    let said = sim.ucom(&["update", "1", &file, "--expect-program-id", "0x4B40"]).ends(4);
-    assert!(said.err.contains("0x4B3F") && said.err.contains("0x4B40"), "{}", said.err);
+    let output = sim.ucom(&["update", "1", &file, "--expect-program-id", "0x4B40"]).ends(4);
+    assert!(output.err.contains("0x4B3F") && output.err.contains("0x4B40"), "{}", output.err);
     sim.ucom(&["update", "1", &file, "--expect-program-id", "0x4B3F"]).ends(0);
 }

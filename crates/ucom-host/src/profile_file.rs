@@ -136,9 +136,9 @@ fn capital(text: &str) -> String {
 /// What `ucom help profile` prints: every key with default, range, rule and meaning.
 pub fn profile_help() -> String {
     let mut text = String::from(
-        "A profile says how the boards on a bus read what the published description leaves open. It is a TOML\n\
+        "A profile defines how the boards on a bus read what the published description leaves open. It is a TOML\n\
          file for `--profile FILE`; every key may be left out, unknown keys are an error. `a.b = 1` and\n\
-         `[a]` with `b = 1` are the same. `ucom probe` measures what a real board can tell.\n",
+         `[a]` with `b = 1` are the same. `ucom probe` measures what a real board can show.\n",
     );
     for key in KEYS {
         let _ = write!(text, "\n{} = {}\n    {} {}.\n", key.name, key.default, key.doc, capital(key.range));

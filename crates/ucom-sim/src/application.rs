@@ -54,7 +54,7 @@ impl SimApplication {
         self.moved_us = self.moved_us.max(now_us);
         let driven = self.running && self.active;
         if let Some(text) = self.model.advance(seconds, driven, &self.ci, &self.par) {
-            self.say(&text);
+            self.print(&text);
         }
     }
 
@@ -70,7 +70,7 @@ impl SimApplication {
         self.running && self.active
     }
 
-    fn say(&mut self, text: &str) {
+    fn print(&mut self, text: &str) {
         if self.debug.len() < 32 {
             self.debug.push(latin1(text));
         }
@@ -84,7 +84,7 @@ impl Application for SimApplication {
         self.ci.copy_from_slice(self.model.initial_ci());
         self.par.copy_from_slice(self.model.initial_par());
         self.up_at = now_us + UP_US;
-        self.say("application started");
+        self.print("application started");
     }
 
     fn stop(&mut self) {
@@ -138,7 +138,7 @@ impl Application for SimApplication {
     fn run(&mut self, now_us: u64, running: bool) {
         self.pass(now_us);
         self.running = running;
-        self.say(if running { "control loop runs" } else { "control loop ended" });
+        self.print(if running { "control loop runs" } else { "control loop ended" });
     }
 
     fn step(&mut self, now_us: u64) {

@@ -47,7 +47,7 @@ impl Default for AxisConfig {
     }
 }
 
-/// What the controller of an axis is told.
+/// The command to the controller of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Command {
     /// Degrees.
@@ -161,7 +161,7 @@ mod tests {
     };
 
     #[test]
-    fn it_goes_where_it_is_told_at_the_speed_it_is_allowed() {
+    fn it_goes_where_it_is_commanded_at_the_speed_it_is_allowed() {
         let mut axis = Axis::new(&AxisConfig { gravity_deg_s2: 900.0, ..Default::default() });
         axis.advance(0.1, Some(&COMMAND));
         assert!(axis.position > 4.0 && axis.position < 10.0, "{}", axis.position);

@@ -25,9 +25,9 @@ pub(super) struct Board {
     pub silent: bool,
     pub deaf: bool,
     pub ack_held: bool,
-    /// What it hears reaches it so much later, µs.
+    /// What it receives reaches it so much later, µs.
     behind_us: u64,
-    /// What it has still to hear, and when.
+    /// What it has still to receive, and when.
     coming: VecDeque<(u64, u32, Format, Payload)>,
     /// The frame that waits for the bus.
     waiting: Option<Frame>,
@@ -152,7 +152,7 @@ impl Board {
     }
 
     /// A frame of another member was on the bus.
-    pub fn hear(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
+    pub fn receive(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
         if !self.unpowered && !self.deaf {
             if let (1.., Some(payload)) = (self.behind_us, Payload::new(data)) {
                 self.coming.push_back((now_us + self.behind_us, id, format, payload));

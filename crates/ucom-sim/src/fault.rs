@@ -11,7 +11,7 @@ pub enum FaultKind {
     PowerLoss,
     /// Nothing that a board sends reaches the bus.
     Silent,
-    /// A board hears nothing.
+    /// A board receives nothing.
     Deaf,
     /// A board's application crashes; it reboots by its watchdog (D-26).
     Crash,
@@ -67,7 +67,7 @@ pub struct Fault {
 /// Why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    /// Not TOML of this form; the text says where and why.
+    /// Not TOML of this form; the text shows where and why.
     #[error("{0}")]
     Form(String),
     /// There is no such kind.

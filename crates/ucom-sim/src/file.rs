@@ -18,9 +18,9 @@ const MOST_AXES: usize = 8;
 /// One board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardConfig {
-    /// Number of its bootloader; the low byte is what DSP_REPORT tells.
+    /// Number of its bootloader; the low byte is what DSP_REPORT carries.
     pub flash_id: u16,
-    /// What DSP_INFO tells.
+    /// The description in DSP_INFO.
     pub description: String,
     /// Program ID of its application; `None` makes one from the description.
     pub program_id: Option<u16>,
@@ -51,10 +51,10 @@ pub enum ChainFileError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Not TOML of this form; the text says where and why.
+    /// Not TOML of this form; the text shows where and why.
     #[error("{0}")]
     Form(String),
     /// More boards than have numbers.
@@ -152,7 +152,7 @@ pub fn help() -> String {
 }
 
 impl ChainConfig {
-    /// A chain of a text; boards have `profile` unless they say otherwise.
+    /// A chain of a text; boards have `profile` unless they have one of their own.
     pub fn from_toml(text: &str, profile: &Profile) -> Result<Self, ChainFileError> {
         let file: File = toml::from_str(text).map_err(|e| ChainFileError::Form(e.to_string()))?;
         let count = file.board.len();
@@ -302,7 +302,7 @@ mod tests {
         let head = ChainConfig::from_toml(HEAD, &Profile::default()).unwrap();
         assert_eq!(head.boards.len(), 10);
         let ids: BTreeSet<u16> = head.boards.iter().map(|b| b.flash_id & 0x7F).collect();
-        assert_eq!(ids.len(), 10, "flash ids are told apart");
+        assert_eq!(ids.len(), 10, "flash ids are distinguished");
     }
 
     #[test]

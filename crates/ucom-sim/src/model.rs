@@ -30,7 +30,7 @@ pub(super) struct Model {
     par_names: Vec<String>,
     initial_ci: Vec<u16>,
     initial_par: Vec<u16>,
-    /// Set points that were beyond their limits are told once.
+    /// Set points that were beyond their limits are reported once.
     limited: Vec<bool>,
 }
 
@@ -82,9 +82,9 @@ impl Model {
         &self.initial_par
     }
 
-    /// Moves on by so many seconds; outputs are enabled when `active`. A text is something worth telling.
+    /// Moves on by so many seconds; outputs are enabled when `active`. A text is something to be reported.
     pub fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
-        let mut told = None;
+        let mut reported = None;
         for (i, axis) in self.axes.iter_mut().enumerate() {
             let (Some(ci), Some(par)) = (triple(ci, 3 * i), five(par, 5 * i)) else { continue };
             let command = command(ci, par);
@@ -92,11 +92,12 @@ impl Model {
             let beyond = active && !(command.limits.0..=command.limits.1).contains(&command.set_position);
             if beyond && !self.limited[i] {
                 let name = if axis.config().name.is_empty() { "axis" } else { &axis.config().name };
-                told = Some(format!("{name}: set point {:.2} deg is beyond its limit", command.set_position));
+                reported =
+                    Some(format!("{name}: set point {:.2} deg is beyond its limit", command.set_position));
             }
             self.limited[i] = beyond;
         }
-        told
+        reported
     }
 
     /// The outputs, in the order of their names.
@@ -155,7 +156,7 @@ mod tests {
         assert_eq!(model.advance(1.0, true, &ci, &par), None);
         let so: Vec<i16> = model.outputs().map(|w| w as i16).collect();
         assert!((so[5] + 1500).abs() < 60 && so[0].abs() < 60, "{so:?}");
-        // Limits are told once, not in every cycle.
+        // Limits are reported once, not in every cycle.
         ci[3] = 9000;
         assert!(model.advance(0.01, true, &ci, &par).unwrap().contains("90.00 deg"));
         assert_eq!(model.advance(0.01, true, &ci, &par), None);

@@ -15,8 +15,8 @@ const FOREIGN_US: u64 = 40_000;
 /// The boards of a chain and what else talks on their bus, as members of a bus that the caller runs.
 ///
 /// Member 0 is the first board; the last member is no board but everything that faults bring onto the bus. Call
-/// [`advance`](Self::advance), then [`poll`](Self::poll) each member, put its frame on the bus, and say what came of it with
-/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent) and to the others with [`hear`](Self::hear).
+/// [`advance`](Self::advance), then [`poll`](Self::poll) each member, put its frame on the bus, and report what came of it with
+/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent) and to the others with [`receive`](Self::receive).
 pub struct ChainSim {
     boards: Vec<Board>,
     profile: Profile,
@@ -41,7 +41,7 @@ pub struct ChainSim {
 }
 
 impl ChainSim {
-    /// A chain at power-up. `profile` says how the fault `foreign-master` talks.
+    /// A chain at power-up. `profile` defines how the fault `foreign-master` sends.
     pub fn new(config: &ChainConfig, faults: Vec<Fault>, seed: u64, profile: &Profile) -> Self {
         let board = |(i, board)| Board::new(board, i == 0, seed.wrapping_mul(31).wrapping_add(i as u64));
         let boards: Vec<Board> = config.boards.iter().enumerate().map(board).collect();
@@ -126,14 +126,14 @@ impl ChainSim {
         }
     }
 
-    /// A member hears a frame of any format.
-    pub fn hear(&mut self, member: usize, id: u32, format: Format, data: &[u8]) {
+    /// A member receives a frame of any format.
+    pub fn receive(&mut self, member: usize, id: u32, format: Format, data: &[u8]) {
         if let Some(board) = self.boards.get_mut(member) {
-            board.hear(self.now_us, id, format, data);
+            board.receive(self.now_us, id, format, data);
         } else if let (Ok(id), true) = (u16::try_from(id), format == Format::BUS)
             && let Some(frame) = Frame::new(id, data)
         {
-            // The last member hears each frame but its own once: there they are counted for triggers.
+            // The last member receives each frame but its own once: there they are counted for triggers.
             self.count(&frame);
         }
     }
@@ -207,7 +207,7 @@ impl ChainSim {
         (self.random >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// What others on the bus say.
+    /// What others on the bus send.
     fn others(&mut self) -> Option<Frame> {
         if self.master_at.is_some_and(|at| at <= self.now_us) {
             self.master_at = Some(self.now_us + MASTER_US);

@@ -7,7 +7,7 @@ use ucom::{Format, Frame, Profile};
 struct Bench {
     sim: ChainSim,
     now_us: u64,
-    heard: Vec<(u64, Frame)>,
+    received: Vec<(u64, Frame)>,
 }
 
 impl Bench {
@@ -15,7 +15,7 @@ impl Bench {
         let profile = Profile::default();
         let chain = ChainConfig::head(&profile).with_boards(boards, &profile);
         let faults = Fault::from_toml(faults).unwrap();
-        Self { sim: ChainSim::new(&chain, faults, seed, &profile), now_us: 0, heard: Vec::new() }
+        Self { sim: ChainSim::new(&chain, faults, seed, &profile), now_us: 0, received: Vec::new() }
     }
 
     /// Lets time pass; one frame at a time is on the bus.
@@ -38,27 +38,27 @@ impl Bench {
             {
                 self.sim.advance(self.now_us);
                 self.sim.sent(member, &frame);
-                self.tell(&frame, Some(member));
+                self.deliver(&frame, Some(member));
             }
             assert_eq!(self.sim.violation(), None);
         }
     }
 
-    fn tell(&mut self, frame: &Frame, from: Option<usize>) {
-        self.heard.push((self.now_us, *frame));
+    fn deliver(&mut self, frame: &Frame, from: Option<usize>) {
+        self.received.push((self.now_us, *frame));
         for other in (0..self.sim.members()).filter(|m| Some(*m) != from) {
-            self.sim.hear(other, frame.id().into(), Format::BUS, frame.data());
+            self.sim.receive(other, frame.id().into(), Format::BUS, frame.data());
         }
     }
 
-    /// The PC sends a frame; what the boards say within a time.
+    /// The PC sends a frame; what the boards send within a time.
     fn ask(&mut self, text: &str, ms: u64) -> Vec<String> {
         let frame: Frame = text.parse().unwrap();
         self.sim.advance(self.now_us);
-        self.tell(&frame, None);
-        let before = self.heard.len();
+        self.deliver(&frame, None);
+        let before = self.received.len();
         self.pass(ms);
-        self.heard[before..].iter().map(|(_, f)| f.to_string()).collect()
+        self.received[before..].iter().map(|(_, f)| f.to_string()).collect()
     }
 
     fn number(&mut self, boards: u8) {
@@ -81,7 +81,7 @@ fn the_same_seed_gives_the_same_frames() {
             bench.ask(&format!("54{board}#"), 20);
         }
         bench.pass(800);
-        bench.heard
+        bench.received
     };
     let first = run(1);
     assert!(first.len() > 300 && first == run(1));
@@ -96,10 +96,10 @@ fn d26_a_crash_is_one_report_and_a_lost_number() {
     bench.pass(250);
     bench.number(2);
     bench.sim.inject(Fault::from_line("crash board=1").unwrap());
-    let before = bench.heard.len();
+    let before = bench.received.len();
     bench.pass(500);
-    let said: Vec<String> = bench.heard[before..].iter().map(|(_, f)| f.to_string()).collect();
-    assert_eq!(said, ["441#21"]);
+    let sent: Vec<String> = bench.received[before..].iter().map(|(_, f)| f.to_string()).collect();
+    assert_eq!(sent, ["441#21"]);
     let states: Vec<BoardState> = bench.sim.boards().collect();
     assert_eq!((states[0].number, states[0].phase), (None, Phase::Uninitialised));
     assert_eq!(states[1].number, Some(2));
@@ -169,7 +169,7 @@ fn d24_two_boards_with_one_number() {
     bench.pass(100);
     let numbers: Vec<Option<u8>> = bench.sim.boards().map(|b| b.number).collect();
     assert_eq!(numbers, [Some(1), Some(1), Some(3)]);
-    let heads = |said: Vec<String>| said.iter().filter(|f| f.len() == 20 && &f[8..10] == "01").count();
+    let heads = |sent: Vec<String>| sent.iter().filter(|f| f.len() == 20 && &f[8..10] == "01").count();
     assert_eq!(heads(bench.ask("201#", 100)), 2);
     assert_eq!(bench.ask("202#", 100), Vec::<String>::new());
     bench.ask("000#", 500);

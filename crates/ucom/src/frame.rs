@@ -76,7 +76,7 @@ pub struct Frame {
     payload: Payload,
 }
 
-/// How a frame arrived, for drivers that hear everything on a bus.
+/// How a frame arrived, for drivers that receive everything on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
     /// 29-bit identifier.
@@ -126,7 +126,7 @@ impl core::error::Error for Foreign {}
 
 impl Frame {
     /// `None` when `id` has more than 11 bits or `data` more than 8 bytes. The id may be one of no function:
-    /// [`Frame::address`] tells.
+    /// [`Frame::address`] returns it.
     pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
         if id > 0x7FF {
             return None;
@@ -142,7 +142,7 @@ impl Frame {
         Self { id: function.id(sequence), payload }
     }
 
-    /// A frame as heard on a bus where others may talk, too (D-02).
+    /// A frame as received on a bus where others may talk, too (D-02).
     pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, Foreign> {
         match format {
             Format { extended: true, .. } => return Err(Foreign::Extended),
@@ -233,7 +233,7 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn d02_c2_foreign_frames_are_told_apart() {
+    fn d02_c2_foreign_frames_are_distinguished() {
         let bus = Format::BUS;
         assert_eq!(Frame::received(0x281, Format { extended: true, ..bus }, &[]), Err(Foreign::Extended));
         assert_eq!(Frame::received(0x281, Format { remote: true, ..bus }, &[]), Err(Foreign::Remote));

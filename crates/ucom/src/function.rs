@@ -131,7 +131,7 @@ functions! {
     DumpIo = 22, "MCA_DUMP_IO_DESCRIPTION", Both;
     /// Asks for the initial controller inputs.
     DumpCi = 23, "MCA_DUMP_CI", Pc;
-    /// The flags run, active, debug and global debug, set by the PC and told by the board.
+    /// The flags run, active, debug and global debug, set by the PC and reported by the board.
     Admin = 24, "MCA_ADMIN_DATA", Both;
     /// A text for people.
     Debug = 25, "MCA_DEBUG_MSG", Board;

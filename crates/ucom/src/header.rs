@@ -42,7 +42,7 @@ impl Memory {
     }
 }
 
-/// What the header block says.
+/// The contents of the header block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     /// 1 or 2; others are possible on the wire and refused by boards.

@@ -1,4 +1,4 @@
-//! What a board tells about itself: the first frame of DSP_INFO and of the IO description.
+//! What a board reports about itself: the first frame of DSP_INFO and of the IO description.
 
 use crate::frame::Payload;
 use crate::profile::Endian;
@@ -9,7 +9,7 @@ use crate::status::Status;
 pub struct BoardInfo {
     /// Number chosen when the bootloader was flashed; its low byte is the UCoM id (D-07).
     pub flash_number: u16,
-    /// Sequence number as the board says it.
+    /// Sequence number as the board reports it.
     pub sequence: u8,
     /// Status byte.
     pub status: Status,
@@ -20,7 +20,7 @@ pub struct BoardInfo {
 }
 
 impl BoardInfo {
-    /// Whether the board says that it has an application.
+    /// Whether the board reports that it has an application.
     pub const fn has_application(&self) -> bool {
         !(self.program_id == 0xFFFF && self.date == 0xFFFF)
     }

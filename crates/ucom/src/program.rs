@@ -133,7 +133,7 @@ const fn month_days(year: u16, month: u8) -> u8 {
 }
 
 impl DateForm {
-    /// The 16 bits of a date; `None` when there is no such day, or the form cannot say it. `raw` says none.
+    /// The 16 bits of a date; `None` when there is no such day, or the form cannot hold it. `raw` holds none.
     pub fn encode(self, year: u16, month: u8, day: u8) -> Option<u16> {
         if day == 0 || day > month_days(year, month) {
             return None;

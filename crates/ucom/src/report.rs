@@ -10,7 +10,7 @@ pub struct Report {
     pub k: u8,
     /// The sequence field of the identifier.
     pub id_field: Sequence,
-    /// The data byte: the low byte of the flash number. This is what tells boards apart.
+    /// The data byte: the low byte of the flash number. This is what distinguishes boards.
     pub ucom_id: u8,
 }
 
@@ -37,7 +37,7 @@ impl Report {
         }
     }
 
-    /// Whether identifier and data say the same flash id, as they must in mode `flash7`.
+    /// Whether identifier and data carry the same flash id, as they must in mode `flash7`.
     pub const fn agrees(&self) -> bool {
         let by_data = Self::flash7(self.ucom_id as u16);
         by_data.k == self.k && by_data.id_field.number() == self.id_field.number()

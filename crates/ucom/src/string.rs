@@ -77,7 +77,7 @@ pub enum Assembled<'a> {
 /// Puts one string together: one assembler for each function and board (D-14).
 ///
 /// Loss cannot be seen inside a string: a lost package makes it wait for more. [`StringAssembler::expired`]
-/// tells when 100 ms (`string.gap`) passed in silence; the next package then starts anew.
+/// shows when 100 ms (`string.gap`) passed in silence; the next package then starts anew.
 #[derive(Clone, Debug)]
 pub struct StringAssembler<const N: usize = 512> {
     text: [u8; N],

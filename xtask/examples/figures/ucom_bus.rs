@@ -26,7 +26,7 @@ struct Bench {
     boards: Vec<MemberId>,
     chain: ChainSim,
     /// Every frame, in the order of the bus.
-    heard: Vec<CanFrame>,
+    received: Vec<CanFrame>,
     /// When the last frame of program data was over, and the time that boards took to answer such ones, ns.
     asked_at: Option<u64>,
     turn_round_ns: u64,
@@ -56,7 +56,7 @@ impl Bench {
         let tool = bus.join();
         let boards = (0..chain.members()).map(|_| bus.join()).collect();
         let master = Master::new(profile);
-        Self { master, bus, tool, boards, chain, heard: Vec::new(), asked_at: None, turn_round_ns: 0 }
+        Self { master, bus, tool, boards, chain, received: Vec::new(), asked_at: None, turn_round_ns: 0 }
     }
 
     fn now_us(&self) -> u64 {
@@ -106,7 +106,7 @@ impl Bench {
                 BusEvent::Received { member, frame } if member == self.tool => self.tell_tool(&frame),
                 BusEvent::Received { member, frame } => {
                     if let Some(number) = self.boards.iter().position(|board| *board == member) {
-                        self.chain.hear(number, frame.id().value(), Format::BUS, frame.data());
+                        self.chain.receive(number, frame.id().value(), Format::BUS, frame.data());
                     }
                 }
                 BusEvent::Sent { member, frame } => self.sent(member, &frame)?,
@@ -117,7 +117,7 @@ impl Bench {
     }
 
     fn tell_tool(&mut self, frame: &CanFrame) {
-        self.heard.push(*frame);
+        self.received.push(*frame);
         let received = Frame::received(frame.id().value(), Format::BUS, frame.data());
         if let Ok(frame) = &received
             && matches!(function(frame), Some(Function::DspReady | Function::ProgFinished))
@@ -133,7 +133,7 @@ impl Bench {
         let id = u16::try_from(wire.id().value())?;
         let frame = Frame::new(id, wire.data()).ok_or("a frame of this protocol")?;
         if member == self.tool {
-            self.heard.push(*wire);
+            self.received.push(*wire);
             if function(&frame) == Some(Function::Prog) {
                 self.asked_at = Some(self.bus.now_ns());
             }
@@ -159,7 +159,7 @@ pub fn figures() -> Result<()> {
     {
         update(name, Profile { prog_frame_gap_us: gap_us, ..Profile::default() })?;
     }
-    decode(&chain.heard)?;
+    decode(&chain.received)?;
     type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
     let around = size_of::<(MemoryFlash, WirePins, MemoryStore, MemoryApplication)>();
     print("ucom_node_bytes", (size_of::<Board>() - around) as f64);
@@ -188,9 +188,9 @@ fn update(name: &str, profile: Profile) -> Result<()> {
 }
 
 /// Frames that are read in a second, of those that numbering a chain takes.
-fn decode(heard: &[CanFrame]) -> Result<()> {
+fn decode(received: &[CanFrame]) -> Result<()> {
     let profile = Profile::default();
-    let frames: Vec<Frame> = heard
+    let frames: Vec<Frame> = received
         .iter()
         .filter_map(|frame| Frame::received(frame.id().value(), Format::BUS, frame.data()).ok())
         .collect();
@@ -209,7 +209,7 @@ fn decode(heard: &[CanFrame]) -> Result<()> {
     print("ucom_decode_frames_s", 1.0 / best);
     if let Some(path) = std::env::var_os("OPENJTC_UCOM_FRAMES") {
         // For the other reader: one frame a line.
-        let text: String = heard.iter().map(|frame| format!("(0.0) can0 {}\n", candump(frame))).collect();
+        let text: String = received.iter().map(|frame| format!("(0.0) can0 {}\n", candump(frame))).collect();
         std::fs::write(&path, text)?;
         let board = |number| DbcBoard { number, ..DbcBoard::default() };
         let dbc = dbc(&(1..=31).map(board).collect::<Vec<_>>(), profile.endian);

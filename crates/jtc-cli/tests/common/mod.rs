@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use cli_kit::trial::{Said, program, run};
+use cli_kit::trial::{CommandOutput, program, run};
 
 /// `jtc`, without variables of the surroundings.
 pub fn command() -> Command {
@@ -13,12 +13,12 @@ pub fn command() -> Command {
 }
 
 /// Runs `jtc` with these words.
-pub fn jtc(words: &[&str]) -> Said {
+pub fn jtc(words: &[&str]) -> CommandOutput {
     jtc_with(words, "")
 }
 
 /// Runs `jtc` with this text on its stdin.
-pub fn jtc_with(words: &[&str], stdin: &str) -> Said {
+pub fn jtc_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
 
@@ -59,7 +59,7 @@ impl Sim {
     }
 
     /// Runs `jtc` at its port.
-    pub fn jtc(&self, words: &[&str]) -> Said {
+    pub fn jtc(&self, words: &[&str]) -> CommandOutput {
         let mut all = words.to_vec();
         all.extend(["--port", self.port.to_str().unwrap()]);
         jtc(&all)

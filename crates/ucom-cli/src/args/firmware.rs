@@ -60,7 +60,7 @@ pub struct UpdateArgs {
     /// File of the second cycle, with `prog.plan` raw; default: IMAGE again
     #[arg(long, env = "UCOM_SECOND", value_name = "FILE")]
     pub second: Option<PathBuf>,
-    /// Program ID that the board must show at the end, where the image does not tell it
+    /// Program ID that the board must show at the end, where the image does not contain it
     #[arg(long, env = "UCOM_EXPECT_PROGRAM_ID", value_name = "ID", value_parser = program_id)]
     pub expect_program_id: Option<u16>,
     /// Accept an image that cannot be verified as done: exit code 0 where the profile leaves nothing to compare

@@ -84,7 +84,7 @@ pub enum Command {
     #[command(after_help = "Examples:\n  ucom init\n  ucom init --inventory head.toml\n\n\
                             An inventory that is there already is compared: a board in another place is an error.")]
     Init(InitArgs),
-    /// What boards say about themselves
+    /// What boards report about themselves
     #[command(after_help = "Examples:\n  ucom info\n  ucom info 3\n  ucom --json info 1-4")]
     Info(BoardsArgs),
     /// Status bits: show, set, clear
@@ -117,8 +117,8 @@ pub enum Command {
                             ucom update 1-4 firmware.s19 --dry-run\n  ucom update 1-4 firmware.hex --group\n  \
                             ucom update 3 app.hex --exloader loader.hex\n  ucom update 3 program.hex --data data.hex\n  \
                             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
-                            Image formats: raw binary, Intel HEX, Motorola S-record, told apart by their content. What the addresses\n\
-                            of records count, bytes or words, is told by records that follow each other; --addresses names it. Whether two\n\
+                            Image formats: raw binary, Intel HEX, Motorola S-record, recognised by their content. What the addresses\n\
+                            of records count, bytes or words, is reported by records that follow each other; --addresses names it. Whether two\n\
                             files are sent is the profile's matter: `prog.plan`, see `ucom help profile`.\n\
                             `all` are the boards that answer and those of the inventory: one that is missing is reported.\n\
                             Exit codes: 0 verified, or already up to date (or written where the profile leaves nothing to verify,\n\
@@ -202,12 +202,12 @@ pub enum Command {
         after_help = "Examples:\n  ucom probe\n  ucom probe --init --out boards.toml\n  ucom probe --image firmware.hex"
     )]
     Probe(ProbeArgs),
-    /// Test whether boards do what the protocol page says; by default only asks
+    /// Test whether boards follow the protocol page; by default only asks
     #[command(
         after_help = "Examples:\n  ucom conformance\n  ucom conformance 1 --run\n  ucom conformance 1 --flash-id 0x21 --program firmware.hex\n  \
                             ucom --json conformance all --init --only D-T1,D-T4\n\n\
                             Without options only harmless requests leave, and applications that run are left alone. Each test is\n\
-                            one of the project's acceptance tests; it says what was sent, what was expected and what came.\n\
+                            one of the project's acceptance tests; it shows what was sent, what was expected and what came.\n\
                             With --init, --run and --program boards are put back as they were found, also after Ctrl-C or an error:\n\
                             numbers, ASTART, applications (with the parameters of a start). --run takes about 80 s a board.\n\
                             Exit codes: 0 all passed or were skipped, 1 some failed or a board is not as it was found,\n\

@@ -38,7 +38,7 @@ pub struct InitArgs {
     /// Inventory to write, and to compare with when it is there
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
-    /// Write the inventory anew, whatever it said before
+    /// Write the inventory anew, whatever stood in it before
     #[arg(long, env = "UCOM_RENEW", value_parser = FalseyValueParser::new())]
     pub renew: bool,
     #[command(flatten)]
@@ -193,7 +193,7 @@ pub struct SoArgs {
 /// What happens when a board's heartbeats stop.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum OnLost {
-    /// Only say it.
+    /// Only report it.
     Report,
     /// Stop that board's control.
     StopBoard,

@@ -10,7 +10,7 @@ use crate::driver::{Driver, shared_numbers, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
 use crate::shape::{bits, board_table, board_value, info_value, state};
 
-/// What boards say about themselves.
+/// What boards report about themselves.
 pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = Driver::open(link)?;
     let profile = driver.master.profile();
@@ -57,7 +57,7 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     Ok(())
 }
 
-/// One PC_SETSTATUS with these two bytes to each board, or one to all; what came of it beside what the rules say.
+/// One PC_SETSTATUS with these two bytes to each board, or one to all; what came of it beside what the rules require.
 fn raw_status(
     args: &StatusArgs,
     (mask, value): (u8, u8),
@@ -107,7 +107,7 @@ fn raw_status(
             };
             let verdict = match b.as_expected() {
                 true => String::new(),
-                false => format!("; the rules say 0x{:02X} {}", b.expected.0, b.expected),
+                false => format!("; the rules require 0x{:02X} {}", b.expected.0, b.expected),
             };
             text += &format!("board {}: 0x{:02X} -> {after}{verdict}\n", b.board, b.before.status.0);
         }
@@ -256,10 +256,10 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
             break;
         }
     }
-    // Only said, and only now: both boards of such a number were told to stop.
+    // Only reported, and only now: both boards of such a number were commanded to stop.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
-        driver.note(format!("{error}; both were told to stop\n  {}", error.hint()));
+        driver.note(format!("{error}; both were commanded to stop\n  {}", error.hint()));
     }
     let Some(worst) = failures.iter().map(|(_, failure)| failure.exit).max() else {
         let boards = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();

@@ -44,9 +44,9 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         if unnumbered > 0 {
             text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
         }
-        // What the command ends with is said there.
-        let said = |f: &&ScanFinding| is_unnumbered(f) || f.error().is_some();
-        text + &lines(&report.findings.iter().filter(|f| !said(f)).collect::<Vec<_>>())
+        // What the command ends with is reported there.
+        let reported = |f: &&ScanFinding| is_unnumbered(f) || f.error().is_some();
+        text + &lines(&report.findings.iter().filter(|f| !reported(f)).collect::<Vec<_>>())
     });
     match shared {
         // stdout has it already.

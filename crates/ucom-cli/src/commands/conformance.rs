@@ -22,7 +22,7 @@ fn date(profile: &Profile) -> u16 {
     profile.prog_date.encode(2026, 1, 1).unwrap_or(0x5C21)
 }
 
-/// Runs the tests that are allowed and says how each ended.
+/// Runs the tests that are allowed and shows how each ended.
 pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(wrong) = args.only.iter().find(|o| !test_names().any(|id| id.eq_ignore_ascii_case(o))) {
         let all: Vec<&str> = test_names().collect();
@@ -146,7 +146,7 @@ fn who(test: &ConformanceTest) -> String {
 }
 
 /// One short line while the tests go on.
-pub fn told(test: &ConformanceTest) -> String {
+pub fn progress_line(test: &ConformanceTest) -> String {
     let how = match &test.verdict {
         Verdict::Pass => "passed",
         Verdict::Fail(_) => "failed",

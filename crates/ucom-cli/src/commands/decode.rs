@@ -9,7 +9,7 @@ use serde_json::json;
 use ucom_host::ProfileFile;
 use ucom_host::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 
-use super::record::tell_broken_off;
+use super::record::report_broken_off;
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::cleanup::CleanupList;
 use crate::failure::Failure;
@@ -31,11 +31,11 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let mut profile = link.profile()?;
     let stop = CleanupList::default().listen()?;
     let records: Box<dyn Iterator<Item = Result<Record, Failure>>> = if stdin {
-        Box::new(heard(&stop)?)
+        Box::new(received(&stop)?)
     } else {
         let recording = Recording::read(&args.file)
             .map_err(|e| Failure::usage(e).hint("forms are candump -L, FZI-CAN 1.2 and MCAP"))?;
-        tell_broken_off(&recording, &args.file, out);
+        report_broken_off(&recording, &args.file, out);
         // The recorder's profile is the right one, unless another is asked for.
         if let (None, Some(text)) = (&link.profile, &recording.profile) {
             profile = ucom::Profile::from_toml(text).map_err(Failure::usage)?;
@@ -96,7 +96,7 @@ fn print(decoder: &mut Decoder, time_ns: u64, frame: &RecordedFrame, out: &Outpu
 }
 
 /// Lines of stdin as they come; Ctrl-C ends them, also while none comes.
-fn heard(stop: &Stop) -> Result<impl Iterator<Item = Result<Record, Failure>> + use<>, Failure> {
+fn received(stop: &Stop) -> Result<impl Iterator<Item = Result<Record, Failure>> + use<>, Failure> {
     let (sender, lines_read) = sync_channel(READ_AHEAD);
     let read = move || lines(std::io::stdin().lock()).try_for_each(|record| sender.send(record));
     std::thread::Builder::new().name("stdin".into()).spawn(read)?;

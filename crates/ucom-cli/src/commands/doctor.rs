@@ -68,7 +68,7 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     }
 }
 
-/// What the CAN adapter says of itself; none where it says nothing.
+/// What the CAN adapter reports about itself; none where it reports nothing.
 pub fn controller(driver: &mut Driver) -> Option<Controller> {
     let state = driver.link().state();
     (state.errors != ErrorState::Unknown).then_some(Controller {

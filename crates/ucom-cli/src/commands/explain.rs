@@ -96,7 +96,7 @@ const WORDS: [Fixed; 37] = [
         "These boards did not confirm the stop.",
         "ucom stop all",
     ),
-    (OUTCOME, &["not-started"], "The board was not touched.", "the error beside it says why"),
+    (OUTCOME, &["not-started"], "The board was not touched.", "the error beside it names the cause"),
     (OUTCOME, &["cancelled"], "Ended by a person before anything was erased.", "ucom update again"),
     (OUTCOME, &["up-to-date"], "The board holds this image already.", "nothing"),
     (
@@ -208,7 +208,7 @@ pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
             let rows: Vec<Vec<String>> =
                 found.iter().map(|w| vec![w.shown.join(", "), w.family.to_owned()]).collect();
             return format!(
-                "{}\nucom explain WORD tells what it means and what to do",
+                "{}\nucom explain WORD shows what it means and what to do",
                 table(&["word", "of"], &rows)
             );
         }

@@ -1,6 +1,6 @@
 //! Boards that a run supervises: which of them has left its control loop, and how old their values are.
 //!
-//! A board leaves its loop by itself when it misses the PC, when another PC stops it, or when its application does. It says
+//! A board leaves its loop by itself when it misses the PC, when another PC stops it, or when its application does. It reports
 //! so once (MCA_ADMIN_DATA); where that frame is lost its outputs stop, and its status is asked for.
 
 use std::collections::BTreeMap;
@@ -20,11 +20,11 @@ const ASK_US: u64 = 1_000_000;
 /// A run of which no board has been in its loop for so long has nothing left to supervise, µs.
 const OVER_US: u64 = 3_000_000;
 
-/// Something to say at once, for programs and for people.
-pub struct Said {
+/// A notice to print at once, for programs and for people.
+pub struct Notice {
     /// An event of `--json`.
     pub value: Value,
-    /// The same in words; empty where the driver says it.
+    /// The same in words; empty where the driver prints it.
     pub text: String,
 }
 
@@ -57,8 +57,8 @@ impl Followed {
         Self { boards: boards.map(|board| (board, one())).collect(), ..Self::default() }
     }
 
-    /// An event of the bus, beside what the driver says of it.
-    pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Said> {
+    /// An event of the bus, beside what the driver prints of it.
+    pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         match event {
             Event::Snapshot { board, snapshot } => {
                 let one = self.boards.get_mut(board)?;
@@ -83,17 +83,17 @@ impl Followed {
                 let followed = self.boards.contains_key(board);
                 self.lost |= matches!(event, "lost") || (event == "rebooted" && followed);
                 let value = json!({ "event": event, "board": board, "time_s": seconds(now_us) });
-                return Some(Said { value, text: String::new() });
+                return Some(Notice { value, text: String::new() });
             }
             _ => {}
         }
         None
     }
 
-    /// Who has left its loop, or is in it again, since the last time. Asks boards of which nothing is heard.
-    pub fn look(&mut self, master: &mut Master, now_us: u64) -> Vec<Said> {
+    /// Who has left its loop, or is in it again, since the last time. Asks boards of which nothing is received.
+    pub fn look(&mut self, master: &mut Master, now_us: u64) -> Vec<Notice> {
         let boards = master.boards();
-        let (mut said, mut silent) = (Vec::new(), None);
+        let (mut notices, mut silent) = (Vec::new(), None);
         for (number, one) in &mut self.boards {
             let Some(board) = boards.get(*number) else { continue };
             let out = board.admin.is_some_and(|admin| !admin.run) || one.status_out;
@@ -101,7 +101,7 @@ impl Followed {
                 one.out = out;
                 one.left |= out && !self.lost;
                 let age_s = one.last.as_ref().map(|last| age_s(last, now_us));
-                said.push(changed(*number, out, self.lost, age_s, now_us));
+                notices.push(changed(*number, out, self.lost, age_s, now_us));
             }
             let quiet = board.so_at.is_some_and(|at| now_us.saturating_sub(at) > OLD_US);
             if quiet && !out && board.life == Life::Alive && now_us.saturating_sub(one.asked_us) > ASK_US {
@@ -112,7 +112,7 @@ impl Followed {
             self.asking = master.start(now_us, Request::Info { board }).ok();
             self.boards.entry(board).or_default().asked_us = now_us;
         }
-        said
+        notices
     }
 
     /// Whether the run is over: every board has left its loop, or was lost and, by `on_lost`, stopped. Nothing leads a board
@@ -165,7 +165,7 @@ impl Followed {
     }
 }
 
-/// Heartbeats that are missing say nothing good of its values.
+/// Missing heartbeats make its values doubtful.
 fn in_doubt(board: &Board) -> bool {
     board.rebooted || matches!(board.life, Life::Late | Life::Lost)
 }
@@ -178,7 +178,7 @@ fn age_s(last: &Snapshot, now_us: u64) -> f64 {
     seconds(now_us.saturating_sub(last.time_us))
 }
 
-fn changed(board: u8, out: bool, lost: bool, age_s: Option<f64>, now_us: u64) -> Said {
+fn changed(board: u8, out: bool, lost: bool, age_s: Option<f64>, now_us: u64) -> Notice {
     let event = match (out, lost) {
         (true, false) => "left-loop",
         (true, true) => "stopped-by-policy",
@@ -194,7 +194,10 @@ fn changed(board: u8, out: bool, lost: bool, age_s: Option<f64>, now_us: u64) ->
         }
         (false, _) => format!("board {board} is in its control loop again"),
     };
-    Said { value: json!({ "event": event, "board": board, "time_s": seconds(now_us), "age_s": age_s }), text }
+    Notice {
+        value: json!({ "event": event, "board": board, "time_s": seconds(now_us), "age_s": age_s }),
+        text,
+    }
 }
 
 #[cfg(test)]
@@ -203,20 +206,20 @@ mod tests {
 
     use super::*;
 
-    /// Frames of board 1 that come at a time; what is said of them.
-    fn hear(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
+    /// Frames of board 1 that come at a time; what is reported of them.
+    fn receive(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
         frames.iter().for_each(|text| master.handle(at_us, Ok(text.parse().unwrap())));
         let mut sent = Vec::new();
         while let Some(frame) = master.poll(at_us) {
             sent.push(frame.to_string());
         }
-        let mut said: Vec<Said> = Vec::new();
+        let mut notices: Vec<Notice> = Vec::new();
         while let Some(event) = master.take_event() {
-            said.extend(followed.see(&event, at_us));
+            notices.extend(followed.see(&event, at_us));
         }
-        said.extend(followed.look(master, at_us));
-        let event = |s: Said| s.value["event"].as_str().unwrap_or_default().to_owned();
-        sent.into_iter().filter(|f| f != "680#").chain(said.into_iter().map(event)).collect()
+        notices.extend(followed.look(master, at_us));
+        let event = |s: Notice| s.value["event"].as_str().unwrap_or_default().to_owned();
+        sent.into_iter().filter(|f| f != "680#").chain(notices.into_iter().map(event)).collect()
     }
 
     /// It runs and has sent its outputs.
@@ -229,7 +232,7 @@ mod tests {
         let (mut master, mut followed) = (Master::new(profile), Followed::new([1].into_iter(), 0));
         master.watch(1, Some(3), true);
         let first = ["681#", "601#01000000", "381#0000640065006600"];
-        assert!(hear(&mut master, &mut followed, 0, &first).is_empty());
+        assert!(receive(&mut master, &mut followed, 0, &first).is_empty());
         (master, followed)
     }
 
@@ -242,12 +245,12 @@ mod tests {
         let (mut master, mut followed) = running();
         assert_eq!(stale(&master, &followed, 10_000), [false]);
         assert!(followed.nobody_left().is_ok());
-        assert_eq!(hear(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
-        assert!(hear(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(), "said once");
+        assert_eq!(receive(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
+        assert!(receive(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(), "reported once");
         assert_eq!(stale(&master, &followed, 30_000), [true]);
         // Another PC starts it again: the run was broken all the same.
         let again = ["601#01000000", "381#0000640065006600"];
-        assert_eq!(hear(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
+        assert_eq!(receive(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
         assert_eq!(stale(&master, &followed, 40_000), [false]);
         assert_eq!(followed.nobody_left().unwrap_err().exit, FAULT);
     }
@@ -255,25 +258,25 @@ mod tests {
     #[test]
     fn d37_where_its_word_is_lost_its_status_is_asked_for() {
         let (mut master, mut followed) = running();
-        hear(&mut master, &mut followed, 1_000_000, &["681#"]);
-        let asked = hear(&mut master, &mut followed, 1_010_000, &[]);
+        receive(&mut master, &mut followed, 1_000_000, &["681#"]);
+        let asked = receive(&mut master, &mut followed, 1_010_000, &[]);
         assert_eq!(stale(&master, &followed, 1_010_000), [true], "no outputs for a second");
-        let asked = [asked, hear(&mut master, &mut followed, 1_020_000, &[])].concat();
+        let asked = [asked, receive(&mut master, &mut followed, 1_020_000, &[])].concat();
         assert_eq!(asked, ["201#"]);
         let answer = ["141#2100018B34126E38", "141#0100", "141#78"];
-        hear(&mut master, &mut followed, 1_030_000, &answer);
-        assert_eq!(hear(&mut master, &mut followed, 1_200_000, &[]), ["left-loop"]);
+        receive(&mut master, &mut followed, 1_030_000, &answer);
+        assert_eq!(receive(&mut master, &mut followed, 1_200_000, &[]), ["left-loop"]);
         assert!(followed.nobody_left().is_err());
     }
 
     #[test]
     fn d51_values_of_a_late_board_are_stale_and_a_stop_by_policy_is_not_its_own() {
         let (mut master, mut followed) = running();
-        let events = hear(&mut master, &mut followed, 1_600_000, &["381#0000640065006600"]);
+        let events = receive(&mut master, &mut followed, 1_600_000, &["381#0000640065006600"]);
         assert_eq!(events, ["late"]);
         assert_eq!(stale(&master, &followed, 1_600_000), [true]);
-        assert_eq!(hear(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
-        assert_eq!(hear(&mut master, &mut followed, 3_110_000, &["601#00000000"]), ["stopped-by-policy"]);
+        assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
+        assert_eq!(receive(&mut master, &mut followed, 3_110_000, &["601#00000000"]), ["stopped-by-policy"]);
         assert!(followed.nobody_left().is_ok(), "the loss is what failed");
     }
 
@@ -281,11 +284,11 @@ mod tests {
     fn d37_a_run_is_over_some_time_after_its_last_board_has_left() {
         let (mut master, mut followed) = running();
         assert!(!followed.is_over(&master, 10_000));
-        hear(&mut master, &mut followed, 20_000, &["601#00000000"]);
+        receive(&mut master, &mut followed, 20_000, &["601#00000000"]);
         assert!(!followed.is_over(&master, 20_000), "it may be in it again at once");
-        hear(&mut master, &mut followed, 2_000_000, &["681#", "601#01000000", "381#0000640065006600"]);
+        receive(&mut master, &mut followed, 2_000_000, &["681#", "601#01000000", "381#0000640065006600"]);
         assert!(!followed.is_over(&master, 2_000_000));
-        hear(&mut master, &mut followed, 2_100_000, &["601#00000000"]);
+        receive(&mut master, &mut followed, 2_100_000, &["601#00000000"]);
         assert!(!followed.is_over(&master, 2_100_000) && !followed.is_over(&master, 5_000_000));
         assert!(followed.is_over(&master, 5_100_000));
     }
@@ -296,7 +299,7 @@ mod tests {
         for on_lost in [OnLost::StopAll, OnLost::StopBoard, OnLost::Report] {
             let (mut master, mut followed) = running_with(on_lost);
             for now_us in [1_600_000, 3_100_000] {
-                hear(&mut master, &mut followed, now_us, &[]);
+                receive(&mut master, &mut followed, now_us, &[]);
                 assert!(!followed.is_over(&master, now_us), "{on_lost:?}");
             }
             assert_eq!(followed.is_over(&master, 6_100_000), on_lost != OnLost::Report, "{on_lost:?}");

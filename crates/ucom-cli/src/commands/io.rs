@@ -15,7 +15,7 @@ use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 use crate::cache::{Known, of_several};
 use crate::driver::{Driver, nothing_shared, unexpected};
 use crate::failure::{FAULT, Failure};
-use crate::values::{Prepared, Word, only, tell_rounded, with_names, words};
+use crate::values::{Prepared, Word, only, print_rounded, with_names, words};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -36,7 +36,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             None => initial(&mut driver, board).ok(),
             Some(_) => None,
         };
-        // Whoever tells its inputs has told its names before.
+        // A board that sends its inputs has sent its names before.
         let known = match driver.master.description(board) {
             Some(names) if initial.is_some() => known.renamed(names, &signals, driver.master.profile()),
             _ => known,
@@ -153,7 +153,7 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         return Ok(());
     }
     let words = words(&known, Kind::Ci, &args.values)?;
-    tell_rounded(&driver, board, Kind::Ci, &words);
+    print_rounded(&driver, board, Kind::Ci, &words);
     let running = become_master(&mut driver, board, args.force.force)?;
     for word in &words {
         let (now, setting) = (driver.now_us(), word.setting(&known, Kind::Ci));
@@ -191,7 +191,7 @@ fn move_for(
         prepared.add(driver, cache, signals, board, force)?;
         let Some(known) = prepared.known.get(&board) else { return Ok(prepared) };
         let words = words(known, Kind::Ci, &args.values).inspect_err(|_| prepared.undo(driver))?;
-        tell_rounded(driver, board, Kind::Ci, &words);
+        print_rounded(driver, board, Kind::Ci, &words);
         let ci = words.iter().map(|w| w.setting(known, Kind::Ci)).collect();
         let plan = RunBoard { board, ci, par: Vec::new() };
         let options = RunOptions { boards: vec![plan], active: true, force };
@@ -210,12 +210,12 @@ fn move_for(
             followed.see(&event, driver.now_us());
             match event {
                 Event::Snapshot { board: from, snapshot } if from == board => last = Some(snapshot),
-                other => driver.tell(&other, None),
+                other => driver.print_event(&other, None),
             }
         }
         let now_us = driver.now_us();
-        for said in followed.look(&mut driver.master, now_us) {
-            driver.note(said.text);
+        for notice in followed.look(&mut driver.master, now_us) {
+            driver.note(notice.text);
         }
     }
     followed.ask_no_more(&mut driver.master);

@@ -38,11 +38,11 @@ pub struct Watch {
     /// How the boards read the protocol.
     pub profile: Profile,
     /// What became of the last key, until the next one.
-    pub said: String,
+    pub message: String,
     loaded: Instant,
 }
 
-/// So long boards have for their answer before silence is said, µs.
+/// So long boards have for their answer before silence is reported, µs.
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {
@@ -55,7 +55,7 @@ impl Watch {
             listen_only,
             ask: !listen_only,
             profile,
-            said: String::new(),
+            message: String::new(),
             loaded: Instant::now(),
         }
     }
@@ -99,17 +99,18 @@ impl Watch {
     /// Stops the control loops of all boards; who is master does not matter for that.
     fn stop(&mut self, driver: &mut Driver) {
         if self.listen_only {
-            self.said = "--listen-only: nothing was sent; `ucom stop all` stops the boards".into();
+            self.message = "--listen-only: nothing was sent; `ucom stop all` stops the boards".into();
             return;
         }
         driver.stop_at_once(None);
-        self.said = "stop sent to all boards; `ucom stop all` also ends their applications".into();
+        self.message = "stop sent to all boards; `ucom stop all` also ends their applications".into();
     }
 
     /// Asks the boards again who they are, where that is allowed.
     fn ask_again(&mut self) {
         self.ask = !self.listen_only;
-        self.said = if self.listen_only { "--listen-only: nothing is asked" } else { "asked again" }.into();
+        self.message =
+            if self.listen_only { "--listen-only: nothing is asked" } else { "asked again" }.into();
     }
 
     fn note(&mut self, time_s: f64, text: String) {
@@ -120,7 +121,7 @@ impl Watch {
     }
 
     /// Asks once, or when the user wants it again. Asking all the time would look like a second master to others (D-08), and
-    /// what changes is heard anyway.
+    /// what changes is received anyway.
     fn question(&mut self, driver: &mut Driver) {
         if self.ask && !driver.master.is_busy() {
             self.ask = false;
@@ -264,7 +265,7 @@ fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64, mut screen: Scree
                 Key::Char('s') => watch.stop(driver),
                 Key::Char('r') => watch.ask_again(),
                 key => {
-                    watch.said.clear();
+                    watch.message.clear();
                     scroll.key(key);
                 }
             }

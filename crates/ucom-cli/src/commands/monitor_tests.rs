@@ -113,7 +113,7 @@ fn eighty_columns_have_flash_number_program_and_status_bits() {
     assert!(line_of(&wide, "0x0021").contains("init out-pin in-pin"), "{}", wide.join("\n"));
 }
 
-/// Every board can be seen on every terminal, and the keys say how.
+/// Every board can be seen on every terminal, and the keys show how.
 #[test]
 fn no_board_vanishes() {
     let chain = ten();
@@ -135,7 +135,7 @@ fn no_board_vanishes() {
     }
 }
 
-/// A board that is lost is named before anything else, with the next command, and shows nothing that it said before.
+/// A board that is lost is named before anything else, with the next command, and shows nothing that it sent before.
 #[test]
 fn d51_a_lost_board_looks_dead() {
     let chain = one_lost();
@@ -158,7 +158,7 @@ fn d51_a_lost_board_looks_dead() {
 }
 
 #[test]
-fn a_terminal_that_is_too_small_says_the_size_that_is_needed() {
+fn a_terminal_that_is_too_small_shows_the_size_that_is_needed() {
     let (master, now) = ten();
     for size in [(39, 12), (40, 8), (20, 6)] {
         let lines = picture_of(&master, now, &watch(), &mut Scroll::default(), size);
@@ -169,7 +169,7 @@ fn a_terminal_that_is_too_small_says_the_size_that_is_needed() {
 
 /// Without any answer the next command is there.
 #[test]
-fn nobody_is_said() {
+fn an_empty_bus_is_reported() {
     let master = Master::new(Profile::default());
     for size in SIZES {
         let text = picture_of(&master, 3_000_000, &watch(), &mut Scroll::default(), size).join("\n");

@@ -23,13 +23,13 @@ const EVENT: u16 = 16;
 
 /// What is shown.
 pub struct Picture<'a> {
-    /// The boards as last heard.
+    /// The boards as last seen.
     pub boards: &'a Boards,
     /// What the bus carried.
     pub statistics: &'a Statistics,
     /// Numbers that two boards have, in words.
     pub shared: &'a [String],
-    /// The CAN adapter, where it says something of itself.
+    /// The CAN adapter, where it reports something about itself.
     pub controller: Option<Controller>,
     /// µs.
     pub now: u64,
@@ -83,7 +83,7 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     let [causes, table] =
         Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(place);
     frame.render_widget(Paragraph::new(above), causes);
-    // A head without a row below it says nothing.
+    // A head without a row below it has no use.
     if boards > 0 && table.height > 1 {
         frame.render_widget(rows::table(picture, inner, skip), table);
     }
@@ -106,13 +106,13 @@ fn trouble(picture: &Picture<'_>) -> Trouble {
         ..Default::default()
     };
     let mut trouble =
-        Trouble { causes: picture.shared.to_vec(), said: watch.said.clone(), ..Trouble::default() };
+        Trouble { causes: picture.shared.to_vec(), message: watch.message.clone(), ..Trouble::default() };
     let mut next: Vec<String> = Vec::new();
     if !trouble.causes.is_empty() {
         next.push("ucom doctor".into());
     }
     let all = findings(&seen).into_iter();
-    // Silence is said below, with what was asked.
+    // Silence is reported below, with what was asked.
     for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
         let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
         let text = format!("{}{why}", finding.what);

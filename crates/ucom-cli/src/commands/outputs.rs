@@ -35,11 +35,11 @@ pub fn named(names: &[String], signals: &[Signal], words: &[u16]) -> Value {
     Value::Object(keys(names, words.len()).into_iter().zip(values).collect::<Map<_, _>>())
 }
 
-/// The units of such values, by the same keys, as far as a signal table tells them.
+/// The units of such values, by the same keys, as far as a signal table has them.
 pub fn units(names: &[String], signals: &[Signal]) -> Value {
     let pairs = keys(names, names.len()).into_iter().zip(signals);
-    let told = pairs.filter(|(_, signal)| signal.known && !signal.unit.is_empty());
-    Value::Object(told.map(|(key, signal)| (key, json!(signal.unit))).collect::<Map<_, _>>())
+    let known = pairs.filter(|(_, signal)| signal.known && !signal.unit.is_empty());
+    Value::Object(known.map(|(key, signal)| (key, json!(signal.unit))).collect::<Map<_, _>>())
 }
 
 /// Waits for the reader of stdout as long as it reads.
@@ -66,7 +66,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         stdout.push_always(head(&all)?);
     }
     let mut left = args.count.unwrap_or(u64::MAX);
-    let (start, mut heard) = (driver.now_us(), Instant::now());
+    let (start, mut received) = (driver.now_us(), Instant::now());
     let mut patient = true;
     while left > 0 && !driver.stop_asked() && !stdout.gone() {
         driver.turn(Duration::from_millis(20))?;
@@ -76,14 +76,14 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                 Event::CompetingMaster { .. } => {}
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;
-                    heard = Instant::now();
+                    received = Instant::now();
                     stdout.push(row(args, &all, board, &snapshot, start, out));
                 }
-                other => driver.tell(&other, None),
+                other => driver.print_event(&other, None),
             }
         }
         nothing_shared(&driver.master)?;
-        if heard.elapsed() > Duration::from_secs(3) && patient {
+        if received.elapsed() > Duration::from_secs(3) && patient {
             if args.count.is_some() {
                 return Err(Failure::new(
                     NO_LINK,

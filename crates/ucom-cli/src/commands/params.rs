@@ -18,7 +18,7 @@ use crate::args::{Boards, LinkArgs, ParArgs};
 use crate::cache::{Known, of_several};
 use crate::driver::{Driver, unexpected};
 use crate::failure::{FAULT, Failure, REFUSED};
-use crate::values::{Word, for_board, only, tell_rounded, words};
+use crate::values::{Word, for_board, only, print_rounded, words};
 use crate::written::History;
 
 /// Shows parameters, writes some, saves or applies a file.
@@ -43,7 +43,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         };
         let known = known.map_err(|e| of_several(e, &args.boards))?;
         let words = words(&known, Kind::Par, &values)?;
-        tell_rounded(&driver, *board, Kind::Par, &words);
+        print_rounded(&driver, *board, Kind::Par, &words);
         let history = History::of(&args.cache, &known.info);
         all.push(Parameters { known, words, history });
     }
@@ -99,8 +99,8 @@ pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool
 /// parameters themselves (D-35). Frames leave in their order, so the answer to a question comes after all of them.
 pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), Failure> {
     let unknown = |why: &str| {
-        let said = format!("board {board}: values were sent, but {why}: what it has now is unknown");
-        Failure::new(FAULT, "unknown", said)
+        let message = format!("board {board}: values were sent, but {why}: what it has now is unknown");
+        Failure::new(FAULT, "unknown", message)
             .hint(format!("ucom status {board} shows its state; ucom start {board}, and write them again"))
     };
     match seen(driver, board) {
@@ -345,7 +345,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     let mut inputs = 0;
     for (known, (_, (ci, words))) in known.into_iter().zip(checked) {
         inputs += ci.len();
-        tell_rounded(&driver, known.board, Kind::Par, &words);
+        print_rounded(&driver, known.board, Kind::Par, &words);
         let history = History::of(&args.cache, &known.info);
         all.push(Parameters { known, words, history });
     }

@@ -8,7 +8,7 @@ use crate::args::{Assignment, RunArgs};
 use crate::cache::Known;
 use crate::driver::Driver;
 use crate::failure::Failure;
-use crate::values::{Prepared, Word, for_board, tell_rounded, words};
+use crate::values::{Prepared, Word, for_board, print_rounded, words};
 use crate::written::History;
 
 /// What each board is to get: the file's values, then those of the command line.
@@ -28,7 +28,7 @@ pub fn plans(
                 all.retain(|w| w.index != word.index);
                 all.push(word);
             }
-            tell_rounded(driver, board, kind, &all);
+            print_rounded(driver, board, kind, &all);
             Ok::<_, Failure>(all.iter().map(|w| w.setting(known, kind)).collect())
         };
         let ci = settings(Kind::Ci, of_file.map(|(ci, _)| ci), &args.ci)?;

@@ -50,8 +50,8 @@ fn failed(e: RecordingError) -> Failure {
     Failure::new(FAULT, "recording", e).hint("is the disk full?")
 }
 
-/// Says that a recording does not end as one does.
-pub fn tell_broken_off(recording: &Recording, file: &Path, out: &Output) {
+/// Reports that a recording does not end as one does.
+pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     if let Some(why) = &recording.broken_off {
         let (file, whole) = (file.display(), recording.records.len());
         let are = if whole == 1 { "is" } else { "are" };
@@ -151,7 +151,7 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         return Err(Failure::usage(format!("--speed {}: it must be above 0", args.speed)));
     }
     let recording = Recording::read(&args.file).map_err(Failure::usage)?;
-    tell_broken_off(&recording, &args.file, out);
+    report_broken_off(&recording, &args.file, out);
     let intrusive = |record: &Record| is_intrusive(&record.frame);
     let (guarded, due): (Vec<&Record>, Vec<&Record>) =
         recording.records.iter().partition(|record| !args.intrusive && intrusive(record));
@@ -188,7 +188,7 @@ fn play(records: &[&Record], speed: f64, bus: &mut Link, stop: &Stop, out: &Outp
             if rest.is_zero() {
                 break;
             }
-            // What others say is of no interest here, and must not pile up.
+            // What others send is of no interest here, and must not pile up.
             bus.receive(rest.min(Duration::from_millis(100)))?;
             bus.news().iter().for_each(|news| out.note(news));
         }

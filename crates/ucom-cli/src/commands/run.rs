@@ -9,7 +9,7 @@ use ucom_host::files::SignalTable;
 use ucom_host::master::io::Kind;
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel, counted};
 
-use super::followed::{Followed, Said};
+use super::followed::{Followed, Notice};
 use super::outputs::{finish, named, units};
 use super::params::Applied;
 use super::plans::{plans, remember};
@@ -19,8 +19,8 @@ use crate::driver::{Driver, nothing_shared, unexpected};
 use crate::failure::{FAULT, Failure};
 use crate::values::{Prepared, only, with_names};
 
-/// How often `run` says how things are.
-const SAY: Duration = Duration::from_secs(1);
+/// How often `run` shows how things are.
+const REPORT_PERIOD: Duration = Duration::from_secs(1);
 
 /// Starts boards and keeps them running until Ctrl-C.
 pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -139,26 +139,26 @@ fn supervise(
 ) -> Result<(), Failure> {
     let typed = typed();
     prepared.known.keys().for_each(|board| driver.master.watch(*board, None, true));
-    let (start, mut said) = (Instant::now(), Instant::now());
-    let say = |driver: &Driver, said: Said| {
-        if !said.text.is_empty() {
-            driver.note(said.text);
+    let (start, mut reported) = (Instant::now(), Instant::now());
+    let print = |driver: &Driver, notice: Notice| {
+        if !notice.text.is_empty() {
+            driver.note(notice.text);
         }
         if out.is_json() {
-            stdout.push_always(said.value.to_string());
+            stdout.push_always(notice.value.to_string());
         }
     };
     loop {
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
-            if let Some(said) = followed.see(&event, driver.now_us()) {
-                say(driver, said);
+            if let Some(notice) = followed.see(&event, driver.now_us()) {
+                print(driver, notice);
             }
-            driver.tell(&event, None);
+            driver.print_event(&event, None);
         }
         let now_us = driver.now_us();
-        for said in followed.look(&mut driver.master, now_us) {
-            say(driver, said);
+        for notice in followed.look(&mut driver.master, now_us) {
+            print(driver, notice);
         }
         // What was found while it runs: a fault, not a refusal.
         nothing_shared(&driver.master).map_err(|failure| Failure { exit: FAULT, ..failure })?;
@@ -178,8 +178,8 @@ fn supervise(
         if driver.stop_asked() || args.duration.is_some_and(|d| start.elapsed() >= d) {
             return Ok(());
         }
-        if said.elapsed() >= SAY && out.is_json() {
-            said = Instant::now();
+        if reported.elapsed() >= REPORT_PERIOD && out.is_json() {
+            reported = Instant::now();
             for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
                 let Some(known) = prepared.known.get(&board) else { continue };
                 let so = named(&known.names.so, known.signals.all(Kind::So), &snapshot.words);
@@ -196,7 +196,7 @@ fn supervise(
 }
 
 /// Control loops and applications end: all loops at once, then each board in turn. Returns those whose end is not certain;
-/// why is said.
+/// why is reported.
 fn halt(driver: &mut Driver, boards: &[u8], why: Option<&Failure>) -> Vec<u8> {
     driver.stop_at_once(Some(boards));
     // A bus that is gone is gone for all boards, and is the reason that is printed last.

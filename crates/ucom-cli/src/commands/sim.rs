@@ -105,10 +105,10 @@ struct Server<'a> {
     words: Receiver<String>,
     /// What clients receive of the last frame on the wire, and when it ended, ns.
     carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
-    /// Clients whose controller is bus-off, as they were told.
+    /// Clients to which bus-off of their controller was reported.
     off: BTreeSet<ClientId>,
-    /// When it was last said that a controller has left the bus, ns.
-    off_said_ns: Option<u64>,
+    /// When it was last reported that a controller has left the bus, ns.
+    off_reported_ns: Option<u64>,
     out: &'a Output,
 }
 
@@ -129,7 +129,7 @@ impl<'a> Server<'a> {
             words: words(),
             carried: None,
             off: BTreeSet::new(),
-            off_said_ns: None,
+            off_reported_ns: None,
             out,
         }
     }
@@ -155,7 +155,7 @@ impl<'a> Server<'a> {
                 // What comes now is on the bus now, not when the clock was last looked at.
                 let now_us = self.now_us();
                 self.advance(now_us);
-                self.heard(event.client, event.event);
+                self.received(event.client, event.event);
                 patience = Duration::ZERO;
             }
         }
@@ -215,7 +215,7 @@ impl<'a> Server<'a> {
                         remote: frame.is_remote(),
                         fd: frame.is_fd(),
                     };
-                    self.chain.hear(i, frame.id().value(), format, frame.data());
+                    self.chain.receive(i, frame.id().value(), format, frame.data());
                 }
                 // A client that is bus-off receives nothing, like any controller.
                 None => {
@@ -260,7 +260,7 @@ impl<'a> Server<'a> {
         self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| *client)
     }
 
-    /// A controller is in another state: a client is told that its own has left the bus, and that it is back.
+    /// A controller is in another state: a client receives the report that its own has left the bus, and that it is back.
     fn is_in_state(&mut self, member: MemberId, state: ErrorState, at_ns: u64) {
         let off = state == ErrorState::BusOff;
         if let Some(client) = self.client_of(member)
@@ -269,16 +269,16 @@ impl<'a> Server<'a> {
             self.gateway.report_state(client, if off { state } else { ErrorState::Active });
         }
         if off {
-            self.say_off(member, at_ns);
+            self.report_off(member, at_ns);
         }
     }
 
-    /// A controller has left the bus; it comes back by itself. Said once a second at most: on a bad wire it happens all the time.
-    fn say_off(&mut self, member: MemberId, at_ns: u64) {
-        if self.off_said_ns.is_some_and(|said| at_ns.saturating_sub(said) < 1_000_000_000) {
+    /// A controller has left the bus; it comes back by itself. Reported once a second at most: on a bad wire it happens all the time.
+    fn report_off(&mut self, member: MemberId, at_ns: u64) {
+        if self.off_reported_ns.is_some_and(|at| at_ns.saturating_sub(at) < 1_000_000_000) {
             return;
         }
-        self.off_said_ns = Some(at_ns);
+        self.off_reported_ns = Some(at_ns);
         let client = self.client_of(member).map(|client| client.to_string());
         let who = match self.inside.iter().position(|m| *m == member) {
             Some(i) => format!("the board at position {}", i + 1),
@@ -290,7 +290,7 @@ impl<'a> Server<'a> {
         ));
     }
 
-    fn heard(&mut self, client: ClientId, event: ClientEvent) {
+    fn received(&mut self, client: ClientId, event: ClientEvent) {
         let member = *self.clients.entry(client).or_insert_with(|| self.bus.join());
         match event {
             ClientEvent::Joined => {}

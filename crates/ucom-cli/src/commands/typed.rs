@@ -9,7 +9,7 @@ use ucom_host::master::{AdminChange, Request, Setting};
 use crate::args::{Assignment, RunArgs};
 use crate::driver::Driver;
 use crate::failure::Failure;
-use crate::values::{Prepared, only, tell_rounded, words};
+use crate::values::{Prepared, only, print_rounded, words};
 use crate::written::History;
 
 /// Lines on stdin, read beside the bus.
@@ -20,7 +20,7 @@ pub fn typed() -> Receiver<String> {
 }
 
 /// Hands over every line until the end, or until `take` wants no more. A byte that is no text makes a line that nothing
-/// obeys, and that is said; it does not keep a later `stop` from being read.
+/// obeys, and that is reported; it does not keep a later `stop` from being read.
 fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     let mut line = Vec::new();
     loop {
@@ -79,7 +79,7 @@ pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared
             only(&[board], &values, "set")?;
             let kind = if kind == "ci" { Kind::Ci } else { Kind::Par };
             let words = words(known, kind, &values)?;
-            tell_rounded(driver, board, kind, &words);
+            print_rounded(driver, board, kind, &words);
             for word in &words {
                 let (now, Setting { name, value }) = (driver.now_us(), word.setting(known, kind));
                 match kind {
@@ -103,12 +103,12 @@ mod tests {
 
     #[test]
     fn a_line_that_is_no_text_does_not_end_the_input() {
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         each_line(&b"ci 1 \xFF=3\nstop\nlast"[..], |line| {
-            heard.push(line.trim().to_owned());
+            received.push(line.trim().to_owned());
             true
         });
-        assert_eq!(heard, ["ci 1 \u{FFFD}=3", "stop", "last"]);
+        assert_eq!(received, ["ci 1 \u{FFFD}=3", "stop", "last"]);
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
     // Before anything is asked or sent: what goes where.
-    files.told.iter().for_each(|told| driver.note(told.clone()));
+    files.notes.iter().for_each(|note| driver.note(note.clone()));
     driver.note(format!("onto {}", targets.iter().map(target).collect::<Vec<_>>().join(", ")));
     let options = UpdateOptions {
         dry_run: args.dry_run,
@@ -64,7 +64,7 @@ fn target(target: &UpdateTarget) -> String {
     format!("board {} ({who})", target.board)
 }
 
-/// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is told.
+/// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is reported.
 fn numbers(driver: &mut Driver, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
     let mut numbers = driver.numbers(&args.boards)?;
     if args.boards == Boards::All && args.inventory.exists() {
@@ -80,7 +80,7 @@ fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
     (0..32).filter(|board| inventory.get(*board).is_some())
 }
 
-/// Ctrl-C while it was still asked who is there: nothing was sent that changes a board, and the report says so.
+/// Ctrl-C while it was still asked who is there: nothing was sent that changes a board, which the report shows.
 fn cancelled(failure: Failure, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
     if failure.code != "cancelled" {
         return failure;
@@ -116,7 +116,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
         };
     }
     if !args.inventory.exists() {
-        // One board by its number alone is what the user said; a list needs to know who is who.
+        // One board by its number alone is what the user asked for; a list needs to know who is who.
         if let ([board], Boards::Some(_)) = (numbers, &args.boards) {
             return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
         }

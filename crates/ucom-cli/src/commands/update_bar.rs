@@ -49,7 +49,7 @@ impl<'a> Bar<'a> {
         Ok(Self { out, bar: None, serial: 0, steps, ended })
     }
 
-    /// Draws what an event tells of progress, when the terminal takes it.
+    /// Draws the progress in an event, when the terminal takes it.
     pub fn see(&mut self, event: &Event) {
         let Event::Progress { progress, .. } = event else { return };
         if self.bar.as_ref().is_none_or(|(boards, _)| *boards != progress.boards) {
@@ -60,8 +60,8 @@ impl<'a> Bar<'a> {
         }
         if let Some((_, bar)) = &self.bar {
             let (bar, serial) = (bar.clone(), self.serial);
-            let step = Step { bar, serial, bytes: progress.bytes, message: said(progress) };
-            // Too many wait: the next step says the same, and more.
+            let step = Step { bar, serial, bytes: progress.bytes, message: message(progress) };
+            // Too many wait: the next step contains the same, and more.
             let _ = self.steps.try_send(step);
         }
     }
@@ -90,7 +90,7 @@ fn draw(steps: &Receiver<Step>) {
     }
 }
 
-fn said(p: &Progress) -> String {
+fn message(p: &Progress) -> String {
     let cycle = if p.cycle == 1 { "checking" } else { "writing" };
     let attempt = if p.attempt > 1 { format!(", attempt {}", p.attempt) } else { String::new() };
     let (rate, left) = (p.rate as f64 / 1000.0, p.remaining_us as f64 * 1e-6);

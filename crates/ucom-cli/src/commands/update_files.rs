@@ -22,7 +22,7 @@ pub struct Files {
     /// Where they came from, in that order.
     pub names: Vec<PathBuf>,
     /// What each holds, in words.
-    pub told: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 impl Files {
@@ -37,9 +37,9 @@ impl Files {
         let (image, first) = image(&args.image, args, out)?;
         let second = other.map(|file| self::image(file, args, out)).transpose()?;
         let (second, more) = second.unzip();
-        let told = [Some(first), more].into_iter().flatten().collect();
+        let notes = [Some(first), more].into_iter().flatten().collect();
         let names = [Some(args.image.as_path()), other].into_iter().flatten().map(Path::to_owned).collect();
-        Ok(Self { image, second, names, told })
+        Ok(Self { image, second, names, notes })
     }
 }
 
@@ -55,7 +55,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
         let (path, text) = (file.display().to_string(), e.to_string());
         let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
         failure.hint(if e.is_of_addresses() {
-            "--addresses byte or --addresses word says what the addresses count: S-records of the boards' tool chain count words, \
+            "--addresses byte or --addresses word defines what the addresses count: S-records of the boards' tool chain count words, \
              those of objcopy and srec_cat bytes"
         } else {
             "formats are Intel HEX, S-record, and raw bytes in a .bin; --raw sends a file as it is"
@@ -66,14 +66,14 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     }
     let count =
         image.address_unit(&options).map_or_else(String::new, |unit| format!(", addresses in {unit}s"));
-    let told = format!(
+    let note = format!(
         "{}: {}, {} bytes from word 0x{:X}{count}",
         file.display(),
         image.format_name(),
         image.bytes().len(),
         image.address_words()
     );
-    Ok((UpdateImage { bytes: image.bytes().to_vec(), address_words: image.address_words() }, told))
+    Ok((UpdateImage { bytes: image.bytes().to_vec(), address_words: image.address_words() }, note))
 }
 
 /// The file beside the image that the plan takes.

@@ -58,7 +58,7 @@ fn boards(report: &UpdateReport) -> String {
     table(&[">board", "flash id", "outcome", ">attempts", ">time", ""], &rows)
 }
 
-/// The board says it is done, and that is all there is.
+/// The board reports that it is done, and there is no other proof.
 fn taken_on_trust(b: &UpdateResult, report: &UpdateReport) -> bool {
     let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
     report.unverifiable.is_some() && done && b.failure.is_none()

@@ -6,19 +6,19 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use can_link::{CanBus, CanFrame, Id};
-use cli_kit::trial::{Said, program, run, signal};
+use cli_kit::trial::{CommandOutput, program, run, signal};
 
 fn command() -> Command {
     program(env!("CARGO_BIN_EXE_ucom"), "UCOM_")
 }
 
 /// Runs `ucom` with these words.
-pub fn ucom(words: &[&str]) -> Said {
+pub fn ucom(words: &[&str]) -> CommandOutput {
     ucom_with(words, "")
 }
 
 /// Runs `ucom` with this text on its stdin.
-pub fn ucom_with(words: &[&str], stdin: &str) -> Said {
+pub fn ucom_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
 
@@ -45,7 +45,7 @@ impl Sim {
         let Some(url) = line.trim().strip_prefix("ready: ") else {
             let mut err = String::new();
             child.stderr.take().expect("stderr").read_to_string(&mut err).ok();
-            panic!("ucom sim says {line:?}, {err}");
+            panic!("ucom sim prints {line:?}, {err}");
         };
         Self { child, url: url.to_owned(), dir: tempfile::tempdir().expect("a directory") }
     }
@@ -59,7 +59,7 @@ impl Sim {
     }
 
     /// Runs `ucom` on its bus, with an inventory and a cache of its own.
-    pub fn ucom(&self, words: &[&str]) -> Said {
+    pub fn ucom(&self, words: &[&str]) -> CommandOutput {
         run(self.command(), words, "")
     }
 
@@ -120,7 +120,7 @@ impl Drop for Sim {
     }
 }
 
-/// A device on the bus that sends and hears raw frames.
+/// A device on the bus that sends and receives raw frames.
 pub struct Peer {
     bus: Box<dyn CanBus + Send>,
 }
@@ -142,7 +142,7 @@ impl Peer {
     }
 
     /// The next frame within a time.
-    pub fn hear(&mut self, within_ms: u64) -> Option<String> {
+    pub fn receive(&mut self, within_ms: u64) -> Option<String> {
         let frame = self.bus.receive(Duration::from_millis(within_ms)).expect("the bus works")?;
         let data: String = frame.data().iter().map(|b| format!("{b:02X}")).collect();
         Some(format!("{}#{data}", frame.id()))
@@ -151,11 +151,11 @@ impl Peer {
     /// Everything within a time.
     pub fn all(&mut self, within_ms: u64) -> Vec<String> {
         let end = Instant::now() + Duration::from_millis(within_ms);
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         while let Some(left) = end.checked_duration_since(Instant::now()) {
-            heard.extend(self.hear(left.as_millis() as u64));
+            received.extend(self.receive(left.as_millis() as u64));
         }
-        heard
+        received
     }
 
     /// Waits for a frame that begins so; what comes before it is passed over. Only what never comes takes as long as the limit,
@@ -163,7 +163,7 @@ impl Peer {
     pub fn wait(&mut self, start: &str) -> String {
         let end = Instant::now() + Duration::from_secs(120);
         while Instant::now() < end {
-            if let Some(frame) = self.hear(100).filter(|f| f.starts_with(start)) {
+            if let Some(frame) = self.receive(100).filter(|f| f.starts_with(start)) {
                 return frame;
             }
         }

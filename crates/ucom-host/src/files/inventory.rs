@@ -24,7 +24,7 @@ pub struct InventoryBoard {
     pub number: u8,
     /// Flash number.
     pub flash_number: u16,
-    /// What the board says about itself.
+    /// What the board reports about itself.
     #[serde(default)]
     pub description: String,
     /// What people call it.

@@ -27,7 +27,7 @@ pub struct Board {
     pub info: Option<BoardInfo>,
     /// Its description, when it came whole.
     pub description: Option<String>,
-    /// Its flags, as it last told them.
+    /// Its flags, as it last sent them.
     pub admin: Option<Admin>,
     /// Supervision.
     pub life: Life,
@@ -49,7 +49,7 @@ pub struct Board {
     pub ready_count: u64,
     /// Since when its application is known to be stopped, and not to start by itself.
     pub(crate) stopped_at: Option<u64>,
-    /// When it was last told to start, until it shows that it has.
+    /// When it was last commanded to start, until it shows that it has.
     pub(crate) starting_since: Option<u64>,
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
@@ -60,7 +60,7 @@ impl Board {
         self.info.map(|info| info.status)
     }
 
-    /// Whether the control loop runs, by what was last heard.
+    /// Whether the control loop runs, by what was last received.
     pub fn running(&self, now: u64) -> bool {
         let so = self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000);
         so || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)

@@ -89,7 +89,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         match numbers(link, board).await {
             Err(Error::NoAnswer { .. }) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
-                // It cannot tell any more: what the rules say (D-22).
+                // It cannot answer any more: what the rules require (D-22).
                 let status = expected_status(&before, mask.0, value.0);
                 return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
             }
@@ -249,7 +249,7 @@ async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, 
 }
 
 /// PC_XRESET until it is taken. It has no answer: a board that answers PC_INFO and has not left its application did not
-/// hear it. One that is silent reboots, or has lost its number, and is not disturbed.
+/// receive it. One that is silent reboots, or has lost its number, and is not disturbed.
 async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     let soon = EXLOADER_WAIT / 3;
@@ -299,8 +299,8 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
-        while let Some(heard) = link.next(until).await {
-            match heard.message {
+        while let Some(received) = link.next(until).await {
+            match received.message {
                 FromBoard::McaReady => break,
                 FromBoard::Error(ErrorCode::AutostartForbidden) => {
                     link.with(|core| core.boards.of(board).starting_since = None);
@@ -310,7 +310,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                         during: "PC_START",
                     });
                 }
-                // Errors of a bad bus are only to be logged; told when nothing came of all tries.
+                // Errors of a bad bus are only to be logged; they are reported when nothing came of all tries.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }
@@ -337,7 +337,7 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// The flags to change from: those the board told last, else what its status says with outputs off (D-37).
+/// The flags to change from: those the board sent last, else what its status shows with outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
     // What ends something waits for nothing.
@@ -347,13 +347,13 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     if !known.status.has(Status::MSTART) {
         return Err(Error::NoApplication { board, valid: known.has_application() });
     }
-    let told = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
+    let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
     // A frame of it may have been lost: the status byte knows whether the loop runs.
-    Ok(told.map_or(Admin { run, ..Admin::default() }, |told| Admin {
+    Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
         run,
-        active: told.active && run,
-        ..told
+        active: flags.active && run,
+        ..flags
     }))
 }
 

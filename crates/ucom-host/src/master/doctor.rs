@@ -5,7 +5,7 @@ pub use host_kit::{Finding, Severity};
 use super::{Boards, InitFinding, InitReport, Life, ScanFinding, ScanReport, Statistics, counted};
 use ucom::{Function, Profile};
 
-/// What the CAN controller says of itself.
+/// What the CAN controller reports about itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Controller {
     /// It has left the bus.
@@ -35,13 +35,13 @@ pub struct Observation {
     pub statistics: Statistics,
     /// Boards as last seen.
     pub boards: Boards,
-    /// Of the adapter, where it tells.
+    /// Of the adapter, where it reports them.
     pub controller: Option<Controller>,
     /// A harmless scan.
     pub scan: Option<ScanReport>,
     /// An init, when there was one.
     pub init: Option<InitReport>,
-    /// Another bit rate at which frames were heard, bit/s.
+    /// Another bit rate at which frames were received, bit/s.
     pub other_bitrate: Option<u32>,
     /// Another PC's last frame.
     pub competing_master: Option<(Function, u8)>,
@@ -49,7 +49,7 @@ pub struct Observation {
     pub profile: Profile,
 }
 
-/// Everything that can be said, problems first.
+/// Everything that can be reported, problems first.
 pub fn findings(o: &Observation) -> Vec<Finding> {
     let mut f = Findings::default();
     bus(o, &mut f);
@@ -60,7 +60,7 @@ pub fn findings(o: &Observation) -> Vec<Finding> {
 }
 
 fn bus(o: &Observation, f: &mut Findings) {
-    let heard = o.statistics.received + o.statistics.foreign_count();
+    let received = o.statistics.received + o.statistics.foreign_count();
     let rate = o.profile.bitrate;
     if let Some(other) = o.other_bitrate.filter(|other| *other != rate) {
         let next = format!("set `bitrate = {other}` in the profile and the adapter to the same rate");
@@ -77,14 +77,14 @@ fn bus(o: &Observation, f: &mut Findings) {
                 if c.times_bus_off == 1 { "once".into() } else { format!("{} times", c.times_bus_off) };
             let what = format!("the adapter has left the bus {times} meanwhile (bus-off) and is back");
             f.problem(what, off_why, "check rate, cable and termination, then ucom doctor again");
-        } else if c.no_acknowledge > 0 && heard == 0 {
+        } else if c.no_acknowledge > 0 && received == 0 {
             let why = "no powered board is connected, or all of them listen at another bit rate";
             f.problem(
                 format!("nobody acknowledges our frames ({} times)", c.no_acknowledge),
                 why,
                 "check power and cable of the boards; other rates: 500000, 250000, 125000 (`bitrate` in the profile)",
             );
-        } else if c.protocol_errors > 0 && heard == 0 {
+        } else if c.protocol_errors > 0 && received == 0 {
             let why = "frames are there but none can be read: usually another bit rate";
             f.problem(
                 format!("{} bus errors and no frame", c.protocol_errors),
@@ -99,12 +99,12 @@ fn bus(o: &Observation, f: &mut Findings) {
             f.good(format!("the adapter is error active ({counters})"));
         }
     }
-    if heard == 0
+    if received == 0
         && o.controller.is_none_or(|c| c.no_acknowledge == 0 && c.protocol_errors == 0 && !c.bus_off)
     {
         let s = o.listened_us as f64 * 1e-6;
         let why = if o.scan.is_some() {
-            "no board is powered or connected to this bus, or none reads the protocol as the profile says"
+            "no board is powered or connected to this bus, or none reads the protocol as the profile does"
         } else {
             "nobody talks without being asked"
         };
@@ -228,8 +228,8 @@ fn chain(o: &Observation, f: &mut Findings) {
             n => format!("{n} boards already have numbers"),
         });
     }
-    let told = |x: &&ScanFinding| matches!(x, ScanFinding::Unnumbered { .. }) || x.error().is_some();
-    for finding in scan.findings.iter().filter(|x| !told(x)) {
+    let reported = |x: &&ScanFinding| matches!(x, ScanFinding::Unnumbered { .. }) || x.error().is_some();
+    for finding in scan.findings.iter().filter(|x| !reported(x)) {
         let next = match finding {
             ScanFinding::SameFlash { .. } | ScanFinding::Ambiguous { .. } => {
                 "give one of them another flash number"

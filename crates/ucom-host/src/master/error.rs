@@ -6,26 +6,26 @@ use super::load::LoadForecast;
 use ucom::profile::Endian;
 use ucom::{ErrorCode, Function, Status};
 
-/// The last frame that was heard from a board.
+/// The last frame that was received from a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LastHeard {
+pub struct LastReceived {
     /// What it was.
     pub function: Function,
     /// How long before the error, ms.
     pub ago_ms: u64,
 }
 
-/// Prints `last heard: MCA_ALIVE 120 ms ago`, or that there was nothing.
+/// Prints `last received: MCA_ALIVE 120 ms ago`, or that there was nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Heard(pub Option<LastHeard>);
+pub struct Received(pub Option<LastReceived>);
 
-impl fmt::Display for Heard {
+impl fmt::Display for Received {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Some(LastHeard { function, ago_ms }) => {
-                write!(f, "last heard: {} {ago_ms} ms ago", function.name())
+            Some(LastReceived { function, ago_ms }) => {
+                write!(f, "last received: {} {ago_ms} ms ago", function.name())
             }
-            None => f.write_str("nothing heard from it at all"),
+            None => f.write_str("nothing received from it at all"),
         }
     }
 }
@@ -35,7 +35,7 @@ impl fmt::Display for Heard {
 #[non_exhaustive]
 pub enum Error {
     /// A board did not answer.
-    #[error("board {board} does not answer {} ({tries} tries, {waited_ms} ms; {})", asked.name(), Heard(*last))]
+    #[error("board {board} does not answer {} ({tries} tries, {waited_ms} ms; {})", asked.name(), Received(*last))]
     NoAnswer {
         /// Its number.
         board: u8,
@@ -45,8 +45,8 @@ pub enum Error {
         tries: u32,
         /// Time from the first request to giving up, ms.
         waited_ms: u64,
-        /// What was last heard from it.
-        last: Option<LastHeard>,
+        /// What was last received from it.
+        last: Option<LastReceived>,
     },
     /// An answer never came whole.
     #[error("board {board}: the answer to {} never came whole ({tries} tries): {problem}", asked.name())]
@@ -81,7 +81,7 @@ pub enum Error {
         during: &'static str,
     },
     /// Acknowledge of PC_INIT under one number with another in it (D-24).
-    #[error("DSP_INITACK under number {id} says number {data}: the board is refused")]
+    #[error("DSP_INITACK under number {id} contains number {data}: the board is refused")]
     AckMismatch {
         /// By the identifier.
         id: u8,
@@ -89,12 +89,12 @@ pub enum Error {
         data: u8,
     },
     /// DSP_INFO under one number with another in it.
-    #[error("board {board} says that its number is {says}: it is refused")]
+    #[error("board {board} reports that its number is {reported}: it is refused")]
     WrongSequence {
         /// By the identifier.
         board: u8,
         /// By the data.
-        says: u8,
+        reported: u8,
     },
     /// Another board than the one that was named.
     #[error("board {board} has flash number 0x{found:04X}, not 0x{wanted:04X}")]
@@ -112,7 +112,7 @@ pub enum Error {
         /// The order that the profile has.
         endian: Endian,
     },
-    /// Two boards have one number: whatever it is told, both do.
+    /// Two boards have one number: both carry out every command to it.
     #[error(
         "two boards answer to number {board}: {}{}",
         Sharing(found),
@@ -121,7 +121,7 @@ pub enum Error {
     NumberShared {
         /// The number.
         board: u8,
-        /// The flash numbers of those that answered to it; twice the same one when they cannot be told apart.
+        /// The flash numbers of those that answered to it; twice the same one when they cannot be distinguished.
         found: Vec<u16>,
         /// Nobody answers to it any more.
         given_back: bool,
@@ -172,11 +172,11 @@ pub enum Error {
         board: u8,
         /// What was sent.
         wanted: ucom::Admin,
-        /// What it says.
+        /// Its text.
         is: ucom::Admin,
     },
     /// A competing master: another PC is on the bus (D-08).
-    #[error("another PC is on the bus: {} to {to} was heard {ago_ms} ms ago", function.name())]
+    #[error("another PC is on the bus: {} to {to} was received {ago_ms} ms ago", function.name())]
     CompetingMaster {
         /// What it sent.
         function: Function,
@@ -271,10 +271,10 @@ pub enum Error {
         /// Its number.
         board: u8,
     },
-    /// The caller says that the bus is gone, see [`Master::abandon`](super::Master::abandon).
+    /// The caller reports that the bus is gone, see [`Master::abandon`](super::Master::abandon).
     #[error("the bus failed: {reason}")]
     Bus {
-        /// What its driver said.
+        /// The driver's error.
         reason: String,
     },
     /// The caller asked to end.

@@ -72,7 +72,7 @@ impl Error {
     pub fn hint(&self) -> String {
         match self {
             Self::NoAnswer { board, last: None, .. } => {
-                format!("no frame of board {board} was heard: `ucom scan` tells who is there, `ucom doctor` why not")
+                format!("no frame of board {board} was received: `ucom scan` lists who is there, `ucom doctor` why not")
             }
             Self::NoAnswer { board, .. } => {
                 format!("board {board} talks but does not answer this: `ucom info {board}`, then `ucom doctor`")
@@ -126,7 +126,7 @@ impl Error {
                 format!("`ucom info {board}`: has it rebooted, has it power? `ucom doctor` looks at bus and boards")
             }
             Self::Bus { .. } => "is the bus still there, the adapter plugged in? `ucom doctor` looks at it".into(),
-            Self::Cancelled => "`ucom scan` tells in what state the boards are".into(),
+            Self::Cancelled => "`ucom scan` shows in what state the boards are".into(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What the master tells its user without being asked.
+//! Events: what the master reports to its user unasked.
 use super::conformance::ConformanceTest;
 use super::io::Snapshot;
 use super::update::Progress;
@@ -30,7 +30,7 @@ pub enum Event {
         /// How it ended.
         test: ConformanceTest,
     },
-    /// A procedure has something to say on its way.
+    /// A procedure reports something on its way.
     Note {
         /// Which procedure.
         id: ProcedureId,
@@ -53,7 +53,7 @@ pub enum Event {
         /// The procedure that was at work with the board; `None`: unsolicited.
         during: Option<ProcedureId>,
     },
-    /// A board's flags, told by itself.
+    /// A board's flags, sent by itself.
     Admin {
         /// Its number.
         board: u8,
@@ -83,11 +83,11 @@ pub enum Event {
         /// To which number.
         to: u8,
     },
-    /// Two boards have one number (D-24); said once, until numbers are given anew.
+    /// Two boards have one number (D-24); reported once, until numbers are given anew.
     NumberShared {
         /// The number.
         board: u8,
-        /// Their flash numbers; twice the same one when they cannot be told apart.
+        /// Their flash numbers; twice the same one when they cannot be distinguished.
         found: Vec<u16>,
     },
     /// So many events were dropped because nobody took them.

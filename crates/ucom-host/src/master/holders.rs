@@ -1,7 +1,7 @@
 //! Whether each number belongs to one board: every answer to PC_INFO is looked at, whoever asked for it.
 //!
-//! Two boards with one number both do whatever that number is told: both are flashed, both move. A board cannot see it, the
-//! PC can: one PC_INFO is answered twice. What is only asked is compared all the time ([`Holders::heard`]); before a
+//! Two boards with one number both carry out every command to it: both are flashed, both move. A board cannot see it, the
+//! PC can: one PC_INFO is answered twice. What is only asked is compared all the time ([`Holders::received`]); before a
 //! procedure changes something it waits until nobody else answers ([`one_board_each`]).
 
 use super::link::Link;
@@ -11,7 +11,7 @@ use super::{Error, Event};
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status, ToBoard};
 
-/// So old an answer to PC_INFO may be and still say who has a number, µs.
+/// So old an answer to PC_INFO may be and still show who has a number, µs.
 const FRESH: u64 = 2_000 * MS;
 /// Between two questions, µs: the answers of 31 boards do not come as one burst.
 const SPACING: u64 = 2 * MS;
@@ -20,7 +20,7 @@ const TWICE: u32 = 3;
 /// Most flash numbers that are remembered of a number: damaged answers may show any.
 const MOST: usize = 8;
 
-/// The first frame of DSP_INFO under a number, told from a package of its description: that does not carry the board's
+/// The first frame of DSP_INFO under a number, distinguished from a package of its description: that does not carry the board's
 /// own number and a possible status at these places.
 pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
     let info = BoardInfo::parse(payload, profile.endian)?;
@@ -93,7 +93,7 @@ impl Holder {
         }
     }
 
-    /// The flash numbers of those that share the number, by what was heard so far; else none.
+    /// The flash numbers of those that share the number, by what was received so far; else none.
     ///
     /// One damaged answer is not another board, and neither is a board that was put in the place of another: flash numbers
     /// that came in answer to different questions must come again and again, in turns.
@@ -131,7 +131,7 @@ impl Holders {
     }
 
     /// A frame of DSP_INFO came; the flash numbers of those that share the number, when that is news.
-    pub(crate) fn heard(&mut self, number: u8, payload: &Payload, profile: &Profile) -> Option<Vec<u16>> {
+    pub(crate) fn received(&mut self, number: u8, payload: &Payload, profile: &Profile) -> Option<Vec<u16>> {
         let holder = self.numbers.entry(number).or_default();
         holder.answer(number, payload, profile);
         if !holder.shared.is_empty() {
@@ -170,12 +170,12 @@ impl Holders {
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// `heard`: up to then everything was handed over. `oldest`: how old an answer may be, µs.
-    fn open(&self, number: u8, heard: u64, patience: u64, oldest: u64) -> Open {
+    /// `received`: up to then everything was handed over. `oldest`: how old an answer may be, µs.
+    fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
-        match holder.asked_at.filter(|at| heard.saturating_sub(*at) <= oldest) {
+        match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {
             None => Open::Ask,
-            Some(at) if heard < at + patience => Open::Wait(at + patience),
+            Some(at) if received < at + patience => Open::Wait(at + patience),
             Some(_) if holder.heads.is_empty() => Open::Ask,
             Some(_) if holder.answered_twice() => Open::AskAgain,
             Some(_) => Open::Nothing,
@@ -266,7 +266,7 @@ async fn out_of_words(link: &Link, mut until: u64) {
 impl super::shared::Core {
     /// A frame of DSP_INFO, before anything else is made of it.
     pub(crate) fn watch_holders(&mut self, number: u8, payload: &Payload) {
-        if let Some(found) = self.holders.heard(number, payload, &self.profile) {
+        if let Some(found) = self.holders.received(number, payload, &self.profile) {
             self.event(Event::NumberShared { board: number, found });
         }
     }
@@ -283,7 +283,7 @@ impl super::shared::Core {
             _ => false,
         };
         match (forgets, function) {
-            // A reset reaches all boards under the number that is no board's, whatever `addr.broadcast` says.
+            // A reset reaches all boards under the number that is no board's, whatever `addr.broadcast` is.
             (true, _) if broadcast || to == self.profile.unnumbered() => self.holders.clear(),
             (true, _) => self.holders.forget(to.number()),
             (false, Function::Info) if broadcast => {
@@ -321,7 +321,7 @@ mod tests {
                     _ => Payload::new(&[0x78]).unwrap(),
                 });
                 for payload in [info.payload(profile.endian)].into_iter().chain(text) {
-                    news = holders.heard(1, &payload, &profile).or(news);
+                    news = holders.received(1, &payload, &profile).or(news);
                 }
             }
         }
@@ -333,7 +333,7 @@ mod tests {
         assert_eq!(question(&mut Holders::default(), &[&[0x21, 0x42]]), Some(vec![0x21, 0x42]));
         let mut once = Holders::default();
         question(&mut once, &[&[0x21, 0x42]]);
-        assert_eq!(question(&mut once, &[&[0x21, 0x42]]), None, "told once");
+        assert_eq!(question(&mut once, &[&[0x21, 0x42]]), None, "reported once");
         assert!(matches!(once.shared(2), Some(Error::NumberShared { board: 1, .. })));
         assert!(once.shared(!2).is_none(), "of another number");
         once.forget(1);

@@ -110,7 +110,7 @@ pub enum InitFinding {
     },
     /// Another board than the inventory has at a position.
     #[error(
-        "unexpected board order: position {board} has flash number 0x{found:04X}, the inventory says 0x{expected:04X}"
+        "unexpected board order: position {board} has flash number 0x{found:04X}, the inventory has 0x{expected:04X}"
     )]
     UnexpectedOrder {
         /// The position.
@@ -202,7 +202,7 @@ async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error>
     }
     let seen = info(link, number).await?;
     one_board_each(link, &[number]).await?;
-    // Raised also when the board says that it did so itself: harmless, and the read-back is needed anyway.
+    // Raised also when the board reports that it did so itself: harmless, and the read-back is needed anyway.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {
         // One of the two answers was damaged, or two boards have this number.
@@ -225,17 +225,19 @@ pub(super) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
         link.ask(to, ToBoard::Init).await;
         let mut until = link.now() + link.times().init_ack;
         let mut acknowledged = false;
-        while let Some(heard) = link.next(until).await {
-            match heard.message {
-                FromBoard::InitAck(data) if heard.from == number || data == number => {
-                    if heard.from != data {
-                        return Err(Error::AckMismatch { id: heard.from, data });
+        while let Some(received) = link.next(until).await {
+            match received.message {
+                FromBoard::InitAck(data) if received.from == number || data == number => {
+                    if received.from != data {
+                        return Err(Error::AckMismatch { id: received.from, data });
                     }
                     acknowledged = true;
                     break;
                 }
                 // The acknowledge of before has not left the board yet (D-24): give it time.
-                FromBoard::Error(ucom::ErrorCode::Reinit) if heard.from == nobody || heard.from == number => {
+                FromBoard::Error(ucom::ErrorCode::Reinit)
+                    if received.from == nobody || received.from == number =>
+                {
                     until = until.max(link.now() + 100 * MS);
                 }
                 _ => {}

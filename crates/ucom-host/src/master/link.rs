@@ -10,7 +10,7 @@ use core::pin::pin;
 use core::task::Poll;
 
 use super::request::numbers;
-use super::shared::{Core, Filter, Forget, Heard, Mailbox, Session};
+use super::shared::{Core, Filter, Forget, Mailbox, Received, Session};
 use super::times::{MS, Times};
 use super::{Error, Event, ProcedureId};
 use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
@@ -59,7 +59,7 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// As [`Link::send`]; what was heard before the frame left is forgotten.
+    /// As [`Link::send`]; what was received before the frame left is forgotten.
     pub(crate) async fn ask(&self, to: Sequence, message: ToBoard) {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::All));
         self.left(serial).await;
@@ -94,14 +94,14 @@ impl Link {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
                 mailbox.filter = Filter::new(boards, functions);
-                mailbox.heard.clear();
+                mailbox.received.clear();
             }
         });
     }
 
     /// The next frame of the mailbox, or `None` when `until` has come first.
-    pub(crate) async fn next(&self, until: u64) -> Option<Heard> {
-        self.next_of(until, |mailbox| mailbox.heard.pop_front()).await
+    pub(crate) async fn next(&self, until: u64) -> Option<Received> {
+        self.next_of(until, |mailbox| mailbox.received.pop_front()).await
     }
 
     /// What `take` finds in the mailbox, or `None` when `until` has come first.
@@ -125,7 +125,7 @@ impl Link {
         .await
     }
 
-    /// Waits; what is heard meanwhile stays in the mailbox.
+    /// Waits; what is received meanwhile stays in the mailbox.
     pub(crate) async fn sleep(&self, us: u64) {
         self.sleep_until(self.now() + us).await;
     }
@@ -157,7 +157,7 @@ impl Link {
         }
     }
 
-    /// Ends `work` with [`Error::Cancelled`] when the caller asks to, with [`Error::Bus`] when he says that the bus is
+    /// Ends `work` with [`Error::Cancelled`] when the caller asks to, with [`Error::Bus`] when he reports that the bus is
     /// gone, with [`Error::NumberShared`] once when two boards with one number show, unless it bears that; its queued frames
     /// do not leave then.
     pub(crate) async fn or_cancel<T>(
@@ -206,7 +206,7 @@ impl Link {
         self.with(|core| core.session != Session::Quiet)
     }
 
-    /// Listens until `master.listen` has passed, refuses when another PC was heard in that time (D-08). Not when this PC
+    /// Listens until `master.listen` has passed, refuses when a frame of another PC was received in that time (D-08). Not when this PC
     /// is master already, or is forced.
     pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
         let already = self.with(|core| core.session != Session::Quiet);
@@ -224,10 +224,10 @@ impl Link {
         Ok(())
     }
 
-    /// Refuses when another PC was heard within the last `window` µs.
+    /// Refuses when a frame of another PC was received within the last `window` µs.
     fn no_competing_master(&self, window: u64) -> Result<(), Error> {
-        let (now, heard) = self.with(|core| (core.now, core.competing_master));
-        match heard.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
+        let (now, received) = self.with(|core| (core.now, core.competing_master));
+        match received.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
             Some((at, function, to)) => {
                 Err(Error::CompetingMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
             }
@@ -283,7 +283,7 @@ impl Link {
             asked,
             tries,
             waited_ms: core.now.saturating_sub(since) / MS,
-            last: core.last_heard(board),
+            last: core.last_received(board),
         })
     }
 }

@@ -72,7 +72,7 @@ use std::task::{Context, Poll, Waker};
 pub use boards::{Board, Boards, Life};
 pub use control::AdminChange;
 pub use counted::counted;
-pub use error::{Error, Heard, Incomplete, LastHeard};
+pub use error::{Error, Incomplete, LastReceived, Received};
 pub use event::{Event, Supervision};
 pub use host_kit::ErrorKind;
 pub use init::{InitFinding, InitOptions, InitReport};
@@ -167,13 +167,13 @@ impl Master {
         self.poll_behind(now, now)
     }
 
-    /// The same for a driver that has handed over what arrived up to `heard`, not what came between that and `now`: no
-    /// wait ends beyond `heard`, but heartbeats go out.
-    pub fn poll_behind(&mut self, now: u64, heard: u64) -> Option<Frame> {
+    /// The same for a driver that has handed over what arrived up to `received`, not what came between that and `now`: no
+    /// wait ends beyond `received`, but heartbeats go out.
+    pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
             core.advance(now);
-            core.fired = core.fired.max(heard);
+            core.fired = core.fired.max(received);
             core.duties();
         }
         self.run();

@@ -48,7 +48,7 @@ pub enum Request {
         /// See above.
         force: bool,
     },
-    /// One PC_SETSTATUS as the formula says it, value bits outside the mask included; never repeated.
+    /// One PC_SETSTATUS as the formula has it, value bits outside the mask included; never repeated.
     RawStatus {
         /// The board it goes to; `None`: all at once.
         board: Option<u8>,
@@ -118,7 +118,7 @@ pub enum Request {
     Run(RunOptions),
     /// Measures what a board reads otherwise.
     Probe(probe::ProbeOptions),
-    /// Whether boards do what the protocol page says.
+    /// Whether boards follow the protocol page.
     Conformance(conformance::ConformanceOptions),
 }
 
@@ -146,7 +146,7 @@ impl Request {
     }
 
     /// Whether two boards with one number do not end it: a stop stops both, and must not wait; the others find them
-    /// themselves and say more.
+    /// themselves and report more.
     pub(super) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,
@@ -214,7 +214,7 @@ pub enum Outcome {
     Description {
         /// The board.
         board: u8,
-        /// What it says.
+        /// Its text.
         description: IoDescription,
     },
     /// Of [`Request::InitialInputs`].

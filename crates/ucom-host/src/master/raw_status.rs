@@ -1,4 +1,4 @@
-//! PC_SETSTATUS as the formula says it, value bits outside the mask included (D-22): for whoever knows why.
+//! PC_SETSTATUS as the formula has it, value bits outside the mask included (D-22): for whoever knows why.
 use super::holders::one_board_each;
 use super::link::Link;
 use super::request::numbers;
@@ -19,7 +19,7 @@ pub struct RawStatus {
 }
 
 impl RawStatus {
-    /// Whether the board did what the rules say: without INIT it has forgotten its number, and is silent.
+    /// Whether the board did what the rules require: without INIT it has forgotten its number, and is silent.
     pub fn as_expected(&self) -> bool {
         match self.after {
             Some(after) => after.status == self.expected,
@@ -70,7 +70,7 @@ pub(crate) async fn raw_status(
     }
     link.become_master(force).await?;
     one_board_each(&link, &seen).await?;
-    // Never repeated: it is to do what it says, once.
+    // Never repeated: it is to do what it stands for, once.
     link.send(address, ToBoard::SetStatus { mask, value }).await;
     let limit = link.now() + link.times().start;
     let mut boards = Vec::new();

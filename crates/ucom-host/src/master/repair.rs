@@ -66,7 +66,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
 
 /// No outgoing pin on but that of the board before `number`, which is.
 ///
-/// Every number is told three times, heard or not: a board may be alive with its answers lost. Who answers is read back.
+/// Every number gets the command three times, whether it answers or not: a board may be alive with its answers lost. Who answers is read back.
 async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let before = statuses(link, &numbers).await;
@@ -120,8 +120,8 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let mut until = link.now() + times.info;
     let limit = until + 20 * times.gap;
     let mut found = Vec::new();
-    while let Some(heard) = link.next(until).await {
-        if let (FromBoard::Info(payload), true) = (&heard.message, heard.from == number) {
+    while let Some(received) = link.next(until).await {
+        if let (FromBoard::Info(payload), true) = (&received.message, received.from == number) {
             found.extend(head(number, payload, &profile).map(|info| info.flash_number));
         }
         until = (link.now() + times.gap).min(limit);

@@ -65,12 +65,12 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     let mut collector = InfoCollector::default();
     let mut until = link.now() + times.info;
     while !collector.finished() {
-        let Some(heard) = link.next(until).await else { break };
-        if heard.from != board {
+        let Some(received) = link.next(until).await else { break };
+        if received.from != board {
             continue;
         }
-        if let FromBoard::Info(payload) = heard.message {
-            if let Err(problem) = collector.push(heard.at, &payload, link) {
+        if let FromBoard::Info(payload) = received.message {
+            if let Err(problem) = collector.push(received.at, &payload, link) {
                 return Ok(Answer::Broken(problem));
             }
             until = link.now() + times.gap;
@@ -83,14 +83,14 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }
         if info.sequence != board {
-            return Err(Error::WrongSequence { board, says: info.sequence });
+            return Err(Error::WrongSequence { board, reported: info.sequence });
         }
         remember(link, board, info, text.as_deref());
     }
     Ok(answer)
 }
 
-/// Keeps what a board said.
+/// Keeps what a board reported.
 pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&str>) {
     link.with(|core| {
         let now = core.now;
@@ -148,7 +148,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Info(info, _)) => numbers = Some(info),
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
-            // One damaged frame may say anything; a board says it again.
+            // One damaged frame may contain anything; a board sends it again.
             Err(e @ Error::WrongSequence { .. }) if mismatch.as_ref() != Some(&e) => mismatch = Some(e),
             Err(e) => return Err(e),
         }
@@ -221,7 +221,7 @@ pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
 }
 
 /// A board's error does not end it: those of a bad bus are only to be logged, and come exactly where the request itself was
-/// lost. It is told when nothing came of all tries.
+/// lost. It is reported when nothing came of all tries.
 async fn ask_admin(
     link: &Link,
     board: u8,
@@ -236,10 +236,10 @@ async fn ask_admin(
     for _ in 0..TRIES {
         link.ask(to, ask).await;
         let until = link.now() + link.times().admin;
-        while let Some(heard) = link.next(until).await {
-            match heard.message {
+        while let Some(received) = link.next(until).await {
+            match received.message {
                 FromBoard::Admin(is) if taken(is) => return Ok(is),
-                // What the board told of its own accord before the request reached it.
+                // What the board sent of its own accord before the request reached it.
                 FromBoard::Admin(is) => other = Some(is),
                 message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
             }

@@ -170,12 +170,12 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    // Only this PC itself can know what a board that runs was told; what another one told it is not overwritten by initial
+    // Only this PC itself can know what was sent to a board that runs; what another one sent is not overwritten by initial
     // values unasked.
-    let told = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
-    let give = !begun.ran || told.is_some() || !plan.ci.is_empty();
+    let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
+    let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
     let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;
-    let mut ci = told.filter(|_| begun.ran).unwrap_or(initial);
+    let mut ci = given.filter(|_| begun.ran).unwrap_or(initial);
     for setting in &plan.ci {
         let index = description.find(board, Kind::Ci, &setting.name)?;
         if let Some(place) = ci.get_mut(usize::from(index)) {
@@ -196,8 +196,8 @@ async fn start_loop(
     }
     // Nothing may start before its values have left.
     link.flush().await;
-    let told = mca_start(link, board).await?;
-    if begun.back.is_none() && !told.active && options.active {
+    let flags = mca_start(link, board).await?;
+    if begun.back.is_none() && !flags.active && options.active {
         begun.back = Some(StopLevel::Outputs);
     }
     if give {

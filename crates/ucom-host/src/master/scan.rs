@@ -19,11 +19,11 @@ pub(crate) const REPORTS: [Function; 4] =
 /// Reports of boards after PC_RESET or PC_REPORT.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reports {
-    /// Low bytes of the flash numbers: what tells boards apart.
+    /// Low bytes of the flash numbers: what distinguishes boards.
     pub ids: BTreeSet<u8>,
     /// How many frames each sent.
     pub frames: BTreeMap<u8, u32>,
-    /// Those whose identifier says something else than the data, under `report.mode = flash7`.
+    /// Those whose identifier has another id than the data, under `report.mode = flash7`.
     pub disagree: BTreeSet<u8>,
 }
 
@@ -91,7 +91,7 @@ pub enum ScanFinding {
         high: u8,
     },
     /// Identifier and data of a report disagree.
-    #[error("the report of UCoM id 0x{ucom_id:02X} came with another identifier: `ucom probe` may tell why")]
+    #[error("the report of UCoM id 0x{ucom_id:02X} came with another identifier: `ucom probe` may show why")]
     Disagrees {
         /// By the data.
         ucom_id: u8,
@@ -115,7 +115,7 @@ pub enum ScanFinding {
         board: u8,
         /// Flash number of one.
         first: u16,
-        /// Flash number of another; the same when they cannot be told apart.
+        /// Flash number of another; the same when they cannot be distinguished.
         second: u16,
     },
     /// A status that cannot be.
@@ -158,8 +158,8 @@ pub(crate) async fn ask_reports(link: &Link, reports: &mut Reports) {
 /// Who reports within `window` µs.
 pub(crate) async fn collect_reports(link: &Link, window: u64, reports: &mut Reports) {
     let until = link.now() + window;
-    while let Some(heard) = link.next(until).await {
-        if let FromBoard::Report(report) = heard.message {
+    while let Some(received) = link.next(until).await {
+        if let FromBoard::Report(report) = received.message {
             reports.add(&report);
         }
         if link.now() > until {
@@ -230,14 +230,14 @@ async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Slot> {
         for number in open {
             link.send(number, ToBoard::Info).await;
             let until = link.now() + SPACING;
-            while let Some(heard) = link.next(until).await {
-                collect(link, &mut collectors, &heard);
+            while let Some(received) = link.next(until).await {
+                collect(link, &mut collectors, &received);
             }
         }
         let mut until = link.now() + times.info;
         let limit = until + 20 * times.gap;
-        while let Some(heard) = link.next(until).await {
-            collect(link, &mut collectors, &heard);
+        while let Some(received) = link.next(until).await {
+            collect(link, &mut collectors, &received);
             until = (link.now() + times.gap).min(limit);
             if link.now() >= limit {
                 break;
@@ -252,11 +252,11 @@ async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Slot> {
     slots
 }
 
-fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, heard: &super::shared::Heard) {
-    if let FromBoard::Info(payload) = heard.message {
-        let collector = collectors.entry(heard.from).or_default();
+fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, received: &super::shared::Received) {
+    if let FromBoard::Info(payload) = received.message {
+        let collector = collectors.entry(received.from).or_default();
         // What is no first frame leaves the collector empty: the next round asks again.
-        let _ = collector.push(heard.at, &payload, link);
+        let _ = collector.push(received.at, &payload, link);
     }
 }
 
@@ -355,7 +355,7 @@ fn judge(report: &mut ScanReport, endian: Endian) {
     findings.extend(reports.disagree.iter().map(|id| ScanFinding::Disagrees { ucom_id: *id }));
 }
 
-/// Status of every board that answers, all asked at once, and twice, because one frame can be lost; a board that sends sensor outputs runs, whatever it says.
+/// Status of every board that answers, all asked at once, and twice, because one frame can be lost; a board that sends sensor outputs runs, whatever its status is.
 pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());
@@ -370,14 +370,14 @@ pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
         }
         let times = link.times();
         let until = link.now() + times.info.max(3 * times.so) + times.gap;
-        while let Some(heard) = link.next(until).await {
-            match heard.message {
+        while let Some(received) = link.next(until).await {
+            match received.message {
                 FromBoard::So(_) => {
-                    outputs.insert(heard.from);
+                    outputs.insert(received.from);
                 }
                 FromBoard::Info(payload) => {
-                    let collector = collectors.entry(heard.from).or_default();
-                    let _ = collector.push(heard.at, &payload, link);
+                    let collector = collectors.entry(received.from).or_default();
+                    let _ = collector.push(received.at, &payload, link);
                 }
                 _ => {}
             }

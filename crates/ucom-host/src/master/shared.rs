@@ -1,7 +1,7 @@
 //! What all procedures share: the clock, frames on their way out, mailboxes, the boards as last seen.
 
 use super::boards::Boards;
-use super::error::LastHeard;
+use super::error::LastReceived;
 use super::holders::Holders;
 use super::io::{DescriptionKey, IoDescription, ProcessData};
 use super::statistics::Statistics;
@@ -13,18 +13,18 @@ use ucom::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence
 /// Most events that wait for their user.
 const MAX_EVENTS: usize = 4096;
 /// Most frames that wait for a procedure.
-const MAX_HEARD: usize = 16_384;
+const MAX_RECEIVED: usize = 16_384;
 
 /// A frame of a board for a procedure.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Heard {
+pub(crate) struct Received {
     /// By [`Core::passed`].
     pub at: u64,
     pub from: u8,
     pub message: FromBoard,
 }
 
-/// What a procedure wants to hear.
+/// What a procedure wants to receive.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Filter {
     /// Boards by bit.
@@ -46,20 +46,20 @@ impl Filter {
     }
 }
 
-/// What a procedure has heard and waits for.
+/// What a procedure has received and waits for.
 #[derive(Debug, Default)]
 pub(crate) struct Mailbox {
     pub name: &'static str,
     pub claims: u32,
     pub filter: Filter,
-    pub heard: VecDeque<Heard>,
+    pub received: VecDeque<Received>,
     /// Every frame as it is, for a procedure that looks at frames themselves.
     pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
     /// Two boards with one number do not end it: a stop, what undoes something, or what sees to numbers itself.
     pub bears_shared_numbers: bool,
-    /// Nothing can be sent or heard any more, and why.
+    /// Nothing can be sent or received any more, and why.
     pub bus_gone: Option<String>,
 }
 
@@ -75,7 +75,7 @@ pub(crate) enum Forget {
 struct Outgoing {
     serial: u64,
     owner: Option<ProcedureId>,
-    /// What of that which the owner has heard is forgotten when this frame leaves.
+    /// What of that which the owner has received is forgotten when this frame leaves.
     forget: Forget,
     what: What,
 }
@@ -119,7 +119,7 @@ pub(crate) struct Core {
     pub competing_master: Option<(u64, Function, u8)>,
     /// Reports until then are answers.
     pub report_until: u64,
-    /// Stops of the policy that are said again, and when: one frame can be lost.
+    /// Stops of the policy that are sent again, and when: one frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
     /// When inputs may be repeated again.
     pub inputs_from: u64,
@@ -255,9 +255,9 @@ impl Core {
             if let Some(mailbox) = next.owner.and_then(|owner| self.mailboxes.get_mut(&owner)) {
                 match next.forget {
                     Forget::Nothing => {}
-                    Forget::Answers => mailbox.heard.retain(|h| matches!(h.message, FromBoard::Error(_))),
+                    Forget::Answers => mailbox.received.retain(|h| matches!(h.message, FromBoard::Error(_))),
                     Forget::All => {
-                        mailbox.heard.clear();
+                        mailbox.received.clear();
                         mailbox.raw.iter_mut().for_each(VecDeque::clear);
                     }
                 }
@@ -301,8 +301,8 @@ impl Core {
     /// A start of the application was sent to a board or broadcast.
     fn may_start(&mut self, to: Sequence) {
         let broadcast = self.profile.broadcast_number() == Some(to);
-        let told = self.boards.iter_mut().filter(|(number, _)| broadcast || *number == to.number());
-        told.for_each(|(_, board)| board.stopped_at = None);
+        let addressed = self.boards.iter_mut().filter(|(number, _)| broadcast || *number == to.number());
+        addressed.for_each(|(_, board)| board.stopped_at = None);
     }
 
     /// Drops what a procedure has queued.
@@ -337,8 +337,8 @@ impl Core {
     pub(crate) fn deliver(&mut self, from: u8, message: FromBoard) {
         let at = self.passed;
         for mailbox in self.mailboxes.values_mut() {
-            if mailbox.filter.takes(from, message.function()) && mailbox.heard.len() < MAX_HEARD {
-                mailbox.heard.push_back(Heard { at, from, message });
+            if mailbox.filter.takes(from, message.function()) && mailbox.received.len() < MAX_RECEIVED {
+                mailbox.received.push_back(Received { at, from, message });
             }
         }
     }
@@ -347,7 +347,7 @@ impl Core {
     pub(crate) fn deliver_raw(&mut self, frame: &Frame) {
         let at = self.now;
         for raw in self.mailboxes.values_mut().filter_map(|mailbox| mailbox.raw.as_mut()) {
-            if raw.len() < MAX_HEARD {
+            if raw.len() < MAX_RECEIVED {
                 raw.push_back((at, *frame));
             }
         }
@@ -358,9 +358,9 @@ impl Core {
         self.mailboxes.iter().find(|(_, mailbox)| mailbox.claims >> board & 1 == 1).map(|(id, _)| *id)
     }
 
-    pub(crate) fn last_heard(&self, board: u8) -> Option<LastHeard> {
+    pub(crate) fn last_received(&self, board: u8) -> Option<LastReceived> {
         let (at, function) = self.boards.get(board)?.last?;
-        Some(LastHeard { function, ago_ms: self.now.saturating_sub(at) / 1000 })
+        Some(LastReceived { function, ago_ms: self.now.saturating_sub(at) / 1000 })
     }
 
     /// A frame that is not ours.

@@ -50,7 +50,7 @@ pub struct Statistics {
     pub foreign: Vec<(Foreign, u64)>,
     /// Frames that only a PC sends.
     pub competing_master: u64,
-    /// Frames of boards that are too short or say nothing that can be.
+    /// Frames of boards that are too short or contain nothing that can be.
     pub undecodable: u64,
 }
 

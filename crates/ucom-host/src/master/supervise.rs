@@ -235,7 +235,7 @@ impl Core {
         };
         match FromBoard::decode(&frame, &self.profile) {
             Ok((from, FromBoard::Report(report))) => self.report(from, report),
-            Ok((from, message)) => self.board_says(from.number(), message),
+            Ok((from, message)) => self.board_message(from.number(), message),
             Err(_) => self.statistics.undecodable += 1,
         }
     }
@@ -285,7 +285,7 @@ impl Core {
         }
     }
 
-    fn board_says(&mut self, from: u8, message: FromBoard) {
+    fn board_message(&mut self, from: u8, message: FromBoard) {
         let now = self.now;
         let unnumbered = from == self.profile.unnumbered().number();
         if unnumbered {
@@ -367,7 +367,7 @@ impl Core {
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
             // Another application may have started.
-            data.told = false;
+            data.sent = false;
         }
     }
 }

@@ -32,7 +32,7 @@ fn d08_whose_heartbeat_is_it() {
     }
 }
 
-/// D-08, D-51: while this PC is master, another one's heartbeats for a board that is not started are told; they do not make
+/// D-08, D-51: while this PC is master, another one's heartbeats for a board that is not started are reported; they do not make
 /// anybody wait for more of them, and a board that is started by us is not mistaken for a PC.
 #[test]
 fn d08_d51_heartbeats_of_another_pc() {
@@ -43,8 +43,8 @@ fn d08_d51_heartbeats_of_another_pc() {
     let now = bench.now;
     bench.master.handle(now, Ok(frame("681#")));
     bench.run(10_000);
-    let told = Event::CompetingMaster { function: Function::Alive, to: 1 };
-    assert!(bench.events.iter().any(|(_, e)| *e == told), "{:?}", bench.events);
+    let reported = Event::CompetingMaster { function: Function::Alive, to: 1 };
+    assert!(bench.events.iter().any(|(_, e)| *e == reported), "{:?}", bench.events);
     assert_eq!(bench.master.boards().get(1).unwrap().life, Life::Unarmed);
     assert_eq!(bench.master.boards().get(2).unwrap().life, Life::Alive);
     assert!(!bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { .. })), "{:?}", bench.events);
@@ -82,7 +82,7 @@ fn a_single_reset_is_checked() {
     assert_eq!((error.exit(), bench.count("004#")), (3, 0));
     assert!(error.hint().contains("ucom scan"), "{}", error.hint());
 
-    // Whatever single frame of it is lost: done, or the board still has its number and that is said.
+    // Whatever single frame of it is lost: done, or the board still has its number and that is reported.
     let mut whole = initialised(&[0x21, 0x42, 0x63]);
     let from = whole.log.len();
     whole.go(reset(2), 10).unwrap();
@@ -102,7 +102,7 @@ fn a_single_reset_is_checked() {
         }
         assert_eq!((bench.board(0).phase(), bench.board(2).phase()), (Phase::Idle, Phase::Idle), "{what}");
     }
-    // It reset, but nothing of it is heard any more.
+    // It reset, but nothing of it is received any more.
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     bench.lose = vec![("> 482#", 100)];
     let error = bench.go(reset(2), 20).unwrap_err();

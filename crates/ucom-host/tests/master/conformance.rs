@@ -77,15 +77,15 @@ fn without_options_only_harmless_frames_leave() {
         // PC_INFO, PC_REPORT, a number that the board has already, dumps; heartbeats go on as `start` began them.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
-            // A number is given only to who has just said that it has it.
+            // A number is given only to a board that has just reported it.
             assert_eq!(last, u16::from(Function::Info.number()) << 6 | frame.id() & 31, "{frame}");
         }
         if function != 26 {
             last = frame.id();
         }
     }
-    let told = bench.events.iter().filter(|(_, e)| matches!(e, Event::Tested { .. })).count();
-    assert_eq!(told, 7, "one event of each test that may be done, D-T2 and three of each board");
+    let reported = bench.events.iter().filter(|(_, e)| matches!(e, Event::Tested { .. })).count();
+    assert_eq!(reported, 7, "one event of each test that may be done, D-T2 and three of each board");
     let listed = |id: &str| report.tests.iter().any(|t| t.id == id);
     assert!(test_names().all(listed), "all are listed, also those that cannot be done");
     assert!(bench.board(0).status().0 == 0x8B && bench.board(1).status().0 == 0x1B);
@@ -103,7 +103,7 @@ fn running_boards_are_left_alone() {
     assert_eq!(refused.exit(), 4, "{refused}");
 }
 
-/// A board with a mistake: what it hears and what it says goes through its hands.
+/// A board with a mistake, which changes what it receives and what it sends.
 struct Flawed {
     inner: TestNode,
     mistake: Mistake,
@@ -112,25 +112,25 @@ struct Flawed {
     count: usize,
 }
 
-/// What becomes of a frame: heard by the board, or said by it.
+/// What becomes of a frame that the board receives or sends.
 #[derive(Clone, Copy)]
 struct Mistake {
-    hears: fn(&TestNode, &Frame) -> Vec<Frame>,
-    says: fn(&TestNode, &Frame, usize) -> Vec<Frame>,
+    receives: fn(&TestNode, &Frame) -> Vec<Frame>,
+    sends: fn(&TestNode, &Frame, usize) -> Vec<Frame>,
 }
 
-const NONE: Mistake = Mistake { hears: |_, f| vec![*f], says: |_, f, _| vec![*f] };
+const NONE: Mistake = Mistake { receives: |_, f| vec![*f], sends: |_, f, _| vec![*f] };
 
 impl Member for Flawed {
     fn poll(&mut self, now: u64) -> Option<Frame> {
         if self.waiting.is_empty() && self.inside.is_none() {
-            let said = self.inner.poll(now)?;
-            self.inside = Some(said);
+            let own = self.inner.poll(now)?;
+            self.inside = Some(own);
             self.count += 1;
-            self.waiting = (self.mistake.says)(&self.inner, &said, self.count);
+            self.waiting = (self.mistake.sends)(&self.inner, &own, self.count);
             if self.waiting.is_empty() {
                 self.inside = None;
-                self.inner.sent(now, &said);
+                self.inner.sent(now, &own);
             }
         }
         self.waiting.first().copied()
@@ -140,13 +140,13 @@ impl Member for Flawed {
             self.waiting.remove(0);
         }
         if self.waiting.is_empty()
-            && let Some(said) = self.inside.take()
+            && let Some(own) = self.inside.take()
         {
-            self.inner.sent(now, &said);
+            self.inner.sent(now, &own);
         }
     }
     fn receive(&mut self, now: u64, frame: &Frame) {
-        for frame in (self.mistake.hears)(&self.inner, frame) {
+        for frame in (self.mistake.receives)(&self.inner, frame) {
             self.inner.receive(now, &frame);
         }
     }
@@ -177,17 +177,20 @@ fn with(mistake: Mistake) -> Bench {
 #[test]
 fn each_mistake_is_found_by_its_test() {
     let mistakes: [(&str, Mistake); 17] = [
-        ("D-T1", Mistake { says: |_, f, _| if f.id() == 0x441 { vec![*f, *f] } else { vec![*f] }, ..NONE }),
+        ("D-T1", Mistake { sends: |_, f, _| if f.id() == 0x441 { vec![*f, *f] } else { vec![*f] }, ..NONE }),
         // Every second report does not come.
         (
             "D-T2",
-            Mistake { says: |_, f, n| if f.id() == 0x441 && n % 2 == 0 { vec![] } else { vec![*f] }, ..NONE },
+            Mistake {
+                sends: |_, f, n| if f.id() == 0x441 && n % 2 == 0 { vec![] } else { vec![*f] },
+                ..NONE
+            },
         ),
         // A request without a number is answered with an error.
         (
             "D-T3",
             Mistake {
-                hears: |b, f| {
+                receives: |b, f| {
                     if b.number().is_none() && f.id() == 0x2C1 { vec![*f, frame("240#")] } else { vec![*f] }
                 },
                 ..NONE
@@ -197,11 +200,11 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T4",
             Mistake {
-                hears: |_, f| {
+                receives: |_, f| {
                     // The chain must be numbered before; it is the second time that fails.
-                    static HEARD: AtomicUsize = AtomicUsize::new(0);
+                    static RECEIVED: AtomicUsize = AtomicUsize::new(0);
                     let raised = f.to_string() == "1C1#0202";
-                    if raised && HEARD.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
+                    if raised && RECEIVED.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
                 },
                 ..NONE
             },
@@ -209,20 +212,20 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T5",
             Mistake {
-                hears: |b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] },
+                receives: |b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] },
                 ..NONE
             },
         ),
         // The value is masked.
         (
             "D-T6",
-            Mistake { hears: |_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] }, ..NONE },
+            Mistake { receives: |_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] }, ..NONE },
         ),
         // MSTART goes with EXLRUN.
         (
             "D-T7",
             Mistake {
-                hears: |_, f| if f.to_string() == "1C1#1000" { vec![frame("1C1#4040")] } else { vec![*f] },
+                receives: |_, f| if f.to_string() == "1C1#1000" { vec![frame("1C1#4040")] } else { vec![*f] },
                 ..NONE
             },
         ),
@@ -230,34 +233,34 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T8",
             Mistake {
-                hears: |_, f| if f.id() == 0x041 { vec![*f, frame("1C1#0400")] } else { vec![*f] },
+                receives: |_, f| if f.id() == 0x041 { vec![*f, frame("1C1#0400")] } else { vec![*f] },
                 ..NONE
             },
         ),
-        ("D-T9", Mistake { says: |_, f, _| if f.id() == 0x501 { vec![] } else { vec![*f] }, ..NONE }),
+        ("D-T9", Mistake { sends: |_, f, _| if f.id() == 0x501 { vec![] } else { vec![*f] }, ..NONE }),
         (
             "D-T10",
             Mistake {
-                hears: |_, f| if f.to_string() == "581#00" { vec![frame("581#")] } else { vec![*f] },
+                receives: |_, f| if f.to_string() == "581#00" { vec![frame("581#")] } else { vec![*f] },
                 ..NONE
             },
         ),
         (
             "D-T11",
             Mistake {
-                says: |_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] },
+                sends: |_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] },
                 ..NONE
             },
         ),
         (
             "D-T12",
-            Mistake { says: |_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] }, ..NONE },
+            Mistake { sends: |_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] }, ..NONE },
         ),
         // A heartbeat is enough to start it again.
         (
             "D-T13",
             Mistake {
-                hears: |b, f| {
+                receives: |b, f| {
                     let ready = f.to_string() == "680#" && b.status().0 == 0x8B;
                     if ready { vec![*f, frame("541#")] } else { vec![*f] }
                 },
@@ -268,7 +271,7 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T14",
             Mistake {
-                hears: |b, f| {
+                receives: |b, f| {
                     if f.to_string() == "680#" && b.application.running {
                         vec![frame("601#00000000")]
                     } else {
@@ -281,17 +284,17 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T15",
             Mistake {
-                hears: |_, f| {
+                receives: |_, f| {
                     if f.to_string() == "601#02000000" { vec![frame("601#00000000")] } else { vec![*f] }
                 },
                 ..NONE
             },
         ),
-        ("D-T17", Mistake { says: |_, f, _| if f.id() == 0x101 { vec![] } else { vec![*f] }, ..NONE }),
+        ("D-T17", Mistake { sends: |_, f, _| if f.id() == 0x101 { vec![] } else { vec![*f] }, ..NONE }),
         (
             "D-T18",
             Mistake {
-                says: |_, f, _| if f.to_string() == "081#0A" { vec![*f, *f] } else { vec![*f] },
+                sends: |_, f, _| if f.to_string() == "081#0A" { vec![*f, *f] } else { vec![*f] },
                 ..NONE
             },
         ),

@@ -21,7 +21,7 @@ pub fn kinds(at: usize) -> [Fault; 6] {
     ]
 }
 
-/// No two boards have one number, and what the report says is what the boards are.
+/// No two boards have one number, and the report shows what the boards are.
 fn check_numbers(bench: &mut Bench, what: &str) {
     let numbers: Vec<_> = (0..IDS.len()).filter_map(|i| bench.board(i).number()).collect();
     let mut unique = numbers.clone();
@@ -82,7 +82,7 @@ fn every_frame_of_a_scan_disturbed() {
             if !matches!(fault, Fault::Corrupted(_)) {
                 assert_eq!(report.boards.len(), 3, "{what}");
             } else if report.boards.len() < 3 {
-                // A request that became a reset: then the boards have no numbers, and the scan says so.
+                // A request that became a reset: then the boards have no numbers, and the scan reports it.
                 assert!(!report.findings.is_empty(), "{what}");
             }
         }

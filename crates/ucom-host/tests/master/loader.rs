@@ -4,7 +4,7 @@ use ucom::Frame;
 
 use crate::bench::{Bench, MS, Member};
 
-/// A board as a table: takes every block; the last rule says what ends the update.
+/// A board as a table: takes every block; the last rule defines what ends the update.
 pub struct Loader {
     /// `DSP_INFO` before and after.
     pub info: [&'static str; 2],
@@ -47,7 +47,7 @@ impl Loader {
         }
     }
 
-    fn say(&mut self, at: u64, text: &str) {
+    fn answer(&mut self, at: u64, text: &str) {
         self.out.push((at, crate::bench::frame(text)));
         self.out.sort_by_key(|(at, _)| *at);
     }
@@ -79,13 +79,13 @@ impl Member for Loader {
                 let done = self.frames >= 8 * self.blocks;
                 let program = self.info[usize::from(done)];
                 let flash = (self.flash)(self.resets, self.cancelled);
-                self.say(now + 300, &format!("141#{flash}01{:02X}{program}", self.status));
-                self.say(now + 301, "141#0000");
+                self.answer(now + 300, &format!("141#{flash}01{:02X}{program}", self.status));
+                self.answer(now + 301, "141#0000");
             }
             _ if text.starts_with("2C1#") => {
                 self.frames += 1;
                 if self.refuses_at == Some(self.frames) {
-                    self.say(now + 10, "081#02");
+                    self.answer(now + 10, "081#02");
                 }
                 if self.refuses_at.is_some_and(|at| self.frames >= at) {
                     return;
@@ -98,7 +98,7 @@ impl Member for Loader {
                     }
                     let answer = (self.special)(self.resets, block).unwrap_or(usual);
                     if !answer.is_empty() {
-                        self.say(now + (self.delay)(block) * MS, answer);
+                        self.answer(now + (self.delay)(block) * MS, answer);
                     }
                 }
             }

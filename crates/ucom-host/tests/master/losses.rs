@@ -16,7 +16,7 @@ fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
     bench
 }
 
-/// D-21, D-24: the acknowledge is lost and so is the beginning of DSP_INFO: what still comes under the number says that it
+/// D-21, D-24: the acknowledge is lost and so is the beginning of DSP_INFO: what still comes under the number shows that it
 /// is taken. Boards that raise their pin by themselves would take it twice.
 #[test]
 fn d24_any_frame_of_an_answer_means_the_number_is_taken() {

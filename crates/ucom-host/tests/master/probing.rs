@@ -70,7 +70,7 @@ fn d10_a_wrong_byte_order_is_named() {
             problems[0].what.contains("byte order") && problems[0].next.contains("ucom probe"),
             "{problems:?}"
         );
-        // `update` is refused while the board has its old program; `info` shows the numbers, and says that they are wrong.
+        // `update` is refused while the board has its old program; `info` shows the numbers, and reports that they are wrong.
         let before = bench.log.len();
         let Ok(Outcome::Update(report)) = bench.go(Request::Update(options(&[1], 128)), 60) else { panic!() };
         let Some(UpdateFailure::Refused(error)) = &report.boards[0].failure else { panic!("{report:?}") };
@@ -79,10 +79,10 @@ fn d10_a_wrong_byte_order_is_named() {
         assert!(bench.log[before..].iter().all(|(_, from, frame)| {
             *from != crate::bench::From::Master || matches!(frame.id() >> 6, 8 | 9 | 26)
         }));
-        let heard = bench.events.len();
+        let received = bench.events.len();
         bench.go(Request::Info { board: 1 }, 60).unwrap();
         let noted = |(_, event): &(_, Event)| matches!(event, Event::Note { text, .. } if text.contains("wrong byte order"));
-        assert!(bench.events[heard..].iter().any(noted));
+        assert!(bench.events[received..].iter().any(noted));
         // `io`: an application that runs is needed to describe itself.
         bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
         let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
@@ -146,7 +146,7 @@ fn observe(bench: &mut Bench) -> Observation {
 }
 
 #[test]
-fn doctor_tells_silence_rate_and_termination_apart() {
+fn doctor_distinguishes_silence_rate_and_termination() {
     let mut silent = observe(&mut Bench::chain(&[]));
     assert!(text(&silent).contains("Problem no frame within"));
     silent.controller = Some(Controller { no_acknowledge: 3, ..Default::default() });

@@ -27,7 +27,7 @@ fn numbers(bench: &mut Bench) -> Vec<u8> {
     (0..FLASH.len()).map(|i| bench.board(i).number().map_or(0, |n| n.number())).collect()
 }
 
-/// What the repair of board 2 said must be true: a success means that this board has the number and no other.
+/// The result of the repair of board 2 must be true: a success means that this board has the number and no other.
 fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
     let numbers = numbers(bench);
     match result {
@@ -35,7 +35,7 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         Err(Error::NumberShared { given_back: true, .. } | Error::WrongBoard { .. }) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // Not heard, or its neighbour keeps its pin on: nothing is claimed.
+        // Not received, or its neighbour keeps its pin on: nothing is claimed.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
@@ -110,7 +110,7 @@ fn d21_no_losses_give_a_number_twice() {
             }
         }
     }
-    assert!(shared > 0, "a pin that stays on unheard is found out by its consequence");
+    assert!(shared > 0, "a pin that stays on silently is found out by its consequence");
 }
 
 /// U-4: the repair of an update takes the same way.

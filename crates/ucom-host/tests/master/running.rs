@@ -231,7 +231,7 @@ fn stop_in_reverse() {
     assert!(!lost, "an application that was stopped on purpose is not lost");
 }
 
-/// P-15, D-51: a lost board is told within 3.1 s of its last heartbeat, the policy's frames leave within 100 ms.
+/// P-15, D-51: a lost board is reported within 3.1 s of its last heartbeat, the policy's frames leave within 100 ms.
 #[test]
 fn p15_d51_lost_boards() {
     for (on_lost, frame) in [
@@ -247,16 +247,16 @@ fn p15_d51_lost_boards() {
         bench.cut = vec![1];
         bench.run(6_000);
         let last = bench.master.boards().get(2).unwrap().alive_at.unwrap();
-        let told = |what: Supervision, bench: &Bench| {
+        let reported = |what: Supervision, bench: &Bench| {
             let is = |e: &Event| *e == Event::Supervision { board: 2, change: what };
             bench.events.iter().find(|(_, e)| is(e)).map(|(at, _)| *at)
         };
-        assert!((1_500 * MS..1_600 * MS).contains(&(told(Supervision::Late, &bench).unwrap() - last)));
-        let lost = told(Supervision::Lost, &bench).unwrap();
+        assert!((1_500 * MS..1_600 * MS).contains(&(reported(Supervision::Late, &bench).unwrap() - last)));
+        let lost = reported(Supervision::Lost, &bench).unwrap();
         assert!((3_000 * MS..=3_100 * MS).contains(&(lost - last)), "{}", lost - last);
         for text in ["600#00000000", "602#00000000"] {
             let times = bench.times_of(text);
-            // Said three times: one frame can be lost.
+            // Sent three times: one frame can be lost.
             assert_eq!(times.len(), 3 * usize::from(frame == Some(text)), "{on_lost:?} {text}");
             assert!(times.iter().all(|at| at - lost <= 100 * MS));
         }
@@ -266,7 +266,7 @@ fn p15_d51_lost_boards() {
         assert_eq!(bench.board(0).application.running, on_lost != OnLost::StopAll);
         bench.cut.clear();
         bench.run(2_000);
-        assert!(told(Supervision::Back, &bench).is_some());
+        assert!(reported(Supervision::Back, &bench).is_some());
         assert_eq!(bench.master.boards().get(2).unwrap().life, Life::Alive);
     }
 }

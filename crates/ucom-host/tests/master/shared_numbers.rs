@@ -93,8 +93,8 @@ fn refuses(flash: [u16; 2]) {
             let of_master = bench.log[from..].iter().filter(|(_, by, _)| *by == From::Master);
             let sent: Vec<String> = of_master.map(|(.., f)| f.to_string()).collect();
             assert!(sent.iter().all(|f| changes_nothing(f)), "{what}: {sent:?}");
-            let told = |(_, e): &&(u64, Event)| matches!(e, Event::NumberShared { board: 1, .. });
-            assert_eq!(bench.events.iter().filter(told).count(), 1, "{what}");
+            let reported = |(_, e): &&(u64, Event)| matches!(e, Event::NumberShared { board: 1, .. });
+            assert_eq!(bench.events.iter().filter(reported).count(), 1, "{what}");
             assert_eq!(bench.master.shared_numbers().len(), 1, "{what}");
         }
     }
@@ -200,7 +200,7 @@ fn program_frames(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| f.to_string().starts_with("2C1#")).count()
 }
 
-/// A stop is neither delayed nor refused; both boards stand, and it is said.
+/// A stop is neither delayed nor refused; both boards stand, and it is reported.
 #[test]
 fn d24_a_stop_stops_both() {
     let mut bench =
@@ -214,8 +214,8 @@ fn d24_a_stop_stops_both() {
     assert!((0..2).all(|i| !bench.board(i).application.running), "at once");
     assert!(matches!(bench.wait(id, 20), Ok(Outcome::Status { board: 1, .. })));
     assert!((0..2).all(|i| !bench.board(i).status().has(Status::MSTART)));
-    let told = |(_, e): &(u64, Event)| matches!(e, Event::NumberShared { board: 1, found } if *found == [0x21, 0x42]);
-    assert!(bench.events.iter().any(told));
+    let reported = |(_, e): &(u64, Event)| matches!(e, Event::NumberShared { board: 1, found } if *found == [0x21, 0x42]);
+    assert!(bench.events.iter().any(reported));
 }
 
 /// Turning outputs off is a stop, too.
@@ -228,7 +228,7 @@ fn d24_outputs_are_turned_off_on_both() {
     assert!((0..2).all(|i| !bench.board(i).application.running));
 }
 
-/// An init that gives one number to two boards takes it back from both and says so.
+/// An init that gives one number to two boards takes it back from both and reports it.
 #[test]
 fn d24_an_init_leaves_no_number_to_two_boards() {
     let mut bench = strapped([0x21, 0x42]);

@@ -107,7 +107,7 @@ fn a_run_that_is_cancelled_is_undone() {
 }
 
 /// D-51: a board is lost while others are still being started: none is started after that, and all are as they were found.
-/// Where a loss is only to be told, the others go on.
+/// Where a loss is only to be reported, the others go on.
 #[test]
 fn d51_a_board_lost_while_others_start() {
     for on_lost in [OnLost::StopAll, OnLost::Report] {

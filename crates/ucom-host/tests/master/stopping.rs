@@ -1,4 +1,4 @@
-//! What is to stop stops: on a bus that loses frames and reports errors, and when a board has only been told to start.
+//! What is to stop stops: on a bus that loses frames and reports errors, and when a board has only been commanded to start.
 
 use crate::bench::Exit;
 use ucom::node::Phase;
@@ -32,7 +32,7 @@ fn an_error_of_a_bad_bus_does_not_end_a_stop() {
         assert!(result.is_ok(), "{lost}: {result:?}");
         assert!(!bench.board(0).application.running, "{lost}");
     }
-    // When nothing comes of all tries the error is told.
+    // When nothing comes of all tries the error is reported.
     let mut bench = initialised(&[0x21]);
     bench.go(run(&[1]), 30).unwrap();
     bad_bus(&mut bench);
@@ -60,9 +60,9 @@ fn an_error_of_a_bad_bus_does_not_end_a_start() {
     assert_eq!(bench.count("301#"), 1);
 }
 
-/// A board that is not heard is told to stop again and again, at every level.
+/// A silent board is commanded to stop again and again, at every level.
 #[test]
-fn a_board_that_is_not_heard_is_told_more_than_once() {
+fn a_silent_board_gets_the_stop_more_than_once() {
     for level in [StopLevel::Outputs, StopLevel::Loop, StopLevel::Application] {
         let mut bench = initialised(&[0x21]);
         bench.go(run(&[1]), 30).unwrap();
@@ -80,19 +80,19 @@ fn a_board_that_is_not_heard_is_told_more_than_once() {
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
     for request in [run(&[1]), Request::Start { board: 1, force: true }] {
-        // It shows that it is started one second after it was told; it stops when it is told to after that.
+        // It shows that it is started one second after the command; it stops when it is commanded to after that.
         let (idle, started) = (info("1B"), info("8B"));
         let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
         let started: Vec<&str> = started.iter().map(String::as_str).collect();
         let was_run = matches!(request, Request::Run(_));
-        // Asked before it is told to start, at the stop and when the stop is read back; then it is up.
+        // Asked before it is commanded to start, at the stop and when the stop is read back; then it is up.
         let script = Script::default().rule("201#", 0, 3, &idle).on("201#", &started);
         let mut bench = Bench::script(script.on("601#00000000", &["601#00000000"]));
         bench.run(2_000);
         let id = bench.master.start(bench.now, request).unwrap();
         bench.run(200);
         assert_eq!(bench.count("301#"), 1);
-        let told = bench.times_of("301#")[0];
+        let commanded = bench.times_of("301#")[0];
         bench.master.cancel(id);
         let result = bench.wait(id, 60);
         assert_eq!(result, Err(Error::Cancelled));
@@ -102,8 +102,11 @@ fn a_board_that_is_still_starting_is_stopped() {
         }
         let stops = bench.times_of("1C1#8000");
         let timeout = u64::from(Profile::default().start_timeout) * MS;
-        assert!(stops[0] < told + timeout, "told to stop at once: {stops:?}, {told}");
-        assert!(stops.iter().any(|at| *at >= told + timeout), "and again once it is up: {stops:?}, {told}");
+        assert!(stops[0] < commanded + timeout, "commanded to stop at once: {stops:?}, {commanded}");
+        assert!(
+            stops.iter().any(|at| *at >= commanded + timeout),
+            "and again once it is up: {stops:?}, {commanded}"
+        );
     }
 }
 

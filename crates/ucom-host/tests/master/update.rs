@@ -107,7 +107,7 @@ fn p8_slow_boards_are_waited_for() {
     );
 }
 
-/// P-9, U-9: DSP_PROGFINISHED lost: PC_INFO says that it is done.
+/// P-9, U-9: DSP_PROGFINISHED lost: PC_INFO reports that it is done.
 #[test]
 fn p9_lost_finished_is_a_success() {
     let mut bench = loader(Loader { special: |_, block| (block == 33).then_some(""), ..Loader::new(34) });
@@ -120,7 +120,7 @@ fn p9_lost_finished_is_a_success() {
     assert_eq!(bench.count("041#"), 1);
 }
 
-/// P-10, U-10: the board says success and shows the old program: a failure.
+/// P-10, U-10: the board reports success and shows the old program: a failure.
 #[test]
 fn p10_success_must_be_read_back() {
     let mut bench = loader(Loader { info: ["34126E38"; 2], ..Loader::new(34) });
@@ -200,7 +200,7 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
     let mut bench = Bench::script(Script::default().on("201#", &["141#2100021934126E38", "141#0000"]));
     let report = update(&mut bench, options(&[1], 1000));
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
-    assert_eq!(**e, Error::WrongSequence { board: 1, says: 2 });
+    assert_eq!(**e, Error::WrongSequence { board: 1, reported: 2 });
     assert_eq!((report.exit(), bench.count("041#")), (4, 0));
 }
 
@@ -210,10 +210,12 @@ fn update_of_nobody() {
     let mut bench = Bench::script(Script::default());
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!((report.exit(), bench.count("041#")), (3, 0));
-    assert!(report.boards[0].failure.as_ref().unwrap().to_string().contains("nothing heard from it at all"));
+    assert!(
+        report.boards[0].failure.as_ref().unwrap().to_string().contains("nothing received from it at all")
+    );
 }
 
-/// P-12: cancel in the middle of a block: the transfer is cleared, the board is usable, the report says what is left.
+/// P-12: cancel in the middle of a block: the transfer is cleared, the board is usable, the report shows what is left.
 #[test]
 fn p12_cancel() {
     // Frames of PC_PROG after which the user gives up: in cycle 1, in cycle 2.

@@ -42,7 +42,7 @@ fn count(bench: &Bench, start: &str) -> usize {
     bench.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
 }
 
-/// D-46: the bus fails at any frame of an update of two boards. The report comes at once, says of no board more or less
+/// D-46: the bus fails at any frame of an update of two boards. The report comes at once, reports of no board more or less
 /// than it is, and the exit code is 5 as soon as something was erased.
 #[test]
 fn d46_a_bus_that_fails_leaves_a_report() {
@@ -135,7 +135,7 @@ fn p12_a_cancelled_update_session() {
     assert_eq!((check_program(&mut bench, 1, 128), check_program(&mut bench, 2, 128)), (OLD, OLD));
 }
 
-/// A cancel while the new application is being started: the board is verified, and that is what the report says.
+/// A cancel while the new application is being started: the board is verified, and that is what the report shows.
 #[test]
 fn p12_cancelled_while_it_starts() {
     let mut bench = initialised(&[0x21]);
@@ -145,7 +145,7 @@ fn p12_cancelled_while_it_starts() {
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
     assert_eq!((report.boards[0].outcome, report.exit()), (left, 5));
     assert_eq!(check_program(&mut bench, 0, 128).1, DATE);
-    // It was stopped again; where its answers are lost nobody knows, and that is what is said.
+    // It was stopped again; where its answers are lost nobody knows, and that is what is reported.
     assert!(!bench.board(0).status().has(ucom::Status::MSTART));
     let mut bench = initialised(&[0x21]);
     let start = UpdateOptions { start: true, ..options(&[1], 128) };
@@ -160,7 +160,7 @@ fn p12_cancelled_while_it_starts() {
     assert!(report.boards[0].failure.as_ref().unwrap().to_string().contains("may be started"));
 }
 
-/// `--start` also starts a board that has the image already; a cancel before that says so.
+/// `--start` also starts a board that has the image already; a cancel before that reports it.
 #[test]
 fn a_board_that_is_up_to_date_is_started() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -249,21 +249,21 @@ impl Member for Impostor {
         self.out.first().map_or(u64::MAX, |(at, _)| *at)
     }
     fn receive(&mut self, now: u64, frame: &Frame) {
-        let mut say = |text: &str| self.out.push((now + 300, crate::bench::frame(text)));
+        let mut answer = |text: &str| self.out.push((now + 300, crate::bench::frame(text)));
         match frame.to_string().as_str() {
             "041#" => self.silent = true,
             "1C1#0800" => self.other = false,
             "281#" => {
                 self.other = true;
-                say("0C1#01");
+                answer("0C1#01");
             }
             "201#" if self.other => {
-                say("141#4200011934126E38");
-                say("141#0000");
+                answer("141#4200011934126E38");
+                answer("141#0000");
             }
             "201#" if !self.silent => {
-                say("141#2100011B34126E38");
-                say("141#0000");
+                answer("141#2100011B34126E38");
+                answer("141#0000");
             }
             _ => {}
         }
@@ -286,7 +286,7 @@ fn u4_repair_that_finds_another_board_is_refused() {
     assert!(place("1C1#0200") < place("281#"));
 }
 
-/// D-08: a dry run says what would happen, so it looks for another PC, too; it still sends nothing but questions.
+/// D-08: a dry run shows what would happen, so it looks for another PC, too; it still sends nothing but questions.
 #[test]
 fn d08_a_dry_run_looks_for_another_pc() {
     let info = ["141#2100011B34126E38", "141#0000"];
@@ -330,7 +330,7 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let report = update(&mut bench, UpdateOptions { dry_run: true, ..options(&[1], 128) });
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::UpToDate, 0));
     assert!(bench.board(0).status().has(Status::PROG));
-    // It cannot be ended: that is said.
+    // It cannot be ended: that is reported.
     let mut bench = left();
     bench.lose = vec![("< 1C1#", u32::MAX)];
     let report = update(&mut bench, options(&[1], 128));

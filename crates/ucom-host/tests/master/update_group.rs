@@ -1,4 +1,4 @@
-//! Updates of several boards at once: who takes part, who must not, and what is said of those that fell behind.
+//! Updates of several boards at once: who takes part, who must not, and what is reported of those that fell behind.
 
 use crate::bench::Exit;
 use ucom::{Frame, Profile};
@@ -20,7 +20,7 @@ fn broadcasts(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| f.id() == 0x2C0).count()
 }
 
-/// D-46: every number that is not selected is told to leave programming and asked whether it did: the answers to one
+/// D-46: every number that is not selected is commanded to leave programming and asked whether it did: the answers to one
 /// A broadcast PC_INFO may be lost, and a board left with PROG = 1 would be erased with the group.
 #[test]
 fn d46_a_group_leaves_other_boards_alone() {
@@ -33,18 +33,18 @@ fn d46_a_group_leaves_other_boards_alone() {
         assert_eq!(check_program(&mut bench, 1, 128), OLD, "{lose:?}");
         assert_eq!(broadcasts(&bench), 48, "{lose:?}");
         let first = bench.log.iter().position(|(.., f)| f.id() == 0x2C0).unwrap();
-        let told = |number: u16| {
-            let told = |(_, from, f): &(u64, From, Frame)| {
+        let commanded = |number: u16| {
+            let commanded = |(_, from, f): &(u64, From, Frame)| {
                 *from == From::Master && f.id() == 0x1C0 + number && f.data() == [4, 0]
             };
-            bench.log[..first].iter().any(told)
+            bench.log[..first].iter().any(commanded)
         };
-        assert!((1..=31).filter(|n| *n != 1 && *n != 3).all(told), "{lose:?}");
-        assert!(!told(1) && !told(3));
+        assert!((1..=31).filter(|n| *n != 1 && *n != 3).all(commanded), "{lose:?}");
+        assert!(!commanded(1) && !commanded(3));
     }
 }
 
-/// A board that keeps PROG = 1 whatever it is told.
+/// A board that keeps PROG = 1 whatever is sent to it.
 #[derive(Default)]
 struct Stubborn {
     out: Vec<(u64, Frame)>,
@@ -113,7 +113,7 @@ fn d42_a_group_waits_for_every_board() {
 /// A selected board takes XRESET and sends nothing any more: the group's frames would erase it unnoticed. So there are
 /// none: the others are updated one by one.
 #[test]
-fn a_board_that_may_listen_unheard_ends_the_broadcast() {
+fn a_silent_board_that_may_listen_ends_the_broadcast() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
     while bench.count("043#") == 0 {
@@ -144,7 +144,7 @@ fn a_board_that_fell_behind_is_asked() {
     }
 }
 
-/// A board that fell behind before the erase and is never heard again may be erased: outcome `unknown`, exit code 5.
+/// A board that fell behind before the erase and is silent from then on may be erased: outcome `unknown`, exit code 5.
 #[test]
 fn a_board_that_was_lost_in_a_group_may_be_erased() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -177,12 +177,12 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     assert_eq!(check_program(&mut bench, 1, 128), OLD);
 }
 
-/// A board that says what the published list has for its CAN controller goes on listening: it is erased with the others
-/// and that is said, or it is asked and has the program.
+/// A board that shows what the published list has for its CAN controller goes on listening: it is erased with the others
+/// and that is reported, or it is asked and has the program.
 #[test]
 fn d43_not_every_error_ends_a_transfer() {
     for code in ["06", "08", "09", "0B", "2A"] {
-        for heard in [true, false] {
+        for received in [true, false] {
             let mut bench = initialised(&[0x21, 0x42]);
             let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
             while broadcasts(&bench) < 10 {
@@ -190,12 +190,12 @@ fn d43_not_every_error_ends_a_transfer() {
             }
             let now = bench.now;
             bench.master.handle(now, Ok(crate::bench::frame(&format!("082#{code}"))));
-            if !heard {
+            if !received {
                 bench.lose = vec![("> 142#", u32::MAX), ("> 182#", u32::MAX), ("> 102#", u32::MAX)];
             }
             let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
             assert_ne!(check_program(&mut bench, 1, 128), OLD, "{code}: it was erased");
-            let expected = if heard { (UpdateOutcome::Verified, 0) } else { (UpdateOutcome::Unknown, 5) };
+            let expected = if received { (UpdateOutcome::Verified, 0) } else { (UpdateOutcome::Unknown, 5) };
             assert_eq!((report.boards[1].outcome, report.exit()), expected, "{code}: {report:?}");
         }
     }
@@ -235,7 +235,7 @@ fn p12_a_cancel_reaches_every_board_of_the_group() {
     while bench.count("043#") == 0 {
         bench.run(1);
     }
-    // Board 3 listens unheard: no broadcast, one by one; board 2 waits with PROG = 1.
+    // Board 3 listens and sends nothing: no broadcast, one by one; board 2 waits with PROG = 1.
     bench.lose = vec![("> 143#", u32::MAX)];
     while bench.log.iter().filter(|(.., f)| f.id() == 0x2C1).count() < 4 {
         bench.run(1);

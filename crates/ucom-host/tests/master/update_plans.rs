@@ -1,5 +1,5 @@
 //! Updates by other plans and headers than the usual ones: what each cycle may destroy, what can be verified, and what the
-//! report says where nothing can.
+//! report shows where nothing can.
 
 use crate::bench::Exit;
 use ucom::profile::{HeaderForm, Plan};
@@ -86,13 +86,13 @@ fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> 
 }
 
 /// U-10 where the image hides its Program ID: never `verified`, done only when the board shows an application, and the
-/// report says why it could not be verified, how it can be, and what the board showed before and after.
+/// report gives the reason why it could not be verified, how it can be, and what the board showed before and after.
 #[test]
 fn u10_what_cannot_be_verified_says_so() {
     let report = raw("3F4BC13A", 0x1B, None);
     let board = &report.boards[0];
     assert_eq!((board.outcome, &board.failure, report.exit()), (UpdateOutcome::Written, &None, 5));
-    // As good as verified to whoever says so.
+    // As good as verified for a user who asks for that.
     assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit(), 0);
     assert_eq!((report.unverifiable, report.program_id), (Some(Unverifiable::RawPlan), None));
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
@@ -141,7 +141,7 @@ fn u9_not_where_nothing_is_expected() {
     assert_eq!((report.exit(), report.boards[0].attempts), (5, 3), "{report:?}");
 }
 
-/// Boards of this crate without checksums, or without headers: written, started, and said to be unverified.
+/// Boards of this crate without checksums, or without headers: written, started, and reported as unverified.
 #[test]
 fn boards_without_checksum_or_header() {
     let none = Profile { prog_checksum: Checksum::None, ..Profile::default() };

@@ -1,4 +1,4 @@
-//! What a board says.
+//! Messages of a board.
 
 use super::to_board::package;
 use super::{DecodeError, need};

@@ -1,7 +1,7 @@
 //! The messages of both directions, made from and into frames.
 //!
 //! Functions 22, 24 and 26 are sent by both sides with one identifier (D-05): which side a frame comes from is
-//! said by choosing [`ToBoard`] or [`FromBoard`].
+//! given by choosing [`ToBoard`] or [`FromBoard`].
 
 mod from_board;
 mod to_board;
@@ -44,7 +44,7 @@ pub enum DecodeError {
 }
 
 impl DecodeError {
-    /// Whether the length is at fault: a board says DSP_ERROR 7.
+    /// Whether the length is at fault: a board sends DSP_ERROR 7.
     pub const fn is_length(&self) -> bool {
         matches!(self, Self::TooShort { .. } | Self::Length { .. })
     }

@@ -20,7 +20,7 @@ fn from(text: &str) -> Result<FromBoard, DecodeError> {
     FromBoard::decode(&frame(text), &Profile::default()).map(|(_, message)| message)
 }
 
-/// C-6: surplus bytes are ignored, missing ones refused and said why.
+/// C-6: surplus bytes are ignored, missing ones refused with the cause.
 #[test]
 fn d12_c6_lengths() {
     assert_eq!(to("201#0000000000000000"), Ok(ToBoard::Info));
@@ -46,7 +46,7 @@ fn d12_c6_lengths() {
     assert!(ToBoard::decode(&frame("341#00000100"), &strict).is_ok());
 }
 
-/// D-05: what both sides send is told apart by side, and where it can be by length.
+/// D-05: what both sides send is distinguished by side, and where it can be by length.
 #[test]
 fn d05_shared_functions() {
     assert_eq!(to("581#"), Ok(ToBoard::DumpIo));

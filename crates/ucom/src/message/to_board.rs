@@ -1,4 +1,4 @@
-//! What the PC says.
+//! Messages of the PC.
 
 use super::{DecodeError, need};
 use crate::admin::Admin;

@@ -28,7 +28,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.app = App::Up;
         self.outbox.mca_ready = true;
         self.alive_at = Some(self.now_us);
-        self.tell_admin_unasked();
+        self.send_admin_unasked();
     }
 
     /// The control loop runs from now on; the PC's heartbeat is due from now on (D-50).
@@ -65,7 +65,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     pub(super) fn pc_lost(&mut self) {
         self.stop_loop();
         self.initial_ci();
-        self.tell_admin_unasked();
+        self.send_admin_unasked();
         self.jobs.own_text = Some(PC_LOST);
     }
 

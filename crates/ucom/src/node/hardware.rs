@@ -40,7 +40,7 @@ pub const RECORD_LEN: usize = 16;
 
 /// Flash of the board, and the RAM that an exloader may be loaded into.
 ///
-/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] says when it is done. The node
+/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when it is done. The node
 /// starts none while another is under way. Implementations MUST keep the validity record apart from the
 /// application area: erasing one leaves the other.
 pub trait Flash {

@@ -1,9 +1,9 @@
 //! The board side: a UCoM board as a state machine without clock, heap or I/O, usable in a board's firmware as
 //! it is and behind every simulated board.
 //!
-//! The caller hands in what was received ([`Node::receive`]), asks what to send ([`Node::poll`]) and says when
+//! The caller hands in what was received ([`Node::receive`]), asks what to send ([`Node::poll`]) and reports when
 //! that has left the controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`]
-//! tells until when nothing will happen by itself. Flash, pins, lasting memory and the application are traits
+//! returns until when nothing will happen by itself. Flash, pins, lasting memory and the application are traits
 //! ([`Flash`], [`Pins`], [`Store`], [`Application`]); the crate `ucom-sim` has all four in memory.
 //!
 //! The node offers one frame at a time: the next comes after `sent`. Strings and dumps are made frame by frame
@@ -180,7 +180,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             self.error(ErrorCode::CanTransmit);
         }
         match FromBoard::decode(frame, &self.config.profile) {
-            // One of before the number was forgotten says nothing about the number that is being taken.
+            // One of before the number was forgotten is not about the number that is being taken.
             Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
                 self.numbered();
             }
@@ -253,7 +253,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// The flags that MCA_ADMIN_DATA tells.
+    /// The flags in MCA_ADMIN_DATA.
     pub const fn admin(&self) -> Admin {
         Admin {
             run: matches!(self.app, App::Running),

@@ -61,7 +61,7 @@ impl Outbox {
         self.finished = false;
     }
 
-    /// What only an application says.
+    /// What only an application sends.
     pub fn forget_application(&mut self) {
         self.mca_ready = false;
         self.alive = false;
@@ -101,7 +101,7 @@ impl Outbox {
 }
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// What the board puts into its identifiers: its number, without one what the profile says (D-06).
+    /// What the board puts into its identifiers: its number, without one what the profile requires (D-06).
     pub(super) fn own_number(&self) -> Sequence {
         self.number.unwrap_or(self.config.profile.unnumbered())
     }
@@ -113,14 +113,14 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 
     /// MCA_ADMIN_DATA as an answer: not at once, the PC's frame with this identifier must be gone (D-05). What was to be
-    /// told anyway goes with it: one frame says both.
+    /// sent anyway goes with it: one frame is enough for both.
     pub(super) fn answer_admin(&mut self) {
         self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }
 
     /// MCA_ADMIN_DATA unasked: after a random time, the PC may be about to send the same identifier (D-05). An answer that
-    /// waits for its time says it, too.
-    pub(super) fn tell_admin_unasked(&mut self) {
+    /// waits for its time carries it, too.
+    pub(super) fn send_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);
         self.outbox.admin_at.get_or_insert(due);

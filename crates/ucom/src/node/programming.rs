@@ -244,7 +244,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if self.programming.work == Work::ClearRecord { Ok(()) } else { self.block_taken() }
     }
 
-    /// The header of a board whose images have none: as long as the board says.
+    /// The header of a board whose images have none: its length is the configured one, at most that of the area.
     fn header_by_itself(&self) -> Option<Header> {
         let cycle = self.programming.number;
         let memory = match (self.config.profile.prog_plan, cycle) {

@@ -1,4 +1,4 @@
-//! What the board does with what it hears.
+//! What the board does with what it receives.
 
 use super::{App, Application, Flash, Node, Pins, Store};
 use crate::error_code::ErrorCode;
@@ -27,7 +27,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// A frame as a driver hears it, of any format (D-02).
+    /// A frame as a driver receives it, of any format (D-02).
     pub fn receive_any(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) -> Result<(), Foreign> {
         match Frame::received(id, format, data) {
             Ok(frame) => {
@@ -63,7 +63,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// D-12: DSP_ERROR 7, but not for what would be ignored anyway, and not without a number: all such boards would say it
+    /// D-12: DSP_ERROR 7, but not for what would be ignored anyway, and not without a number: all such boards would send it
     /// at once with one identifier (D-06).
     fn wrong_length(&mut self, function: Function, to: Sequence) {
         self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);

@@ -33,7 +33,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.boot_until = Some(now_us.saturating_add(self.config.boot_us));
     }
 
-    /// The exloader listens; what the flash says counts now.
+    /// The exloader listens; the state of the flash counts now.
     pub(super) fn booted(&mut self) {
         self.boot_until = None;
         self.record = Record::parse(&self.flash.record());

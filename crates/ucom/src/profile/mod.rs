@@ -112,7 +112,7 @@ mod tests {
     use std::string::ToString;
     use std::vec::Vec;
 
-    /// Every key's default is what the table says, fits its own range, and is read back as it is written.
+    /// Every key's default is the one in the table, fits its own range, and is read back as it is written.
     #[test]
     fn keys_and_defaults_agree() {
         let mut profile = Profile::default();

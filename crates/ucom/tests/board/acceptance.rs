@@ -15,7 +15,7 @@ fn d_t1_reset_reports() {
     let start = bus.now;
     bus.send("000#");
     bus.run(2000);
-    assert!(bus.heard.iter().all(|(at, _)| at - start <= 500 * MS));
+    assert!(bus.received.iter().all(|(at, _)| at - start <= 500 * MS));
     assert_eq!(sorted(bus.take()), frames(FIVE_REPORTS));
 }
 
@@ -25,8 +25,8 @@ fn d_t2_report_without_reset() {
     let mut bus = Bus::new(&FIVE, Profile::default());
     bus.number(1);
     for _ in 0..2 {
-        let heard = bus.ask("240#", 300);
-        assert_eq!(sorted(heard), frames(FIVE_REPORTS));
+        let received = bus.ask("240#", 300);
+        assert_eq!(sorted(received), frames(FIVE_REPORTS));
         let info = bus.info(1).unwrap();
         assert_eq!((info.sequence, info.status), (1, Status(0x1B)));
     }
@@ -143,17 +143,17 @@ fn d_t10_io_description() {
     let start = bus.now;
     bus.send("581#");
     bus.run(100);
-    assert!(bus.heard[0].0 - start >= 2 * MS, "D-05: not before the request is gone");
-    let heard = bus.take();
+    assert!(bus.received[0].0 - start >= 2 * MS, "D-05: not before the request is gone");
+    let received = bus.take();
     assert_eq!(
-        heard[..6],
+        received[..6],
         frames(
             "581#020004000300 581#0200 581#55436F4D32206865 581#61642070616E 581#0100 581#706F735F736F6C6C"
         )
     );
     // Counted independently: headers of 2 bytes announce what follows.
     let mut strings = 0;
-    let mut rest = heard[1..].iter();
+    let mut rest = received[1..].iter();
     while let Some(header) = rest.next() {
         strings += 1;
         assert_eq!(header.dlc(), 2);
@@ -210,13 +210,17 @@ fn d_t13_pc_lost() {
     bus.run(1600);
     let at = |text: &str| {
         let frame: Frame = text.parse().unwrap();
-        bus.heard.iter().filter(|(_, heard)| *heard == frame).map(|(at, _)| at - start).collect::<Vec<_>>()
+        bus.received
+            .iter()
+            .filter(|(_, received)| *received == frame)
+            .map(|(at, _)| at - start)
+            .collect::<Vec<_>>()
     };
     let stopped = at("601#00000000");
     assert_eq!(stopped.len(), 1);
     assert!((1500 * MS..1510 * MS).contains(&stopped[0]), "{stopped:?}");
     let last_output =
-        bus.heard.iter().filter(|(_, frame)| frame.id() == 0x381).map(|(at, _)| at - start).max();
+        bus.received.iter().filter(|(_, frame)| frame.id() == 0x381).map(|(at, _)| at - start).max();
     assert!(last_output.unwrap() <= 1502 * MS);
     assert!(!bus.boards[0].application.active && !bus.boards[0].application.running);
     assert_eq!(bus.boards[0].application.latched_ci, [0, 0], "inputs are as nobody has set them");
@@ -271,9 +275,9 @@ fn d_t16_autostart_can_be_held_off() {
         bus.run(1000);
         (bus.boards[0].status().0, bus.take())
     };
-    let (status, heard) = chain(&[]);
+    let (status, received) = chain(&[]);
     assert_eq!(status, 0xC9, "S5, never S6");
-    assert_eq!(heard[..2], frames("0C1#01 501#"));
+    assert_eq!(received[..2], frames("0C1#01 501#"));
     assert_eq!(chain(&[("680#", 290), ("041#", 1)]), (0x5D, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#4000", 1)]), (0x19, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#0404", 1)]), (0x5D, frames("0C1#01")));
@@ -316,7 +320,7 @@ fn d_t20_init_while_the_acknowledgement_waits() {
 #[test]
 fn d_t21_equal_flash_ids_look_like_one_board() {
     let mut bus = Bus::new(&[0x21, 0x121], Profile::default());
-    let mut heard = bus.ask("000#", 500);
-    heard.dedup();
-    assert_eq!(heard, frames("441#21"));
+    let mut received = bus.ask("000#", 500);
+    received.dedup();
+    assert_eq!(received, frames("441#21"));
 }

@@ -155,16 +155,16 @@ fn d_t19_group_update() {
     bus.send("041#");
     bus.send("043#");
     let image: Vec<u8> = (0..100u8).collect();
-    let mut heard = Vec::new();
+    let mut received = Vec::new();
     for block in blocks(&image, &Profile::default()) {
         for data in block.chunks_exact(8) {
             bus.send_frame(&Frame::new(0x2C0, data).unwrap());
         }
         bus.run(60);
-        heard.push(sorted(bus.take()));
+        received.push(sorted(bus.take()));
     }
-    assert_eq!(heard.pop().unwrap(), frames("101# 103#"));
-    assert!(heard.iter().all(|answers| *answers == frames("181# 183#")));
+    assert_eq!(received.pop().unwrap(), frames("101# 103#"));
+    assert!(received.iter().all(|answers| *answers == frames("181# 183#")));
     let ids: Vec<_> = bus.boards.iter().map(|board| board.record().unwrap().program_id).collect();
     assert_eq!((ids[0], ids[1]), (ids[2], 0x1234));
     assert_ne!(ids[0], 0x1234);

@@ -5,12 +5,12 @@ use ucom::{Frame, FromBoard, Profile, Status, StringAssembler};
 
 use crate::bus::{Bus, MS, frames};
 
-/// Debug texts in what was heard.
-fn texts(heard: &[Frame]) -> Vec<String> {
+/// Debug texts in what was received.
+fn texts(received: &[Frame]) -> Vec<String> {
     let profile = Profile::default();
     let mut assembler = StringAssembler::<512>::new();
     let mut texts = Vec::new();
-    for frame in heard {
+    for frame in received {
         if let Ok((_, FromBoard::Debug(payload))) = FromBoard::decode(frame, &profile)
             && let ucom::Assembled::Complete(text) = assembler.push(0, &payload, &profile)
         {
@@ -30,7 +30,7 @@ fn d05_shared_identifiers() {
         bus.number(1);
         bus.send("301#");
         bus.run(50);
-        let at = |id: u16, bus: &Bus| bus.heard.iter().find(|(_, frame)| frame.id() == id).unwrap().0;
+        let at = |id: u16, bus: &Bus| bus.received.iter().find(|(_, frame)| frame.id() == id).unwrap().0;
         let delay = at(0x601, &bus) - at(0x501, &bus);
         assert!((MS..=9 * MS).contains(&(delay + 200)), "{delay} µs");
         delays.insert(delay / MS);
@@ -47,13 +47,13 @@ fn d05_shared_identifiers() {
 #[test]
 fn d33_outputs() {
     let mut bus = Bus::running();
-    bus.heard.clear();
+    bus.received.clear();
     let start = bus.now;
     for i in 0..50u16 {
         bus.boards[0].application.so = vec![i; 4];
         bus.run(10);
     }
-    let outputs: Vec<_> = bus.heard.iter().filter(|(_, frame)| frame.id() == 0x381).collect();
+    let outputs: Vec<_> = bus.received.iter().filter(|(_, frame)| frame.id() == 0x381).collect();
     assert_eq!(outputs.len(), 100);
     for (i, pair) in outputs.chunks(2).enumerate() {
         assert_eq!((pair[0].1.data()[0], pair[1].1.data()[0]), (0, 3));
@@ -70,7 +70,7 @@ fn d33_outputs_on_a_blocked_bus() {
     bus.hold = |_| true;
     bus.run(1000);
     assert!(bus.boards[0].counters().so_skipped > 50);
-    bus.heard.clear();
+    bus.received.clear();
     bus.release();
     bus.run(9);
     assert!(bus.take().len() <= 6);
@@ -125,25 +125,25 @@ fn d38_debug_texts() {
             bus.boards[0].application.debug.push(text(i));
             bus.run(10);
         }
-        let heard = texts(&bus.take());
+        let received = texts(&bus.take());
         let seconds = (bus.now - start).div_ceil(1000 * MS) as usize;
-        assert!((20..=20 * (seconds + 1)).contains(&heard.len()), "{}", heard.len());
-        assert_eq!(heard[0], "text 0");
+        assert!((20..=20 * (seconds + 1)).contains(&received.len()), "{}", received.len());
+        assert_eq!(received[0], "text 0");
         bus.run(1500);
         bus.take();
     }
     assert!(bus.boards[0].counters().texts_dropped > 300);
 }
 
-/// D-50: the loss of the PC is said in words when texts are wanted; the debug flags stay.
+/// D-50: the loss of the PC is reported in words when texts are wanted; the debug flags stay.
 #[test]
 fn d50_text_when_the_pc_is_lost() {
     let mut bus = Bus::started();
     bus.send("601#01010100");
     bus.run(1600);
-    let heard = bus.take();
-    assert_eq!(texts(&heard), ["PC alive lost"]);
-    assert!(heard.contains(&frames("601#00000100")[0]));
+    let received = bus.take();
+    assert_eq!(texts(&received), ["PC alive lost"]);
+    assert!(received.contains(&frames("601#00000100")[0]));
 }
 
 /// A board's heartbeat, every second while the application is up, and only then (D-51 is what the PC makes of it).
@@ -168,9 +168,9 @@ fn d34_error_rate() {
         }
         bus.run(5);
     }
-    let heard = bus.take();
-    assert_eq!(heard.iter().filter(|frame| frame.data() == [5]).count(), 10);
-    assert_eq!(heard.iter().filter(|frame| frame.data() == [7]).count(), 1);
+    let received = bus.take();
+    assert_eq!(received.iter().filter(|frame| frame.data() == [5]).count(), 10);
+    assert_eq!(received.iter().filter(|frame| frame.data() == [7]).count(), 1);
     assert_eq!(bus.boards[0].counters().errors_dropped, 90);
 }
 
@@ -208,7 +208,7 @@ fn d35_control_cycles() {
 
 /// Errors 6 and 8 come from the controller.
 #[test]
-fn controller_troubles_are_told() {
+fn controller_troubles_are_reported() {
     let mut bus = Bus::initialised();
     let now = bus.now;
     bus.boards[0].overrun(now);
@@ -243,7 +243,7 @@ fn other_frames_than_the_one_on_its_way_are_ignored() {
     assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
 }
 
-/// D-38: a program that is not up yet is not asked for texts; what it wants to say by then is not dropped.
+/// D-38: a program that is not up yet is not asked for texts; its texts until then are not dropped.
 #[test]
 fn d38_texts_of_a_program_that_is_not_up() {
     let mut bus = Bus::initialised();
@@ -302,7 +302,7 @@ fn d50_a_repeated_start_is_no_heartbeat() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-14, D-36: the end of the application ends its dumps, not what the board tells about itself.
+/// D-14, D-36: the end of the application ends its dumps, not what the board sends about itself.
 #[test]
 fn d14_info_survives_the_application() {
     let mut bus = Bus::started();
@@ -316,9 +316,9 @@ fn d14_info_survives_the_application() {
     }
     board.sent(now, &first);
     bus.run(50);
-    let heard = bus.take();
-    assert_eq!(heard.len(), 3 + 4, "the rest, and the second answer");
-    assert!(heard.iter().all(|frame| frame.id() == first.id()));
+    let received = bus.take();
+    assert_eq!(received.len(), 3 + 4, "the rest, and the second answer");
+    assert!(received.iter().all(|frame| frame.id() == first.id()));
 }
 
 /// D-14, D-36: a second request during a dump of the inputs is served once, after it; without inputs there is nothing to serve.

@@ -13,7 +13,7 @@ pub struct Bus {
     pub boards: Vec<Board>,
     pub now: u64,
     /// What the boards sent and when, since the last look.
-    pub heard: Vec<(u64, Frame)>,
+    pub received: Vec<(u64, Frame)>,
     /// Every DSP_ERROR so far.
     pub errors: Vec<Frame>,
     /// Frames that the bus holds back: their boards wait for `sent`.
@@ -58,7 +58,7 @@ impl Bus {
         let mut bus = Self {
             boards,
             now: 0,
-            heard: Vec::new(),
+            received: Vec::new(),
             errors: Vec::new(),
             hold: |_| false,
             held: Vec::new(),
@@ -68,7 +68,7 @@ impl Bus {
             frames_from_boards: 0,
         };
         bus.run(50);
-        assert!(bus.heard.is_empty(), "nothing is said at power-up");
+        assert!(bus.received.is_empty(), "nothing is sent at power-up");
         bus
     }
 
@@ -76,7 +76,7 @@ impl Bus {
         Self::new(&[0x21], Profile::default())
     }
 
-    /// One board with number 1 and its pin on, nothing in `heard`.
+    /// One board with number 1 and its pin on, nothing in `received`.
     pub fn initialised() -> Self {
         let mut bus = Self::one();
         bus.number(1);
@@ -155,14 +155,14 @@ impl Bus {
                 }
                 self.now += duration(&frame);
                 self.boards[i].sent(self.now, &frame);
-                self.heard.push((self.now, frame));
+                self.received.push((self.now, frame));
                 if (0x080..0x0A0).contains(&frame.id()) {
                     self.errors.push(frame);
                 }
                 let number = self.frames_from_boards;
                 self.frames_from_boards += 1;
                 if self.lose_from_boards == Some(number) {
-                    self.heard.pop();
+                    self.received.pop();
                 }
                 for (other, board) in self.boards.iter_mut().enumerate() {
                     if other != i {
@@ -188,7 +188,7 @@ impl Bus {
         self.hold = |_| false;
         for (i, frame) in std::mem::take(&mut self.held) {
             self.boards[i].sent(self.now, &frame);
-            self.heard.push((self.now, frame));
+            self.received.push((self.now, frame));
         }
     }
 
@@ -200,14 +200,14 @@ impl Bus {
         }
     }
 
-    /// What was heard since the last look.
+    /// What was received since the last look.
     pub fn take(&mut self) -> Vec<Frame> {
-        std::mem::take(&mut self.heard).into_iter().map(|(_, frame)| frame).collect()
+        std::mem::take(&mut self.received).into_iter().map(|(_, frame)| frame).collect()
     }
 
-    /// Sends, waits and returns what was heard from the sending on.
+    /// Sends, waits and returns what was received from the sending on.
     pub fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
-        self.heard.clear();
+        self.received.clear();
         self.send(text);
         self.run(ms);
         self.take()
@@ -217,8 +217,8 @@ impl Bus {
     pub fn info(&mut self, n: u8) -> Option<BoardInfo> {
         let id = 0x140 + u16::from(n);
         let endian = self.boards[0].config().profile.endian;
-        let heard = self.ask(&format!("{:03X}#", 0x200 + u16::from(n)), 20);
-        let first = heard.iter().find(|frame| frame.id() == id)?;
+        let received = self.ask(&format!("{:03X}#", 0x200 + u16::from(n)), 20);
+        let first = received.iter().find(|frame| frame.id() == id)?;
         BoardInfo::parse(&first.payload(), endian)
     }
 
@@ -229,13 +229,13 @@ impl Bus {
 
     /// Sends a block in frames 200 µs apart and waits for an answer of board 1; returns what came.
     pub fn block(&mut self, block: &[u8; 64], wait_ms: u64) -> Vec<Frame> {
-        self.heard.clear();
+        self.received.clear();
         for data in block.chunks_exact(8) {
             self.send_frame(&Frame::new(0x2C1, data).unwrap());
             self.run_us(70);
         }
         for _ in 0..wait_ms {
-            if !self.heard.is_empty() {
+            if !self.received.is_empty() {
                 break;
             }
             self.run(1);
@@ -278,7 +278,7 @@ pub fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
 }
 
 /// By identifier.
-pub fn sorted(mut heard: Vec<Frame>) -> Vec<Frame> {
-    heard.sort_by_key(Frame::id);
-    heard
+pub fn sorted(mut received: Vec<Frame>) -> Vec<Frame> {
+    received.sort_by_key(Frame::id);
+    received
 }

@@ -97,7 +97,7 @@ fn d04_other_addresses() {
     assert_eq!(bus.ask("281#", 20), frames("0C1#01"));
     assert_eq!(bus.ask("21F#", 20).iter().filter(|frame| frame.dlc() == 8).count(), 4, "both boards");
     let mut bus = Bus::new(&[0x21], with(|p| p.addr_broadcast = Broadcast::None));
-    assert_eq!(bus.ask("000#", 300), frames("441#21"), "boards without a number hear 0");
+    assert_eq!(bus.ask("000#", 300), frames("441#21"), "boards without a number receive 0");
     bus.number(1);
     assert_eq!(bus.ask("000#", 300), []);
     assert_eq!(bus.ask("200#", 300), []);
@@ -163,7 +163,7 @@ fn d02_foreign_frames() {
     assert_eq!(bus.take(), []);
 }
 
-/// D-04: what boards say concerns no board, whatever its number; it is not even counted.
+/// D-04: what boards send concerns no board, whatever its number; it is not even counted.
 #[test]
 fn d04_boards_do_not_listen_to_boards() {
     let mut bus = Bus::initialised();

@@ -38,15 +38,16 @@ fn golden_start_and_run() {
     bus.send("341#0000000000000000");
     bus.boards[0].application.so = vec![100, 101, 102, 103];
     bus.send("680#");
-    bus.heard.clear();
+    bus.received.clear();
     bus.send("541#");
     let start = bus.now;
     bus.run(25);
-    let heard: Vec<_> = bus.heard.iter().map(|(at, frame)| ((at - start) / (10 * MS), *frame)).collect();
+    let received: Vec<_> =
+        bus.received.iter().map(|(at, frame)| ((at - start) / (10 * MS), *frame)).collect();
     let outputs = frames("381#0000640065006600 381#0300670000000000");
     let expected =
         [(0, frames("601#01000000")[0]), (1, outputs[0]), (1, outputs[1]), (2, outputs[0]), (2, outputs[1])];
-    assert_eq!(heard, expected);
+    assert_eq!(received, expected);
     bus.take();
     bus.send("601#01010000");
     bus.send("341#0000DC05ECFF0000");

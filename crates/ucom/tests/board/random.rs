@@ -23,7 +23,7 @@ impl Random {
 }
 
 /// D-20: whatever comes, whenever, the status byte never contradicts itself, numbers stay apart, outputs are
-/// active only while the loop runs, and what a board says is of the protocol.
+/// active only while the loop runs, and what a board sends is of the protocol.
 #[test]
 fn d20_a_million_random_frames() {
     let seed = std::env::var("UCOM_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(2026);
@@ -70,7 +70,7 @@ fn d20_a_million_random_frames() {
             assert!(!application.active || board.phase() == Phase::Running, "frame {i}: {frame}");
             assert_eq!(application.running, board.phase() == Phase::Running, "frame {i}: {frame}");
         }
-        for (_, frame) in bus.heard.drain(..) {
+        for (_, frame) in bus.received.drain(..) {
             assert!(ucom::FromBoard::decode(&frame, &Profile::default()).is_ok(), "{frame}");
         }
     }

@@ -5,7 +5,7 @@ use ucom::Profile;
 
 use crate::bus::{Bus, MS, frames};
 
-/// What can happen to a board that has reasons to tell its flags or its descriptions.
+/// What can happen to a board that has reasons to send its flags or its descriptions.
 #[derive(Clone, Copy, Debug)]
 enum Act {
     Wait(u64),
@@ -24,14 +24,14 @@ fn acts() -> impl Strategy<Value = Vec<Act>> {
         "1C1#8000",
     ]);
     let short = (0_u64..3_000).prop_map(Act::Wait);
-    // The PC's silence lasts long enough for the board to say so by itself.
+    // The PC's silence lasts long enough for the board to report it by itself.
     let long = (1_490_000_u64..1_512_000).prop_map(Act::Wait);
     let act = prop_oneof![3 => send.prop_map(Act::Send), 4 => short, 1 => long];
     prop::collection::vec(act, 1..40)
 }
 
 proptest! {
-    /// D-05: whatever a board has to tell, on a shared identifier it begins no earlier than 2 ms after the PC's last frame
+    /// D-05: whatever a board has to send, on a shared identifier it begins no earlier than 2 ms after the PC's last frame
     /// there.
     #[test]
     fn d05_never_within_2_ms_of_a_request(acts in acts()) {
@@ -50,7 +50,7 @@ proptest! {
             }
         }
         bus.run(50);
-        for (at, frame) in &bus.heard {
+        for (at, frame) in &bus.received {
             // The dimensions begin a dump; the rest of one that is under way follows at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - crate::bus::duration(frame);
@@ -76,7 +76,7 @@ fn d14_an_answer_ends_when_its_text_changes() {
                 bus.boards[0].application.texts[0][0] = long.clone().into_bytes();
                 bus.send(request);
                 // So many frames of the answer leave, then the text is another.
-                while bus.heard.iter().filter(|(_, f)| f.id() == id).count() < after {
+                while bus.received.iter().filter(|(_, f)| f.id() == id).count() < after {
                     bus.run_us(50);
                 }
                 bus.boards[0].store.description = b"x".to_vec();
@@ -90,8 +90,8 @@ fn d14_an_answer_ends_when_its_text_changes() {
                     bus.ask("5C1#", 20).iter().any(|f| f.id() == 0x6C1),
                     "{request} after {after} frames"
                 );
-                let heard = bus.ask(request, 20);
-                let answer: Vec<_> = heard.into_iter().filter(|f| f.id() == id).collect();
+                let received = bus.ask(request, 20);
+                let answer: Vec<_> = received.into_iter().filter(|f| f.id() == id).collect();
                 assert_eq!(answer.iter().filter(|f| f.dlc() == begins).count(), 1, "{request}: {answer:?}");
                 let end = answer[1..3] == frames(&format!("{id:03X}#0100 {id:03X}#78"));
                 assert!(end, "{request} after {after} frames: {answer:?}");
@@ -100,7 +100,7 @@ fn d14_an_answer_ends_when_its_text_changes() {
     }
 }
 
-/// D-06, D-12: a board without a number says nothing about wrong lengths, however strict it is: all such boards would say
+/// D-06, D-12: a board without a number reports no wrong lengths, however strict it is: all such boards would send
 /// it at once with one identifier. Nor does it answer.
 #[test]
 fn d06_d12_no_error_without_a_number() {
@@ -112,7 +112,7 @@ fn d06_d12_no_error_without_a_number() {
         assert_eq!(bus.ask(text, 300), [], "{text}");
         bus.number(1);
         let expected = match text {
-            // The one with the number says it for itself.
+            // The one with the number reports it for itself.
             "000#00" | "240#00" | "281#00" | "200#00" | "000#0000000000000000" => "081#07",
             _ => "",
         };

@@ -5,7 +5,7 @@ use ucom::{Frame, Profile, Sequence, Status};
 
 use crate::bus::{Bus, blocks, frames, image};
 
-/// The columns of the table; S3x and S4 are told apart from their neighbours.
+/// The columns of the table; S3x and S4 are distinguished from their neighbours.
 const STATES: [Phase; 7] = [
     Phase::Uninitialised,
     Phase::Idle,
@@ -45,24 +45,24 @@ fn in_state(phase: Phase) -> Bus {
 /// What came of an event.
 struct Seen {
     phase: Phase,
-    /// What was said within 9 ms, before the first transfer of the outputs.
-    said: Vec<Frame>,
+    /// What was sent within 9 ms, before the first transfer of the outputs.
+    sent: Vec<Frame>,
 }
 
 fn event(phase: Phase, text: &str) -> Seen {
     let mut bus = in_state(phase);
     // In S6 the outputs go out every 10 ms; they are no answers.
-    let said = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
-    Seen { phase: bus.boards[0].phase(), said }
+    let sent = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
+    Seen { phase: bus.boards[0].phase(), sent }
 }
 
-/// `expected` gives for each state the state after the event and what is said.
+/// `expected` gives for each state the state after the event and what is sent.
 fn row(text: &str, expected: impl Fn(Phase) -> (Phase, &'static str)) {
     for phase in STATES {
         let seen = event(phase, text);
-        let (after, said) = expected(phase);
+        let (after, sent) = expected(phase);
         assert_eq!(seen.phase, after, "{text} in {phase:?}");
-        assert_eq!(seen.said, frames(said), "{text} in {phase:?}");
+        assert_eq!(seen.sent, frames(sent), "{text} in {phase:?}");
     }
 }
 
@@ -74,13 +74,13 @@ fn d23_pc_reset_in_every_state() {
         for text in ["000#", "001#"] {
             let mut bus = in_state(phase);
             bus.boards[0].application.active = phase == Running;
-            let heard = bus.ask(text, 500);
+            let received = bus.ask(text, 500);
             if text == "001#" && phase == Uninitialised {
-                assert_eq!(heard, [], "nobody has this number");
+                assert_eq!(received, [], "nobody has this number");
                 continue;
             }
             let expected = frames("441#21");
-            let reports: Vec<_> = heard.into_iter().filter(|frame| frame.id() != 0x381).collect();
+            let reports: Vec<_> = received.into_iter().filter(|frame| frame.id() != 0x381).collect();
             assert_eq!(reports, expected, "{text} in {phase:?}");
             assert_eq!(bus.boards[0].status(), Status(0x11));
             assert_eq!(bus.boards[0].phase(), Uninitialised);
@@ -95,8 +95,8 @@ fn d07_pc_report_in_every_state() {
     for phase in STATES {
         let mut bus = in_state(phase);
         let status = bus.boards[0].status();
-        let heard = bus.ask("240#", 40);
-        assert_eq!(heard.iter().filter(|frame| **frame == frames("441#21")[0]).count(), 1, "{phase:?}");
+        let received = bus.ask("240#", 40);
+        assert_eq!(received.iter().filter(|frame| **frame == frames("441#21")[0]).count(), 1, "{phase:?}");
         assert_eq!(bus.boards[0].status(), status, "{phase:?}");
     }
 }
@@ -118,8 +118,8 @@ fn d04_pc_info_in_every_state() {
     for phase in STATES {
         for text in ["201#", "200#"] {
             let mut bus = in_state(phase);
-            let heard: Vec<_> = bus.ask(text, 9).into_iter().filter(|frame| frame.id() == 0x141).collect();
-            assert_eq!(heard.len(), if phase == Uninitialised { 0 } else { 4 }, "{text} in {phase:?}");
+            let received: Vec<_> = bus.ask(text, 9).into_iter().filter(|frame| frame.id() == 0x141).collect();
+            assert_eq!(received.len(), if phase == Uninitialised { 0 } else { 4 }, "{text} in {phase:?}");
         }
     }
 }
@@ -187,7 +187,7 @@ fn d43_pc_prog_in_every_state() {
     row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
 }
 
-/// D-12, D-06: what is too short is told, but for what would be ignored anyway.
+/// D-12, D-06: what is too short is reported, but for what would be ignored anyway.
 #[test]
 fn d12_short_frames_in_every_state() {
     row("1C1#02", |phase| (phase, if phase == Uninitialised { "" } else { "081#07" }));
@@ -269,8 +269,8 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
     for phase in STATES {
         for text in ["341#010007000000", "3C1#010007000000"] {
             let mut bus = in_state(phase);
-            let heard: Vec<_> = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
-            assert_eq!(heard, [], "{text} in {phase:?}");
+            let received: Vec<_> = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
+            assert_eq!(received, [], "{text} in {phase:?}");
             let application = &bus.boards[0].application;
             let taken = application.latched_ci[1] == 7 || application.par[1] == 7;
             assert_eq!(taken, matches!(phase, Ready | Running), "{text} in {phase:?}");
@@ -294,12 +294,12 @@ fn d36_dumps_in_every_state() {
         }
         let mut bus = in_state(phase);
         bus.send("580#");
-        let heard = bus.ask("5C0#", 9);
-        assert!(heard.iter().all(|frame| frame.id() == 0x381), "{phase:?}");
+        let received = bus.ask("5C0#", 9);
+        assert!(received.iter().all(|frame| frame.id() == 0x381), "{phase:?}");
     }
 }
 
-/// D-26: a board that reboots by itself says so, once.
+/// D-26: a board that reboots by itself reports it, once.
 #[test]
 fn d26_spontaneous_report() {
     for phase in STATES {

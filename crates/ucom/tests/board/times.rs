@@ -42,7 +42,7 @@ fn d07_boot_time() {
             assert_eq!(board.poll(at), None, "{after}");
             assert_eq!(board.phase(), phase, "{after} at {}", at - now);
         }
-        assert_eq!((board.number(), board.counters().ignored), (None, 0), "{after}: not heard");
+        assert_eq!((board.number(), board.counters().ignored), (None, 0), "{after}: not received");
     }
 }
 
@@ -149,7 +149,7 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(flush(&mut board, now + 10 * MS).len(), 2, "all outputs");
     assert_eq!(flush(&mut board, now + 20 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 20 * MS).len(), 2);
-    // Nobody says that the PC is there.
+    // No frame shows that the PC is there.
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
     board.poll(now + 1500 * MS);

@@ -17,9 +17,9 @@ pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.run(1);
     let mut finished = false;
     for block in all {
-        let heard = bus.block(block, 100);
-        finished |= heard.contains(&frames("101#")[0]);
-        if heard.is_empty() && bus.boards[0].flash.is_dark() {
+        let received = bus.block(block, 100);
+        finished |= received.contains(&frames("101#")[0]);
+        if received.is_empty() && bus.boards[0].flash.is_dark() {
             return false;
         }
     }
@@ -208,8 +208,8 @@ fn d40_exloader_then_application() {
         assert_eq!(bus.boards[0].record(), Some(GOLDEN));
     }
     let two = [vec![second.build(Endian::Little)], data(&image)].concat();
-    let heard: Vec<_> = two.iter().flat_map(|block| bus.block(block, 100)).collect();
-    assert_eq!(heard, frames("181# 181# 181# 181# 101#"));
+    let received: Vec<_> = two.iter().flat_map(|block| bus.block(block, 100)).collect();
+    assert_eq!(received, frames("181# 181# 181# 181# 101#"));
     assert_eq!(bus.boards[0].flash.bytes(Memory::Ram)[..120], exloader);
     assert_no_half_image(&bus, &image, "");
     assert_eq!(bus.boards[0].record().unwrap().program_id, second.program_id);
@@ -269,11 +269,11 @@ fn d41_no_header() {
     bus.run(50);
     bus.number(1);
     bus.send("041#");
-    let mut heard = Vec::new();
+    let mut received = Vec::new();
     for block in [data(&image), data(&image)].concat() {
-        heard.extend(bus.block(&block, 200));
+        received.extend(bus.block(&block, 200));
     }
-    assert_eq!(heard, frames("181# 181# 181# 181# 181# 181# 181# 101#"));
+    assert_eq!(received, frames("181# 181# 181# 181# 181# 181# 181# 101#"));
     assert_no_half_image(&bus, &image, "");
     let id = ucom::checksum(Checksum::Crc16, Endian::Little, &image);
     assert_eq!(bus.boards[0].record().unwrap().program_id, id);
@@ -308,7 +308,7 @@ fn d44_update_in_other_profiles() {
     }
 }
 
-/// D-40: raw, two different files as their headers say; the first is only checked.
+/// D-40: raw, two different files as their headers require; the first is only checked.
 #[test]
 fn d40_raw_takes_two_files() {
     let profile = Profile { prog_plan: Plan::Raw, ..Profile::default() };

@@ -35,12 +35,12 @@ fn d41_no_header_in_every_plan() {
     ] {
         let mut bus = headerless(plan);
         bus.send("041#");
-        let heard: Vec<_> = [data_blocks(&one), data_blocks(&two)]
+        let received: Vec<_> = [data_blocks(&one), data_blocks(&two)]
             .concat()
             .iter()
             .flat_map(|block| bus.block(block, 200))
             .collect();
-        assert_eq!(heard, frames("181# 181# 181# 181# 181# 181# 181# 101#"), "{plan}");
+        assert_eq!(received, frames("181# 181# 181# 181# 181# 181# 181# 101#"), "{plan}");
         for (memory, image) in memories.into_iter().zip([&one, &two]) {
             let Some(memory) = memory else { continue };
             assert_eq!(bus.boards[0].flash.bytes(memory)[..200], image[..], "{plan} {memory:?}");
@@ -51,7 +51,7 @@ fn d41_no_header_in_every_plan() {
     }
 }
 
-/// D-41: an image without header is as long as the board says, never longer than the area, and starts where that does.
+/// D-41: an image without header is as long as the board is configured to have it, never longer than the area, and starts where that does.
 #[test]
 fn d41_no_header_fills_the_area() {
     let image: Vec<u8> = (0..128).collect();
@@ -60,8 +60,9 @@ fn d41_no_header_fills_the_area() {
         let mut bus = headerless_in(MemoryFlash::new(area, area, area), Plan::VerifyWrite, headerless_words);
         bus.send("041#");
         let cycle = data_blocks(&image);
-        let heard: Vec<_> = [cycle.clone(), cycle].concat().iter().flat_map(|b| bus.block(b, 200)).collect();
-        assert_eq!(heard, frames("181# 181# 181# 101#"), "{headerless_words}");
+        let received: Vec<_> =
+            [cycle.clone(), cycle].concat().iter().flat_map(|b| bus.block(b, 200)).collect();
+        assert_eq!(received, frames("181# 181# 181# 101#"), "{headerless_words}");
         let record = bus.boards[0].record().unwrap();
         assert_eq!((record.address, record.words), (0x1000, words), "{headerless_words}");
         let bytes = 2 * words as usize;
@@ -130,8 +131,8 @@ fn d41_headers_of_the_first_cycle() {
         bus.number(1);
         bus.send("041#");
         let header = ucom::Header { memory, address, length, target, ..header(&[], 1, &profile) };
-        let heard = bus.block(&header.build(profile.prog_endian), 200);
-        assert_eq!(heard, frames(answer), "{plan}, {header:?}");
+        let received = bus.block(&header.build(profile.prog_endian), 200);
+        assert_eq!(received, frames(answer), "{plan}, {header:?}");
     }
 }
 
@@ -219,7 +220,7 @@ fn d42_block_time_without_header() {
 #[test]
 fn d42_no_ready_of_a_transfer_that_is_no_more() {
     let all = blocks(&small(), &Profile::default());
-    for (text, heard) in
+    for (text, received) in
         [("041#", "0C1#01"), ("1C1#0400", "0C1#01"), ("301#", "0C1#01 501# 681# 601#00000000")]
     {
         let mut bus = Bus::initialised();
@@ -230,6 +231,6 @@ fn d42_no_ready_of_a_transfer_that_is_no_more() {
         bus.send(text);
         bus.release();
         bus.run(50);
-        assert_eq!(bus.take(), frames(heard), "{text}");
+        assert_eq!(bus.take(), frames(received), "{text}");
     }
 }

@@ -183,7 +183,7 @@ impl View {
                 (causes, warnings, words::next_step(s).to_owned())
             }
         };
-        Trouble { causes, warnings, next, said }
+        Trouble { causes, warnings, next, message: said }
     }
 
     fn curves(&self, frame: &mut Frame<'_>, area: Rect) {

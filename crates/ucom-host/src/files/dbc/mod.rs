@@ -81,7 +81,7 @@ impl DbcSignal {
         };
         let Self { name, multiplex, bits, signal, .. } = self;
         let (scale, offset, unit) = signal.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
-        // The shortest number that says the limit: what calculating loses is not written.
+        // The shortest number for the limit: what calculating loses is not written.
         let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
         let (low, high) = match signal {
             Some(signal) if signal.known && signal.kind != SignalType::Hex => {

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_tell_what_the_texts_say() {
+    fn names_keep_what_the_texts_mean() {
         let mut names = Names::default();
         assert_eq!(names.name("Position (Soll)", "x"), "Position_Soll");
         assert_eq!(names.name("position soll", "x"), "position_soll_2");

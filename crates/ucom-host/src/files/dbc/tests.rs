@@ -7,7 +7,7 @@ use super::*;
 use ucom::{BufferPackage, Frame, Packages};
 
 fn boards() -> Vec<DbcBoard> {
-    let signal = Signal::bare(&ucom::Profile::default());
+    let signal = crate::files::Signal::bare(&ucom::Profile::default());
     let texts = |list: &[&str]| {
         list.iter().map(|t| NamedSignal { name: (*t).to_owned(), signal: signal.clone() }).collect::<Vec<_>>()
     };

@@ -1,7 +1,7 @@
-//! What a file is when nobody says so: records by their first line, raw bytes only where they cannot be text.
+//! The format of a file that no option names: records by their first line, raw bytes only where they cannot be text.
 //!
 //! A text that is taken for raw bytes is flashed, read back and called verified, and the board has no program any more.
-//! So raw bytes are only taken from a `.bin` without printable text, or when the user says so.
+//! So raw bytes are only taken from a `.bin` without printable text, or when an option names them.
 
 use super::{Format, ImageError};
 use std::path::Path;
@@ -21,7 +21,7 @@ impl Format {
         record_form(content).unwrap_or(Self::Bin)
     }
 
-    /// What a file of this name holds, where the user does not say it: raw bytes only from a `.bin`, and never text.
+    /// What a file of this name holds, where no option names it: raw bytes only from a `.bin`, and never text.
     pub(super) fn of(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         let by_name = name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         let expected = by_name.as_deref().and_then(|extension| match extension {

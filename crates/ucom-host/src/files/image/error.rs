@@ -106,11 +106,11 @@ pub enum LineProblem {
     /// Not a hexadecimal digit.
     #[error("not a hexadecimal digit")]
     Digit,
-    /// The record has another length than it says.
-    #[error("the record says {said} bytes and has {has}")]
+    /// The record has another length than it declares.
+    #[error("the record declares {declared} bytes and has {has}")]
     Length {
         /// By its length byte.
-        said: usize,
+        declared: usize,
         /// In the line.
         has: usize,
     },
@@ -156,10 +156,10 @@ pub enum LineProblem {
     #[error("data after the end record")]
     AfterEnd,
     /// The count record disagrees.
-    #[error("the count record says {said} data records, there are {has}")]
+    #[error("the count record declares {declared} data records, there are {has}")]
     Count {
         /// By the record.
-        said: u32,
+        declared: u32,
         /// In the file.
         has: u32,
     },

@@ -14,14 +14,14 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
         let [b':', digits @ ..] = line else { return Err(at(0, LineProblem::Start { expected: ':' })) };
         let bytes = hex_bytes(digits).map_err(|(column, problem)| at(column + 1, problem))?;
         let [length, high, low, kind, rest @ ..] = bytes.as_slice() else {
-            return Err(at(1, LineProblem::Length { said: 5, has: bytes.len() }));
+            return Err(at(1, LineProblem::Length { declared: 5, has: bytes.len() }));
         };
         let Some((&checksum, data)) = rest.split_last() else {
-            return Err(at(1, LineProblem::Length { said: 5, has: bytes.len() }));
+            return Err(at(1, LineProblem::Length { declared: 5, has: bytes.len() }));
         };
         if data.len() != usize::from(*length) {
-            let (said, has) = (usize::from(*length), data.len());
-            return Err(at(1, LineProblem::Length { said, has }));
+            let (declared, has) = (usize::from(*length), data.len());
+            return Err(at(1, LineProblem::Length { declared, has }));
         }
         let sum = bytes.iter().take(bytes.len() - 1).fold(0_u8, |sum, b| sum.wrapping_add(*b));
         let should = sum.wrapping_neg();
@@ -46,12 +46,12 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
             // Start addresses: the loader has its own.
             (3 | 5, [_, _, _, _]) => {}
             (1..=5, data) => {
-                let said = match kind {
+                let declared = match kind {
                     1 => 0,
                     2 | 4 => 2,
                     _ => 4,
                 };
-                return Err(at(1, LineProblem::Length { said, has: data.len() }));
+                return Err(at(1, LineProblem::Length { declared, has: data.len() }));
             }
             _ => return Err(at(7, LineProblem::Type { kind: *kind })),
         }

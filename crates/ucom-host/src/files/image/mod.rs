@@ -2,7 +2,7 @@
 //! unless it is asked for.
 //!
 //! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of
-//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are told by
+//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are reported by
 //! their records: where those leave gaps or overlap in one unit and follow each other without any in the other one. What one
 //! record or two can mean is not guessed; the unit can always be given.
 mod detect;
@@ -19,7 +19,7 @@ use core::str::FromStr;
 pub use error::{ImageError, LineProblem};
 use segments::Segments;
 
-/// Most bytes of an image unless [`ImageOptions::max_bytes`] says otherwise: 1 MiB.
+/// Most bytes of an image unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
 /// So many records in a row are no coincidence: a hole as long as the record before it may be meant once, and in a table of
@@ -87,7 +87,7 @@ pub enum Gaps {
     /// Refuse the file.
     #[default]
     Refuse,
-    /// Fill with 0xFF, the erased state of flash, and tell in [`Image::notes`].
+    /// Fill with 0xFF, the erased state of flash, and note it in [`Image::notes`].
     Fill,
 }
 
@@ -162,7 +162,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads a file's content, as of a `.bin` where the options say nothing and it is none of the others.
+    /// Reads a file's content, as of a `.bin` where the options leave it open and it is none of the others.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
         Self::parse_named(None, content, options)
     }

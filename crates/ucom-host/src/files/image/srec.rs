@@ -16,9 +16,9 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
         let kind = kind - b'0';
         let bytes = hex_bytes(digits).map_err(|(column, problem)| at(column + 2, problem))?;
         // The length counts address, data and checksum.
-        let (said, has) = (usize::from(*bytes.first().unwrap_or(&0)), bytes.len().saturating_sub(1));
-        if said != has || has == 0 {
-            return Err(at(2, LineProblem::Length { said, has }));
+        let (declared, has) = (usize::from(*bytes.first().unwrap_or(&0)), bytes.len().saturating_sub(1));
+        if declared != has || has == 0 {
+            return Err(at(2, LineProblem::Length { declared, has }));
         }
         let Some((&checksum, counted)) = bytes.split_last() else { continue };
         let should = !counted.iter().fold(0_u8, |sum, b| sum.wrapping_add(*b));
@@ -33,7 +33,7 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
             _ => return Err(at(1, LineProblem::Type { kind })),
         };
         let Some((address, data)) = body.split_at_checked(width) else {
-            return Err(at(2, LineProblem::Length { said: width + 1, has }));
+            return Err(at(2, LineProblem::Length { declared: width + 1, has }));
         };
         let address = address.iter().fold(0_u64, |value, b| value << 8 | u64::from(*b));
         if ended {
@@ -47,7 +47,7 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
             5 | 6 => {
                 let mask = if kind == 5 { 0xFFFF } else { 0xFF_FFFF };
                 if u64::from(records & mask) != address {
-                    let problem = LineProblem::Count { said: address as u32, has: records };
+                    let problem = LineProblem::Count { declared: address as u32, has: records };
                     return Err(at(4, problem));
                 }
             }

@@ -63,37 +63,40 @@ fn s_records_as_published_count_words_here() {
     let image = Image::parse(text.as_bytes(), &options).unwrap();
     assert_eq!(image.bytes().len(), 70);
     assert!(image.bytes().ends_with(b"Hello world.\n\0"));
-    assert_eq!(problem(&text.replace("S5030003F9", "S5030002FA")).2, LineProblem::Count { said: 2, has: 3 });
+    assert_eq!(
+        problem(&text.replace("S5030003F9", "S5030002FA")).2,
+        LineProblem::Count { declared: 2, has: 3 }
+    );
 }
 
-/// Which unit addresses count is told by records that follow each other in one unit alone; one or two records tell nothing.
+/// Records that follow each other in one unit alone show which unit addresses count; one or two records are not enough.
 #[test]
-fn the_unit_of_addresses_is_told_by_the_records() {
+fn the_unit_of_addresses_is_taken_from_the_records() {
     let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
     let file = |count: usize, length: usize, step: u32| {
         let lines = bytes.chunks(length).take(count).zip(0..);
         lines.map(|(data, i)| s_line(1, 2, 0x100 + i * step, data)).collect::<String>()
             + &s_line(9, 2, 0, &[])
     };
-    let told = |text: &str| {
+    let read = |text: &str| {
         let image = parse(text)?;
         let unit = image.address_unit(&ImageOptions::default());
         Ok::<_, ImageError>((image.address_words(), image.bytes().to_vec(), unit, image.notes().to_vec()))
     };
-    let in_words = told(&file(4, 16, 8)).unwrap();
+    let in_words = read(&file(4, 16, 8)).unwrap();
     assert_eq!(in_words, (0x100, bytes.clone(), Some(AddressUnit::Word), vec![]));
-    let in_bytes = told(&file(4, 16, 16)).unwrap();
+    let in_bytes = read(&file(4, 16, 16)).unwrap();
     let note = ImageNote::AddressesCount(AddressUnit::Byte);
     assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
     // A hole that is meant, or one unit or the other: it is not guessed.
-    assert!(matches!(told(&file(2, 16, 16)), Err(ImageError::Gap { address_words: 0x108, bytes: 16 })));
+    assert!(matches!(read(&file(2, 16, 16)), Err(ImageError::Gap { address_words: 0x108, bytes: 16 })));
     // A table of vectors: two words in each place of four.
-    assert!(matches!(told(&file(16, 4, 4)), Err(ImageError::Gap { address_words: 0x102, bytes: 4 })));
+    assert!(matches!(read(&file(16, 4, 4)), Err(ImageError::Gap { address_words: 0x102, bytes: 4 })));
     // Intel HEX whose addresses count words: their bytes lie over each other otherwise.
     let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
     let hex = lines.collect::<String>() + ":00000001FF\n";
     let note = ImageNote::AddressesCount(AddressUnit::Word);
-    assert_eq!(told(&hex).unwrap(), (0x100, bytes.clone(), Some(AddressUnit::Word), vec![note]));
+    assert_eq!(read(&hex).unwrap(), (0x100, bytes.clone(), Some(AddressUnit::Word), vec![note]));
 }
 
 #[test]
@@ -103,7 +106,7 @@ fn what_is_wrong_is_named_with_line_and_column() {
     assert_eq!(problem(&good.replace("0102", "0103")).2, LineProblem::Checksum { has: 0xF2, should: 0xF1 });
     assert_eq!(problem(&good.replace(":00000001FF", "nonsense")).0, 2);
     assert_eq!(problem(&good.replace(":00000001FF", ":000000G1FF")), (2, 8, LineProblem::Digit));
-    assert_eq!(problem(&good.replace(":04", ":05")), (1, 2, LineProblem::Length { said: 5, has: 4 }));
+    assert_eq!(problem(&good.replace(":04", ":05")), (1, 2, LineProblem::Length { declared: 5, has: 4 }));
     let twice = hex_line(0, 0, &[1, 2]) + &hex_line(1, 0, &[9, 2]) + ":00000001FF\n";
     assert_eq!(problem(&twice), (2, 1, LineProblem::Overlap { address: 1 }));
     assert!(matches!(parse(&hex_line(0, 0, &[1, 2])), Err(ImageError::NoEnd { lines: 1, .. })));
@@ -179,7 +182,7 @@ fn a_text_is_no_image() {
             assert!(Image::parse(text, &raw).is_ok());
         }
     }
-    // A name promises records: their first mistake is told.
+    // A name promises records: their first mistake is reported.
     assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
     assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
     let bytes: Vec<u8> = (0..=255).collect();

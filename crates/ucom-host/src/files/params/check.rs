@@ -114,23 +114,23 @@ pub enum ParamsProblemKind {
 /// Whether the board is the one that the file means, and has the program that it means.
 pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<ParamsProblem> {
     let mut problems = Vec::new();
-    let mut say = |kind| problems.push(ParamsProblem { place: board.place, board: board.number, kind });
+    let mut add = |kind| problems.push(ParamsProblem { place: board.place, board: board.number, kind });
     let info = target.info;
     if let Some(wanted) = board.flash_number
         && wanted != info.flash_number
     {
-        say(ParamsProblemKind::WrongFlash { wanted, found: info.flash_number });
+        add(ParamsProblemKind::WrongFlash { wanted, found: info.flash_number });
     }
     if let Some(wanted) = &board.name
         && target.name != Some(wanted)
     {
-        say(ParamsProblemKind::WrongName { wanted: wanted.clone(), found: target.name.map(str::to_owned) });
+        add(ParamsProblemKind::WrongName { wanted: wanted.clone(), found: target.name.map(str::to_owned) });
     }
     let found = info.has_application().then_some(info.program_id);
     if let Some(wanted) = board.program_id
         && found != Some(wanted)
     {
-        say(ParamsProblemKind::WrongProgram { wanted, found });
+        add(ParamsProblemKind::WrongProgram { wanted, found });
     }
     problems
 }
@@ -159,16 +159,16 @@ fn check_entries(
     let mut lines: BTreeMap<u16, u32> = BTreeMap::new();
     let mut words = Vec::new();
     for ParamsEntry { name, given, place } in entries {
-        let mut say = |problem| problems.push(ParamsProblem { place: *place, board, kind: problem });
+        let mut add = |problem| problems.push(ParamsProblem { place: *place, board, kind: problem });
         let index = match description.find(board, kind, name) {
             Ok(index) => index,
             Err(e) => {
-                say(ParamsProblemKind::NoSignal(e));
+                add(ParamsProblemKind::NoSignal(e));
                 continue;
             }
         };
         if let Some(first) = lines.insert(index, place.line) {
-            say(ParamsProblemKind::Twice { kind: kind.name(), name: name.clone(), first });
+            add(ParamsProblemKind::Twice { kind: kind.name(), name: name.clone(), first });
             continue;
         }
         let Some(signal) = signals.get(kind, index.into()) else { continue };
@@ -180,7 +180,7 @@ fn check_entries(
                 text: signal.text_with_unit(word),
                 rounded: signal.rounded(given, word).map(|sent| format!("{given} → {sent}")),
             }),
-            Err(problem) => say(ParamsProblemKind::Value { kind: kind.name(), name: name.clone(), problem }),
+            Err(problem) => add(ParamsProblemKind::Value { kind: kind.name(), name: name.clone(), problem }),
         }
     }
     words

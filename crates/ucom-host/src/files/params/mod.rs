@@ -1,6 +1,6 @@
 //! Parameter files: which parameters, and which first inputs, boards are to have. YAML, written to be edited.
 //!
-//! The protocol has no way to read parameters back (D-35), so a file never says what is on a board. It says what somebody
+//! The protocol has no way to read parameters back (D-35), so a file never shows what is on a board. It shows what somebody
 //! wants there; who stands where is checked by flash number or name, and the names belong to a Program ID.
 
 mod check;
@@ -35,7 +35,7 @@ pub struct ParamsBoard {
     pub flash_number: Option<u16>,
     /// The name in the inventory that must stand there; a board has this or a flash number, or both.
     pub name: Option<String>,
-    /// The program that the names belong to; `None`: the file says `any`.
+    /// The program that the names belong to; `None`: `any` in the file.
     pub program_id: Option<u16>,
     /// Parameters.
     pub par: Vec<ParamsEntry>,

@@ -98,7 +98,7 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
     let name = name.map(|n| n.trim().to_owned()).filter(|n| !n.is_empty());
     if flash_number.is_none() && name.is_none() {
         let what = format!(
-            "board {number_of}: neither flash_number nor name says which board must stand there; \
+            "board {number_of}: neither flash_number nor name identifies the board that must stand there; \
              `ucom info {number_of}` shows the flash number"
         );
         return Err(wrong(at, what));
@@ -117,9 +117,9 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
     Ok(ParamsBoard { number: number_of, place: at, flash_number, name, program_id, par, ci })
 }
 
-/// What the YAML library says, in words for whoever wrote the file.
+/// The YAML library's message, in words for whoever wrote the file.
 fn people(words: &str) -> String {
-    // The place is told by us.
+    // The place is reported by us.
     let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');
     if let Some(rest) = words.strip_prefix("duplicate mapping key") {
         let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);

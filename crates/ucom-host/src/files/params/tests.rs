@@ -55,37 +55,37 @@ fn values_become_words_of_their_signals() {
 #[test]
 fn another_board_or_program_is_a_problem_with_its_line() {
     let file = ParamsFile::parse(GOOD).unwrap();
-    let said = |info: &BoardInfo, number: u8, name: Option<&str>| {
+    let message = |info: &BoardInfo, number: u8, name: Option<&str>| {
         let target = ParamsTarget { info, name };
         let problems = check_identity(file.board(number).unwrap(), &target);
         problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
     };
     let other = BoardInfo { flash_number: 0x42, program_id: 0x4B3F, ..info() };
-    let text = said(&other, 1, None);
+    let text = message(&other, 1, None);
     assert!(
         text.contains("line 2, column 5: board 1: its flash number is 0x0042, the file is for 0x0021"),
         "{text}"
     );
     assert!(text.contains("its program is 0x4B3F, the names in the file belong to 0x1234"), "{text}");
     let bare = BoardInfo { program_id: 0xFFFF, date: 0xFFFF, ..info() };
-    assert!(said(&bare, 1, None).contains("its program is missing"));
-    assert_eq!(said(&other, 2, Some("jaw")), "");
+    assert!(message(&bare, 1, None).contains("its program is missing"));
+    assert_eq!(message(&other, 2, Some("jaw")), "");
     assert!(
-        said(&other, 2, Some("lips"))
+        message(&other, 2, Some("lips"))
             .contains("line 11, column 5: board 2: the file is for `jaw`, the inventory calls it `lips`")
     );
-    assert!(said(&other, 2, None).contains("calls it nothing"));
+    assert!(message(&other, 2, None).contains("calls it nothing"));
 }
 
-/// Every mistake is told at once, with line and column.
+/// Every mistake is reported at once, with line and column.
 #[test]
 fn names_and_ranges_are_checked_with_their_place() {
     let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 4000\n    kp: 70000\n    current_max: 3 A\n    mode: on\n  ci:\n    set_position: 61 deg\n";
     let file = ParamsFile::parse(text).unwrap();
     let problems = check_board(file.board(1).unwrap(), &description(), &signals()).unwrap_err();
-    let said: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    let message: Vec<String> = problems.iter().map(ToString::to_string).collect();
     assert_eq!(
-        said,
+        message,
         [
             "line 12, column 19: board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg",
             "line 6, column 9: board 1 has no PAR `kq`; there is `kp [mA/deg]`",
@@ -121,13 +121,13 @@ fn what_is_no_parameter_file_is_refused_with_its_place() {
     assert!(of("kp: 0x10000").contains("no word of 16 bits"));
     assert!(of("kp: ~").contains("line 6") && of("kp:").contains("line 6"), "{}", of("kp:"));
     assert!(of("kp: 1\n      kp: 2").contains("line 7"), "{}", of("kp: 1\n      kp: 2"));
-    let said = of("kp: 1\n      kp: 2");
-    assert!(said.contains("`kp` is given twice") && !said.contains("Policy"), "{said}");
-    let said = of("kp: [1, 2]");
-    assert!(said.contains("line 6, column 11: ") && said.contains("one value"), "{said}");
-    let said = refused("boards: []\n---\nboards: []\n");
-    assert!(said.contains("line 2") || said.contains("line 3"), "{said}");
-    assert!(said.contains("second document") && !said.contains("from_"), "{said}");
+    let message = of("kp: 1\n      kp: 2");
+    assert!(message.contains("`kp` is given twice") && !message.contains("Policy"), "{message}");
+    let message = of("kp: [1, 2]");
+    assert!(message.contains("line 6, column 11: ") && message.contains("one value"), "{message}");
+    let message = refused("boards: []\n---\nboards: []\n");
+    assert!(message.contains("line 2") || message.contains("line 3"), "{message}");
+    assert!(message.contains("second document") && !message.contains("from_"), "{message}");
     assert!(refused("boards:\n  - bord: 1\n").contains("line 2"));
     assert!(refused("boards: 3\n").contains("line 1"), "{}", refused("boards: 3\n"));
     assert!(refused("# nothing").contains("end of input"), "{}", refused("# nothing"));

@@ -185,7 +185,7 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
         }
         Ok(())
     });
-    // A chunk whose writer was killed says nothing of its length yet, so its damage need not be at the end.
+    // A chunk whose writer was killed does not contain its length yet, so its damage need not be at the end.
     let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
     let broken_off = |why: String| format!("the file is broken off after {} bytes{why}", file.len());
     recording.broken_off = match read {

@@ -168,7 +168,7 @@ fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     }
 }
 
-/// The same where a chunk of MCAP was under way: its head does not say yet how long it is.
+/// The same where a chunk of MCAP was under way: its head does not contain its length yet.
 #[test]
 fn a_chunk_without_its_end_hides_nothing_before_it() {
     let record = |i: u64| {

@@ -119,7 +119,7 @@ impl FileSignal {
     }
 }
 
-/// What the TOML library says, in words for whoever wrote the table.
+/// The TOML library's message, in words for whoever wrote the table.
 pub(super) fn people(words: &str) -> String {
     let terms = [
         ("duplicate key", "the same key is given twice"),

@@ -36,7 +36,7 @@ pub struct Signal {
     pub min: Option<f64>,
     /// Largest value that may be written, in units.
     pub max: Option<f64>,
-    /// A table says so; otherwise it is a bare word.
+    /// It comes from a table; otherwise it is a bare word.
     pub known: bool,
     /// There is a table, and it knows nothing of the program: only the word itself can be given.
     pub raw_only: bool,
@@ -87,7 +87,7 @@ impl Signal {
         f64::from(number) * self.scale + self.offset
     }
 
-    /// Digits behind the point that tell two neighbouring words apart.
+    /// Digits behind the point that distinguish two neighbouring words.
     fn digits(&self) -> usize {
         let written = |x: f64| format!("{x}").split_once('.').map_or(0, |(_, digits)| digits.len());
         let enough = (-self.scale.abs().log10()).ceil().max(0.0) as usize + 2;
@@ -140,7 +140,7 @@ impl Signal {
         }
         let text = |limit: f64, own: Option<f64>| {
             let text = self.written(limit);
-            // A limit of the table between two words is told as it is.
+            // A limit of the table between two words is shown as it is.
             let odd = own == Some(limit) && text.parse() != Ok(limit);
             if odd { limit.to_string() } else { text }
         };
@@ -280,23 +280,23 @@ mod tests {
         assert_eq!(angle.text_with_unit(0xFFFF), "-0.01 deg");
         assert_eq!(angle.json(1550), json!(15.5));
         // It could be the word, or a value in the unit.
-        let said = word(&angle, "15").unwrap_err().to_string();
-        assert_eq!(said, "15: the unit is missing: `15deg`, or the word itself as 0x0000");
+        let message = word(&angle, "15").unwrap_err().to_string();
+        assert_eq!(message, "15: the unit is missing: `15deg`, or the word itself as 0x0000");
         assert!(word(&angle, "0").is_err());
         // The word itself is never scaled.
         assert_eq!(word(&angle, "0x0010"), Ok(16));
-        let said = word(&angle, "400 deg").unwrap_err().to_string();
-        assert_eq!(said, "400 deg is outside -327.68..327.67 deg");
+        let message = word(&angle, "400 deg").unwrap_err().to_string();
+        assert_eq!(message, "400 deg is outside -327.68..327.67 deg");
         assert!(word(&angle, "15 rad").unwrap_err().to_string().contains("its unit is deg"));
         let warm = signal(SignalType::Uint16, 0.1, -40.0, "°C");
         assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
         let down = signal(SignalType::Int16, -0.5, 0.0, "");
         assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
         // It would be the word where the table is missing; without a unit there is only the word to be given.
-        let said = word(&down, "2").unwrap_err().to_string();
+        let message = word(&down, "2").unwrap_err().to_string();
         assert!(
-            said.starts_with("2: the table scales it and names no unit") && said.contains("0x0000"),
-            "{said}"
+            message.starts_with("2: the table scales it and names no unit") && message.contains("0x0000"),
+            "{message}"
         );
         assert_eq!(word(&down, "0x0002"), Ok(2));
         // A number that the table does not scale is the word with it and without.
@@ -316,9 +316,9 @@ mod tests {
     fn d11_rounding_never_leaves_the_limits() {
         let coarse = Signal { max: Some(150.0), ..signal(SignalType::Int16, 100.0, 0.0, "mA") };
         for wrong in ["199.9mA", "150.1mA", "0x0002"] {
-            let said = word(&coarse, wrong).unwrap_err().to_string();
+            let message = word(&coarse, wrong).unwrap_err().to_string();
             assert_eq!(
-                said,
+                message,
                 format!("{} is outside -3276800..150 mA", wrong.parse::<SignalValue>().unwrap())
             );
         }
@@ -336,14 +336,17 @@ mod tests {
     }
 
     #[test]
-    fn a_rounded_value_is_told() {
+    fn a_rounded_value_is_reported() {
         let tenths = signal(SignalType::Int16, 0.1, 0.0, "A");
-        let told = |text: &str| {
+        let rounded = |text: &str| {
             let given = text.parse().unwrap();
             tenths.rounded(&given, tenths.word(&given).unwrap())
         };
-        assert_eq!((told("0.04A"), told("0.3 A"), told("0x0003")), (Some("0.0 A".into()), None, None));
-        assert_eq!(told("-1234.56 A"), Some("-1234.6 A".into()));
+        assert_eq!(
+            (rounded("0.04A"), rounded("0.3 A"), rounded("0x0003")),
+            (Some("0.0 A".into()), None, None)
+        );
+        assert_eq!(rounded("-1234.56 A"), Some("-1234.6 A".into()));
     }
 
     #[test]

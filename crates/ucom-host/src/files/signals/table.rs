@@ -113,7 +113,7 @@ impl SignalTable {
         Self::parse(&text).map_err(|e| SignalTableError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// Whether it was read from anything; otherwise nobody has said what words mean.
+    /// Whether it was read from anything; otherwise the meaning of words is unknown.
     pub fn is_given(&self) -> bool {
         self.given
     }
@@ -123,7 +123,7 @@ impl SignalTable {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
-    /// The file's text for programs that are to get a table: every name, and what the texts of the boards seem to say about
+    /// The file's text for programs that are to get a table: every name, and what the texts of the boards seem to mean for
     /// scale and unit, to be looked over by somebody who knows.
     pub fn template(programs: &[(u16, &IoDescription)]) -> String {
         let mut text = String::from(
@@ -138,7 +138,7 @@ impl SignalTable {
             for (kind, title) in [(Kind::Ci, "ci"), (Kind::So, "so"), (Kind::Par, "par")] {
                 text += &format!("\n[program.{title}]\n");
                 if kind != Kind::So {
-                    text += "# Boards tell no limits: add them, as { …, min = -60, max = 60 }, before anything moves.\n";
+                    text += "# Boards send no limits: add them, as { …, min = -60, max = 60 }, before anything moves.\n";
                 }
                 let mut used = BTreeSet::new();
                 for (i, name) in description.names(kind).iter().enumerate() {
@@ -151,7 +151,7 @@ impl SignalTable {
                     };
                     // Two signals of one name, and a third that is called by the number of the second: nothing to be done.
                     if used.insert(key.clone()) {
-                        text += &format!("{key} = {{ {} }}\n", told(name));
+                        text += &format!("{key} = {{ {} }}\n", keys(name));
                     }
                 }
             }
@@ -161,7 +161,7 @@ impl SignalTable {
 }
 
 /// `scale = 0.01, unit = "deg"` from `position [0.01 deg]`.
-fn told(name: &str) -> String {
+fn keys(name: &str) -> String {
     let bracket =
         name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
     let mut keys = vec!["type = \"int16\"".to_owned()];
@@ -174,8 +174,8 @@ fn told(name: &str) -> String {
     };
     let scale = scale.filter(|n: &f64| (1.0 / LARGEST..=LARGEST).contains(n));
     keys.extend(scale.map(|n| format!("scale = {n}")));
-    let told = FileSignal { unit: unit.into(), ..Default::default() };
-    if told.check().is_ok() && !unit.is_empty() {
+    let signal = FileSignal { unit: unit.into(), ..Default::default() };
+    if signal.check().is_ok() && !unit.is_empty() {
         keys.push(format!("unit = {}", quoted(unit)));
     }
     keys.join(", ")
@@ -277,15 +277,18 @@ mod tests {
         assert!(refused("scale = nan").contains("NaN"));
         assert!(refused("offset = inf").contains("inf"));
         assert!(refused("min = 2, max = 1").contains("min = 2 is above max = 1"));
-        let said = refused("scale = 0.01, unit = \"deg\", min = -60, max = 400");
-        assert!(said.contains("max = 400 is outside -327.68..327.67, what the word can hold"), "{said}");
+        let message = refused("scale = 0.01, unit = \"deg\", min = -60, max = 400");
+        assert!(
+            message.contains("max = 400 is outside -327.68..327.67, what the word can hold"),
+            "{message}"
+        );
         assert!(refused("type = \"uint16\", min = -1").contains("min = -1 is outside 0..65535"));
         assert!(refused("scale = 100, min = 110, max = 150").contains("no word lies between"));
         assert!(refused("type = \"bool\", scale = 2").contains("have no scale"));
         assert!(refused("unit = \"2m\"").contains("behind a number"));
         assert!(refused("scales = 2").contains("line 4") && refused("type = \"int8\"").contains("line 4"));
-        let said = refused("scale = \"x\"");
-        assert!(said.contains("expected a number") && !said.contains("f64"), "{said}");
+        let message = refused("scale = \"x\"");
+        assert!(message.contains("expected a number") && !message.contains("f64"), "{message}");
         let form = |text: &str| SignalTable::parse(text).unwrap_err().to_string();
         assert!(form("[[program]]\nname = \"x\"").contains("program 1 has no program_id"));
         assert!(form("[[program]]\nprogram_id = [1, 1]").contains("0x0001 is given twice"));

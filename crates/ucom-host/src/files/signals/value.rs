@@ -93,7 +93,7 @@ impl fmt::Display for SignalValue {
             Self::Raw(word) => write!(f, "0x{word:04X}"),
             Self::Number { value, unit } => {
                 let size = value.abs();
-                // 1e300 is not told with 300 zeros.
+                // 1e300 is not printed with 300 zeros.
                 if *value != 0.0 && !(1e-6..1e15).contains(&size) {
                     write!(f, "{value:e}")?;
                 } else {

@@ -23,7 +23,7 @@ fn is(frame: &Frame, function: Function, board: u8) -> bool {
 async fn halt(bench: &mut Bench<'_>, board: u8) {
     for _ in 0..3 {
         bench.send(Function::Admin, board, &[0; 4]).await;
-        bench.hear(20 * MS).await;
+        bench.receive(20 * MS).await;
     }
 }
 
@@ -42,25 +42,25 @@ pub(super) async fn walk(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Er
     bench.wait(Function::McaReady, board, times.start).await;
     need!(bench.status_is(board, 0x8B, "PC_START").await);
     bench.send(Function::McaStart, board, &[]).await;
-    bench.hear(times.admin).await;
+    bench.receive(times.admin).await;
     let running = bench.status_is(board, 0xAB, "MCA_PC_START").await;
     halt(bench, board).await;
     need!(running);
     need!(bench.status_is(board, 0x8B, "flags with run = 0").await);
     bench.send(Function::SetStatus, board, &[0x80, 0]).await;
-    bench.hear(100 * MS).await;
+    bench.receive(100 * MS).await;
     need!(bench.status_is(board, 0x1B, "MSTART = 0").await);
     Ok(Verdict::Pass)
 }
 
 pub(super) async fn start(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     bench.send(Function::SetStatus, board, &[0x84, 0]).await;
-    bench.hear(100 * MS).await;
+    bench.receive(100 * MS).await;
     let Some(info) = bench.info(board).await else {
         return Ok(Verdict::Fail("PC_INFO is not answered".into()));
     };
     bench.send(Function::Start, board, &[]).await;
-    let came = bench.hear(bench.link.times().start).await;
+    let came = bench.receive(bench.link.times().start).await;
     if !info.has_application() {
         let pass = came.iter().any(|f| is(f, Function::Error, board) && f.data() == [11]);
         return Ok(verdict(pass, &came));
@@ -81,14 +81,14 @@ pub(super) async fn inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
         [a, b, 0, 0, 0, 0, 0, 0]
     };
     bench.send(Function::Ci, board, &package(d.ci)).await;
-    let came = bench.hear(100 * MS).await;
+    let came = bench.receive(100 * MS).await;
     if !matches!(came.as_slice(), [f] if is(f, Function::Error, board) && f.data() == [5]) {
         return Ok(Verdict::Fail(format!("at the dimension {}: {}", d.ci, list(&came))));
     }
     if let Some(last) = d.ci.checked_sub(1) {
         // Zeros, as the loop does not run and takes the initial inputs when it starts.
         bench.send(Function::Ci, board, &package(last)).await;
-        let came = bench.hear(100 * MS).await;
+        let came = bench.receive(100 * MS).await;
         if !came.is_empty() {
             return Ok(Verdict::Fail(format!("last word with surplus words: {}", list(&came))));
         }
@@ -145,14 +145,14 @@ async fn judge_alone(
         return v;
     }
     bench.send(Function::McaStart, board, &[]).await;
-    bench.hear(bench.link.times().admin).await;
+    bench.receive(bench.link.times().admin).await;
     bench.status_is(board, 0xAB, "MCA_PC_START").await.err().unwrap_or(Verdict::Pass)
 }
 
 pub(super) async fn alive(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     need!(bench.started(board).await?);
     bench.send(Function::McaStart, board, &[]).await;
-    bench.hear(bench.link.times().admin).await;
+    bench.receive(bench.link.times().admin).await;
     let result = judge_alive(bench, board).await;
     bench.heartbeats(true);
     halt(bench, board).await;
@@ -189,7 +189,7 @@ async fn judge_alive(bench: &mut Bench<'_>, board: u8) -> Verdict {
 pub(super) async fn flags(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     need!(bench.started(board).await?);
     bench.send(Function::Admin, board, &[2, 0, 0, 0]).await;
-    let came = bench.hear(150 * MS).await;
+    let came = bench.receive(150 * MS).await;
     let answered = came.iter().any(|f| is(f, Function::Admin, board) || is(f, Function::Error, board));
     let ran = bench.info(board).await.is_some_and(|info| info.status.has(Status::MCARUN));
     if answered || ran {
@@ -197,7 +197,7 @@ pub(super) async fn flags(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
         return Ok(Verdict::Fail(format!("02000000: {}", list(&came))));
     }
     bench.send(Function::Admin, board, &[0; 3]).await;
-    let came = bench.hear(150 * MS).await;
+    let came = bench.receive(150 * MS).await;
     let pass = matches!(came.as_slice(), [f] if is(f, Function::Error, board) && f.data() == [7]);
     Ok(verdict(pass, &came))
 }

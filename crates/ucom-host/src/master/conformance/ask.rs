@@ -34,7 +34,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Resu
     let mut seen = Vec::new();
     for _ in 0..2 {
         bench.send(Function::AskReport, broadcast, &[]).await;
-        seen.push(only_reports(&bench.hear(window).await));
+        seen.push(only_reports(&bench.receive(window).await));
     }
     let [first, second] = seen.as_slice() else { return Ok(Verdict::Pass) };
     if first != second {
@@ -49,7 +49,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Resu
     for board in boards {
         match bench.info(board.number).await {
             Some(now) if now == board.info => {}
-            other => return Ok(Verdict::Fail(format!("afterwards board {} says {other:?}", board.number))),
+            other => return Ok(Verdict::Fail(format!("afterwards board {} sends {other:?}", board.number))),
         }
     }
     Ok(Verdict::Pass)
@@ -74,7 +74,7 @@ pub(super) async fn init_again(
         return Ok(Verdict::Fail("PC_INFO is not answered: has it rebooted? `ucom scan`".into()));
     }
     bench.send(Function::Init, board, &[]).await;
-    let came = bench.hear(bench.link.times().init_ack).await;
+    let came = bench.receive(bench.link.times().init_ack).await;
     let pass = matches!(came.as_slice(), [f] if f.id() == 0x0C0 + u16::from(board) && f.data() == [board]);
     Ok(verdict(pass, &came))
 }
@@ -99,14 +99,14 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     // With data it is a board's answer, never a request (D-12). Nobody but the board itself may send so under its number, so
     // it must not be about to.
     bench.send(Function::DumpIo, board, &[0]).await;
-    let came = answers(bench.hear(150 * MS).await);
+    let came = answers(bench.receive(150 * MS).await);
     if !came.is_empty() {
         return Ok(Verdict::Fail(format!("with one byte of data: {}", list(&came))));
     }
     bench.send(Function::DumpIo, board, &[]).await;
     let mut came = Vec::new();
     loop {
-        let more = answers(bench.hear(bench.link.times().gap.max(bench.link.times().info)).await);
+        let more = answers(bench.receive(bench.link.times().gap.max(bench.link.times().info)).await);
         if more.is_empty() || came.len() > 10_000 {
             break;
         }
@@ -166,7 +166,7 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
         return Ok(Verdict::Fail("no dimensions in the IO description".into()));
     };
     bench.send(Function::DumpCi, board, &[]).await;
-    let came = bench.hear(times.info.max(times.gap) + 2 * MS * u64::from(dimensions.ci)).await;
+    let came = bench.receive(times.info.max(times.gap) + 2 * MS * u64::from(dimensions.ci)).await;
     let id = Function::DspCi;
     let packages: Vec<Frame> =
         came.into_iter().filter(|f| f.address().is_ok_and(|(f, n)| f == id && n.number() == board)).collect();
@@ -190,7 +190,7 @@ pub(super) async fn dimensions(bench: &mut Bench<'_>, board: u8) -> Option<Dimen
     bench.send(Function::DumpIo, board, &[]).await;
     let first = bench.wait(Function::DumpIo, board, bench.link.times().info).await;
     // The rest of the answer must not be taken for another one.
-    while !bench.hear(bench.link.times().gap).await.is_empty() {}
+    while !bench.receive(bench.link.times().gap).await.is_empty() {}
     let endian: Endian = bench.profile().endian;
     Dimensions::parse(&first?.payload(), endian)
 }

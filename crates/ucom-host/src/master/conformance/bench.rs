@@ -61,7 +61,7 @@ impl<'a> Bench<'a> {
     }
 
     /// All frames of boards within a time, but for those that come by themselves.
-    pub async fn hear(&mut self, us: u64) -> Vec<Frame> {
+    pub async fn receive(&mut self, us: u64) -> Vec<Frame> {
         let all = self.hear_all(us).await;
         let answer = |f: &Frame| f.address().is_ok_and(|(function, _)| !NOISE.contains(&function));
         all.into_iter().map(|(_, f)| f).filter(answer).collect()
@@ -108,7 +108,7 @@ impl<'a> Bench<'a> {
             self.send(Function::Info, board, &[]).await;
             let first = self.wait(Function::DspInfo, board, self.link.times().info).await;
             // The text that follows must not be taken for the next answer.
-            self.hear(self.link.times().gap).await;
+            self.receive(self.link.times().gap).await;
             if let Some(frame) = first {
                 return BoardInfo::parse(&frame.payload(), self.profile().endian);
             }
@@ -144,7 +144,7 @@ impl<'a> Bench<'a> {
             Err(e) => return skipped_or(e),
         }
         self.send(Function::Admin, board, &[0; 4]).await;
-        self.hear(20 * MS).await;
+        self.receive(20 * MS).await;
         Ok(Ok(()))
     }
 }

@@ -13,7 +13,7 @@ async fn reset_all(bench: &mut Bench<'_>) -> Vec<ucom::Frame> {
         core.boards.clear();
         core.data.clear();
     });
-    bench.hear(bench.link.times().report_window).await
+    bench.receive(bench.link.times().report_window).await
 }
 
 pub(super) async fn reset(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict {
@@ -45,27 +45,27 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>) -> Verdict {
     ];
     for (function, data) in requests {
         bench.send(function, first, data).await;
-        let came = bench.hear(60 * MS).await;
+        let came = bench.receive(60 * MS).await;
         if !came.is_empty() {
             return Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came)));
         }
     }
     // By broadcast, too: a board without a number does not take it (D-04, D-06).
     bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
-    let came = bench.hear(150 * MS).await;
+    let came = bench.receive(150 * MS).await;
     verdict(came.is_empty(), &came)
 }
 
 pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict {
     if bench.profile().chain_auto_opinit {
-        return Verdict::Skipped("the profile says that boards raise their pin by themselves".into());
+        return Verdict::Skipped("by the profile boards raise their pin by themselves".into());
     }
     reset_all(bench).await;
     let ack = bench.link.times().init_ack;
     let numbers: Vec<u8> = bench.profile().board_numbers().map(|n| n.number()).collect();
     for (i, n) in numbers.iter().take(boards.len()).enumerate() {
         bench.send(Function::Init, *n, &[]).await;
-        let came = bench.hear(ack).await;
+        let came = bench.receive(ack).await;
         let pass = matches!(came.as_slice(), [f] if f.id() == 0x0C0 + u16::from(*n) && f.data() == [*n]);
         if !pass {
             return Verdict::Fail(format!("PC_INIT({n}): {}", list(&came)));
@@ -74,7 +74,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict
         if let Some(next) = numbers.get(i + 1) {
             for function in [Function::Init, Function::Info] {
                 bench.send(function, *next, &[]).await;
-                let came = bench.hear(ack).await;
+                let came = bench.receive(ack).await;
                 if !came.is_empty() {
                     let name = function.name();
                     return Verdict::Fail(format!(
@@ -85,7 +85,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict
             }
         }
         bench.send(Function::SetStatus, *n, &[2, 2]).await;
-        bench.hear(10 * MS).await;
+        bench.receive(10 * MS).await;
         match bench.info(*n).await {
             Some(info) if info.status.has(Status::OPINIT) => {}
             other => return Verdict::Fail(format!("board {n}: OPINIT is not set: {other:?}")),
@@ -97,7 +97,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict
 /// One PC_SETSTATUS, and the status afterwards.
 async fn set(bench: &mut Bench<'_>, board: u8, mask: u8, value: u8) -> Option<Status> {
     bench.send(Function::SetStatus, board, &[mask, value]).await;
-    bench.hear(10 * MS).await;
+    bench.receive(10 * MS).await;
     bench.info(board).await.map(|info| info.status)
 }
 
@@ -152,7 +152,7 @@ pub(super) async fn autostart(bench: &mut Bench<'_>, first: &BoardSeen) -> Verdi
     bench.send(Function::XReset, board, &[]).await;
     // The hold-off, and the time that an application needs.
     let holdoff = u64::from(bench.profile().autostart_holdoff) * MS;
-    let came = bench.hear(holdoff + bench.link.times().start).await;
+    let came = bench.receive(holdoff + bench.link.times().start).await;
     let now = bench.info(board).await;
     if now.is_some_and(|info| info.flash_number == flash) {
         set(bench, board, 0x44, if kept { 0x40 } else { 0 }).await;

@@ -1,4 +1,4 @@
-//! Whether boards do what the protocol page says: the acceptance tests of the board side, against boards that are there.
+//! Whether boards follow the protocol page: the acceptance tests of the board side, against boards that are there.
 //!
 //! By default only what changes nothing is asked. More is allowed by [`ConformanceOptions`]: a new address assignment,
 //! running applications with safe outputs, programming. Each test is a short conversation in frames of its own making, so that

@@ -27,7 +27,7 @@ fn header(bench: &Bench<'_>, program: &ConformanceProgram, cycle: u16) -> Header
     }
 }
 
-/// One block, frames as far apart as the profile says.
+/// One block, frames as far apart as the profile requires.
 async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     for data in block.chunks(8) {
         bench.send(Function::Prog, board, data).await;
@@ -35,17 +35,17 @@ async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     }
 }
 
-/// What a board says about a block: READY, PROGFINISHED or an error.
+/// A board's answer to a block: READY, PROGFINISHED or an error.
 async fn answer(bench: &mut Bench<'_>, us: u64) -> Option<Frame> {
     let until = bench.link.now() + us;
     loop {
-        let came = bench.hear(5 * MS).await;
-        let said = came.into_iter().find(|f| {
+        let came = bench.receive(5 * MS).await;
+        let reply = came.into_iter().find(|f| {
             let function = f.address().map(|(function, _)| function);
             matches!(function, Ok(Function::DspReady | Function::ProgFinished | Function::Error))
         });
-        if said.is_some() || bench.link.now() >= until {
-            return said;
+        if reply.is_some() || bench.link.now() >= until {
+            return reply;
         }
     }
 }
@@ -65,12 +65,12 @@ pub(super) async fn update(bench: &mut Bench<'_>, program: &ConformanceProgram) 
             block(bench, board, next).await;
             let last = cycle == 2 && i == data.len();
             let slow = cycle == 2 && (i == 0 || last);
-            let said = answer(bench, if slow { times.erase } else { times.ready }).await;
+            let reply = answer(bench, if slow { times.erase } else { times.ready }).await;
             let wanted = if last { Function::ProgFinished } else { Function::DspReady };
-            if said.and_then(|f| f.address().ok()).is_none_or(|(f, n)| f != wanted || n.number() != board) {
-                let said = said.map_or_else(|| "silence".into(), |f| f.to_string());
+            if reply.and_then(|f| f.address().ok()).is_none_or(|(f, n)| f != wanted || n.number() != board) {
+                let reply = reply.map_or_else(|| "silence".into(), |f| f.to_string());
                 return Ok(Verdict::Fail(format!(
-                    "cycle {cycle}, block {i}: {said} instead of {}",
+                    "cycle {cycle}, block {i}: {reply} instead of {}",
                     wanted.name()
                 )));
             }
@@ -113,7 +113,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, program: &ConformanceProgram
         // A transfer that was given up is forgotten.
         bench.send(Function::SetStatus, board, &[4, 0]).await;
         bench.send(Function::SetStatus, board, &[4, 4]).await;
-        bench.hear(20 * MS).await;
+        bench.receive(20 * MS).await;
         match case {
             Case::Short => bench.send(Function::Prog, board, &[0x43; 7]).await,
             Case::Pause => {
@@ -140,14 +140,14 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, program: &ConformanceProgram
                 block(bench, board, &other.build(endian)).await;
             }
         }
-        let came = bench.hear(300 * MS).await;
+        let came = bench.receive(300 * MS).await;
         let errors: Vec<&Frame> = came.iter().filter(|f| f.id() >> 6 == 2).collect();
         if !matches!(errors.as_slice(), [f] if f.id() == 0x080 + u16::from(board) && f.data() == [code]) {
             return Ok(Verdict::Fail(format!("{what}: {} instead of error {code}, once", list(&came))));
         }
     }
     bench.send(Function::SetStatus, board, &[4, 0]).await;
-    bench.hear(20 * MS).await;
+    bench.receive(20 * MS).await;
     let after = bench.info(board).await.map(|info| (info.program_id, info.date));
     Ok(match after == Some((before.program_id, before.date)) {
         true => Verdict::Pass,

@@ -32,7 +32,7 @@ pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     Ok(())
 }
 
-/// All boards, after the tests. What cannot be put back is said in `left`, and does not keep the others from it. `at`: the
+/// All boards, after the tests. What cannot be put back is reported in `left`, and does not keep the others from it. `at`: the
 /// board whose test was given up.
 pub(super) async fn put_all_back(
     link: &Link,
@@ -72,7 +72,7 @@ pub(super) async fn put_back(
     if now.status.has(Status::MSTART) {
         halt(link, n).await?;
     }
-    // It may be about to start by itself, or PC_START may have been the last that it was told.
+    // It may be about to start by itself, or PC_START may have been the last command that it received.
     let coming = now.status.has(Status::ASTART) || in_work;
     if now.status.has(Status::ASTART) != was.has(Status::ASTART) {
         now = set_status(link, n, Status::ASTART, was & Status::ASTART).await?;

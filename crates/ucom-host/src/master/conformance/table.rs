@@ -66,7 +66,7 @@ pub(super) const TESTS: [(&str, Level, &str); 21] = [
     (
         "D-T19",
         Level::Elsewhere(
-            "would program several boards at once: `ucom update --group` does, and says what each took",
+            "would program several boards at once: `ucom update --group` does, and shows what each took",
         ),
         "broadcast program data: boards with PROG = 1 take them, the others are silent",
     ),
@@ -78,7 +78,7 @@ pub(super) const TESTS: [(&str, Level, &str); 21] = [
     (
         "D-T21",
         Level::Elsewhere("needs two boards with one flash id: `ucom sim --flash-ids 0x21,0x21` has them"),
-        "two boards with one flash id: one report is seen, and the PC says that there are more boards than reports",
+        "two boards with one flash id: one report is seen, and the PC reports that there are more boards than reports",
     ),
 ];
 

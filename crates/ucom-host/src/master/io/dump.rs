@@ -89,15 +89,15 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
         Collector { dimensions: None, strings: Vec::new(), assembler: StringAssembler::new() };
     let mut until = link.now() + times.gap.max(times.info);
     loop {
-        let Some(heard) = link.next(until).await else {
+        let Some(received) = link.next(until).await else {
             if collector.done() {
                 return Ok(collector.description().map(Ok));
             }
             return Ok(collector.dimensions.map(|_| Err(collector.problem(collector.silence()))));
         };
-        match heard.message {
+        match received.message {
             FromBoard::IoDescription(payload) => {
-                if let Err(problem) = collector.push(heard.at, &payload, link) {
+                if let Err(problem) = collector.push(received.at, &payload, link) {
                     return Ok(Some(Err(collector.problem(problem))));
                 }
                 // A surplus frame would come at once.
@@ -134,17 +134,17 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
 }
 
-/// The description of a board whose application runs, as it told it since it started.
+/// The description of a board whose application runs, as it has sent it since it started.
 ///
 /// A description that is only kept under Program ID and date (D-36) may be of another application: nothing is written by
 /// its names.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
     let key = DescriptionKey::of(known);
-    let told = link.with(|core| {
-        let told = core.data.get(&board).is_some_and(|data| data.told && data.description == Some(key));
-        core.descriptions.get(&key).filter(|_| told).cloned()
+    let kept = link.with(|core| {
+        let sent = core.data.get(&board).is_some_and(|data| data.sent && data.description == Some(key));
+        core.descriptions.get(&key).filter(|_| sent).cloned()
     });
-    if let Some(description) = told {
+    if let Some(description) = kept {
         return Ok(description);
     }
     let description = read_description(link, board).await?;
@@ -159,7 +159,7 @@ fn take_over(link: &Link, board: u8, key: DescriptionKey, description: &IoDescri
     link.with(|core| {
         let data = core.data.entry(board).or_default();
         data.description = Some(key);
-        data.told = true;
+        data.sent = true;
         data.ci.resize(d.ci.into(), 0);
         data.par.resize(d.par);
         if data.so.dimension() != usize::from(d.so) {
@@ -177,7 +177,7 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
     let (to, times) = (link.board(board)?, link.times());
     link.listen(1 << board, &[Function::DspCi]);
     let since = link.now();
-    let mut heard_any = false;
+    let mut received_any = false;
     let mut missing = packages;
     for tries in 0..TRIES {
         if tries > 0 {
@@ -190,12 +190,12 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         // A board that repeats itself for ever must not hold us.
         let limit = link.now() + times.gap * u64::from(packages + 1);
         while missing_packages(&seen) > 0
-            && let Some(heard) = link.next((link.now() + times.gap).min(limit)).await
+            && let Some(received) = link.next((link.now() + times.gap).min(limit)).await
             && link.now() < limit
         {
-            match heard.message {
+            match received.message {
                 FromBoard::Ci(package) if package.offset.is_multiple_of(3) => {
-                    heard_any = true;
+                    received_any = true;
                     if package.apply(&mut words).is_ok()
                         && let Some(place) = seen.get_mut(usize::from(package.offset / 3))
                     {
@@ -215,7 +215,7 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         }
     }
     let asked = Function::DumpCi;
-    if heard_any {
+    if received_any {
         let problem = Incomplete::Packages { missing, of: packages };
         return Err(Error::Incomplete { board, asked, tries: TRIES, problem });
     }

@@ -14,8 +14,8 @@ pub use snapshot::{Snapshot, SnapshotAssembler};
 pub(crate) struct ProcessData {
     /// Key of its description.
     pub description: Option<DescriptionKey>,
-    /// The board told that description itself since its application started.
-    pub told: bool,
+    /// The board has sent that description itself since its application started.
+    pub sent: bool,
     /// Inputs as last set.
     pub ci: Vec<u16>,
     /// When they are sent again; `None`: not at all.

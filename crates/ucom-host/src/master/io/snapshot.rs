@@ -88,7 +88,7 @@ mod tests {
         Packages::new(&words).collect()
     }
 
-    /// D-33: a gap makes no snapshot, and the next whole one says so.
+    /// D-33: a gap makes no snapshot, and the next whole one reports it.
     #[test]
     fn d33_gaps_are_counted_and_never_shown() {
         for lost in 0..3 {
@@ -99,7 +99,7 @@ mod tests {
             let whole: Vec<_> = packages(200).iter().filter_map(|p| assembler.push(5, p)).collect();
             assert_eq!(whole.len(), 1);
             assert_eq!(whole[0].words, (200..208).collect::<Vec<u16>>());
-            // A lost first package cannot be told from a start in the middle.
+            // A lost first package cannot be distinguished from a start in the middle.
             assert_eq!(whole[0].incomplete_before, u64::from(lost > 0));
         }
     }

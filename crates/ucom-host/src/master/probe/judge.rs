@@ -1,4 +1,4 @@
-//! From what was heard to a profile: what decides is said, what does not is kept.
+//! From what was received to a profile: what decides is reported, what does not is kept.
 
 use super::super::counted;
 use super::measure::status_of;
@@ -10,7 +10,7 @@ use ucom::{Checksum, Payload, Profile, Report, Sequence, Status, checksum};
 /// Answers of one board to PC_INFO, frame by frame.
 pub(super) type Answers = Vec<Vec<Payload>>;
 
-/// Everything that was heard.
+/// Everything that was received.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     pub before: Profile,
@@ -126,7 +126,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
     let broadcast = match (zero, top) {
         (1.., _) => Some(Broadcast::Zero),
         (0, 1..) => Some(Broadcast::ThirtyOne),
-        // Silence says something only when there are boards that could have answered.
+        // Silence means something only when there are boards that could have answered.
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };

@@ -18,7 +18,7 @@ const ROUNDS: usize = 3;
 
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
     let mut seen = Seen { before: link.profile(), image: options.image.clone(), ..Default::default() };
-    // Everything is to be heard raw, so nothing may be refused for its length.
+    // Everything is to be received raw, so nothing may be refused for its length.
     use_profile(&link, Profile { dlc_strict: false, ..seen.before });
     seen.reports = all_reports(&link).await;
     if options.init {
@@ -78,8 +78,8 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
         link.listen(0, &REPORTS);
         link.ask(link.broadcast_number(), ToBoard::Report).await;
         let until = link.now() + link.times().report_ask;
-        while let Some(heard) = link.next(until).await {
-            if let FromBoard::Report(report) = heard.message {
+        while let Some(received) = link.next(until).await {
+            if let FromBoard::Report(report) = received.message {
                 reports.push(report);
             }
             if link.now() >= until || reports.len() > 1000 {
@@ -128,9 +128,9 @@ async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8,
     }
     let (times, limit) = (link.times(), link.now() + 5_000 * MS);
     let gap = times.info.max(times.gap);
-    while let Some(heard) = link.next((link.now() + gap).min(limit)).await {
-        if let FromBoard::Info(payload) = heard.message {
-            answers.entry(heard.from).or_default().push(payload);
+    while let Some(received) = link.next((link.now() + gap).min(limit)).await {
+        if let FromBoard::Info(payload) = received.message {
+            answers.entry(received.from).or_default().push(payload);
         }
         if link.now() >= limit {
             break;
@@ -145,8 +145,8 @@ async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     link.ask(board, ToBoard::DumpCi).await;
     let limit = link.now() + 1_000 * MS;
     let mut offsets = Vec::new();
-    while let Some(heard) = link.next((link.now() + link.times().gap).min(limit)).await {
-        if let FromBoard::Ci(package) = heard.message {
+    while let Some(received) = link.next((link.now() + link.times().gap).min(limit)).await {
+        if let FromBoard::Ci(package) = received.message {
             offsets.push(package.offset);
         }
         if link.now() >= limit {

@@ -32,7 +32,7 @@ pub struct ProbeRow {
     pub key: &'static str,
     /// What is unknown.
     pub unknown: &'static str,
-    /// What the published description says about it.
+    /// What the published description has about it.
     pub published: &'static str,
     /// What was observed.
     pub observed: String,

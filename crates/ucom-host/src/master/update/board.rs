@@ -84,7 +84,7 @@ async fn leave_programming(link: &Link, board: u8) {
     }
 }
 
-/// One attempt with one board; `Some`: it failed in a way that another attempt may heal (the result says how).
+/// One attempt with one board; `Some`: it failed in a way that another attempt may heal (the result shows how).
 async fn attempt(
     link: &Link,
     session: &mut UpdateSession,
@@ -136,8 +136,8 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    // The board must not take what comes next for the rest of this transfer. It is told while it still counts as at
-    // work: a cancel in this moment tells it, too.
+    // The board must not take what comes next for the rest of this transfer. It gets the command while it still counts as at
+    // work: a cancel in this moment sends the command, too.
     leave_programming(link, board).await;
     // Another board that has taken the number since complains of program data, or takes them out of turn.
     if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
@@ -155,7 +155,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
     session.reach(board, Stage::Written);
     let known = match confirmed(link, board).await {
         Ok(seen) => seen.info,
-        // The board said that it is done; only the read-back is missing.
+        // The board reported that it is done; only the read-back is missing.
         Err(e) => return session.fail_with(board, e),
     };
     // Whoever shares the number was written, too, or is what has just answered.

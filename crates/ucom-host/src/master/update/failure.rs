@@ -63,7 +63,7 @@ pub enum UpdateFailure {
     },
     /// DSP_PROGFINISHED came, and the board shows no application in its exloader.
     #[error(
-        "the board says it is done, but shows no valid application in its exloader: Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
+        "the board reports that it is done, but shows no valid application in its exloader: Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
     )]
     NotValid {
         /// On the board.
@@ -157,7 +157,7 @@ impl UpdateFailure {
             }
             Self::Device { code, .. } => code.reaction().into(),
             Self::Timeout { .. } => {
-                "frames get lost or the board is slower than the profile says (`prog.ready_timeout`): `ucom doctor`".into()
+                "frames get lost or the board is slower than the profile has it (`prog.ready_timeout`): `ucom doctor`".into()
             }
             Self::NotVerified { .. } => {
                 "the board may compute its Program ID otherwise (`prog.checksum`): `ucom probe --image FILE`".into()
@@ -178,7 +178,7 @@ fn left_behind(outcome: UpdateOutcome) -> &'static str {
     match outcome {
         UpdateOutcome::Incomplete => "the old application is erased, the board waits in its exloader",
         UpdateOutcome::Unknown => "the old application may be erased",
-        UpdateOutcome::Written => "the board said that it is done, nobody has read it back",
+        UpdateOutcome::Written => "the board reported that it is done, nobody has read it back",
         UpdateOutcome::UpToDate => "the image was there already, its application was not started",
         UpdateOutcome::Running => "the new application is on the board, and it may be started",
         UpdateOutcome::Verified => "the new application is on the board, but not started",

@@ -81,7 +81,7 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
 
 /// Takes every number that is not selected out of programming, and reads that back.
 ///
-/// A number that does not answer has been told as well, three times; who has no number takes no PC_PROG.
+/// A number that does not answer has got the command as well, three times; who has no number takes no PC_PROG.
 async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     let others: Vec<Sequence> =
         link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();
@@ -100,7 +100,7 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The selected boards in their exloaders. `true`: one failed, and did not say that it left programming either: it would
+/// The selected boards in their exloaders. `true`: one failed, and did not report that it left programming either: it would
 /// be erased by the group's frames unnoticed.
 async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);

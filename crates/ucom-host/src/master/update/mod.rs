@@ -41,7 +41,7 @@ pub struct UpdateOptions {
     pub image: UpdateImage,
     /// What the other cycle carries under the plans `exloader-app` (first), `pmem-xmem` and `raw` (second).
     pub second: Option<UpdateImage>,
-    /// Program ID that the board must show at the end, where the image does not tell it (plan `raw`, `prog.header` or
+    /// Program ID that the board must show at the end, where the image does not contain it (plan `raw`, `prog.header` or
     /// `prog.checksum` `none`); elsewhere the image must have it.
     pub expect_program_id: Option<u16>,
     /// Flash date as 16 bits, see [`DateForm`](ucom::DateForm).

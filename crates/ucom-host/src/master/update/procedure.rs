@@ -44,7 +44,7 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
             session.unfinished().into_iter().for_each(|board| session.cancel(board));
             session.cancel_starts();
         }
-        // Nothing can be sent any more, but what is known of the boards is still worth telling.
+        // Nothing can be sent any more, but what is known of the boards is still worth reporting.
         Err(error @ Error::Bus { .. }) => {
             let waiting = core::mem::take(&mut session.to_start);
             for board in session.unfinished().into_iter().chain(waiting) {
@@ -66,7 +66,7 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     Ok(Outcome::Update(report))
 }
 
-/// The boards at work are told to forget the transfer; nothing half written is ever valid. `why`: the user ended it, or two
+/// The boards at work are commanded to forget the transfer; nothing half written is ever valid. `why`: the user ended it, or two
 /// boards have one number.
 async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
     for board in session.active.clone() {
@@ -164,7 +164,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         refuse(session, &Error::Running { boards: running });
         return Ok(());
     }
-    // D-08, in a dry run as well: what it says must be what would happen.
+    // D-08, in a dry run as well: what it reports must be what would happen.
     if let Err(error) = link.look_for_master(session.options.force).await {
         refuse(session, &error);
         return Ok(());

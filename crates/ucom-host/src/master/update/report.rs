@@ -19,14 +19,14 @@ pub enum UpdateOutcome {
     UpToDate,
     /// Something was erased and no image is complete: the board stays in its exloader and can be programmed again.
     Incomplete,
-    /// The board may have lost what it had, and does not tell.
+    /// The board may have lost what it had, and does not report it.
     Unknown,
-    /// The board says it is written, but PC_INFO did not confirm the new Program ID and date: it showed others, nothing,
+    /// The board reports it as written, but PC_INFO did not confirm the new Program ID and date: it showed others, nothing,
     /// or nobody knows what to expect ([`UpdateReport::unverifiable`]).
     Written,
     /// PC_INFO shows the new Program ID and date (U-10).
     Verified,
-    /// Written, and the application runs; verified unless [`UpdateReport::unverifiable`] says why not.
+    /// Written, and the application runs; verified unless [`UpdateReport::unverifiable`] gives the reason against it.
     Running,
 }
 
@@ -60,7 +60,7 @@ pub struct UpdateResult {
     pub flash_number: Option<u16>,
     /// What PC_INFO showed before.
     pub before: Option<BoardInfo>,
-    /// What PC_INFO showed after the board said that it is done.
+    /// What PC_INFO showed after the board reported that it is done.
     pub after: Option<BoardInfo>,
     /// How far it got.
     pub outcome: UpdateOutcome,
@@ -112,7 +112,7 @@ impl UpdateReport {
     /// What kind of failure it is: the gravest of any board. `None`: all is done.
     pub fn failure(&self) -> Option<ErrorKind> {
         let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
-        // Done, says the board, and nobody can tell.
+        // Done by the board's report, which nothing can confirm.
         let trusted = |b: &&UpdateResult| {
             let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
             self.unverifiable.is_some() && !self.accept_unverified && done && b.failure.is_none()

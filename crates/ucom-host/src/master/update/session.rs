@@ -16,9 +16,9 @@ pub(super) enum Stage {
     Untouched,
     /// Frames that erase went past it while it may have listened.
     MaybeErased,
-    /// It was told to erase.
+    /// It was commanded to erase.
     Erased,
-    /// It said that it is done.
+    /// It reported that it is done.
     Written,
     /// PC_INFO showed the new program.
     Verified,
@@ -30,7 +30,7 @@ pub(super) struct UpdateSession {
     pub results: Vec<UpdateResult>,
     /// Boards between XRESET and their end.
     pub active: Vec<u8>,
-    /// The board that is told to start its application.
+    /// The board that is commanded to start its application.
     pub starting: Option<u8>,
     /// Boards that have the image already and are still to be started.
     pub to_start: Vec<u8>,
@@ -116,7 +116,7 @@ impl UpdateSession {
         self.fail(board, failure);
     }
 
-    /// The user ended it. A board that was told to start, and is not known to be stopped, may run.
+    /// The user ended it. A board that was commanded to start, and is not known to be stopped, may run.
     pub fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
         let started = self.starting == Some(board);

@@ -19,7 +19,7 @@ pub(super) enum Broken {
         block: usize,
         waited_ms: u64,
     },
-    /// Nothing came after the very last block: PC_INFO must tell (U-9).
+    /// Nothing came after the very last block: PC_INFO must show it (U-9).
     NoFinish {
         waited_ms: u64,
     },
@@ -106,17 +106,17 @@ impl Attempt<'_> {
         let until = since + timeout;
         let mut waiting: Vec<u8> = self.boards.clone();
         while !waiting.is_empty() {
-            let Some(heard) = self.link.next(until).await else { break };
-            if !self.boards.contains(&heard.from) {
+            let Some(received) = self.link.next(until).await else { break };
+            if !self.boards.contains(&received.from) {
                 continue;
             }
-            match heard.message {
+            match received.message {
                 // A READY after the very last block is none of ours to judge: FINISHED must follow.
-                FromBoard::Ready if !last => waiting.retain(|b| *b != heard.from),
-                FromBoard::ProgFinished if last => waiting.retain(|b| *b != heard.from),
+                FromBoard::Ready if !last => waiting.retain(|b| *b != received.from),
+                FromBoard::ProgFinished if last => waiting.retain(|b| *b != received.from),
                 FromBoard::Error(code) => {
-                    waiting.retain(|b| *b != heard.from);
-                    self.leave(heard.from, Broken::Device { code, cycle, block }, out);
+                    waiting.retain(|b| *b != received.from);
+                    self.leave(received.from, Broken::Device { code, cycle, block }, out);
                 }
                 _ => {}
             }

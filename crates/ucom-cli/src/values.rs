@@ -130,7 +130,7 @@ impl Prepared {
     ) -> Result<(), Failure> {
         let known = match cache.known(driver, table, board) {
             Err(e) if e.code == "no-application" => {
-                // Before it is commanded to: a start that is cancelled may have reached it.
+                // Before the command leaves: a start that is cancelled may have reached it.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
                     // Refused means that nothing was sent; taking that back would speak on another PC's bus.

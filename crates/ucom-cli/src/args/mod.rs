@@ -118,7 +118,7 @@ pub enum Command {
                             ucom update 3 app.hex --exloader loader.hex\n  ucom update 3 program.hex --data data.hex\n  \
                             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
                             Image formats: raw binary, Intel HEX, Motorola S-record, recognised by their content. What the addresses\n\
-                            of records count, bytes or words, is reported by records that follow each other; --addresses names it. Whether two\n\
+                            of records count, bytes or words, is seen from records that follow each other; --addresses names it. Whether two\n\
                             files are sent is the profile's matter: `prog.plan`, see `ucom help profile`.\n\
                             `all` are the boards that answer and those of the inventory: one that is missing is reported.\n\
                             Exit codes: 0 verified, or already up to date (or written where the profile leaves nothing to verify,\n\

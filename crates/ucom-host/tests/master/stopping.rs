@@ -80,7 +80,7 @@ fn a_silent_board_gets_the_stop_more_than_once() {
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
     for request in [run(&[1]), Request::Start { board: 1, force: true }] {
-        // It shows that it is started one second after the command; it stops when it is commanded to after that.
+        // It shows that it is started one second after the command; it stops when it is commanded to stop after that.
         let (idle, started) = (info("1B"), info("8B"));
         let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
         let started: Vec<&str> = started.iter().map(String::as_str).collect();

@@ -178,7 +178,7 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
 }
 
 /// A board that shows what the published list has for its CAN controller goes on listening: it is erased with the others
-/// and that is reported, or it is asked and has the program.
+/// which is reported, or it is asked and has the program.
 #[test]
 fn d43_not_every_error_ends_a_transfer() {
     for code in ["06", "08", "09", "0B", "2A"] {

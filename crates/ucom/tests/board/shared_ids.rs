@@ -24,7 +24,7 @@ fn acts() -> impl Strategy<Value = Vec<Act>> {
         "1C1#8000",
     ]);
     let short = (0_u64..3_000).prop_map(Act::Wait);
-    // The PC's silence lasts long enough for the board to report it by itself.
+    // The PC's silence lasts long enough for the board to report the loss by itself.
     let long = (1_490_000_u64..1_512_000).prop_map(Act::Wait);
     let act = prop_oneof![3 => send.prop_map(Act::Send), 4 => short, 1 => long];
     prop::collection::vec(act, 1..40)

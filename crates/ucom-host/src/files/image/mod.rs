@@ -2,7 +2,7 @@
 //! unless it is asked for.
 //!
 //! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of
-//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are reported by
+//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are recognised by
 //! their records: where those leave gaps or overlap in one unit and follow each other without any in the other one. What one
 //! record or two can mean is not guessed; the unit can always be given.
 mod detect;

@@ -182,7 +182,7 @@ fn a_text_is_no_image() {
             assert!(Image::parse(text, &raw).is_ok());
         }
     }
-    // A name promises records: their first mistake is reported.
+    // By its name the file has records: their first mistake is reported.
     assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
     assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
     let bytes: Vec<u8> = (0..=255).collect();

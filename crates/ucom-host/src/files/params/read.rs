@@ -119,7 +119,7 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
 
 /// The YAML library's message, in words for whoever wrote the file.
 fn people(words: &str) -> String {
-    // The place is reported by us.
+    // This message has a place of its own.
     let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');
     if let Some(rest) = words.strip_prefix("duplicate mapping key") {
         let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);

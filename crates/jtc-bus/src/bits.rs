@@ -1,133 +1,126 @@
-//! Bits of the nodes' bytes, in words.
+//! Bits of words: each word is one table of bit, name, text and meaning.
 
-/// Warning bits of a node.
-pub mod warning {
-    /// Position not accurate.
-    pub const POSITION_NOT_ACCURATE: u8 = 0x01;
-    /// Outside its working area.
-    pub const OUTSIDE_WORKING_AREA: u8 = 0x02;
-    /// Magnetic field of the encoder out of range.
-    pub const MAGNETIC_FIELD: u8 = 0x04;
-    /// Safety line active.
-    pub const SAFETY_LINE: u8 = 0x08;
-    /// In words, bit 0 first.
-    pub const NAMES: [&str; 8] = [
-        "position not accurate",
-        "outside working area",
-        "magnetic field of the encoder out of range",
-        "safety line active",
-        "bit 4",
-        "bit 5",
-        "bit 6",
-        "bit 7",
-    ];
+/// Declares words of bits. A row of a word is the meaning (documentation), the name of the mask, the bit and its text.
+///
+/// Each word is a module with a mask for each bit and the texts in `NAMES`.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! bit_words {
+    ($($(#[$doc:meta])* $word:ident: $type:ty {
+        $($(#[$meaning:meta])+ $name:ident = $bit:literal, $text:literal;)+
+        $(with $($also:item)+)?
+    })+) => {$(
+        $(#[$doc])*
+        pub mod $word {
+            $($(#[$meaning])+ pub const $name: $type = 1 << $bit;)+
+            /// Texts of the bits, bit 0 first.
+            pub const NAMES: [&str; [$($bit),+].len()] = {
+                let mut names = [""; [$($bit),+].len()];
+                $(names[$bit] = $text;)+
+                names
+            };
+            $($($also)+)?
+        }
+    )+};
 }
 
-/// Error bits of a node.
-pub mod error {
-    /// Position encoder failed (oldest drives).
-    pub const POSITION_ENCODER: u8 = 0x01;
-    /// Motor-control fault: its bits identify it.
-    pub const MOTOR_CONTROL: u8 = 0x02;
-    /// Joint over-speed.
-    pub const OVER_SPEED: u8 = 0x04;
-    /// Gate driver reports a hardware fault.
-    pub const HARDWARE: u8 = 0x08;
-    /// In words, bit 0 first.
-    pub const NAMES: [&str; 8] = [
-        "position encoder",
-        "motor-control fault",
-        "over-speed",
-        "hardware fault of the gate driver",
-        "bit 4",
-        "bit 5",
-        "bit 6",
-        "bit 7",
-    ];
+bit_words! {
+    /// Warning bits of a node.
+    warning: u8 {
+        /// Position not accurate.
+        POSITION_NOT_ACCURATE = 0, "position not accurate";
+        /// Outside its working area.
+        OUTSIDE_WORKING_AREA = 1, "outside working area";
+        /// Magnetic field of the encoder out of range.
+        MAGNETIC_FIELD = 2, "magnetic field of the encoder out of range";
+        /// Safety line active.
+        SAFETY_LINE = 3, "safety line active";
+    }
+
+    /// Error bits of a node.
+    error: u8 {
+        /// Position encoder failed (oldest drives).
+        POSITION_ENCODER = 0, "position encoder";
+        /// Motor-control fault: its bits identify it.
+        MOTOR_CONTROL = 1, "motor-control fault";
+        /// Joint over-speed.
+        OVER_SPEED = 2, "over-speed";
+        /// Gate driver reports a hardware fault.
+        HARDWARE = 3, "hardware fault of the gate driver";
+    }
+
+    /// Motor-control fault bits of a joint (now, and occurred).
+    motor_control: u8 {
+        /// The current loop took too long.
+        FOC_DURATION = 0, "current loop took too long";
+        /// Supply voltage too high.
+        OVER_VOLTAGE = 1, "over-voltage";
+        /// Supply voltage too low.
+        UNDER_VOLTAGE = 2, "under-voltage";
+        /// Power stage too hot.
+        OVER_TEMPERATURE = 3, "over-temperature";
+        /// Motor did not start.
+        START_UP = 4, "start-up failed";
+        /// Speed feedback lost.
+        SPEED_FEEDBACK = 5, "speed feedback lost";
+        /// Hardware over-current.
+        OVER_CURRENT = 6, "over-current";
+        /// Software error.
+        SOFTWARE = 7, "software error";
+    }
+
+    /// Configuration bits of a node, sent with ChangeMode.
+    config: u8 {
+        /// Keep to the working area.
+        WORKING_AREA = 0, "working area";
+        /// Absolute encoder on; without it the position reads 0.
+        ABSOLUTE_ENCODER = 1, "absolute encoder";
+        /// React to the safety line.
+        SAFETY_LINE = 2, "safety line";
+        /// Watch the bus.
+        BUS_WATCHDOG = 3, "bus watchdog";
+        /// Trip on over-speed; a configuration without this bit switches the trip off.
+        OVER_SPEED_TRIP = 4, "over-speed trip";
+        with
+        /// Default of a joint, 0x17.
+        pub const JOINT_DEFAULT: u8 = WORKING_AREA | ABSOLUTE_ENCODER | SAFETY_LINE | OVER_SPEED_TRIP;
+        /// Default of the gripper, 0x04.
+        pub const GRIPPER_DEFAULT: u8 = SAFETY_LINE;
+    }
 }
 
-/// Motor-control fault bits of a joint (now, and occurred).
-pub mod motor_control {
-    /// The current loop took too long.
-    pub const FOC_DURATION: u8 = 0x01;
-    /// Supply voltage too high.
-    pub const OVER_VOLTAGE: u8 = 0x02;
-    /// Supply voltage too low.
-    pub const UNDER_VOLTAGE: u8 = 0x04;
-    /// Power stage too hot.
-    pub const OVER_TEMPERATURE: u8 = 0x08;
-    /// Motor did not start.
-    pub const START_UP: u8 = 0x10;
-    /// Speed feedback lost.
-    pub const SPEED_FEEDBACK: u8 = 0x20;
-    /// Hardware over-current.
-    pub const OVER_CURRENT: u8 = 0x40;
-    /// Software error.
-    pub const SOFTWARE: u8 = 0x80;
-    /// In words, bit 0 first.
-    pub const NAMES: [&str; 8] = [
-        "current loop took too long",
-        "over-voltage",
-        "under-voltage",
-        "over-temperature",
-        "start-up failed",
-        "speed feedback lost",
-        "over-current",
-        "software error",
-    ];
-}
-
-/// Configuration bits of a node, sent with ChangeMode.
-pub mod config {
-    /// Keep to the working area.
-    pub const WORKING_AREA: u8 = 0x01;
-    /// Absolute encoder on; without it the position reads 0.
-    pub const ABSOLUTE_ENCODER: u8 = 0x02;
-    /// React to the safety line.
-    pub const SAFETY_LINE: u8 = 0x04;
-    /// Watch the bus.
-    pub const BUS_WATCHDOG: u8 = 0x08;
-    /// Trip on over-speed; a configuration without this bit switches the trip off.
-    pub const OVER_SPEED_TRIP: u8 = 0x10;
-    /// Default of a joint, 0x17.
-    pub const JOINT_DEFAULT: u8 = WORKING_AREA | ABSOLUTE_ENCODER | SAFETY_LINE | OVER_SPEED_TRIP;
-    /// Default of the gripper, 0x04.
-    pub const GRIPPER_DEFAULT: u8 = SAFETY_LINE;
-    /// In words, bit 0 first.
-    pub const NAMES: [&str; 8] = [
-        "working area",
-        "absolute encoder",
-        "safety line",
-        "bus watchdog",
-        "over-speed trip",
-        "bit 5",
-        "bit 6",
-        "bit 7",
-    ];
-}
-
-/// Set bits in words, separated by commas; `-` when there is none.
+/// Texts of the set bits, separated by commas; `-` when there is none, `bit N` for a bit without a text.
 ///
 /// ```
 /// use jtc_bus::{Bits, warning};
 /// assert_eq!(Bits(0x09, &warning::NAMES).to_string(), "position not accurate, safety line active");
+/// assert_eq!(Bits(0x11, &warning::NAMES).to_string(), "position not accurate, bit 4");
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Bits<'a>(pub u8, pub &'a [&'a str; 8]);
+pub struct Bits<'a>(pub u32, pub &'a [&'a str]);
+
+impl<'a> Bits<'a> {
+    /// Number and text of each set bit; the text is empty when the list has none.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, &'a str)> + use<'a> {
+        let (word, names) = (self.0, self.1);
+        (0..u32::BITS)
+            .filter(move |bit| word >> bit & 1 == 1)
+            .map(move |bit| (bit, names.get(bit as usize).copied().unwrap_or("")))
+    }
+}
 
 impl core::fmt::Display for Bits<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         if self.0 == 0 {
             return f.write_str("-");
         }
-        let mut first = true;
-        for (bit, name) in self.1.iter().enumerate() {
-            if self.0 >> bit & 1 == 1 {
-                if !first {
-                    f.write_str(", ")?;
-                }
-                first = false;
-                f.write_str(name)?;
+        for (i, (bit, name)) in self.iter().enumerate() {
+            if i > 0 {
+                f.write_str(", ")?;
+            }
+            match name {
+                "" => write!(f, "bit {bit}")?,
+                name => f.write_str(name)?,
             }
         }
         Ok(())

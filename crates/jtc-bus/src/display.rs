@@ -97,7 +97,7 @@ impl Display for Request {
                     }
                     write!(f, "/{bits:02X}")?;
                 }
-                write!(f, ", gripper {gripper:02X} ({})", Bits(*gripper, &config::NAMES))
+                write!(f, ", gripper {gripper:02X} ({})", Bits((*gripper).into(), &config::NAMES))
             }
             Self::ResetAll => f.write_str("ResetAll"),
             Self::Reset(node) => write!(f, "Reset {}", Node(*node)),
@@ -129,11 +129,11 @@ impl Display for Answer {
 }
 
 /// Names what is set; nothing when nothing is.
-fn report_bits(f: &mut Formatter<'_>, title: &str, bits: u8, names: &[&str; 8]) -> Result {
+fn report_bits(f: &mut Formatter<'_>, title: &str, bits: u8, names: &[&str]) -> Result {
     if bits == 0 {
         return Ok(());
     }
-    write!(f, ", {title}: {}", Bits(bits, names))
+    write!(f, ", {title}: {}", Bits(bits.into(), names))
 }
 
 impl Display for JointReport {

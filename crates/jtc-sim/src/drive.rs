@@ -1,6 +1,6 @@
 //! A joint's drive with the habits of the real ones: slow first enable, coarse encoder, late speed, torques
 //! that never time out.
-use jtc_bus::NodeState;
+use jtc_bus::{NodeState, config as config_bit, error as error_bit};
 
 use crate::inbox::Inbox;
 
@@ -12,21 +12,6 @@ mod states;
 pub use config::{DriveConfig, DriveFault};
 use encoders::Encoders;
 use states::States;
-
-/// Configuration bits of ChangeMode.
-mod config_bit {
-    pub const WORKING_AREA: u8 = 0x01;
-    pub const ENCODER: u8 = 0x02;
-    pub const SAFETY_LINE: u8 = 0x04;
-    pub const OVER_SPEED: u8 = 0x10;
-}
-
-/// Bits of the error byte.
-mod error_bit {
-    pub const MOTOR_CONTROL: u8 = 0x02;
-    pub const OVER_SPEED: u8 = 0x04;
-    pub const HARDWARE: u8 = 0x08;
-}
 
 /// A drive.
 #[derive(Clone, Debug)]
@@ -95,7 +80,7 @@ impl Drive {
         self.configured = false;
         self.mode = 1;
         // Over-speed trip is on by default.
-        self.bits = config_bit::OVER_SPEED;
+        self.bits = config_bit::OVER_SPEED_TRIP;
         self.goal = 0.0;
         self.errors = 0;
         self.mc_current = 0;
@@ -159,7 +144,7 @@ impl Drive {
 
     fn read_encoders(&mut self, q: f64) {
         self.velocity = self.encoders.speed(q);
-        let read = self.bits & config_bit::ENCODER != 0;
+        let read = self.bits & config_bit::ABSOLUTE_ENCODER != 0;
         self.position = if read { self.encoders.position(q + self.fault.encoder_offset) } else { 0.0 };
     }
 
@@ -171,7 +156,7 @@ impl Drive {
         } else {
             self.errors &= !error_bit::MOTOR_CONTROL;
         }
-        if self.bits & config_bit::OVER_SPEED != 0 && self.velocity.abs() > self.config.over_speed {
+        if self.bits & config_bit::OVER_SPEED_TRIP != 0 && self.velocity.abs() > self.config.over_speed {
             self.errors |= error_bit::OVER_SPEED;
         }
         if self.fault.hardware {

@@ -1,5 +1,5 @@
 //! The vacuum gripper, node 6: a pump, two vacuum switches and the habits of its firmware.
-use jtc_bus::{Answer, GRIPPER, GripperReport, NodeState, Request};
+use jtc_bus::{Answer, GRIPPER, GripperReport, NodeState, Request, config};
 
 use crate::inbox::Inbox;
 use crate::request::NodeRequest;
@@ -100,7 +100,7 @@ impl Gripper {
             Request::ChangeMode { gripper, .. } => {
                 let accepted = matches!(self.state, NodeState::INIT | NodeState::READY);
                 if accepted {
-                    self.reacts_to_safety = gripper & 0x04 != 0;
+                    self.reacts_to_safety = gripper & config::SAFETY_LINE != 0;
                 }
                 Some(Answer::Mode { node, accepted })
             }

@@ -1,6 +1,6 @@
 //! The controller: state machine and tick (section 4).
 use jtc_dynamics::Dynamics;
-use jtc_wire::{RawPoint, Response, STATUS_LEN};
+use jtc_wire::{RawPoint, Response, STATUS_LEN, missing_parameter};
 
 use crate::check::{TrajectoryCheck, Violation};
 use crate::config::{Config, PidGains, TableOf};
@@ -23,9 +23,9 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 pub(crate) struct ReceivedParameters(u8);
 
 impl ReceivedParameters {
-    pub const FRICTION: u8 = 1 << 0;
-    pub const PID: u8 = 1 << 1;
-    pub const MODEL: u8 = 1 << 2;
+    pub const FRICTION: u8 = missing_parameter::FRICTION;
+    pub const PID: u8 = missing_parameter::PID;
+    pub const MODEL: u8 = missing_parameter::MODEL;
 
     pub fn set(&mut self, bit: u8) {
         self.0 |= bit;

@@ -10,6 +10,7 @@ extern crate std;
 pub mod fuzzing;
 
 mod batch;
+mod bits;
 mod code;
 mod command;
 mod crc;
@@ -27,6 +28,7 @@ mod urgent;
 pub mod words;
 
 pub use batch::{EVENTS_MAX, EventBatch, ReceivedEvent};
+pub use bits::{can_flag, error, joint_error, missing_parameter};
 pub use code::{Code, Known};
 pub use command::{ALL_NODES, Command, ExecCommand, Floats};
 pub use crc::{crc16, crc16_update};

@@ -96,11 +96,11 @@ pub struct Status {
     pub response: Response,
     /// State of the controller.
     pub state: Code<ControllerState>,
-    /// Current errors: bits of [`crate::words::JTC_ERRORS`].
+    /// Current errors: bits of [`crate::error`].
     pub errors: u16,
     /// Occurred errors, same bits.
     pub occurred: u16,
-    /// What is missing: bits of [`crate::words::JTC_INIT`].
+    /// What is missing: bits of [`crate::missing_parameter`].
     pub jtc_init: u8,
     /// Nodes that are missing: bits of [`crate::words::NODES`].
     pub node_init: u8,
@@ -112,7 +112,7 @@ pub struct Status {
     pub friction_type: u8,
     /// 0 good, 1 error.
     pub can_error: u8,
-    /// Bit 0 transmit timeout, bit 8+n receive timeout of node n.
+    /// Current CAN flags: bits of [`crate::can_flag`].
     pub can_current: u32,
     /// Occurred flags, same bits.
     pub can_occurred: u32,
@@ -127,15 +127,15 @@ pub struct Status {
 pub struct JointStatus {
     /// State of the drive.
     pub state: NodeState,
-    /// Current motor-control faults: bits of [`crate::words::MC_FAULTS`].
+    /// Current motor-control faults: bits of [`jtc_bus::motor_control`].
     pub mc_current: u8,
     /// Occurred motor-control faults.
     pub mc_occurred: u8,
-    /// Errors of the drive: bits of [`crate::words::NODE_ERRORS`].
+    /// Errors of the drive: bits of [`jtc_bus::error`].
     pub errors: u8,
-    /// Warnings of the drive: bits of [`crate::words::NODE_WARNINGS`].
+    /// Warnings of the drive: bits of [`jtc_bus::warning`].
     pub warnings: u8,
-    /// Errors found by the controller: bits of [`crate::words::JOINT_INTERNAL`].
+    /// Errors found by the controller: bits of [`crate::joint_error`].
     pub internal: u16,
     /// Occurred errors found by the controller.
     pub internal_occurred: u16,
@@ -160,9 +160,9 @@ pub struct GripperStatus {
     pub pressure1: u8,
     /// 1: second pressure level reached.
     pub pressure2: u8,
-    /// Errors: bits of [`crate::words::NODE_ERRORS`].
+    /// Errors: bits of [`jtc_bus::error`].
     pub errors: u8,
-    /// Warnings: bits of [`crate::words::NODE_WARNINGS`].
+    /// Warnings: bits of [`jtc_bus::warning`].
     pub warnings: u8,
 }
 

@@ -1,19 +1,12 @@
 //! States, error bits and codes in words: the same everywhere they are printed.
 pub use jtc_bus::Bits;
 
+use crate::bits::{error, joint_error, missing_parameter};
+
 /// Bits of the controller's error words.
-pub const JTC_ERRORS: [&str; 8] = [
-    "emergency input",
-    "emergency output",
-    "internal error",
-    "external error",
-    "internal joints error",
-    "internal CAN error",
-    "internal COM error",
-    "external joints error",
-];
-/// Bits of what the host has not given yet.
-pub const JTC_INIT: [&str; 3] = ["friction", "PID", "arm model"];
+pub const JTC_ERRORS: [&str; 8] = error::NAMES;
+/// Bits of the parameters that the controller has not received.
+pub const JTC_INIT: [&str; 3] = missing_parameter::NAMES;
 /// Nodes of the joint bus: nodes count from 0 on the wire, joints from 1.
 pub const NODES: [&str; 7] = [
     "node 0 (joint 1)",
@@ -25,14 +18,7 @@ pub const NODES: [&str; 7] = [
     "gripper",
 ];
 /// Bits of a joint's errors found by the controller.
-pub const JOINT_INTERNAL: [&str; 6] = [
-    "position over limit",
-    "velocity over limit",
-    "acceleration over limit",
-    "torque over limit",
-    "position error over limit",
-    "friction table value missing",
-];
+pub const JOINT_INTERNAL: [&str; 6] = joint_error::NAMES;
 /// Bits of a drive's motor-control faults.
 pub const MC_FAULTS: [&str; 8] = jtc_bus::motor_control::NAMES;
 /// Bits of a node's errors.

@@ -4,7 +4,8 @@ use jtc_wire::words::{self, Bits};
 use jtc_wire::{
     Code, Command, ControllerState, Described, FRAME_MAX, Floats, FrameRef, FrameStatus, FrameType,
     FrictionTable, GripperStatus, JointStatus, Known, Piece, RawPoint, Response, Status, TrajectoryState,
-    arm_model, fixed, friction_polynomial, friction_table, pieces, trajectory,
+    arm_model, can_flag, error, fixed, friction_polynomial, friction_table, joint_error, missing_parameter,
+    pieces, trajectory,
 };
 
 #[test]
@@ -49,6 +50,25 @@ fn bits_in_words() {
     assert_eq!(Bits(0x8000_0007, &names).to_string(), "a, bit 1, c, bit 31");
     assert_eq!(Bits(4, &names).to_string(), "c");
     assert!(Bits(0b1010, &names).iter().eq([(1, ""), (3, "")]));
+}
+
+/// Masks and texts of a word are one table: those of the protocol.
+#[test]
+fn masks_have_the_texts_of_their_bits() {
+    let errors = error::EMERGENCY_INPUT | error::EXTERNAL | error::EXTERNAL_JOINTS;
+    assert_eq!(errors, 0x89);
+    let text = Bits(errors.into(), &words::JTC_ERRORS).to_string();
+    assert_eq!(text, "emergency input, external error, external joints error");
+    assert_eq!(joint_error::FRICTION_TABLE, 0x20);
+    let text = Bits(joint_error::FRICTION_TABLE.into(), &words::JOINT_INTERNAL).to_string();
+    assert_eq!(text, "friction table value missing");
+    assert_eq!(missing_parameter::FRICTION | missing_parameter::MODEL, 5);
+    assert_eq!(Bits(5, &words::JTC_INIT).to_string(), "friction, arm model");
+    let flags = can_flag::TRANSMIT_TIMEOUT | can_flag::no_answer(0) | can_flag::no_answer(6);
+    assert_eq!(flags, 0x4101);
+    let text = Bits(flags, &words::CAN_FLAGS).to_string();
+    assert_eq!(text, "transmit timeout, no answer from node 0 (joint 1), no answer from the gripper");
+    assert_eq!(Bits(0x08, &words::NODE_WARNINGS).to_string(), "safety line active");
 }
 
 #[test]

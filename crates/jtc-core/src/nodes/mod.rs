@@ -1,6 +1,7 @@
 //! The seven nodes on the joint bus: what they report, how they are brought up (J-20), what of them is an error (J-14, J-16), and
 //! which frame each tick sends (J-12).
 use jtc_bus::{Answer, JointReport, NodeState, Scale, warning};
+use jtc_wire::can_flag;
 
 use crate::config::Config;
 use crate::io::Inputs;
@@ -18,7 +19,7 @@ pub(crate) use node::{Goal, Node};
 /// Node number of the gripper.
 pub(crate) const GRIPPER: usize = 6;
 /// CAN flag of the gripper's receive timeout.
-const GRIPPER_FLAG: u32 = 1 << (8 + GRIPPER);
+const GRIPPER_FLAG: u32 = can_flag::no_answer(GRIPPER);
 /// Frames looked at in one tick.
 const FRAMES_MAX: usize = 32;
 
@@ -327,11 +328,12 @@ impl Nodes {
         }
     }
 
-    /// CAN flags of this tick that are errors: bit 0 transmit timeout or bus-off, bit 8+n receive timeout of joint n.
+    /// CAN flags of this tick that are errors: transmit timeout or bus-off, and the receive timeouts of the joints.
     pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
-        let mut flags = u32::from(inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max);
+        let transmit = inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max;
+        let mut flags = can_flag::TRANSMIT_TIMEOUT * u32::from(transmit);
         for (n, node) in self.joints().iter().enumerate() {
-            flags |= u32::from(node.silent >= config.missed_moves_max) << (8 + n);
+            flags |= can_flag::no_answer(n) * u32::from(node.silent >= config.missed_moves_max);
         }
         flags
     }

@@ -49,7 +49,7 @@ pub struct Core {
     pub stop_at: u64,
     /// The last instruction begun.
     pub pc: u32,
-    /// A stop was asked for at this address.
+    /// A stop was requested at this address.
     pub stopping: Option<u32>,
     /// Something changed that the loop must see before the next instruction.
     pub attention: bool,
@@ -96,7 +96,7 @@ pub struct Chip {
     /// Observers.
     pub observers: Observers,
     plain: Plain,
-    /// Registers nobody models, by address.
+    /// Registers without a model, by address.
     pub unknown: BTreeMap<u32, Access>,
     /// Accesses to peripherals whose clock is off.
     pub unclocked: BTreeMap<u32, Access>,

@@ -41,7 +41,7 @@ pub const fn node(id: u16) -> u8 {
     (id & 0x00F) as u8
 }
 
-/// Node bits for a node number; one that does not exist becomes 15, which nobody has, never somebody else's.
+/// Node bits for a node number; one that does not exist becomes 15, which no node has, never that of another node.
 pub(crate) const fn on_wire(node: u8) -> u16 {
     if (node as usize) < crate::NODES { node as u16 } else { 0x00F }
 }

@@ -19,7 +19,7 @@ mod field {
     pub const MODE_LEN: usize = 16;
 }
 
-/// A state that can be asked of a node. There are no others (J-16): some drives take any other byte, such as
+/// A state that can be requested of a node. There are no others (J-16): some drives take any other byte, such as
 /// their own state echoed, as a command to move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
@@ -36,10 +36,10 @@ pub enum Target {
 }
 
 impl Target {
-    /// The state asked for by a byte of the wire.
+    /// The target of a byte on the wire.
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match NodeState::new(byte) {
-            // No node is asked for Start: that byte asks for nothing.
+            // Start is no target: its byte requests no change.
             NodeState::START => Some(Self::NoChange),
             NodeState::INIT => Some(Self::Init),
             NodeState::READY => Some(Self::Ready),
@@ -61,7 +61,7 @@ pub enum Request {
     },
     /// 0x010: target per node (J-16).
     ChangeFsm {
-        /// State asked of each node.
+        /// Requested state of each node.
         target: [Target; NODES],
     },
     /// 0x0F0: mode (1 torque) and configuration bits per joint, configuration bits of the gripper.
@@ -75,7 +75,7 @@ pub enum Request {
     },
     /// 0x0A0.
     ResetAll,
-    /// 0x1A0 + node, 0..6. A node that does not exist is sent as 15, which nobody has.
+    /// 0x1A0 + node, 0..6. A node that does not exist is sent as 15, which no node has.
     Reset(u8),
 }
 

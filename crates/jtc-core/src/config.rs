@@ -58,7 +58,7 @@ pub struct Config {
     pub missed_moves_max: u8,
     /// Silence of a node after its reset that is no error yet, ms.
     pub node_boot_ms: u32,
-    /// Longest READY→ENABLE, ms (J-16); counted while enabling is asked for.
+    /// Longest READY→ENABLE, ms (J-16); counted while enabling is requested.
     pub enable_timeout_ms: u32,
     /// Joints are enabled only while every one has moved slower than this for `enable_still_ms`, rad/s (J-16): an arm that
     /// falls is not caught with a jolt.

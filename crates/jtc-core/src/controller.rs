@@ -72,7 +72,7 @@ pub struct Controller<M> {
     pub(crate) trajectory: TrajectoryState,
     pub(crate) clock: PathClock,
     pub(crate) path: Path,
-    /// Ticks since a pause or stop was asked for on the path, until the arm stands (J-33).
+    /// Ticks since a pause or stop was commanded on the path, until the arm stands (J-33).
     pub(crate) braking_ms: Option<u16>,
     pub(crate) motion: Motion,
     // The link to the host.
@@ -243,7 +243,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.nodes.clearing()
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
         if initialised && !self.powered() && !self.holdable(&self.dynamics) {
-            // Sent before the positions were known: it is asked for again.
+            // Received before the positions were known: the host has to send it again.
             self.received.withdraw(ReceivedParameters::MODEL);
             return self.enter(if self.errors.any() {
                 ControllerState::Error
@@ -307,7 +307,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn hold(&mut self) -> [f64; JOINTS] {
-        // It does not wait for ever: nobody expects the arm to go soft then.
+        // The wait ends: the operator no longer expects the arm to go soft then.
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         self.motion.latch(&self.nodes, &self.config);
@@ -372,7 +372,7 @@ mod tests {
         assert!(bytes <= 448 * 1024, "{bytes} bytes");
     }
 
-    /// An accepted teaching waits as long as enabling may take, and is over then: nobody expects the arm to go soft.
+    /// An accepted teaching waits as long as enabling may take, and is over then: the operator no longer expects the arm to go soft.
     #[test]
     fn j25_teaching_waits_for_a_while_only() {
         let most = Config::avena().enable_timeout_ms;

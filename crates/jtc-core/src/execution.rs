@@ -120,7 +120,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
                 self.motion.hold(&self.config);
                 if !self.motion.all_holding() {
-                    // It does not wait for ever: nobody expects a motion then (J-16).
+                    // The wait ends: the operator no longer expects a motion then (J-16).
                     self.path = Path::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_trajectory(TrajectoryState::Stop);

@@ -18,7 +18,7 @@ pub struct PathClock {
     pub slope: f64,
     /// The rate that is wanted, 0 or 1.
     target: f64,
-    /// Ticks since standstill was asked for.
+    /// Ticks since standstill was requested.
     halting_ms: f64,
     /// The S with its margins is too slow for the time that a stop may take.
     hurried: bool,
@@ -82,7 +82,7 @@ impl PathClock {
         self.slope = 0.0;
     }
 
-    /// Slow down to standstill. The time for it runs from the first time this is asked.
+    /// Slow down to standstill. The time for it runs from the first call.
     pub fn halt(&mut self) {
         if self.target != 0.0 {
             (self.target, self.halting_ms, self.hurried) = (0.0, 0.0, false);

@@ -14,7 +14,7 @@ use crate::motion::smooth;
 
 /// Ticks over which the missing torque is averaged: the time constant of a low-pass filter.
 const AVERAGE_MS: f64 = 100.0;
-/// Ticks of calm holding after which the average is trusted: an arm that swings below what counts as standing turns twice.
+/// Ticks of calm holding after which the average is trusted: an arm that swings below the speed of standing reverses twice.
 const OBSERVED_MS: u16 = 400;
 /// Share of a torque limit below which what is missing is no load worth waiting for: friction of the joint holds it.
 const LITTLE: f64 = 0.1;

@@ -65,7 +65,7 @@ impl SimArm {
             // A drive has a rotor also where the file of the arm gives no inertia for it.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
-            // Nobody has measured beyond what the arm may do.
+            // Friction is measured only within the limits of the arm.
             polynomial_speed: config.joints.map(|j| j.velocity_max),
             friction_model: FrictionModel::default(),
             stops: config.joints.map(|j| (j.position_min - 0.04, j.position_max + 0.04)),

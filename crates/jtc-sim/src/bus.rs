@@ -76,7 +76,7 @@ pub struct BusStatistics {
     pub repeated: u64,
     /// Answers garbled by a fault.
     pub garbled: u64,
-    /// Requests that nobody acknowledged.
+    /// Requests that no node acknowledged.
     pub unacknowledged: u64,
     /// Times that the controller went bus-off.
     pub bus_offs: u64,

@@ -1,4 +1,4 @@
-//! What is behind the joint bus: drives, gripper and the arm that they move. It knows nothing of the controller, which may be
+//! What is behind the joint bus: drives, gripper and the arm that they move. It is independent of the controller, which may be
 //! the simulated one of [`World`](crate::World) or any other that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_dynamics::{ArmModel, JointVec};

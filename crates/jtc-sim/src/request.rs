@@ -14,7 +14,7 @@ impl NodeRequest {
     /// The request in a frame; `None` for answers and for frames that mean nothing to nodes.
     pub fn parse(frame: &Frame) -> Option<Self> {
         if frame.id == id::CHANGE_FSM {
-            // Bytes beyond a short frame read as 0, which asks for nothing.
+            // Bytes beyond a short frame read as 0, which requests no change.
             let state = |n| NodeState::new(frame.data().get(n).copied().unwrap_or(0));
             return Some(Self::ChangeFsm(core::array::from_fn(state)));
         }

@@ -1,9 +1,9 @@
-//! What the host asks for: the meaning of each frame type.
+//! The commands of the host: the meaning of each frame type.
 use crate::frame::{FrameRef, FrameType};
 use crate::response::DataStatus;
 use crate::segment::Segment;
 
-/// What TrajSetExecStatus asks for.
+/// The command in TrajSetExecStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]

@@ -27,7 +27,7 @@ pub enum Outcome {
     Good,
     /// Destroyed by an error.
     Error,
-    /// Nobody acknowledged it.
+    /// No member acknowledged it.
     NoAcknowledge,
 }
 
@@ -73,7 +73,7 @@ pub struct Transmission {
 /// The wire.
 #[derive(Default)]
 pub struct Wire {
-    /// The other members; without any, nobody acknowledges.
+    /// The other members; without any, no frame is acknowledged.
     pub peers: Option<Box<dyn CanPeers>>,
     queue: Vec<Queued>,
     on_wire: Option<Transmission>,

@@ -170,7 +170,7 @@ impl Motion {
         let mass = parameters.dynamics.mass_matrix(nodes.positions());
         for (j, torque) in self.torque.iter_mut().enumerate() {
             let joint = &config.joints[j];
-            // A rotor that nobody gave is there all the same.
+            // A drive has a rotor also where the configuration gives none.
             let rotor = if joint.rotor_inertia > 0.0 { joint.rotor_inertia } else { UNKNOWN_ROTOR };
             let damping = config.teach_damping.min(BRAKE_RATE * (mass[j][j] + rotor));
             if nodes.node(j).enabled() {

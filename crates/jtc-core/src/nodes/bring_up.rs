@@ -69,7 +69,7 @@ impl Nodes {
         change.then_some(Request::ChangeFsm { target })
     }
 
-    /// What each node is asked for.
+    /// The requested state of each node.
     fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
         let mut target = [Target::NoChange; NODES];
         for (node, target) in self.joints().iter().zip(&mut target) {
@@ -82,7 +82,7 @@ impl Nodes {
         target
     }
 
-    /// What the gripper is asked for: it is brought up in any state with torque as well, on the side (J-23).
+    /// The requested state of the gripper: it is brought up in any state with torque as well, on the side (J-23).
     fn gripper_target(&self, goal: Goal, config: &Config) -> Target {
         let Some(node) = self.gripper_node().filter(|_| self.gripper_answers(config)) else {
             return Target::NoChange;

@@ -260,18 +260,18 @@ impl Nodes {
     /// Counts Moves without answer, without usable answer, and without acknowledge (J-14, J-35).
     fn count_missing(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8, usable: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
-        // While every node boots there is nobody to acknowledge.
-        let somebody = self.all().iter().any(|node| node.boot_left == 0);
+        // While every node boots, no node acknowledges.
+        let any_booted = self.all().iter().any(|node| node.boot_left == 0);
         if on_the_bus {
             self.unacknowledged = 0;
-        } else if self.sent_move && somebody {
+        } else if self.sent_move && any_booted {
             self.unacknowledged = self.unacknowledged.saturating_add(1);
         }
         for (n, node) in self.nodes.iter_mut().enumerate() {
             let (answered, usable) = (answered & (1 << n) != 0, usable & (1 << n) != 0);
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
             let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
-            // Nobody was there to answer, and the bus is not given up yet: the joint is predicted all the same (J-63).
+            // No node can have answered, and the bus is not given up yet: the joint is predicted all the same (J-63).
             let predicted =
                 self.sent_move && node.valid && (1..config.missed_moves_max).contains(&self.unacknowledged);
             let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
@@ -320,7 +320,7 @@ impl Nodes {
                 node.misbehaved = true;
             }
             node.enabled = false;
-            // J-16: while the arm falls nothing is asked for.
+            // J-16: while the arm falls no state is requested.
             node.enable_wait = node.enable_wait.saturating_add(u32::from(may_enable));
             if node.enable_wait > config.enable_timeout_ms {
                 (node.misbehaved, node.enable_wait) = (true, 0);

@@ -1,4 +1,4 @@
-//! One node: what it last reported, how far its bring-up is, and which state it is asked for (J-16, J-20).
+//! One node: what it last reported, how far its bring-up is, and which state is requested of it (J-16, J-20).
 use jtc_bus::{JointReport, NodeState, Target, warning};
 
 use super::measure::Measurement;
@@ -71,7 +71,7 @@ impl Node {
         !self.valid || self.starting()
     }
 
-    /// Reports an error. A gripper knows no warnings.
+    /// Reports an error. A gripper has no warnings.
     pub fn faulty(&self) -> bool {
         let r = &self.report;
         // Drives set this warning also before they are configured, whatever the line is.
@@ -90,7 +90,7 @@ impl Node {
         self.measured = Measurement::default();
     }
 
-    /// State that the node is asked for (J-16).
+    /// State requested of the node (J-16).
     pub fn request(&self, goal: Goal) -> Target {
         let state = self.report.state;
         if !self.seen {

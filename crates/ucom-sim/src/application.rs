@@ -1,6 +1,7 @@
 //! The application of a simulated board behind the words of the protocol.
 use super::file::BoardConfig;
 use super::model::Model;
+use super::texts::{Texts, latin1};
 use ucom::Dimensions;
 use ucom::node::{Application, Text};
 
@@ -13,8 +14,7 @@ const MOST_S: f64 = 5.0;
 #[derive(Clone, Debug)]
 pub(super) struct SimApplication {
     model: Model,
-    name: Vec<u8>,
-    texts: [Vec<Vec<u8>>; 3],
+    texts: Texts,
     received: Vec<u16>,
     ci: Vec<u16>,
     par: Vec<u16>,
@@ -30,10 +30,9 @@ pub(super) struct SimApplication {
 impl SimApplication {
     pub fn new(config: &BoardConfig) -> Self {
         let model = Model::new(&config.axes);
-        let texts = |names: &[String]| names.iter().map(|name| latin1(name)).collect();
+        let name = format!("{} control", config.description);
         Self {
-            name: latin1(&format!("{} control", config.description)),
-            texts: [texts(model.ci_names()), texts(model.so_names()), texts(model.par_names())],
+            texts: Texts::new(&name, model.ci_names(), model.so_names(), model.par_names()),
             received: model.initial_ci().to_vec(),
             ci: model.initial_ci().to_vec(),
             par: model.initial_par().to_vec(),
@@ -101,13 +100,7 @@ impl Application for SimApplication {
     }
 
     fn text(&self, text: Text) -> &[u8] {
-        let (list, index) = match text {
-            Text::Application => return &self.name,
-            Text::Ci(index) => (&self.texts[0], index),
-            Text::So(index) => (&self.texts[1], index),
-            Text::Par(index) => (&self.texts[2], index),
-        };
-        list.get(usize::from(index)).map_or(&[], |text| text)
+        self.texts.get(text)
     }
 
     fn initial_ci(&self, index: u16) -> u16 {
@@ -158,9 +151,4 @@ impl Application for SimApplication {
             self.debug.remove(0);
         }
     }
-}
-
-/// Characters that Latin-1 does not have become `?`.
-pub(super) fn latin1(text: &str) -> Vec<u8> {
-    text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect()
 }

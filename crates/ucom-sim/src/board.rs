@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 
-use super::application::{SimApplication, latin1};
+use super::application::SimApplication;
 use super::file::BoardConfig;
+use super::texts::latin1;
 use crate::memory::{MemoryFlash, MemoryStore, WirePins};
 use ucom::node::{Node, NodeConfig, Phase, Pins, Record};
 use ucom::profile::{Endian, HeaderForm};

@@ -14,9 +14,11 @@ mod model;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
+mod texts;
 
 pub use axis::AxisConfig;
 pub use board::BoardState;
 pub use fault::{FAULT_HELP, Fault, FaultError, FaultKind, Trigger};
 pub use file::{BoardConfig, ChainConfig, ChainFileError, HEAD, help};
 pub use sim::ChainSim;
+pub use texts::Texts;

@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use ucom::node::{Application, Area, Flash, FlashError, FlashState, Pins, RECORD_LEN, Store, Text};
 use ucom::{Dimensions, Memory};
 
+use crate::texts::Texts;
+
 /// Flash, data flash and exloader RAM in memory.
 ///
 /// Bits can only be cleared by writing, as in a real flash. `fail_after` makes operations fail, `cut_after`
@@ -251,8 +253,8 @@ impl Store for MemoryStore {
 pub struct MemoryApplication {
     /// From start to up, µs.
     pub start_us: u64,
-    /// Its description and those of inputs, outputs and parameters, Latin-1.
-    pub texts: [Vec<Vec<u8>>; 4],
+    /// Its description, and the names of its inputs, outputs and parameters.
+    pub texts: Texts,
     /// Initial inputs.
     pub initial_ci: Vec<u16>,
     /// Inputs as received.
@@ -280,11 +282,9 @@ pub struct MemoryApplication {
 impl MemoryApplication {
     /// As many inputs, outputs and parameters as there are texts; all 0.
     pub fn new(text: &str, ci: &[&str], so: &[&str], par: &[&str]) -> Self {
-        let latin1 = |text: &&str| text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect();
-        let list = |texts: &[&str]| texts.iter().map(latin1).collect::<Vec<_>>();
         Self {
             start_us: 10_000,
-            texts: [list(&[text]), list(ci), list(so), list(par)],
+            texts: Texts::new(text, ci, so, par),
             initial_ci: vec![0; ci.len()],
             ci: vec![0; ci.len()],
             latched_ci: vec![0; ci.len()],
@@ -318,13 +318,7 @@ impl Application for MemoryApplication {
     }
 
     fn text(&self, text: Text) -> &[u8] {
-        let (list, index) = match text {
-            Text::Application => (0, 0),
-            Text::Ci(index) => (1, index),
-            Text::So(index) => (2, index),
-            Text::Par(index) => (3, index),
-        };
-        self.texts[list].get(usize::from(index)).map_or(&[], Vec::as_slice)
+        self.texts.get(text)
     }
 
     fn initial_ci(&self, index: u16) -> u16 {

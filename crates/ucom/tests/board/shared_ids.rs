@@ -36,7 +36,7 @@ proptest! {
     #[test]
     fn d05_never_within_2_ms_of_a_request(acts in acts()) {
         let mut bus = Bus::started();
-        bus.boards[0].application.texts[0][0] = b"a".to_vec();
+        bus.boards[0].application.texts.application = b"a".to_vec();
         let mut asked: Vec<(u64, u16)> = Vec::new();
         for act in acts {
             match act {
@@ -73,14 +73,14 @@ fn d14_an_answer_ends_when_its_text_changes() {
             for after in 1..9 {
                 let mut bus = Bus::started();
                 bus.boards[0].store.description = long.clone().into_bytes();
-                bus.boards[0].application.texts[0][0] = long.clone().into_bytes();
+                bus.boards[0].application.texts.application = long.clone().into_bytes();
                 bus.send(request);
                 // So many frames of the answer leave, then the text is another.
                 while bus.received.iter().filter(|(_, f)| f.id() == id).count() < after {
                     bus.run_us(50);
                 }
                 bus.boards[0].store.description = b"x".to_vec();
-                bus.boards[0].application.texts[0][0] = b"x".to_vec();
+                bus.boards[0].application.texts.application = b"x".to_vec();
                 if asked_again {
                     bus.send(request);
                 }

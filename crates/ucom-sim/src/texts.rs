@@ -1,0 +1,40 @@
+//! The texts of a program: its description and the names of its inputs, outputs and parameters, in Latin-1.
+
+use ucom::node::Text;
+
+/// The texts of a program, in Latin-1.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Texts {
+    /// The description of the application.
+    pub application: Vec<u8>,
+    /// Names of the inputs.
+    pub ci: Vec<Vec<u8>>,
+    /// Names of the outputs.
+    pub so: Vec<Vec<u8>>,
+    /// Names of the parameters.
+    pub par: Vec<Vec<u8>>,
+}
+
+impl Texts {
+    /// Texts of a description and names; characters that Latin-1 does not have become `?`.
+    pub fn new<T: AsRef<str>>(application: &str, ci: &[T], so: &[T], par: &[T]) -> Self {
+        let list = |names: &[T]| names.iter().map(|name| latin1(name.as_ref())).collect();
+        Self { application: latin1(application), ci: list(ci), so: list(so), par: list(par) }
+    }
+
+    /// One text; empty where there is none.
+    pub fn get(&self, text: Text) -> &[u8] {
+        let (list, index) = match text {
+            Text::Application => return &self.application,
+            Text::Ci(index) => (&self.ci, index),
+            Text::So(index) => (&self.so, index),
+            Text::Par(index) => (&self.par, index),
+        };
+        list.get(usize::from(index)).map_or(&[], Vec::as_slice)
+    }
+}
+
+/// Characters that Latin-1 does not have become `?`.
+pub(super) fn latin1(text: &str) -> Vec<u8> {
+    text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect()
+}

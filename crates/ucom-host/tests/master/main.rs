@@ -10,6 +10,7 @@ mod faults;
 mod kept;
 mod loader;
 mod losses;
+mod outgoing;
 mod overload;
 mod probing;
 mod repairing;

@@ -8,6 +8,7 @@ use ucom_host::master::{Error, Event, Master, Outcome, Request};
 use crate::bench::{Bench, From, Member, OLD, Script};
 use crate::chain::initialised;
 use crate::loader::{Loader, loader};
+use crate::outgoing::Outgoing;
 use crate::update::{check_program, options, update};
 
 const DATE: u16 = 0x3AC1;
@@ -235,21 +236,21 @@ fn one_damaged_answer_is_no_swapped_board() {
 struct Impostor {
     silent: bool,
     other: bool,
-    out: Vec<(u64, Frame)>,
+    out: Outgoing,
 }
 
 impl Member for Impostor {
     fn poll(&mut self, now: u64) -> Option<Frame> {
-        self.out.first().filter(|(at, _)| *at <= now).map(|(_, frame)| *frame)
+        self.out.due(now)
     }
     fn sent(&mut self, _: u64, _: &Frame) {
-        self.out.remove(0);
+        self.out.sent();
     }
     fn deadline(&self) -> u64 {
-        self.out.first().map_or(u64::MAX, |(at, _)| *at)
+        self.out.deadline()
     }
     fn receive(&mut self, now: u64, frame: &Frame) {
-        let mut answer = |text: &str| self.out.push((now + 300, crate::bench::frame(text)));
+        let mut answer = |text: &str| self.out.add(now + 300, text);
         match frame.to_string().as_str() {
             "041#" => self.silent = true,
             "1C1#0800" => self.other = false,

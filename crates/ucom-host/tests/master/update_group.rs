@@ -7,6 +7,7 @@ use ucom_host::master::{Error, Request};
 
 use crate::bench::{Bench, From, Member, OLD};
 use crate::chain::initialised;
+use crate::outgoing::Outgoing;
 use crate::update::{check_program, options, update};
 
 const DATE: u16 = 0x3AC1;
@@ -47,24 +48,24 @@ fn d46_a_group_leaves_other_boards_alone() {
 /// A board that keeps PROG = 1 whatever is sent to it.
 #[derive(Default)]
 struct Stubborn {
-    out: Vec<(u64, Frame)>,
+    out: Outgoing,
 }
 
 impl Member for Stubborn {
     fn poll(&mut self, now: u64) -> Option<Frame> {
-        self.out.first().filter(|(at, _)| *at <= now).map(|(_, frame)| *frame)
+        self.out.due(now)
     }
     fn sent(&mut self, _: u64, _: &Frame) {
-        self.out.remove(0);
+        self.out.sent();
     }
     fn deadline(&self) -> u64 {
-        self.out.first().map_or(u64::MAX, |(at, _)| *at)
+        self.out.deadline()
     }
     fn receive(&mut self, now: u64, frame: &Frame) {
         // It does not answer broadcast questions.
         if frame.to_string() == "209#" {
-            self.out.push((now + 300, crate::bench::frame("149#7700091F34126E38")));
-            self.out.push((now + 301, crate::bench::frame("149#0000")));
+            self.out.add(now + 300, "149#7700091F34126E38");
+            self.out.add(now + 301, "149#0000");
         }
     }
 }

@@ -199,16 +199,17 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// The timing program of jtc-dynamics, copied away: other crates have an example of that name too.
 fn dynamics_program(work: &Path) -> Result<PathBuf> {
-    run(&mut cargo(&["build", "--release", "--package", "jtc-dynamics", "--example", "time"]))?;
+    run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-dynamics", "--example", "time"]))?;
     let program = work.join("dynamics_time");
-    std::fs::copy(shell::target().join("release/examples/time"), &program)?;
+    std::fs::copy(shell::target().join("dist/examples/time"), &program)?;
     Ok(program)
 }
 
 /// What the crates measure of themselves. The UCoM frames that were read go to `frames`, too.
 fn own_figures(frames: &Path) -> Result<Figures> {
     let example = |package: &str, name: &str| {
-        let mut example = cargo(&["run", "--release", "--quiet", "--package", package, "--example", name]);
+        let mut example =
+            cargo(&["run", "--profile", "dist", "--quiet", "--package", package, "--example", name]);
         shell::read(example.env("OPENJTC_UCOM_FRAMES", frames))
     };
     let mut figures = lines(&example("xtask", "figures")?);

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use host_kit::Findings;
 pub use host_kit::{Finding, Severity};
-use jtc_wire::{ControllerState, NodeState, Status};
+use jtc_bus::{NODES, warning};
+use jtc_wire::{ControllerState, NodeState, Status, error};
 
 use crate::port::Port;
 use crate::{Error, Session, words};
@@ -138,7 +139,7 @@ fn link(seen: &Observation, all: &mut Findings) {
 
 fn errors(s: &Status, all: &mut Findings) {
     use Severity::{Problem, Warning};
-    if s.errors & 1 != 0 {
+    if s.errors & error::EMERGENCY_INPUT != 0 {
         all.add(
             Problem,
             "the safety input is low",
@@ -174,7 +175,7 @@ fn errors(s: &Status, all: &mut Findings) {
             );
         }
         for word in words::node_warnings(joint.warnings) {
-            let severity = if joint.warnings & 8 != 0 { Problem } else { Warning };
+            let severity = if joint.warnings & warning::SAFETY_LINE != 0 { Problem } else { Warning };
             all.add(severity, format!("{who}: {word}"), "reported by the drive", "`jtc explain`");
         }
         if joint.state.is_fault() {
@@ -197,16 +198,16 @@ fn set_up(s: &Status, all: &mut Findings) {
             "`jtc params push FILE` or `jtc params use-defaults`",
         );
     }
-    for n in (0..7).filter(|n| s.node_init >> n & 1 == 1) {
+    for n in (0..NODES).filter(|n| words::is_awaited(s, *n)) {
         let (state, warnings) = match (s.joints.get(n), s.gripper) {
             (Some(j), _) => (j.state, j.warnings),
             (None, Some(g)) => (g.state, g.warnings),
             (None, None) => (NodeState::START, 0),
         };
-        let why = match (state, warnings & 1) {
-            _ if s.can_current >> (8 + n) & 1 == 1 => "it does not answer",
+        let why = match (state, warnings & warning::POSITION_NOT_ACCURATE != 0) {
+            _ if words::is_silent(s, n) => "it does not answer",
             (NodeState::START, _) => "it has not answered yet, or it starts",
-            (_, 1) => "its position is not accurate yet",
+            (_, true) => "its position is not accurate yet",
             (NodeState::INIT, _) => "its configuration was not accepted yet",
             (state, _) if state.is_fault() => "it is in its fault state",
             (state, _) if state.is_transition() => "it is changing its state (the first enable takes 4 s)",

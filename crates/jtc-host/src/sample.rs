@@ -4,6 +4,7 @@ use jtc_core::{JOINTS, JointTelemetry, Telemetry};
 use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};
 
 use crate::trajectory::Trajectory;
+use crate::words;
 
 /// One joint in a [`Sample`]; NaN where the source does not know a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,7 +143,7 @@ impl From<&Telemetry> for Sample {
 /// The numbers of joint `j` (from 0) in a status are measured ones. The controller reports zero for a joint that it does not know:
 /// silent, or not ready.
 pub fn is_measured(status: &Status, j: usize) -> bool {
-    let unknown = (status.can_current >> (8 + j) | u32::from(status.node_init) >> j) & 1 == 1;
+    let unknown = words::is_silent(status, j) || words::is_awaited(status, j);
     !unknown || status.joints.get(j).is_some_and(|s| s.position != 0.0 || s.velocity != 0.0)
 }
 

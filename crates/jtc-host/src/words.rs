@@ -1,6 +1,8 @@
 //! The controller's numbers in words.
 
-use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status};
+pub use jtc_bus::GRIPPER;
+use jtc_bus::{NODES, warning};
+use jtc_wire::{ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status, can_flag, error};
 
 /// Name of a node on the joint bus.
 pub fn node(n: usize) -> String {
@@ -89,11 +91,22 @@ pub fn node_warnings(byte: u8) -> Vec<&'static str> {
 /// CAN flags.
 pub fn can_flags(word: u32) -> Vec<String> {
     let mut all = Vec::new();
-    if word & 1 != 0 {
+    if word & can_flag::TRANSMIT_TIMEOUT != 0 {
         all.push("no acknowledge on the joint bus".to_owned());
     }
-    all.extend((0..7).filter(|n| word >> (8 + n) & 1 == 1).map(|n| format!("{} does not answer", node(n))));
+    let silent = (0..NODES).filter(|n| word & can_flag::no_answer(*n) != 0);
+    all.extend(silent.map(|n| format!("{} does not answer", node(n))));
     all
+}
+
+/// Whether a node does not answer; joints are nodes 0..5, the gripper is node 6.
+pub fn is_silent(s: &Status, node: usize) -> bool {
+    s.can_current & can_flag::no_answer(node) != 0
+}
+
+/// Whether the controller still waits for a node to be ready.
+pub fn is_awaited(s: &Status, node: usize) -> bool {
+    s.node_init >> node & 1 == 1
 }
 
 /// What the controller still waits for in Init: friction, PID, arm model.
@@ -103,46 +116,37 @@ pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
 
 /// Nodes that are not ready.
 pub fn missing_nodes(node_init: u8) -> Vec<String> {
-    (0..7).filter(|n| node_init >> n & 1 == 1).map(node).collect()
+    (0..NODES).filter(|n| node_init >> n & 1 == 1).map(node).collect()
 }
 
 /// All current errors of a status, the most particular ones first: nodes that do not answer, the safety input, what each joint and
 /// the gripper report. The controller's other error bits follow from these.
 pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
-    all.extend(errors(s.errors & SAFETY_INPUT).into_iter().map(String::from));
+    all.extend(errors(s.errors & error::EMERGENCY_INPUT).into_iter().map(String::from));
     for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
+        // The drive holds its torque off. Before it is configured it sets the bit, too, which means nothing then.
+        let line_active = joint.warnings & warning::SAFETY_LINE != 0 && !is_awaited(s, number.index());
         let words = joint_errors(joint.internal)
             .into_iter()
             .chain(node_errors(joint.errors))
             .chain(motor_faults(joint.mc_current))
-            .chain((joint.warnings & SAFETY_LINE != 0 && is_ready(s, number)).then_some("safety line active"))
+            .chain(line_active.then_some("safety line active"))
             .chain(joint.state.is_fault().then(|| joint.state.name()));
         all.extend(words.map(|w| format!("{number}: {w}")));
     }
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
-    all.extend(errors(s.errors & !SAFETY_INPUT).into_iter().map(String::from));
+    all.extend(errors(s.errors & !error::EMERGENCY_INPUT).into_iter().map(String::from));
     all
-}
-
-/// Bit of the controller's errors that has no other cause than itself.
-const SAFETY_INPUT: u16 = 1;
-
-/// Bit of a node's warnings that is an error: the drive holds its torque off.
-const SAFETY_LINE: u8 = 8;
-
-/// Before it is configured a drive sets the bit, too, which says nothing then.
-fn is_ready(s: &Status, joint: Joint) -> bool {
-    s.node_init >> joint.index() & 1 == 0
 }
 
 /// What nodes warn of and is no error.
 pub fn warnings(s: &Status) -> Vec<String> {
     let joints = s.joints.iter().map(|joint| joint.warnings).chain(s.gripper.map(|g| g.warnings)).enumerate();
     let words = joints.flat_map(|(n, byte)| {
-        let own = if n < s.joints.len() { byte & !SAFETY_LINE } else { byte };
+        let own = if n < s.joints.len() { byte & !warning::SAFETY_LINE } else { byte };
         node_warnings(own).into_iter().map(move |word| format!("{}: {word}", node(n)))
     });
     words.collect()

@@ -2,7 +2,7 @@
 
 use cli_kit::{Output, figure, table};
 use jtc_host::sample::is_measured;
-use jtc_host::words;
+use jtc_host::words::{self, GRIPPER};
 use jtc_wire::{Joint, NodeState, Status};
 use serde_json::{Value, json};
 
@@ -78,13 +78,13 @@ pub fn as_json(s: &Status) -> Value {
 pub fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
     // A joint that is not ready may answer; one that is enabled and not measured does not.
-    let silent = !is_measured(s, j) && (s.can_current >> (8 + j) & 1 == 1 || state == NodeState::ENABLED);
+    let silent = !is_measured(s, j) && (words::is_silent(s, j) || state == NodeState::ENABLED);
     if silent { "does not answer" } else { state.name() }
 }
 
 /// What the status says of pump and vacuum is what the gripper sent.
 pub fn gripper_answers(s: &Status) -> bool {
-    s.can_current >> 14 & 1 == 0
+    !words::is_silent(s, GRIPPER)
 }
 
 /// State of the gripper: what it sent last, unless it sends nothing any more.

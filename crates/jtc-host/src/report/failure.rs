@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use jtc_wire::{ControllerState, Joint, NodeState, Status};
+use jtc_bus::GRIPPER;
+use jtc_wire::{ControllerState, Joint, NodeState, Status, can_flag};
 use serde::Serialize;
 
 use crate::recording::{Ending, RecordingInfo};
@@ -289,7 +290,7 @@ impl Words {
     /// What is wrong with a joint.
     fn joint(&self, joint: Joint) -> Vec<String> {
         let own = &self.joints[joint.index()];
-        let silent = (self.can >> (8 + joint.index()) & 1 == 1).then_some("does not answer");
+        let silent = (self.can & can_flag::no_answer(joint.index()) != 0).then_some("does not answer");
         let all = silent
             .into_iter()
             .chain(words::motor_faults(own.motor))
@@ -310,10 +311,10 @@ fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
             all.push(format!("{joint}: {problem}"));
         }
     }
-    if words.can & 1 != 0 {
+    if words.can & can_flag::TRANSMIT_TIMEOUT != 0 {
         all.push("no acknowledge on the joint bus".into());
     }
-    if words.can >> 14 & 1 == 1 {
+    if words.can & can_flag::no_answer(GRIPPER) != 0 {
         all.push("the gripper does not answer".into());
     }
     let own = crate::words::errors(words.errors).into_iter().map(|word| format!("controller: {word}"));

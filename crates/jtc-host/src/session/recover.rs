@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use jtc_wire::{ControllerState, Status};
+use jtc_bus::NODES;
+use jtc_wire::{ControllerState, Status, error};
 
 use super::Session;
 use crate::arm::ParameterSet;
@@ -279,11 +280,12 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
     fn leave_error(&mut self, status: &Status) -> Result<(), Error> {
         let nodes = faulty(status);
         // Errors latch: only clearing tells whether the safety input is high again.
-        let safety_input = status.errors & 1 != 0;
+        let safety_input = status.errors & error::EMERGENCY_INPUT != 0;
         if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
             return self.wait_for_a_person(status);
         }
-        let silent = (status.can_current >> 8 & 0x7F) as u8 & !self.reset;
+        let silent = (0..NODES).filter(|n| words::is_silent(status, *n)).fold(0, |mask, n| mask | 1 << n)
+            & !self.reset;
         if silent != 0 && self.clears > 0 {
             self.reset |= silent;
             self.reset_nodes(silent)?;

@@ -129,7 +129,16 @@ impl core::fmt::Display for Bits<'_> {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+    use std::string::ToString;
+
     use super::*;
+
+    #[test]
+    fn bits_print_their_texts_or_else_their_numbers() {
+        assert_eq!(Bits(0, &warning::NAMES).to_string(), "-");
+        assert_eq!(Bits(0x11, &warning::NAMES).to_string(), "position not accurate, bit 4");
+    }
 
     #[test]
     fn j11_default_configuration_bits() {

@@ -116,14 +116,18 @@ fn comment(words: &str) -> String {
     if one_line.trim().is_empty() { String::new() } else { format!("   # {}", one_line.trim()) }
 }
 
-/// The name of a signal, as short as it can be and still mean this one.
+/// Characters that YAML allows an implicit key (1.2.2, section 7.4.2), quotes and escapes counted.
+const KEY_MAX: usize = 1024;
+
+/// The name of a signal, as short as it can be and still mean this one; its number where no key of YAML holds the name.
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);
     // A board may call another signal "#1": further signs make the number different from every name.
     let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
     let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
-    let name = names.chain(numbers).find(|name| means(name)).unwrap_or_default();
+    let fits = |name: &str| quoted(name).chars().count() <= KEY_MAX;
+    let name = names.chain(numbers).find(|name| fits(name) && means(name)).unwrap_or_default();
     let word = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     // Words that YAML takes for something else.

@@ -1,8 +1,11 @@
 //! What is wrong with bus, chain and boards, in words with the next command.
+use crate::master::engine::{Boards, Life, Statistics};
+use crate::master::error::SHARED_CAUSE;
+use crate::master::reports::{InitFinding, InitReport, ScanFinding, ScanReport};
 use host_kit::Findings;
 pub use host_kit::{Finding, Severity};
 
-use super::{Boards, InitFinding, InitReport, Life, ScanFinding, ScanReport, Statistics, counted};
+use crate::master::counted::counted;
 use ucom::{Function, Profile};
 
 /// What the CAN controller reports about itself.
@@ -191,7 +194,7 @@ fn chain(o: &Observation, f: &mut Findings) {
     }
     let Some(scan) = &o.scan else { return };
     for shared in scan.findings.iter().filter_map(ScanFinding::error) {
-        let (why, next) = super::error::SHARED_CAUSE;
+        let (why, next) = SHARED_CAUSE;
         f.problem(shared.to_string(), why, next);
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {

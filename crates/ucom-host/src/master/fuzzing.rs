@@ -1,11 +1,10 @@
 //! What the fuzz targets run: any frames at any time into any procedure. A panic or a wait without end is a finding.
-use super::control::AdminChange;
-use super::init::InitOptions;
-use super::probe::ProbeOptions;
-use super::run::{RunBoard, RunOptions};
-use super::stop::StopLevel;
-use super::update::{UpdateImage, UpdateOptions, UpdateTarget};
-use super::{Event, Master, Request};
+use crate::master::engine::Event;
+use crate::master::interface::Master;
+use crate::master::reports::update::{UpdateImage, UpdateOptions, UpdateTarget};
+use crate::master::reports::{
+    AdminChange, InitOptions, ProbeOptions, Request, RunBoard, RunOptions, StopLevel,
+};
 use ucom::{Format, Frame, Profile, Status};
 
 /// Longest virtual time that a procedure may take whatever comes, µs: attempts × blocks × the longest timeout.

@@ -1,7 +1,7 @@
 //! Names of a board's inputs, outputs and parameters (D-36).
 use serde::{Deserialize, Serialize};
 
-use crate::master::Error;
+use crate::master::error::Error;
 use ucom::{BoardInfo, Dimensions};
 
 /// Which of the three buffers.

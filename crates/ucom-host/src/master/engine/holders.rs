@@ -1,0 +1,275 @@
+//! Whether each number belongs to one board: every answer to PC_INFO is looked at, whoever asked for it.
+//!
+//! Two boards with one number both carry out every command to it: both are flashed, both move. A board cannot see it, the
+//! PC can: one PC_INFO is answered twice. What is only asked is compared all the time ([`Holders::received`]); before a
+//! procedure changes something it waits until nobody else answers (`one_board_each`).
+
+use crate::master::error::Error;
+use std::collections::BTreeMap;
+use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
+
+/// So many questions in a row must be answered twice by one flash number: a gateway may double a frame now and then.
+const TWICE: u32 = 3;
+/// Most flash numbers that are remembered of a number: damaged answers may show any.
+const MOST: usize = 8;
+
+/// The first frame of DSP_INFO under a number, distinguished from a package of its description: that does not carry the board's
+/// own number and a possible status at these places.
+pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
+    let info = BoardInfo::parse(payload, profile.endian)?;
+    let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);
+    (possible && info.sequence == number).then_some(info)
+}
+
+/// Who answered to which number.
+#[derive(Debug, Default)]
+pub(crate) struct Holders {
+    numbers: BTreeMap<u8, Holder>,
+}
+
+/// Who answered to one number since it was given.
+#[derive(Debug, Default)]
+struct Holder {
+    /// The last PC_INFO, µs.
+    asked_at: Option<u64>,
+    /// What answered it: heads by flash number, other frames, and how many of those one answer has.
+    heads: BTreeMap<u16, u32>,
+    packages: u32,
+    of_one: Option<u32>,
+    /// Questions before it that were answered twice by one flash number, in a row.
+    twice: u32,
+    /// How many questions each flash number answered, which one the last, and how often that changed.
+    seen: BTreeMap<u16, u32>,
+    last: Option<u16>,
+    changes: u32,
+    /// The flash numbers of those that share it, once that is certain.
+    shared: Vec<u16>,
+}
+
+impl Holder {
+    /// The last question was answered twice, from the first frame to the last, by one flash number.
+    fn answered_twice(&self) -> bool {
+        let two = self.heads.len() == 1 && self.heads.values().all(|count| *count > 1);
+        two && self.of_one.is_some_and(|of_one| self.packages >= 2 * of_one)
+    }
+
+    fn ask(&mut self, now: u64) {
+        if !self.heads.is_empty() {
+            self.twice = if self.answered_twice() { self.twice + 1 } else { 0 };
+        }
+        self.asked_at = Some(now);
+        self.heads.clear();
+        (self.packages, self.of_one) = (0, None);
+    }
+
+    fn answer(&mut self, number: u8, payload: &Payload, profile: &Profile) {
+        let Some(info) = head(number, payload, profile) else {
+            if self.packages == 0 && payload.len() == 2 {
+                let count = payload.bytes().try_into().map_or(0, |bytes| profile.endian.word(bytes));
+                let with_header = u32::from(profile.string_count_includes_header);
+                self.of_one = Some(1 + u32::from(count).saturating_sub(with_header));
+            }
+            self.packages = self.packages.saturating_add(1);
+            return;
+        };
+        let flash = info.flash_number;
+        if self.seen.len() >= MOST && !self.seen.contains_key(&flash) {
+            return;
+        }
+        let times = self.heads.entry(flash).or_default();
+        *times = times.saturating_add(1);
+        if *times == 1 {
+            *self.seen.entry(flash).or_default() += 1;
+        }
+        if self.last.replace(flash).is_some_and(|last| last != flash) {
+            self.changes = self.changes.saturating_add(1);
+        }
+    }
+
+    /// The flash numbers of those that share the number, by what was received so far; else none.
+    ///
+    /// One damaged answer is not another board, and neither is a board that was put in the place of another: flash numbers
+    /// that came in answer to different questions must come again and again, in turns.
+    fn sharing(&self) -> Vec<u16> {
+        if self.heads.len() > 1 {
+            return self.heads.keys().copied().collect();
+        }
+        let often: Vec<u16> =
+            self.seen.iter().filter(|(_, times)| **times > 1).map(|(flash, _)| *flash).collect();
+        if often.len() > 1 && self.changes > 1 {
+            return often;
+        }
+        match self.heads.keys().next() {
+            Some(flash) if self.answered_twice() && self.twice + 1 >= TWICE => vec![*flash; 2],
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// What is still to be done before a number is known to be one board's.
+pub(crate) enum Open {
+    Nothing,
+    /// Somebody may still answer until then.
+    Wait(u64),
+    /// Nobody has answered.
+    Ask,
+    /// One flash number answered twice: is it so again?
+    AskAgain,
+}
+
+impl Holders {
+    /// PC_INFO went to a number.
+    fn asked(&mut self, number: Sequence, now: u64) {
+        self.numbers.entry(number.number()).or_default().ask(now);
+    }
+
+    /// A frame of DSP_INFO came; the flash numbers of those that share the number, when that is news.
+    pub(crate) fn received(&mut self, number: u8, payload: &Payload, profile: &Profile) -> Option<Vec<u16>> {
+        let holder = self.numbers.entry(number).or_default();
+        holder.answer(number, payload, profile);
+        if !holder.shared.is_empty() {
+            return None;
+        }
+        holder.shared = holder.sharing();
+        (!holder.shared.is_empty()).then(|| holder.shared.clone())
+    }
+
+    /// A frame of this PC, or of another one: what it means for who has which number.
+    pub(crate) fn may_change(
+        &mut self,
+        function: Function,
+        to: Sequence,
+        data: &[u8],
+        profile: &Profile,
+        now: u64,
+    ) {
+        let broadcast = profile.broadcast_number() == Some(to);
+        let forgets = match function {
+            Function::Reset | Function::Init => true,
+            Function::SetStatus => match data {
+                [mask, value, ..] => Status(*mask).has(Status::INIT) && !Status(*value).has(Status::INIT),
+                _ => false,
+            },
+            _ => false,
+        };
+        match (forgets, function) {
+            // A reset reaches all boards under the number that is no board's, whatever `addr.broadcast` is.
+            (true, _) if broadcast || to == profile.unnumbered() => self.clear(),
+            (true, _) => self.forget(to.number()),
+            (false, Function::Info) if broadcast => {
+                profile.board_numbers().for_each(|number| self.asked(number, now));
+            }
+            (false, Function::Info) => self.asked(to, now),
+            _ => {}
+        }
+    }
+
+    /// When one of these boards (by bit) was last asked who it is, µs.
+    pub(crate) fn last_asked(&self, boards: u32) -> Option<u64> {
+        let mine = self.numbers.iter().filter(|(number, _)| boards >> **number & 1 == 1);
+        mine.filter_map(|(_, holder)| holder.asked_at).max()
+    }
+
+    /// Who has the number may have changed: it was given, taken, or its board has rebooted.
+    pub(crate) fn forget(&mut self, number: u8) {
+        self.numbers.remove(&number);
+    }
+
+    /// All numbers are void.
+    fn clear(&mut self) {
+        self.numbers.clear();
+    }
+
+    /// The lowest of these numbers (by bit) that boards share.
+    pub(crate) fn shared(&self, numbers: u32) -> Option<Error> {
+        let mine =
+            |(number, holder): &(&u8, &Holder)| numbers >> **number & 1 == 1 && !holder.shared.is_empty();
+        let (board, holder) = self.numbers.iter().find(mine)?;
+        Some(Error::NumberShared { board: *board, found: holder.shared.clone(), given_back: false })
+    }
+
+    /// All numbers that boards share.
+    pub(crate) fn all_shared(&self) -> Vec<Error> {
+        self.numbers.keys().filter_map(|number| self.shared(1 << number)).collect()
+    }
+
+    /// Numbers that one flash number has answered twice, but not often enough to be sure.
+    pub(crate) fn doubtful(&self) -> Vec<u8> {
+        let doubtful = |holder: &Holder| holder.shared.is_empty() && holder.answered_twice();
+        self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
+    }
+
+    /// `received`: up to then everything was handed over. `oldest`: how old an answer may be, µs.
+    pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
+        let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
+        match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {
+            None => Open::Ask,
+            Some(at) if received < at + patience => Open::Wait(at + patience),
+            Some(_) if holder.heads.is_empty() => Open::Ask,
+            Some(_) if holder.answered_twice() => Open::AskAgain,
+            Some(_) => Open::Nothing,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One PC_INFO and these answers to it.
+    fn question(holders: &mut Holders, answers: &[&[u16]]) -> Option<Vec<u16>> {
+        let profile = Profile::default();
+        let mut news = None;
+        let one = Sequence::new(1).unwrap();
+        for flashes in answers {
+            holders.asked(one, 0);
+            for flash_number in *flashes {
+                let (program_id, date) = (0x1234, 0x386E);
+                let info = BoardInfo {
+                    flash_number: *flash_number,
+                    sequence: 1,
+                    status: Status(0x19),
+                    program_id,
+                    date,
+                };
+                let text = ["0100", "78"].map(|hex| match hex {
+                    "0100" => Payload::new(&[1, 0]).unwrap(),
+                    _ => Payload::new(&[0x78]).unwrap(),
+                });
+                for payload in [info.payload(profile.endian)].into_iter().chain(text) {
+                    news = holders.received(1, &payload, &profile).or(news);
+                }
+            }
+        }
+        news
+    }
+
+    #[test]
+    fn d24_two_answers_to_one_question_are_two_boards() {
+        assert_eq!(question(&mut Holders::default(), &[&[0x21, 0x42]]), Some(vec![0x21, 0x42]));
+        let mut once = Holders::default();
+        question(&mut once, &[&[0x21, 0x42]]);
+        assert_eq!(question(&mut once, &[&[0x21, 0x42]]), None, "reported once");
+        assert!(matches!(once.shared(2), Some(Error::NumberShared { board: 1, .. })));
+        assert!(once.shared(!2).is_none(), "of another number");
+        once.forget(1);
+        assert!(once.shared(2).is_none());
+    }
+
+    #[test]
+    fn d24_boards_that_answer_in_turns_are_two_boards() {
+        let turns: [&[u16]; 4] = [&[0x21], &[0x42], &[0x21], &[0x42]];
+        assert_eq!(question(&mut Holders::default(), &turns), Some(vec![0x21, 0x42]));
+        let exchanged: [&[u16]; 4] = [&[0x21], &[0x21], &[0x42], &[0x42]];
+        assert_eq!(question(&mut Holders::default(), &exchanged), None, "put in the place of the other");
+        let damaged: [&[u16]; 4] = [&[0x21], &[0x21], &[0x121], &[0x21]];
+        assert_eq!(question(&mut Holders::default(), &damaged), None, "one damaged answer");
+    }
+
+    #[test]
+    fn d24_one_flash_number_that_answers_twice_each_time_is_two_boards() {
+        let twice: &[u16] = &[0x21, 0x21];
+        assert_eq!(question(&mut Holders::default(), &[twice; 3]), Some(vec![0x21, 0x21]));
+        assert_eq!(question(&mut Holders::default(), &[twice, twice, &[0x21], twice, twice]), None);
+    }
+}

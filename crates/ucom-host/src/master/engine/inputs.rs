@@ -1,0 +1,103 @@
+//! Inputs and parameters on their way to the boards.
+use crate::master::engine::mailbox::Forget;
+use crate::master::engine::shared::{Core, Session};
+use crate::master::io::process_data::ProcessData;
+use crate::master::load::frame_bits;
+use ucom::{BufferPackage, Frame, Sequence, ToBoard};
+
+/// Percent of the bus that repeated inputs may take.
+const INPUTS_SHARE: u64 = 70;
+/// How far they may be behind that and catch up, µs.
+const INPUTS_CREDIT: u64 = 5_000;
+
+impl Core {
+    /// No repetition of a board's inputs any more, and none that waits. Those of a board that is only being started are no
+    /// repetition yet.
+    pub(crate) fn stop_inputs(&mut self, board: u8) {
+        if self.data.get_mut(&board).is_some_and(|data| data.repeat.take().is_some()) {
+            self.forget_inputs(board);
+        }
+    }
+
+    pub(crate) fn stop_all_inputs(&mut self) {
+        let all: Vec<u8> = self.data.keys().copied().collect();
+        all.into_iter().for_each(|number| self.stop_inputs(number));
+    }
+
+    /// CI again every `ci.period`, so that a lost frame heals (D-34): whoever has waited longest is first.
+    ///
+    /// All repetitions together leave the bus to others for a part of the time, whatever was started with force: answers
+    /// and heartbeats come after inputs on the bus, and a socket takes more frames than the bus carries.
+    pub(crate) fn repeat_inputs(&mut self) {
+        if self.session == Session::Quiet {
+            return;
+        }
+        let packages = |data: &ProcessData| data.ci.len().div_ceil(3) as u64;
+        while self.inputs_from <= self.now
+            && let Some((_, board, packages)) = self
+                .data
+                .iter()
+                .filter_map(|(board, data)| Some((data.repeat?, *board, packages(data))))
+                .min()
+                .filter(|(at, ..)| *at <= self.now)
+        {
+            let us = packages * frame_bits(8) * 1_000_000 / u64::from(self.profile.bitrate.max(1));
+            let credit = self.now.saturating_sub(INPUTS_CREDIT);
+            self.inputs_from = self.inputs_from.max(credit) + us * 100 / INPUTS_SHARE;
+            self.send_inputs(board);
+        }
+    }
+
+    /// All CI of a board, and the time of the next repetition.
+    pub(crate) fn send_inputs(&mut self, board: u8) {
+        let Some(data) = self.data.get_mut(&board) else { return };
+        if let Some(at) = data.repeat {
+            let next = at + self.times.ci;
+            data.repeat = Some(if self.now >= next { self.now + self.times.ci } else { next });
+        }
+        let offsets: Vec<u16> = ucom::Packages::new(&data.ci).map(|package| package.offset).collect();
+        offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
+    }
+
+    /// An input that has changed, at once. Where all inputs are this PC's its whole package goes (it is atomic, D-34); else
+    /// the word alone (DLC 4, D-15), for those beside it are not known here.
+    pub(crate) fn send_input(&mut self, board: u8, index: u16) {
+        let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
+        if data.repeat.is_some() {
+            return self.queue_inputs(board, index - index % 3);
+        }
+        let Some(word) = data.ci.get(usize::from(index)) else { return };
+        let package = BufferPackage { offset: index, count: 1, words: [*word, 0, 0] };
+        let payload = package.payload(self.profile.endian, true);
+        let frame = Frame::of(ToBoard::Ci(package).function(), to, payload);
+        self.queue_frame(None, frame, Forget::Nothing);
+    }
+
+    /// After a restart of its application nothing is known of a board's parameters (D-35).
+    pub(crate) fn forget_parameters(&mut self, board: u8) {
+        self.stop_inputs(board);
+        if let Some(data) = self.data.get_mut(&board) {
+            data.par.forget();
+            // Another application may have started.
+            data.sent = false;
+        }
+    }
+
+    /// Writes one parameter; the shadow takes it as assumed (D-35).
+    ///
+    /// The package holds this word alone (DLC 4, which every receiver takes): words beside it may be unknown here and must
+    /// not be touched.
+    pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
+        let Some(to) = Sequence::new(board) else { return false };
+        let Some(data) = self.data.get_mut(&board) else { return false };
+        if index >= data.par.len() {
+            return false;
+        }
+        data.par.wrote(index, value);
+        let package = BufferPackage { offset: index, count: 1, words: [value, 0, 0] };
+        let payload = package.payload(self.profile.endian, true);
+        let frame = Frame::of(ToBoard::Par(package).function(), to, payload);
+        self.queue_frame(None, frame, Forget::Nothing);
+        true
+    }
+}

@@ -1,0 +1,241 @@
+//! What a procedure can do: send, wait for frames, sleep.
+//!
+//! Procedures are `async` functions. Nothing of an executor is behind them: the compiler makes each a state machine,
+//! [`Master`](crate::master::Master) moves it on when a frame arrives or its time has come, and they read like the steps they
+//! are. No lock is ever held while one waits.
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
+
+use crate::master::engine::event::Event;
+use crate::master::engine::mailbox::{Filter, Forget, Mailbox, Received};
+use crate::master::engine::shared::Core;
+use crate::master::engine::times::{MS, Times};
+use crate::master::error::Error;
+use crate::master::reports::ProcedureId;
+use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
+
+/// A procedure's hold on the bus.
+#[derive(Clone)]
+pub(crate) struct Link {
+    pub(crate) core: Arc<Mutex<Core>>,
+    pub(crate) id: ProcedureId,
+}
+
+/// The lock of the core; a panic elsewhere leaves it usable.
+pub(crate) fn lock(core: &Mutex<Core>) -> MutexGuard<'_, Core> {
+    core.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Link {
+    pub(crate) fn with<T>(&self, f: impl FnOnce(&mut Core) -> T) -> T {
+        f(&mut lock(&self.core))
+    }
+
+    pub(crate) fn now(&self) -> u64 {
+        self.with(|core| core.now)
+    }
+
+    pub(crate) fn times(&self) -> Times {
+        self.with(|core| core.times)
+    }
+
+    pub(crate) fn profile(&self) -> Profile {
+        self.with(|core| core.profile)
+    }
+
+    /// The broadcast number, or 0 where the profile has none.
+    pub(crate) fn broadcast_number(&self) -> Sequence {
+        self.profile().unnumbered()
+    }
+
+    pub(crate) fn note(&self, text: String) {
+        self.with(|core| core.event(Event::Note { id: self.id, text }));
+    }
+
+    /// Sends and waits until the frame has left.
+    pub(crate) async fn send(&self, to: Sequence, message: ToBoard) {
+        let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Nothing));
+        self.left(serial).await;
+    }
+
+    /// As [`Link::send`]; what was received before the frame left is forgotten.
+    pub(crate) async fn ask(&self, to: Sequence, message: ToBoard) {
+        let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::All));
+        self.left(serial).await;
+    }
+
+    /// As [`Link::ask`], but errors are kept: program data, where an error may come in the middle of a block. Returns when
+    /// the frame left.
+    pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
+        let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
+        self.left(serial).await;
+        self.with(|core| core.sent_at)
+    }
+
+    /// As [`Link::send`] with a frame of any form.
+    pub(crate) async fn send_frame(&self, frame: Frame) {
+        let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::Nothing));
+        self.left(serial).await;
+    }
+
+    /// Waits until everything queued so far, by whomever, has left.
+    pub(crate) async fn flush(&self) {
+        let serial = self.with(|core| core.queued());
+        self.left(serial).await;
+    }
+
+    pub(crate) async fn left(&self, serial: u64) {
+        poll_fn(|_| if self.with(|core| core.left(serial)) { Poll::Ready(()) } else { Poll::Pending }).await;
+    }
+
+    /// Hears these functions of these boards from now on, and their errors.
+    pub(crate) fn listen(&self, boards: u32, functions: &[Function]) {
+        self.with(|core| {
+            if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
+                mailbox.filter = Filter::new(boards, functions);
+                mailbox.received.clear();
+            }
+        });
+    }
+
+    /// The next frame of the mailbox, or `None` when `until` has come first.
+    pub(crate) async fn next(&self, until: u64) -> Option<Received> {
+        self.next_of(until, |mailbox| mailbox.received.pop_front()).await
+    }
+
+    /// What `take` finds in the mailbox, or `None` when `until` has come first.
+    pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Mailbox) -> Option<T>) -> Option<T> {
+        poll_fn(|_| {
+            self.with(|core| {
+                let fired = core.fired;
+                let Some(mailbox) = core.mailboxes.get_mut(&self.id) else { return Poll::Ready(None) };
+                if let Some(found) = take(mailbox) {
+                    mailbox.wake = None;
+                    return Poll::Ready(Some(found));
+                }
+                if fired >= until {
+                    mailbox.wake = None;
+                    return Poll::Ready(None);
+                }
+                mailbox.wake = Some(until);
+                Poll::Pending
+            })
+        })
+        .await
+    }
+
+    /// The next frame as it is, or `None` when `until` has come first.
+    pub(crate) async fn next_raw(&self, until: u64) -> Option<(u64, Frame)> {
+        self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
+    }
+
+    /// Keeps every frame as it is from now on, for [`Link::next_raw`], or no more.
+    pub(crate) fn tap(&self, on: bool) {
+        self.with(|core| {
+            if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
+                mailbox.raw = on.then(Default::default);
+            }
+        });
+    }
+
+    /// Waits; what is received meanwhile stays in the mailbox.
+    pub(crate) async fn sleep(&self, us: u64) {
+        self.sleep_until(self.now() + us).await;
+    }
+
+    /// The same up to a time.
+    pub(crate) async fn sleep_until(&self, until: u64) {
+        poll_fn(|_| {
+            self.with(|core| {
+                let fired = core.fired;
+                let Some(mailbox) = core.mailboxes.get_mut(&self.id) else { return Poll::Ready(()) };
+                if fired >= until {
+                    mailbox.wake = None;
+                    return Poll::Ready(());
+                }
+                mailbox.wake = Some(until);
+                Poll::Pending
+            })
+        })
+        .await;
+    }
+
+    /// Waits until nothing that the procedure listens to has come for `us`; at most 20 times as long.
+    pub(crate) async fn quiet(&self, us: u64) {
+        let limit = self.now() + 20 * us;
+        while self.next((self.now() + us).min(limit)).await.is_some() {
+            if self.now() >= limit {
+                break;
+            }
+        }
+    }
+
+    /// Ends `work` with [`Error::Cancelled`] when the caller asks to, with [`Error::Bus`] when he reports that the bus is
+    /// gone, with [`Error::NumberShared`] once when two boards with one number show, unless it bears that; its queued frames
+    /// do not leave then.
+    pub(crate) async fn or_cancel<T>(
+        &self,
+        work: impl Future<Output = Result<T, Error>>,
+    ) -> Result<T, Error> {
+        let mut work = pin!(work);
+        poll_fn(|context| {
+            let ended = self.with(|core| {
+                let mailbox = core.mailboxes.get_mut(&self.id)?;
+                let gone = mailbox.bus_gone.clone().map(|reason| Error::Bus { reason });
+                let cancelled = core::mem::take(&mut mailbox.cancel).then_some(Error::Cancelled);
+                let mut ended = gone.or(cancelled);
+                if ended.is_none() && !mailbox.bears_shared_numbers {
+                    ended = core.holders.shared(mailbox.claims);
+                    // What follows undoes something.
+                    mailbox.bears_shared_numbers = ended.is_some();
+                }
+                if ended.is_some() {
+                    core.forget_queued(self.id);
+                }
+                ended
+            });
+            match ended {
+                Some(error) => Poll::Ready(Err(error)),
+                None => work.as_mut().poll(context),
+            }
+        })
+        .await
+    }
+
+    /// From now on two boards with one number do not end this procedure, or do.
+    pub(crate) fn bear_shared_numbers(&self, bears: bool) {
+        self.with(|core| {
+            if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
+                mailbox.bears_shared_numbers = bears;
+            }
+        });
+    }
+
+    /// The board's number, checked against the profile.
+    pub(crate) fn board(&self, number: u8) -> Result<Sequence, Error> {
+        let profile = self.profile();
+        let wrong = Error::NoBoard { number, first: profile.addr_first };
+        Sequence::new(number).filter(|n| profile.is_board(*n)).ok_or(wrong)
+    }
+
+    /// A board's error, as what the procedure ends with.
+    pub(crate) fn device(board: u8, message: &FromBoard, during: &'static str) -> Option<Error> {
+        match message {
+            FromBoard::Error(code) => Some(Error::Device { board, code: *code, during }),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn no_answer(&self, board: u8, asked: Function, tries: u32, since: u64) -> Error {
+        self.with(|core| Error::NoAnswer {
+            board,
+            asked,
+            tries,
+            waited_ms: core.now.saturating_sub(since) / MS,
+            last: core.last_received(board),
+        })
+    }
+}

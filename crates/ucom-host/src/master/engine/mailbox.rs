@@ -1,0 +1,64 @@
+//! What a procedure wants to receive, and what waits for it.
+use std::collections::VecDeque;
+
+use ucom::{Frame, FromBoard, Function};
+
+/// Most frames that wait for a procedure.
+pub(crate) const MAX_RECEIVED: usize = 16_384;
+
+/// A frame of a board for a procedure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Received {
+    /// By the time that has certainly passed between frames, µs.
+    pub at: u64,
+    pub from: u8,
+    pub message: FromBoard,
+}
+
+/// What a procedure wants to receive.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Filter {
+    /// Boards by bit.
+    pub boards: u32,
+    /// Functions by bit.
+    pub functions: u32,
+}
+
+impl Filter {
+    pub(crate) fn new(boards: u32, functions: &[Function]) -> Self {
+        let functions = functions.iter().fold(0, |bits, f| bits | 1 << f.number());
+        // A board's error is an answer to anything.
+        Self { boards, functions: functions | 1 << Function::Error.number() }
+    }
+
+    pub(crate) fn takes(&self, from: u8, function: Function) -> bool {
+        let report = (16..20).contains(&function.number());
+        self.functions >> function.number() & 1 == 1 && (report || self.boards >> from & 1 == 1)
+    }
+}
+
+/// What a procedure has received and waits for.
+#[derive(Debug, Default)]
+pub(crate) struct Mailbox {
+    pub name: &'static str,
+    pub claims: u32,
+    pub filter: Filter,
+    pub received: VecDeque<Received>,
+    /// Every frame as it is, for a procedure that looks at frames themselves.
+    pub raw: Option<VecDeque<(u64, Frame)>>,
+    pub wake: Option<u64>,
+    pub cancel: bool,
+    /// Two boards with one number do not end it: a stop, what undoes something, or what sees to numbers itself.
+    pub bears_shared_numbers: bool,
+    /// Nothing can be sent or received any more, and why.
+    pub bus_gone: Option<String>,
+}
+
+/// What a procedure forgets when one of its frames leaves: it cannot be an answer to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Forget {
+    Nothing,
+    /// All but errors.
+    Answers,
+    All,
+}

@@ -1,0 +1,23 @@
+//! What every procedure stands on: the clock, frames on their way, mailboxes, the boards as last seen and their supervision.
+//!
+//! Files import downwards only; from the lowest: times, statistics, boards, holders, event, mailbox, shared, inputs,
+//! supervise, link.
+mod boards;
+mod event;
+mod holders;
+mod inputs;
+mod link;
+mod mailbox;
+mod shared;
+mod statistics;
+mod supervise;
+mod times;
+
+pub use boards::{Board, Boards, Life};
+pub use event::{Event, Supervision};
+pub(crate) use holders::{Open, head};
+pub(crate) use link::{Link, lock};
+pub(crate) use mailbox::{Forget, Mailbox, Received};
+pub(crate) use shared::{Core, Session};
+pub use statistics::{Rate, Statistics, WINDOW_US};
+pub(crate) use times::{MS, Times};

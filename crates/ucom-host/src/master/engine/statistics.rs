@@ -1,0 +1,113 @@
+//! What a monitor shows: rates of each board, load of the bus, frames of others.
+
+use crate::master::load::frame_bits;
+use std::collections::{BTreeMap, VecDeque};
+use ucom::{Foreign, Frame};
+
+/// Length of the window that rates are taken over, µs.
+pub const WINDOW_US: u64 = 1_000_000;
+const SLOTS: usize = 10;
+const SLOT_US: u64 = WINDOW_US / SLOTS as u64;
+
+/// A number per second over the last second.
+#[derive(Clone, Debug, Default)]
+pub struct Rate {
+    /// Number of the slot and its sum.
+    slots: VecDeque<(u64, u64)>,
+}
+
+impl Rate {
+    pub(crate) fn add(&mut self, now: u64, amount: u64) {
+        let slot = now / SLOT_US;
+        match self.slots.back_mut() {
+            Some((last, sum)) if *last == slot => *sum += amount,
+            _ => self.slots.push_back((slot, amount)),
+        }
+        while self.slots.len() > SLOTS + 1 {
+            self.slots.pop_front();
+        }
+    }
+
+    /// Sum over the last second before `now`.
+    pub fn per_second(&self, now: u64) -> u64 {
+        let slot = now / SLOT_US;
+        self.slots.iter().filter(|(s, _)| *s <= slot && slot - s < SLOTS as u64).map(|(_, sum)| sum).sum()
+    }
+}
+
+/// Counters of the bus.
+#[derive(Clone, Debug, Default)]
+pub struct Statistics {
+    bitrate: u32,
+    bits: Rate,
+    /// Frames received from boards, by number; reports of boards without a number count under their identifier's.
+    boards: BTreeMap<u8, Rate>,
+    /// Frames received, foreign ones not counted.
+    pub received: u64,
+    /// Frames sent.
+    pub sent: u64,
+    /// Foreign frames by kind.
+    pub foreign: Vec<(Foreign, u64)>,
+    /// Frames that only a PC sends.
+    pub competing_master: u64,
+    /// Frames of boards that are too short or contain nothing that can be.
+    pub undecodable: u64,
+}
+
+impl Statistics {
+    pub(crate) fn new(bitrate: u32) -> Self {
+        Self { bitrate, ..Default::default() }
+    }
+
+    pub(crate) fn sent(&mut self, now: u64, frame: &Frame) {
+        self.sent += 1;
+        self.bits.add(now, frame_bits(frame.dlc()));
+    }
+
+    pub(crate) fn received(&mut self, now: u64, frame: &Frame) {
+        self.received += 1;
+        self.bits.add(now, frame_bits(frame.dlc()));
+        let number = (frame.id() & 31) as u8;
+        self.boards.entry(number).or_default().add(now, 1);
+    }
+
+    /// Counts a foreign frame; `true`: the first of its kind.
+    pub(crate) fn foreign(&mut self, now: u64, foreign: Foreign) -> bool {
+        self.bits.add(now, frame_bits(8));
+        if let Some((_, count)) = self.foreign.iter_mut().find(|(kind, _)| *kind == foreign) {
+            *count += 1;
+            return false;
+        }
+        self.foreign.push((foreign, 1));
+        true
+    }
+
+    /// Frames per second of a board.
+    pub fn frames_per_s(&self, board: u8, now: u64) -> u64 {
+        self.boards.get(&board).map_or(0, |rate| rate.per_second(now))
+    }
+
+    /// Load of the bus by worst-case stuffing over the last second, percent.
+    pub fn load_percent(&self, now: u64) -> f64 {
+        100.0 * self.bits.per_second(now) as f64 / f64::from(self.bitrate.max(1))
+    }
+
+    /// Foreign frames of all kinds.
+    pub fn foreign_count(&self) -> u64 {
+        self.foreign.iter().map(|(_, count)| count).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_those_of_the_last_second() {
+        let mut rate = Rate::default();
+        (0..200).for_each(|i| rate.add(i * 10_000, 3));
+        assert_eq!(rate.per_second(1_999_000), 300);
+        assert_eq!(rate.per_second(2_499_000), 150);
+        assert_eq!(rate.per_second(9_000_000), 0);
+    }
+}

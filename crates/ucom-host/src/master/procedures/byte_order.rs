@@ -1,0 +1,32 @@
+//! Whether boards send the bytes of a word in the other order than the profile has (D-10): what shows without asking more.
+use crate::master::engine::Link;
+use crate::master::error::Error;
+use crate::master::procedures::ask_reports::ask_reports;
+use crate::master::reports::{BoardSeen, Reports};
+
+/// Whether flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
+pub(crate) fn exchanged(reports: &Reports, flash_numbers: &[u16]) -> bool {
+    let fits = |byte: u16| reports.ids.contains(&(byte as u8));
+    let only_exchanged = |number: u16| !fits(number) && fits(number >> 8);
+    flash_numbers.iter().any(|number| only_exchanged(*number))
+        && flash_numbers.iter().all(|number| only_exchanged(*number) || number >> 8 == number & 0xFF)
+}
+
+/// Refuses boards whose words come in the other order. Boards are asked for reports only where a flash number has a high byte,
+/// which most have not.
+pub(crate) async fn right_order(link: &Link, flash_numbers: &[u16]) -> Result<(), Error> {
+    if flash_numbers.iter().all(|number| *number < 0x100) {
+        return Ok(());
+    }
+    let mut reports = Reports::default();
+    ask_reports(link, &mut reports).await;
+    if exchanged(&reports, flash_numbers) {
+        return Err(Error::ByteOrder { endian: link.profile().endian });
+    }
+    Ok(())
+}
+
+/// Flash numbers of boards.
+pub(crate) fn flash_numbers(boards: &[BoardSeen]) -> Vec<u16> {
+    boards.iter().map(|board| board.info.flash_number).collect()
+}

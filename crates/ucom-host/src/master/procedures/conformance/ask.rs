@@ -1,0 +1,196 @@
+//! Tests that change nothing.
+use crate::master::engine::MS;
+use crate::master::error::Error;
+use crate::master::procedures::conformance::bench::{Bench, list, verdict};
+use crate::master::reports::{BoardSeen, Verdict};
+use ucom::profile::{Endian, ReportMode};
+use ucom::{Dimensions, Frame, FromBoard, Function, Report, Status, package_count};
+
+/// Report functions among frames, in order.
+pub(super) fn only_reports(frames: &[Frame]) -> Vec<Frame> {
+    let report = |f: &&Frame| f.address().is_ok_and(|(function, _)| (16..20).contains(&function.number()));
+    let mut all: Vec<Frame> = frames.iter().filter(report).copied().collect();
+    all.sort_by_key(|f| (f.id(), f.data().first().copied()));
+    all
+}
+
+/// The frames that boards with these flash numbers report with (D-07).
+pub(super) fn expected_reports(bench: &Bench<'_>, boards: &[BoardSeen]) -> Option<Vec<Frame>> {
+    if bench.profile().report_mode != ReportMode::Flash7 {
+        return None;
+    }
+    let frame = |b: &BoardSeen| {
+        let report = Report::flash7(b.info.flash_number);
+        FromBoard::Report(report).encode(report.id_field, &bench.profile())
+    };
+    let mut frames: Vec<Frame> = boards.iter().map(frame).collect();
+    frames.sort_by_key(|f| (f.id(), f.data().first().copied()));
+    Some(frames)
+}
+
+pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Result<Verdict, Error> {
+    let window = bench.link.times().report_ask;
+    let broadcast = bench.link.broadcast_number().number();
+    let mut seen = Vec::new();
+    for _ in 0..2 {
+        bench.send(Function::AskReport, broadcast, &[]).await;
+        seen.push(only_reports(&bench.receive(window).await));
+    }
+    let [first, second] = seen.as_slice() else { return Ok(Verdict::Pass) };
+    if first != second {
+        return Ok(Verdict::Fail(format!("first {}; then {}", list(first), list(second))));
+    }
+    // A board of the chain may be left out of the test, so there may be more.
+    if let Some(missing) = expected_reports(bench, boards)
+        .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
+    {
+        return Ok(Verdict::Fail(format!("{missing} is not there exactly once: {}", list(first))));
+    }
+    for board in boards {
+        match bench.info(board.number).await {
+            Some(now) if now == board.info => {}
+            other => return Ok(Verdict::Fail(format!("afterwards board {} sends {other:?}", board.number))),
+        }
+    }
+    Ok(Verdict::Pass)
+}
+
+pub(super) async fn init_again(
+    bench: &mut Bench<'_>,
+    board: u8,
+    strangers: bool,
+    force: bool,
+) -> Result<Verdict, Error> {
+    if strangers {
+        let why = "a board that is not tested, or has no number, could take this one";
+        return Ok(Verdict::Skipped(why.into()));
+    }
+    match bench.link.look_for_master(force).await {
+        Err(e @ Error::CompetingMaster { .. }) => return Ok(Verdict::Skipped(e.to_string())),
+        other => other?,
+    }
+    // A board that has rebooted since would take any number.
+    if bench.info(board).await.is_none() {
+        return Ok(Verdict::Fail("PC_INFO is not answered: has it rebooted? `ucom scan`".into()));
+    }
+    bench.send(Function::Init, board, &[]).await;
+    let came = bench.receive(bench.link.times().init_ack).await;
+    let pass = matches!(came.as_slice(), [f] if f.id() == 0x0C0 + u16::from(board) && f.data() == [board]);
+    Ok(verdict(pass, &came))
+}
+
+/// Whether the application of a board is up.
+async fn up(bench: &mut Bench<'_>, board: u8) -> Option<Verdict> {
+    match bench.info(board).await {
+        Some(info) if info.status.has(Status::MSTART) => None,
+        Some(_) => Some(Verdict::Skipped("its application is not started: ucom start".into())),
+        None => Some(Verdict::Fail("PC_INFO is not answered".into())),
+    }
+}
+
+pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    if let Some(verdict) = up(bench, board).await {
+        return Ok(verdict);
+    }
+    let id = Function::DumpIo.number();
+    let answers = move |all: Vec<Frame>| -> Vec<Frame> {
+        all.into_iter().filter(|f| f.id() == u16::from(id) << 6 | u16::from(board)).collect()
+    };
+    // With data it is a board's answer, never a request (D-12). Nobody but the board itself may send so under its number, so
+    // it must not be about to.
+    bench.send(Function::DumpIo, board, &[0]).await;
+    let came = answers(bench.receive(150 * MS).await);
+    if !came.is_empty() {
+        return Ok(Verdict::Fail(format!("with one byte of data: {}", list(&came))));
+    }
+    bench.send(Function::DumpIo, board, &[]).await;
+    let mut came = Vec::new();
+    loop {
+        let more = answers(bench.receive(bench.link.times().gap.max(bench.link.times().info)).await);
+        if more.is_empty() || came.len() > 10_000 {
+            break;
+        }
+        came.extend(more);
+    }
+    Ok(match strings(bench, &came) {
+        Ok(()) => Verdict::Pass,
+        Err(what) => Verdict::Fail(what),
+    })
+}
+
+/// Counts the strings of a description by their headers alone.
+fn strings(bench: &Bench<'_>, came: &[Frame]) -> Result<(), String> {
+    let profile = bench.profile();
+    let Some((head, rest)) = came.split_first() else { return Err("silence".into()) };
+    if head.dlc() < 6 {
+        return Err(format!("the first frame is {head}, not the dimensions"));
+    }
+    let dimensions = Dimensions::parse(&head.payload(), profile.endian).ok_or_else(|| head.to_string())?;
+    let (mut found, mut left) = (0_u32, 0_u16);
+    for frame in rest {
+        match left {
+            0 => {
+                let &[a, b] = frame.data() else {
+                    return Err(format!("{frame} is no header of string {found}: 2 bytes"));
+                };
+                let count = profile.endian.word([a, b]);
+                left = count.saturating_sub(u16::from(profile.string_count_includes_header));
+                found += u32::from(left == 0);
+            }
+            1 => {
+                left = 0;
+                found += 1;
+            }
+            _ if frame.dlc() != 8 => {
+                return Err(format!(
+                    "{frame}: {left} packages of string {found} are missing, only the last may be short"
+                ));
+            }
+            _ => left -= 1,
+        }
+    }
+    match found == dimensions.strings() && left == 0 {
+        true => Ok(()),
+        false => {
+            Err(format!("{found} whole strings, the dimensions {head} announce {}", dimensions.strings()))
+        }
+    }
+}
+
+pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    if let Some(verdict) = up(bench, board).await {
+        return Ok(verdict);
+    }
+    let (profile, times) = (bench.profile(), bench.link.times());
+    let Some(dimensions) = dimensions(bench, board).await else {
+        return Ok(Verdict::Fail("no dimensions in the IO description".into()));
+    };
+    bench.send(Function::DumpCi, board, &[]).await;
+    let came = bench.receive(times.info.max(times.gap) + 2 * MS * u64::from(dimensions.ci)).await;
+    let id = Function::DspCi;
+    let packages: Vec<Frame> =
+        came.into_iter().filter(|f| f.address().is_ok_and(|(f, n)| f == id && n.number() == board)).collect();
+    let mut wrong = packages.len() != usize::from(package_count(dimensions.ci));
+    for (i, frame) in packages.iter().enumerate() {
+        let first = 3 * i;
+        let [a, b, words @ ..] = frame.data() else {
+            wrong = true;
+            continue;
+        };
+        wrong |= usize::from(profile.endian.word([*a, *b])) != first;
+        // With pd.short_last a package may end with its last word.
+        let surplus = 2 * usize::from(dimensions.ci).saturating_sub(first).min(3);
+        wrong |= words.len() < surplus || words.iter().skip(surplus).any(|byte| *byte != 0);
+    }
+    Ok(verdict(!wrong, &packages))
+}
+
+/// The dimensions of a board, as its description begins.
+pub(super) async fn dimensions(bench: &mut Bench<'_>, board: u8) -> Option<Dimensions> {
+    bench.send(Function::DumpIo, board, &[]).await;
+    let first = bench.wait(Function::DumpIo, board, bench.link.times().info).await;
+    // The rest of the answer must not be taken for another one.
+    while !bench.receive(bench.link.times().gap).await.is_empty() {}
+    let endian: Endian = bench.profile().endian;
+    Dimensions::parse(&first?.payload(), endian)
+}

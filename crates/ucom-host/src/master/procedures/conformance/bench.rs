@@ -1,0 +1,159 @@
+//! Frames out, frames in, and what was sent and came.
+
+use crate::master::engine::{Forget, Link, MS, Session};
+use crate::master::error::Error;
+use crate::master::procedures::control::start_application;
+use crate::master::reports::Verdict;
+use ucom::{BoardInfo, Frame, Function, Profile, Sequence, Status};
+
+/// Functions that come by themselves and answer nothing.
+const NOISE: [Function; 3] = [Function::So, Function::Alive, Function::Debug];
+
+/// Most frames of one test that are kept.
+const KEPT: usize = 64;
+
+/// One conversation.
+pub(super) struct Bench<'a> {
+    pub link: &'a Link,
+    sent: Vec<String>,
+    came: Vec<String>,
+}
+
+impl<'a> Bench<'a> {
+    pub fn new(link: &'a Link) -> Self {
+        Self { link, sent: Vec::new(), came: Vec::new() }
+    }
+
+    pub fn profile(&self) -> Profile {
+        self.link.profile()
+    }
+
+    /// What was sent and what came.
+    pub fn log(self) -> (Vec<String>, Vec<String>) {
+        (self.sent, self.came)
+    }
+
+    /// Sends a frame; what came before is forgotten.
+    pub async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
+        let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
+        let Some(frame) = Frame::new(function.id(number), data) else { return };
+        if self.sent.len() < KEPT {
+            self.sent.push(frame.to_string());
+        }
+        let serial = self.link.with(|core| core.queue_frame(Some(self.link.id), frame, Forget::All));
+        self.link.left(serial).await;
+    }
+
+    /// All frames of boards within a time, but for those that come by themselves.
+    pub async fn receive(&mut self, us: u64) -> Vec<Frame> {
+        let all = self.hear_all(us).await;
+        let answer = |f: &Frame| f.address().is_ok_and(|(function, _)| !NOISE.contains(&function));
+        all.into_iter().map(|(_, f)| f).filter(answer).collect()
+    }
+
+    /// The same with everything, and with its time.
+    pub async fn hear_all(&mut self, us: u64) -> Vec<(u64, Frame)> {
+        let until = self.link.now() + us;
+        let mut all = Vec::new();
+        while let Some((at, frame)) = self.link.next_raw(until).await {
+            self.keep(&frame);
+            if frame.address().is_ok_and(|(function, _)| function.from_board()) {
+                all.push((at, frame));
+            }
+            if self.link.now() >= until || all.len() > 20_000 {
+                break;
+            }
+        }
+        all
+    }
+
+    /// The first frame of a function under a number within a time.
+    pub async fn wait(&mut self, function: Function, from: u8, us: u64) -> Option<Frame> {
+        let until = self.link.now() + us;
+        while let Some((_, frame)) = self.link.next_raw(until).await {
+            self.keep(&frame);
+            if frame.address().is_ok_and(|(f, n)| f == function && n.number() == from) {
+                return Some(frame);
+            }
+        }
+        None
+    }
+
+    fn keep(&mut self, frame: &Frame) {
+        let noise = frame.address().is_ok_and(|(function, _)| NOISE.contains(&function));
+        if self.came.len() < KEPT && !noise {
+            self.came.push(frame.to_string());
+        }
+    }
+
+    /// The numbers that PC_INFO gives; `None`: silence.
+    pub async fn info(&mut self, board: u8) -> Option<BoardInfo> {
+        for _ in 0..3 {
+            self.send(Function::Info, board, &[]).await;
+            let first = self.wait(Function::DspInfo, board, self.link.times().info).await;
+            // The text that follows must not be taken for the next answer.
+            self.receive(self.link.times().gap).await;
+            if let Some(frame) = first {
+                return BoardInfo::parse(&frame.payload(), self.profile().endian);
+            }
+        }
+        None
+    }
+
+    /// Whether the status bits of a board are so; the pins and autostart are left out.
+    pub async fn status_is(&mut self, board: u8, bits: u8, step: &str) -> Result<(), Verdict> {
+        let mask = !(Status::IPINIT | Status::OPINIT | Status::ASTART);
+        match self.info(board).await {
+            Some(info) if info.status & mask == Status(bits) & mask => Ok(()),
+            Some(info) => Err(Verdict::Fail(format!(
+                "after {step} the status is 0x{:02X} {}",
+                info.status.0, info.status
+            ))),
+            None => Err(Verdict::Fail(format!("after {step} PC_INFO is not answered"))),
+        }
+    }
+
+    /// No heartbeats of this PC, or heartbeats again.
+    pub fn heartbeats(&self, on: bool) {
+        self.link.with(|core| match on {
+            true => core.start_session(),
+            false => core.session = Session::Quiet,
+        });
+    }
+
+    /// The application is up, its loop does not run.
+    pub async fn started(&mut self, board: u8) -> Result<Result<(), Verdict>, Error> {
+        match start_application(self.link, board).await {
+            Ok(_) => {}
+            Err(e) => return skipped_or(e),
+        }
+        self.send(Function::Admin, board, &[0; 4]).await;
+        self.receive(20 * MS).await;
+        Ok(Ok(()))
+    }
+}
+
+/// Without an application there is nothing to test.
+fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
+    match e {
+        Error::Device { .. } | Error::NoApplication { .. } => {
+            Ok(Err(Verdict::Skipped(format!("its application does not start: {e}"))))
+        }
+        e => Err(e),
+    }
+}
+
+/// Frames as words.
+pub(super) fn list(frames: &[Frame]) -> String {
+    let texts: Vec<String> = frames.iter().take(8).map(ToString::to_string).collect();
+    match frames.len() {
+        0 => "silence".into(),
+        n if n > 8 => format!("{} … ({n} frames)", texts.join(" ")),
+        _ => texts.join(" "),
+    }
+}
+
+/// Passed, or failed with what came.
+pub(super) fn verdict(pass: bool, came: &[Frame]) -> Verdict {
+    if pass { Verdict::Pass } else { Verdict::Fail(list(came)) }
+}

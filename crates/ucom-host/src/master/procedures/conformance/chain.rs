@@ -1,0 +1,166 @@
+//! Tests that number the chain anew, and of the status byte.
+use crate::master::engine::MS;
+use crate::master::error::Error;
+use crate::master::procedures::conformance::ask::{expected_reports, only_reports};
+use crate::master::procedures::conformance::bench::{Bench, list, verdict};
+use crate::master::reports::{BoardSeen, Verdict};
+use ucom::{Function, Status};
+
+/// PC_RESET to all, and time for all to be ready.
+async fn reset_all(bench: &mut Bench<'_>) -> Vec<ucom::Frame> {
+    bench.send(Function::Reset, bench.link.broadcast_number().number(), &[]).await;
+    bench.link.with(|core| {
+        core.boards.clear();
+        core.data.clear();
+    });
+    bench.receive(bench.link.times().report_window).await
+}
+
+pub(super) async fn reset(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict {
+    let came = reset_all(bench).await;
+    let Some(expected) = expected_reports(bench, boards) else {
+        return Verdict::Skipped("the profile's report.mode is another than flash7".into());
+    };
+    let reports = only_reports(&came);
+    let pass = expected.iter().all(|f| reports.iter().filter(|r| *r == f).count() == 1)
+        && reports.len() == came.len();
+    verdict(pass, &came)
+}
+
+pub(super) async fn unnumbered(bench: &mut Bench<'_>) -> Verdict {
+    reset_all(bench).await;
+    let Some(first) = bench.profile().board_numbers().next().map(|n| n.number()) else {
+        return Verdict::Pass;
+    };
+    let requests: [(Function, &[u8]); 9] = [
+        (Function::Info, &[]),
+        (Function::SetStatus, &[0, 0]),
+        (Function::Prog, &[0; 8]),
+        (Function::Start, &[]),
+        (Function::McaStart, &[]),
+        (Function::DumpIo, &[]),
+        (Function::DumpCi, &[]),
+        (Function::Ci, &[0; 8]),
+        (Function::Par, &[0; 8]),
+    ];
+    for (function, data) in requests {
+        bench.send(function, first, data).await;
+        let came = bench.receive(60 * MS).await;
+        if !came.is_empty() {
+            return Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came)));
+        }
+    }
+    // By broadcast, too: a board without a number does not take it (D-04, D-06).
+    bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
+    let came = bench.receive(150 * MS).await;
+    verdict(came.is_empty(), &came)
+}
+
+pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict {
+    if bench.profile().chain_auto_opinit {
+        return Verdict::Skipped("by the profile boards raise their pin by themselves".into());
+    }
+    reset_all(bench).await;
+    let ack = bench.link.times().init_ack;
+    let numbers: Vec<u8> = bench.profile().board_numbers().map(|n| n.number()).collect();
+    for (i, n) in numbers.iter().take(boards.len()).enumerate() {
+        bench.send(Function::Init, *n, &[]).await;
+        let came = bench.receive(ack).await;
+        let pass = matches!(came.as_slice(), [f] if f.id() == 0x0C0 + u16::from(*n) && f.data() == [*n]);
+        if !pass {
+            return Verdict::Fail(format!("PC_INIT({n}): {}", list(&came)));
+        }
+        // Nobody else is enabled yet.
+        if let Some(next) = numbers.get(i + 1) {
+            for function in [Function::Init, Function::Info] {
+                bench.send(function, *next, &[]).await;
+                let came = bench.receive(ack).await;
+                if !came.is_empty() {
+                    let name = function.name();
+                    return Verdict::Fail(format!(
+                        "{name}({next}) before the pin of board {n} is up: {}",
+                        list(&came)
+                    ));
+                }
+            }
+        }
+        bench.send(Function::SetStatus, *n, &[2, 2]).await;
+        bench.receive(10 * MS).await;
+        match bench.info(*n).await {
+            Some(info) if info.status.has(Status::OPINIT) => {}
+            other => return Verdict::Fail(format!("board {n}: OPINIT is not set: {other:?}")),
+        }
+    }
+    Verdict::Pass
+}
+
+/// One PC_SETSTATUS, and the status afterwards.
+async fn set(bench: &mut Bench<'_>, board: u8, mask: u8, value: u8) -> Option<Status> {
+    bench.send(Function::SetStatus, board, &[mask, value]).await;
+    bench.receive(10 * MS).await;
+    bench.info(board).await.map(|info| info.status)
+}
+
+pub(super) async fn formula(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    let Some(before) = bench.info(board).await else {
+        return Ok(Verdict::Fail("PC_INFO is not answered".into()));
+    };
+    let on = set(bench, board, 0x00, 0x40).await;
+    let off = set(bench, board, 0x40, 0x00).await;
+    let (with, without) =
+        (before.status.with(Status::ASTART, true), before.status.with(Status::ASTART, false));
+    if before.status.has(Status::ASTART) {
+        set(bench, board, 0x40, 0x40).await;
+    }
+    Ok(match (on, off) {
+        (Some(on), Some(off)) if on == with && off == without => Verdict::Pass,
+        other => Verdict::Fail(format!("after 0040 and 4000: {other:?}, before {}", before.status)),
+    })
+}
+
+pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    let Some(before) = bench.info(board).await else {
+        return Ok(Verdict::Fail("PC_INFO is not answered".into()));
+    };
+    for (mask, value) in [(0x01, 0x00), (0x10, 0x00), (0x20, 0x20)] {
+        let after = set(bench, board, mask, value).await;
+        if after != Some(before.status) {
+            let text =
+                format!("after {mask:02X}{value:02X} the status is {after:?}, before {}", before.status);
+            return Ok(Verdict::Fail(text));
+        }
+    }
+    Ok(Verdict::Pass)
+}
+
+/// The numbers must be new: the reset in it gives `first.number` to whoever is first on the wire.
+pub(super) async fn autostart(bench: &mut Bench<'_>, first: &BoardSeen) -> Verdict {
+    if !first.info.has_application() {
+        return Verdict::Skipped("there is no application that could start".into());
+    }
+    let (board, flash) = (first.number, first.info.flash_number);
+    let kept = first.info.status.has(Status::ASTART);
+    match bench.info(board).await {
+        Some(info) if info.flash_number == flash => {}
+        other => return Verdict::Fail(format!("it is not 0x{flash:04X} that has its number: {other:?}")),
+    }
+    set(bench, board, 0x40, 0x40).await;
+    reset_all(bench).await;
+    bench.send(Function::Init, board, &[]).await;
+    let acknowledged = bench.wait(Function::InitAck, board, bench.link.times().init_ack).await.is_some();
+    bench.link.sleep(100 * MS).await;
+    bench.send(Function::XReset, board, &[]).await;
+    // The hold-off, and the time that an application needs.
+    let holdoff = u64::from(bench.profile().autostart_holdoff) * MS;
+    let came = bench.receive(holdoff + bench.link.times().start).await;
+    let now = bench.info(board).await;
+    if now.is_some_and(|info| info.flash_number == flash) {
+        set(bench, board, 0x44, if kept { 0x40 } else { 0 }).await;
+    }
+    match now {
+        Some(i) if i.flash_number == flash && !i.status.has(Status::MSTART) && acknowledged => Verdict::Pass,
+        other => {
+            Verdict::Fail(format!("acknowledged: {acknowledged}, afterwards {other:?}, {}", list(&came)))
+        }
+    }
+}

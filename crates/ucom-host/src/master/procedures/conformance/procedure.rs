@@ -1,0 +1,86 @@
+//! The tests as a whole: which boards are there, every test that is allowed, and all as it was found.
+use crate::master::engine::Link;
+use crate::master::error::Error;
+use crate::master::procedures::conformance::order::{Run, who_reports};
+use crate::master::procedures::conformance::restore::{Found, put_all_back};
+use crate::master::procedures::exchange::confirmed;
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::procedures::survey::board_states;
+use crate::master::reports::{ConformanceOptions, Outcome};
+use ucom::{Function, Status};
+
+pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Result<Outcome, Error> {
+    let (found, strangers) = link.or_cancel(look(&link, &options)).await?;
+    link.tap(true);
+    let mut tests = Run::new(&link, &options, &found, strangers);
+    let result = link.or_cancel(tests.all()).await;
+    link.tap(false);
+    link.bear_shared_numbers(true);
+    if let Err(error) = result {
+        let why = match &error {
+            Error::Cancelled => "cancelled".to_owned(),
+            Error::NoAnswer { board, .. } => format!("board {board} does not answer"),
+            other => other.to_string(),
+        };
+        tests.skip_rest(&why);
+        tests.report.error = Some(error);
+    }
+    let Run { mut report, unnumbered, at, .. } = tests;
+    if options.changes() && !matches!(report.error, Some(Error::Bus { .. })) {
+        let at = at.filter(|_| report.error.is_some());
+        let back = put_all_back(&link, &found, &options, unnumbered, at, &mut report.left);
+        if let Err(error) = link.or_cancel(back).await {
+            report.left.push(format!("not every board is as it was found ({error}): `ucom scan`"));
+        }
+    } else if options.changes() {
+        report.left.push("the boards are as the last test left them: `ucom scan`, `ucom init`".into());
+    }
+    Ok(Outcome::Conformance(report))
+}
+
+/// Which boards are there, and whether the tests may be done with them. Changes nothing.
+async fn look(link: &Link, options: &ConformanceOptions) -> Result<(Found, bool), Error> {
+    let mut boards = Vec::new();
+    let asked: Vec<u8> = match options.boards.is_empty() {
+        true => link.profile().board_numbers().map(|n| n.number()).collect(),
+        false => options.boards.clone(),
+    };
+    for board in asked {
+        link.board(board)?;
+        match confirmed(link, board).await {
+            Ok(seen) => boards.push(seen),
+            Err(Error::NoAnswer { .. }) if options.boards.is_empty() => {}
+            Err(e) => return Err(e),
+        }
+    }
+    one_board_each(link, &boards.iter().map(|b| b.number).collect::<Vec<_>>()).await?;
+    let mut running: Vec<u8> =
+        boards.iter().filter(|b| b.info.status.has(Status::MCARUN)).map(|b| b.number).collect();
+    if let Some(program) = &options.program {
+        let board = program.board;
+        let seen = match boards.iter().find(|b| b.number == board) {
+            Some(seen) => seen.clone(),
+            None => return Err(link.no_answer(board, Function::Info, 3, link.now())),
+        };
+        if seen.info.flash_number != program.flash_number {
+            let (wanted, found) = (program.flash_number, seen.info.flash_number);
+            return Err(Error::WrongBoard { board, wanted, found });
+        }
+        // U-2: program data outrank the process data of any board that runs, tested or not.
+        let states = board_states(link).await;
+        running.extend(states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b));
+        running.sort_unstable();
+        running.dedup();
+    }
+    if options.changes() && !running.is_empty() {
+        return Err(Error::LoopRuns { boards: running });
+    }
+    let (reports, all) = who_reports(link, &boards).await;
+    if options.init && !all {
+        return Err(Error::NotNumbered { reports: reports as u32, boards: boards.len() as u32 });
+    }
+    if options.changes() {
+        link.become_master(options.force).await?;
+    }
+    Ok((Found { boards }, !all))
+}

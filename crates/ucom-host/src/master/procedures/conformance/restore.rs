@@ -1,0 +1,159 @@
+//! Boards as they were found: after the tests, and when these end before their time.
+use crate::master::engine::{Link, MS, Session};
+use crate::master::error::Error;
+use crate::master::procedures::control::{start_application, wait_status};
+use crate::master::procedures::exchange::{confirmed, numbers, set_status};
+use crate::master::procedures::init::init;
+use crate::master::procedures::repair::repair;
+use crate::master::reports::{BoardSeen, ConformanceOptions, InitOptions, Outcome};
+use ucom::{Admin, BoardInfo, Status, ToBoard};
+
+/// How the boards were before the first test.
+pub(super) struct Found {
+    pub boards: Vec<BoardSeen>,
+}
+
+/// Numbers for the chain anew; every board must have the one that it had.
+pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
+    // This PC is the master of the bus already.
+    let outcome = init(link.clone(), InitOptions { force: true, ..Default::default() }).await?;
+    let Outcome::Init(report) = outcome else { return Ok(()) };
+    for before in &found.boards {
+        let (board, wanted) = (before.number, before.info.flash_number);
+        match report.boards.iter().find(|b| b.number == board).map(|b| b.info.flash_number) {
+            Some(found) if found == wanted => {}
+            Some(found) => return Err(Error::WrongBoard { board, wanted, found }),
+            None => {
+                numbers(link, board).await?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// All boards, after the tests. What cannot be put back is reported in `left`, and does not keep the others from it. `at`: the
+/// board whose test was given up.
+pub(super) async fn put_all_back(
+    link: &Link,
+    found: &Found,
+    options: &ConformanceOptions,
+    unnumbered: bool,
+    at: Option<u8>,
+    left: &mut Vec<String>,
+) -> Result<(), Error> {
+    link.with(|core| {
+        if core.session == Session::Quiet {
+            core.start_session();
+        }
+    });
+    if unnumbered && let Err(error) = renumber(link, found).await {
+        left.push(format!("numbers: {error}: `ucom init`"));
+    }
+    for before in &found.boards {
+        let in_work = at == Some(before.number);
+        if let Err(error) = put_back(link, before, options, in_work, left).await {
+            left.push(format!("board {}: {error}", before.number));
+        }
+    }
+    Ok(())
+}
+
+/// One board: its loop ended, ASTART, PROG and its application as they were.
+pub(super) async fn put_back(
+    link: &Link,
+    before: &BoardSeen,
+    options: &ConformanceOptions,
+    in_work: bool,
+    left: &mut Vec<String>,
+) -> Result<(), Error> {
+    let (n, was) = (before.number, before.info.status);
+    let mut now = answering(link, before, options).await?;
+    if now.status.has(Status::MSTART) {
+        halt(link, n).await?;
+    }
+    // It may be about to start by itself, or PC_START may have been the last command that it received.
+    let coming = now.status.has(Status::ASTART) || in_work;
+    if now.status.has(Status::ASTART) != was.has(Status::ASTART) {
+        now = set_status(link, n, Status::ASTART, was & Status::ASTART).await?;
+    }
+    if coming {
+        now = coming_up(link, n, now, was).await?;
+    }
+    if before.info.has_application() && !now.has_application() {
+        let text = format!("board {n} has no program now: `ucom update {n} IMAGE`");
+        if !left.contains(&text) {
+            left.push(text);
+        }
+    }
+    if was.has(Status::MSTART) && now.has_application() {
+        if !now.status.has(Status::MSTART) {
+            start_application(link, n).await?;
+            link.note(format!(
+                "board {n}: its application is started again, its parameters are those of a start"
+            ));
+        }
+        return Ok(());
+    }
+    // Off first: what was begun of a transfer is forgotten.
+    set_status(link, n, Status::MSTART | Status::PROG, Status(0)).await?;
+    if was.has(Status::PROG) {
+        set_status(link, n, Status::PROG, Status::PROG).await?;
+    }
+    Ok(())
+}
+
+/// The board answers, and it is the one that it was. One that erases its memory is silent for long, one that has rebooted
+/// has lost its number.
+async fn answering(
+    link: &Link,
+    before: &BoardSeen,
+    options: &ConformanceOptions,
+) -> Result<BoardInfo, Error> {
+    let n = before.number;
+    let programmed = options.program.as_ref().is_some_and(|p| p.board == n);
+    let limit = if programmed { link.times().erase } else { 500 * MS };
+    let what = "it does not answer";
+    let now = match wait_status(link, n, Status(0), Status(0), limit, what).await {
+        Ok(info) => info,
+        Err(Error::NoAnswer { .. }) => {
+            // It may run all the same.
+            halt(link, n).await?;
+            repair(link, n, before.info.flash_number).await?.info
+        }
+        Err(e) => return Err(e),
+    };
+    if now.flash_number == before.info.flash_number {
+        return Ok(now);
+    }
+    let now = confirmed(link, n).await?.info;
+    match now.flash_number == before.info.flash_number {
+        true => Ok(now),
+        false => {
+            Err(Error::WrongBoard { board: n, wanted: before.info.flash_number, found: now.flash_number })
+        }
+    }
+}
+
+/// The loop ends; three times, as one frame can be lost.
+async fn halt(link: &Link, board: u8) -> Result<(), Error> {
+    let to = link.board(board)?;
+    for _ in 0..3 {
+        link.send(to, ToBoard::Admin(Admin::default())).await;
+        link.sleep(20 * MS).await;
+    }
+    Ok(())
+}
+
+/// Gives an application that should not be up, and may be coming up, the time for it.
+async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Result<BoardInfo, Error> {
+    if now.status.has(Status::MSTART) || was.has(Status::MSTART) || !now.has_application() {
+        return Ok(now);
+    }
+    let what = "its application comes up";
+    let limit = u64::from(link.profile().autostart_holdoff) * MS + link.times().start;
+    match wait_status(link, board, Status::MSTART, Status::MSTART, limit, what).await {
+        Ok(up) => Ok(up),
+        Err(Error::NotReached { .. }) => numbers(link, board).await,
+        Err(e) => Err(e),
+    }
+}

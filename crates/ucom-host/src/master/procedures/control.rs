@@ -1,0 +1,341 @@
+//! Single acts: status, resets, start, stop, flags.
+use crate::master::engine::{Link, MS};
+use crate::master::error::{Error, MEASURE_ORDER};
+use crate::master::procedures::ask_reports::{REPORTS, ask_reports, collect_reports};
+use crate::master::procedures::byte_order::right_order;
+use crate::master::procedures::exchange::{TRIES, admin, confirmed, info, numbers, set_status};
+use crate::master::procedures::one_board::{one_board_each, one_board_for_each_number};
+use crate::master::procedures::repair::repair;
+use crate::master::reports::{AdminChange, BoardSeen, Outcome, Reports, expected_status};
+use ucom::{Admin, BoardInfo, ErrorCode, FromBoard, Function, Sequence, Status, ToBoard};
+
+pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Error> {
+    let seen = info(&link, board).await?;
+    one_board_each(&link, &[board]).await?;
+    if let Err(error) = right_order(&link, &[seen.info.flash_number]).await {
+        link.note(format!("{error}: {MEASURE_ORDER}"));
+    }
+    Ok(Outcome::Info(seen))
+}
+
+/// PC_SETSTATUS with read-back. What takes longer than one answer is waited for.
+pub(crate) async fn set_status_procedure(
+    link: Link,
+    board: u8,
+    mask: Status,
+    value: Status,
+    force: bool,
+) -> Result<Outcome, Error> {
+    let to = link.board(board)?;
+    link.become_master(force).await?;
+    one_board_each(&link, &[board]).await?;
+    let value = value & mask;
+    if mask.has(Status::INIT) && !value.has(Status::INIT) {
+        return forget_number(&link, board, mask, value).await;
+    }
+    if mask.has(Status::MSTART) && value.has(Status::MSTART) {
+        // As PC_START: the application needs its time.
+        let before = numbers(&link, board).await?;
+        link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
+        if !before.status.has(Status::MSTART) {
+            let what = "the application did not start";
+            wait_status(&link, board, Status::MSTART, Status::MSTART, link.times().start, what).await?;
+            link.with(|core| core.forget_parameters(board));
+        }
+    }
+    let now = set_status(&link, board, mask, value).await?;
+    Ok(Outcome::Status { board, info: now })
+}
+
+/// INIT off: the board forgets its number, so its silence is the confirmation.
+async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> Result<Outcome, Error> {
+    let to = link.board(board)?;
+    let before = numbers(link, board).await?;
+    for _ in 0..TRIES {
+        link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
+        match numbers(link, board).await {
+            Err(Error::NoAnswer { .. }) => {
+                link.with(|core| *core.boards.of(board) = Default::default());
+                // It cannot answer any more: what the rules require (D-22).
+                let status = expected_status(&before, mask.0, value.0);
+                return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
+            }
+            Err(e) => return Err(e),
+            Ok(_) => {}
+        }
+    }
+    let status = before.status;
+    Err(Error::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES })
+}
+
+/// Polls PC_INFO every 200 ms until some bits are as wanted.
+pub(crate) async fn wait_status(
+    link: &Link,
+    board: u8,
+    mask: Status,
+    value: Status,
+    limit: u64,
+    what: &'static str,
+) -> Result<BoardInfo, Error> {
+    let since = link.now();
+    let mut last = None;
+    loop {
+        match numbers(link, board).await {
+            Ok(info) if info.status & mask == value => return Ok(info),
+            Ok(info) => last = Some(info.status),
+            Err(Error::NoAnswer { .. } | Error::Incomplete { .. }) => {}
+            Err(e) => return Err(e),
+        }
+        let waited = link.now().saturating_sub(since);
+        if waited >= limit {
+            let waited_ms = waited / MS;
+            return Err(match last {
+                Some(status) => Error::NotReached { board, what, waited_ms, status },
+                None => link.no_answer(board, Function::Info, TRIES, since),
+            });
+        }
+        link.sleep(200 * MS).await;
+    }
+}
+
+/// PC_RESET to one board or to all; who reports. Never repeated: the user decides.
+pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<Outcome, Error> {
+    let to = match board {
+        Some(board) => link.board(board)?,
+        None => link.broadcast_number(),
+    };
+    link.become_master(force).await?;
+    // Whether there is such a board: a frame to nobody would look like a reset without an answer.
+    let before = match board {
+        Some(board) => {
+            let before = confirmed(&link, board).await?.info;
+            one_board_each(&link, &[board]).await?;
+            Some(before)
+        }
+        None => {
+            one_board_for_each_number(&link).await?;
+            None
+        }
+    };
+    link.listen(0, &REPORTS);
+    link.ask(to, ToBoard::Reset).await;
+    link.with(|core| match board {
+        Some(board) => {
+            *core.boards.of(board) = Default::default();
+            core.data.remove(&board);
+        }
+        None => {
+            core.boards.clear();
+            core.data.clear();
+        }
+    });
+    let mut reports = Reports::default();
+    collect_reports(&link, link.times().report_window, &mut reports).await;
+    if let (Some(board), Some(before)) = (board, before) {
+        was_reset(&link, board, before, &mut reports).await?;
+    }
+    Ok(Outcome::Reset(reports))
+}
+
+/// A board that was reset has reported and has no number any more. Only its report may have been lost: then it is asked
+/// for another one.
+async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Reports) -> Result<(), Error> {
+    let since = link.now().saturating_sub(link.times().report_window);
+    let ucom_id = before.flash_number as u8;
+    for _ in 1..TRIES {
+        if !reports.ids.contains(&ucom_id) {
+            let mut all = Reports::default();
+            ask_reports(link, &mut all).await;
+            reports.ids.extend(all.ids.contains(&ucom_id).then_some(ucom_id));
+        }
+    }
+    match numbers(link, board).await {
+        Err(Error::NoAnswer { .. }) if reports.ids.contains(&ucom_id) => {
+            link.with(|core| *core.boards.of(board) = Default::default());
+            Ok(())
+        }
+        Err(Error::NoAnswer { .. }) => Err(link.no_answer(board, Function::Reset, 1, since)),
+        Err(error) => Err(error),
+        Ok(info) => {
+            let waited_ms = link.now().saturating_sub(since) / MS;
+            Err(Error::NotReached {
+                board,
+                what: "it did not give its number up",
+                waited_ms,
+                status: info.status,
+            })
+        }
+    }
+}
+
+/// PC_XRESET, and the board back in its exloader with programming enabled (D-23).
+pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    one_board_each(&link, &[board]).await?;
+    let info = enter_exloader(&link, board, None).await?;
+    Ok(Outcome::Status { board, info })
+}
+
+/// XRESET, wait, poll PC_INFO until the exloader runs; PROG by SETSTATUS when it is off (U-4).
+///
+/// A board that does not answer any more is repaired when its flash number is known; another board that answers in its
+/// place is refused.
+pub(crate) async fn enter_exloader(
+    link: &Link,
+    board: u8,
+    flash_number: Option<u16>,
+) -> Result<BoardInfo, Error> {
+    let info = match (xreset_taken(link, board).await, flash_number) {
+        (Err(Error::NoAnswer { .. }), Some(flash_number)) => {
+            link.note(format!("board {board} lost its number: giving it back"));
+            repair(link, board, flash_number).await?;
+            exloader_runs(link, board, EXLOADER_WAIT).await?
+        }
+        (result, _) => result?,
+    };
+    if let Some(wanted) = flash_number.filter(|wanted| *wanted != info.flash_number) {
+        // One damaged answer is not another board.
+        let found = confirmed(link, board).await?.info.flash_number;
+        if found != wanted {
+            return Err(Error::WrongBoard { board, wanted, found });
+        }
+    }
+    if info.status.has(Status::PROG) {
+        return Ok(info);
+    }
+    set_status(link, board, Status::PROG, Status::PROG).await
+}
+
+/// How long an exloader may take to come up.
+const EXLOADER_WAIT: u64 = 3_000 * MS;
+
+async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, Error> {
+    let what = "its exloader did not come up";
+    wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await
+}
+
+/// PC_XRESET until it is taken. It has no answer: a board that answers PC_INFO and has not left its application did not
+/// receive it. One that is silent reboots, or has lost its number, and is not disturbed.
+async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
+    let to = link.board(board)?;
+    let soon = EXLOADER_WAIT / 3;
+    for _ in 1..TRIES {
+        send_xreset(link, to).await;
+        match exloader_runs(link, board, soon).await {
+            Err(Error::NotReached { .. }) => {}
+            Err(Error::NoAnswer { .. }) => return exloader_runs(link, board, EXLOADER_WAIT - soon).await,
+            other => return other,
+        }
+    }
+    send_xreset(link, to).await;
+    exloader_runs(link, board, EXLOADER_WAIT).await
+}
+
+async fn send_xreset(link: &Link, to: Sequence) {
+    link.send(to, ToBoard::XReset).await;
+    link.with(|core| {
+        core.boards.of(to.number()).application_ended();
+        core.forget_parameters(to.number());
+    });
+    link.sleep(link.times().xreset_wait).await;
+}
+
+/// PC_START and the application up: MCA_DSP_READY, or PC_INFO that shows MSTART (D-30).
+pub(crate) async fn start_application(link: &Link, board: u8) -> Result<BoardSeen, Error> {
+    let before = info(link, board).await?;
+    start_from(link, before).await
+}
+
+/// The same for a board that has just been asked who it is.
+pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSeen, Error> {
+    let board = before.number;
+    let to = link.board(board)?;
+    let mut last = before.info.status;
+    one_board_each(link, &[board]).await?;
+    if last.has(Status::MSTART) {
+        return Ok(before);
+    }
+    let since = link.now();
+    let mut error = None;
+    for _ in 0..TRIES {
+        link.listen(1 << board, &[Function::McaReady]);
+        // Before it leaves: whoever cancels this must know of it.
+        link.with(|core| core.boards.of(board).starting_since = Some(core.now));
+        link.ask(to, ToBoard::Start).await;
+        let until = link.now() + link.times().start;
+        while let Some(received) = link.next(until).await {
+            match received.message {
+                FromBoard::McaReady => break,
+                FromBoard::Error(ErrorCode::AutostartForbidden) => {
+                    link.with(|core| core.boards.of(board).starting_since = None);
+                    return Err(Error::Device {
+                        board,
+                        code: ErrorCode::AutostartForbidden,
+                        during: "PC_START",
+                    });
+                }
+                // Errors of a bad bus are only to be logged; they are reported when nothing came of all tries.
+                message => error = Link::device(board, &message, "PC_START").or(error),
+            }
+        }
+        let now = info(link, board).await?;
+        last = now.info.status;
+        if last.has(Status::MSTART) {
+            link.with(|core| {
+                core.boards.of(board).starting_since = None;
+                core.forget_parameters(board);
+            });
+            return Ok(now);
+        }
+    }
+    if let Some(error) = error {
+        return Err(error);
+    }
+    let waited_ms = link.now().saturating_sub(since) / MS;
+    Err(Error::NotReached { board, what: "the application did not start", waited_ms, status: last })
+}
+
+pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    start_application(&link, board).await.map(Outcome::Started)
+}
+
+/// The flags to change from: those the board sent last, else what its status shows with outputs off (D-37).
+async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
+    let known = info(link, board).await?.info;
+    // What ends something waits for nothing.
+    if !ends {
+        one_board_each(link, &[board]).await?;
+    }
+    if !known.status.has(Status::MSTART) {
+        return Err(Error::NoApplication { board, valid: known.has_application() });
+    }
+    let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
+    let run = known.status.has(Status::MCARUN);
+    // A frame of it may have been lost: the status byte knows whether the loop runs.
+    Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
+        run,
+        active: flags.active && run,
+        ..flags
+    }))
+}
+
+/// Read-modify-write of the flags.
+pub(crate) async fn change_flags(link: &Link, board: u8, change: AdminChange) -> Result<Admin, Error> {
+    let wanted = change.apply(flags(link, board, change.only_ends()).await?);
+    admin(link, board, wanted).await
+}
+
+pub(crate) async fn admin_procedure(
+    link: Link,
+    board: u8,
+    change: AdminChange,
+    force: bool,
+) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    let admin = change_flags(&link, board, change).await?;
+    Ok(Outcome::Admin { board, admin })
+}

@@ -1,0 +1,253 @@
+//! Requests that the procedures are made of, with their bounded repetition.
+use crate::master::engine::Link;
+use crate::master::error::{Error, Incomplete};
+use crate::master::reports::BoardSeen;
+use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
+
+/// Requests whose repetition has no further effect are sent once and repeated twice.
+pub(crate) const TRIES: u32 = 3;
+
+/// What one PC_INFO brought.
+#[derive(Debug)]
+pub(crate) enum Answer {
+    /// Nothing.
+    Silence,
+    /// Something that is no answer.
+    Broken(Incomplete),
+    /// The numbers; the description only when it came whole.
+    Info(BoardInfo, Option<String>),
+}
+
+/// Collects the frames of one DSP_INFO.
+#[derive(Default)]
+pub(crate) struct InfoCollector {
+    info: Option<BoardInfo>,
+    assembler: StringAssembler,
+    text: Option<String>,
+    broken: bool,
+}
+
+impl InfoCollector {
+    /// Takes a frame; `Err`: this is no answer at all.
+    pub(crate) fn push(&mut self, at: u64, payload: &Payload, link: &Link) -> Result<(), Incomplete> {
+        let profile = link.profile();
+        if self.info.is_none() {
+            let start = Incomplete::Start { len: payload.len(), need: 8 };
+            self.info = Some(BoardInfo::parse(payload, profile.endian).ok_or(start)?);
+        } else if self.text.is_some() || (self.assembler.missing() > 1 && payload.len() < 8) {
+            self.broken = true;
+        } else {
+            match self.assembler.push(at, payload, &profile) {
+                Assembled::Partial => {}
+                Assembled::Complete(text) => self.text = Some(text.to_string()),
+                Assembled::Refused => self.broken = true,
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn finished(&self) -> bool {
+        self.broken || self.text.is_some()
+    }
+
+    pub(crate) fn answer(self) -> Answer {
+        match self.info {
+            None => Answer::Silence,
+            Some(info) => Answer::Info(info, self.text.filter(|_| !self.broken)),
+        }
+    }
+}
+
+/// One PC_INFO, not repeated. The mailbox must listen to DSP_INFO.
+pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
+    let (to, times) = (link.board(board)?, link.times());
+    link.ask(to, ToBoard::Info).await;
+    let mut collector = InfoCollector::default();
+    let mut until = link.now() + times.info;
+    while !collector.finished() {
+        let Some(received) = link.next(until).await else { break };
+        if received.from != board {
+            continue;
+        }
+        if let FromBoard::Info(payload) = received.message {
+            if let Err(problem) = collector.push(received.at, &payload, link) {
+                return Ok(Answer::Broken(problem));
+            }
+            until = link.now() + times.gap;
+        }
+    }
+    let answer = collector.answer();
+    if let Answer::Info(info, text) = &answer {
+        // A string's package that is taken for the first frame does not carry the board's number and a possible status.
+        if info.status.contradiction().is_some() || !info.status.has(Status::INIT) {
+            return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
+        }
+        if info.sequence != board {
+            return Err(Error::WrongSequence { board, reported: info.sequence });
+        }
+        remember(link, board, info, text.as_deref());
+    }
+    Ok(answer)
+}
+
+/// Keeps what a board reported.
+pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&str>) {
+    link.with(|core| {
+        let now = core.now;
+        let known = core.boards.of(board);
+        if known.info.is_some_and(|old| old.flash_number != info.flash_number) {
+            *known = Default::default();
+        }
+        let was_started = known.status().is_some_and(|s| s.has(Status::MSTART));
+        known.info = Some(*info);
+        known.rebooted = false;
+        if let Some(text) = text {
+            known.description = Some(text.into());
+        }
+        let starts_itself = info.status.has(Status::ASTART) && info.has_application();
+        known.stopped_at = match info.status.has(Status::MSTART) || starts_itself {
+            true => None,
+            false => known.stopped_at.or(Some(now)),
+        };
+        if !info.status.has(Status::MSTART) {
+            known.application_ended();
+            if was_started {
+                core.forget_parameters(board);
+            }
+        }
+    });
+}
+
+/// PC_INFO with the description, asked up to three times.
+///
+/// A description that never comes whole does not make the numbers useless: they are given without it. A number that is
+/// not the board's own is an error at once (D-24).
+pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
+    info_for(link, board, true).await
+}
+
+/// PC_INFO for the numbers only.
+pub(crate) async fn numbers(link: &Link, board: u8) -> Result<BoardInfo, Error> {
+    info_for(link, board, false).await.map(|seen| seen.info)
+}
+
+async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen, Error> {
+    link.listen(1 << board, &[Function::DspInfo]);
+    let since = link.now();
+    let (mut numbers, mut problem) = (None, None);
+    let mut mismatch = None;
+    for tries in 0..TRIES {
+        if tries > 0 {
+            // What is left of a truncated answer must not mix with the next one.
+            link.quiet(link.times().gap).await;
+        }
+        match ask_info(link, board).await {
+            Ok(Answer::Info(info, text)) if text.is_some() || !description => {
+                return Ok(BoardSeen { number: board, info, description: text });
+            }
+            Ok(Answer::Info(info, _)) => numbers = Some(info),
+            Ok(Answer::Broken(p)) => problem = Some(p),
+            Ok(Answer::Silence) => {}
+            // One damaged frame may contain anything; a board sends it again.
+            Err(e @ Error::WrongSequence { .. }) if mismatch.as_ref() != Some(&e) => mismatch = Some(e),
+            Err(e) => return Err(e),
+        }
+    }
+    if let Some(info) = numbers {
+        return Ok(BoardSeen { number: board, info, description: None });
+    }
+    let asked = Function::DspInfo;
+    match (mismatch, problem) {
+        (Some(mismatch), _) => Err(mismatch),
+        (None, Some(problem)) => Err(Error::Incomplete { board, asked, tries: TRIES, problem }),
+        (None, None) => Err(link.no_answer(board, Function::Info, TRIES, since)),
+    }
+}
+
+/// The numbers of a board, read until two answers agree: one damaged answer is never taken for another board.
+pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error> {
+    let mut first = info(link, board).await?;
+    for _ in 0..TRIES {
+        let second = info(link, board).await?;
+        let same = identity(&first.info) == identity(&second.info);
+        let description = second.description.clone().or(first.description);
+        first = BoardSeen { description, ..second };
+        if same {
+            return Ok(first);
+        }
+    }
+    Err(Error::Contradiction { board, tries: TRIES + 1 })
+}
+
+/// What does not change from one answer to the next.
+pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
+    (info.flash_number, info.program_id, info.date)
+}
+
+/// PC_SETSTATUS read back with PC_INFO, repeated when it was not taken (D-22). Value bits outside the mask are never
+/// sent.
+pub(crate) async fn set_status(
+    link: &Link,
+    board: u8,
+    mask: Status,
+    value: Status,
+) -> Result<BoardInfo, Error> {
+    let to = link.board(board)?;
+    let value = value & mask;
+    let mut status = Status(0);
+    for _ in 0..TRIES {
+        link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
+        let info = numbers(link, board).await?;
+        status = info.status;
+        if status & mask == value {
+            return Ok(info);
+        }
+    }
+    Err(Error::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES })
+}
+
+/// MCA_ADMIN_DATA, answered by the board's state.
+pub(crate) async fn admin(link: &Link, board: u8, wanted: Admin) -> Result<Admin, Error> {
+    let to = link.board(board)?;
+    let wanted = Admin { active: wanted.active && wanted.run, ..wanted };
+    ask_admin(link, board, ToBoard::Admin(wanted), to, |is| is == wanted, wanted).await
+}
+
+/// MCA_PC_START, answered by the board's state.
+pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
+    let to = link.board(board)?;
+    let wanted = Admin { run: true, ..Admin::default() };
+    ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
+}
+
+/// A board's error does not end it: those of a bad bus are only to be logged, and come exactly where the request itself was
+/// lost. It is reported when nothing came of all tries.
+async fn ask_admin(
+    link: &Link,
+    board: u8,
+    ask: ToBoard,
+    to: ucom::Sequence,
+    taken: impl Fn(Admin) -> bool,
+    wanted: Admin,
+) -> Result<Admin, Error> {
+    link.listen(1 << board, &[Function::Admin]);
+    let since = link.now();
+    let (mut other, mut error) = (None, None);
+    for _ in 0..TRIES {
+        link.ask(to, ask).await;
+        let until = link.now() + link.times().admin;
+        while let Some(received) = link.next(until).await {
+            match received.message {
+                FromBoard::Admin(is) if taken(is) => return Ok(is),
+                // What the board sent of its own accord before the request reached it.
+                FromBoard::Admin(is) => other = Some(is),
+                message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
+            }
+        }
+    }
+    match (error, other) {
+        (Some(error), _) => Err(error),
+        (None, Some(is)) => Err(Error::AdminRefused { board, wanted, is }),
+        (None, None) => Err(link.no_answer(board, ask.function(), TRIES, since)),
+    }
+}

@@ -1,0 +1,135 @@
+//! Numbers for the boards of a chain, in the order of the wire (section on initialisation: D-21, D-24).
+//!
+//! PC_INIT(n) is taken by the one board without a number whose incoming pin is active; its outgoing pin, raised by this
+//! PC after the number is confirmed, enables the next board. PC_INIT is never repeated without asking PC_INFO first:
+//! a board that raises its pin by itself would otherwise let its neighbour take the same number.
+
+use crate::master::engine::Link;
+use crate::master::error::Error;
+use crate::master::procedures::ask_reports::{REPORTS, ask_reports, collect_reports};
+use crate::master::procedures::byte_order::{exchanged, flash_numbers};
+use crate::master::procedures::exchange::{confirmed, info, set_status};
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::procedures::repair::given_back;
+use crate::master::procedures::take_number::take_number;
+use crate::master::reports::{BoardSeen, InitFinding, InitOptions, InitReport, Outcome, Reports};
+use std::collections::BTreeSet;
+use ucom::{Sequence, Status, ToBoard};
+
+/// Numbers the whole chain.
+pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Error> {
+    link.become_master(options.force).await?;
+    let mut report = InitReport::default();
+    reset_all(&link, &mut report.reports).await;
+    let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
+    for number in numbers {
+        match next_board(&link, number.number()).await {
+            Ok(Some(seen)) => report.boards.push(seen),
+            Ok(None) => break,
+            Err(error @ Error::NumberShared { .. }) => {
+                return Err(given_back(&link, number.number(), error).await?);
+            }
+            Err(error) => {
+                report.findings.push(InitFinding::Refused { board: number.number(), error });
+                break;
+            }
+        }
+    }
+    verify(&link, &options, &mut report).await;
+    Ok(Outcome::Init(report))
+}
+
+/// PC_RESET to all and their reports. When nobody reports although boards are there, the reset was lost: once more.
+async fn reset_all(link: &Link, reports: &mut Reports) {
+    for _ in 0..2 {
+        link.listen(0, &REPORTS);
+        link.ask(link.broadcast_number(), ToBoard::Reset).await;
+        link.with(|core| {
+            core.boards.clear();
+            core.data.clear();
+        });
+        collect_reports(link, link.times().report_window, reports).await;
+        if !reports.ids.is_empty() {
+            return;
+        }
+        let mut asked = Reports::default();
+        ask_reports(link, &mut asked).await;
+        if asked.ids.is_empty() {
+            return;
+        }
+        link.note("boards are there but did not report after PC_RESET: once more".into());
+    }
+}
+
+/// Gives a number to the next board of the chain; `None`: nobody took it.
+async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error> {
+    if !take_number(link, number, false).await? {
+        return Ok(None);
+    }
+    let seen = info(link, number).await?;
+    one_board_each(link, &[number]).await?;
+    // Raised also when the board reports that it did so itself: harmless, and the read-back is needed anyway.
+    let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
+    if raised.flash_number != seen.info.flash_number {
+        // One of the two answers was damaged, or two boards have this number.
+        return confirmed(link, number).await.map(Some);
+    }
+    Ok(Some(BoardSeen { info: raised, ..seen }))
+}
+
+/// Compares what was numbered with what reported and with the inventory.
+async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
+    let low = |seen: &BoardSeen| seen.info.flash_number as u8;
+    let reached: BTreeSet<u8> = report.boards.iter().map(low).collect();
+    if reached != report.reports.ids {
+        // A report may have been lost.
+        ask_reports(link, &mut report.reports).await;
+    }
+    if exchanged(&report.reports, &flash_numbers(&report.boards)) {
+        // Everything else would compare numbers that are read wrong.
+        report.findings.push(InitFinding::ByteOrder { endian: link.profile().endian });
+        return;
+    }
+    let reports = &report.reports.ids;
+    let mut findings = Vec::new();
+    let unreached: Vec<u8> = reports.difference(&reached).copied().collect();
+    let refused = report.findings.iter().any(|f| matches!(f, InitFinding::Refused { .. }));
+    if report.boards.is_empty() && reports.is_empty() && !refused {
+        findings.push(InitFinding::NoBoards);
+    }
+    if !unreached.is_empty() {
+        let after = report.boards.last().map_or(0, |b| b.number);
+        findings.push(InitFinding::NotReached { after, ids: unreached });
+    }
+    let (boards, seen) = (report.boards.len() as u32, reports.len() as u32);
+    if reached.len() < report.boards.len() {
+        findings.push(InitFinding::MoreBoardsThanReports { boards, reports: seen });
+    }
+    for board in report.boards.iter().filter(|b| !reports.contains(&low(b))) {
+        findings.push(InitFinding::NotReported { board: board.number });
+    }
+    for (i, first) in report.boards.iter().enumerate() {
+        let flash_number = first.info.flash_number;
+        for second in report.boards.iter().skip(i + 1).filter(|b| b.info.flash_number == flash_number) {
+            findings.push(InitFinding::DuplicateFlash {
+                flash_number,
+                first: first.number,
+                second: second.number,
+            });
+        }
+    }
+    for &(board, expected) in &options.expected {
+        match report.boards.iter().find(|b| b.number == board) {
+            Some(seen) if seen.info.flash_number == expected => {}
+            Some(seen) => {
+                let found = seen.info.flash_number;
+                findings.push(InitFinding::UnexpectedOrder { board, expected, found });
+            }
+            None => findings.push(InitFinding::Missing { board, expected }),
+        }
+    }
+    findings.extend(
+        report.reports.ambiguous().into_iter().map(|(low, high)| InitFinding::Ambiguous { low, high }),
+    );
+    report.findings.extend(findings);
+}

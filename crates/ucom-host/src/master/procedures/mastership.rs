@@ -1,0 +1,71 @@
+//! Whether this PC may be the master of the bus (D-08).
+use crate::master::engine::{Core, Link, MS, Session};
+use crate::master::error::Error;
+use crate::master::procedures::exchange::numbers;
+use ucom::Function;
+
+impl Link {
+    /// Becomes master before the first intrusive command (D-08): looks for another one, then sends ALIVE until the
+    /// session ends.
+    pub(crate) async fn become_master(&self, force: bool) -> Result<(), Error> {
+        self.look_for_master(force).await?;
+        self.with(|core| {
+            if core.session == Session::Quiet {
+                core.start_session();
+            }
+        });
+        Ok(())
+    }
+
+    /// This PC is the master of the bus.
+    pub(crate) fn is_master(&self) -> bool {
+        self.with(|core| core.session != Session::Quiet)
+    }
+
+    /// Listens until `master.listen` has passed, refuses when a frame of another PC was received in that time (D-08). Not when this PC
+    /// is master already, or is forced.
+    pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
+        let already = self.with(|core| core.session != Session::Quiet);
+        if !already && !force {
+            let (since, listen, now) =
+                self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
+            // The time before the command counts when the bus was listened to.
+            if now < since + listen {
+                self.sleep(since + listen - now).await;
+            }
+            self.no_competing_master(listen)?;
+            self.whose_heartbeats(listen).await;
+            self.no_competing_master(2 * listen)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses when a frame of another PC was received within the last `window` µs.
+    fn no_competing_master(&self, window: u64) -> Result<(), Error> {
+        let (now, received) = self.with(|core| (core.now, core.competing_master));
+        match received.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
+            Some((at, function, to)) => {
+                Err(Error::CompetingMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// A heartbeat under the number of a board may be the board's, or another PC's for that board alone: whether it is
+    /// started, the board knows. Without an answer it is taken for the board's.
+    async fn whose_heartbeats(&self, window: u64) {
+        let recent =
+            |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);
+        let unknown: Vec<u8> = self.with(|core| {
+            let boards = core.boards.iter().filter(|(_, b)| b.info.is_none() && recent(core, b.alive_at));
+            boards.map(|(number, _)| number).collect()
+        });
+        for board in unknown {
+            let answer = numbers(self, board).await;
+            let stopped = |core: &Core| core.boards.get(board).is_some_and(|b| b.stopped_at.is_some());
+            if answer.is_ok() && self.with(|core| stopped(core)) {
+                self.with(|core| core.competing_master_frame(Function::Alive, board, &[]));
+            }
+        }
+    }
+}

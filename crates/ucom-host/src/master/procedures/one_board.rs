@@ -1,0 +1,87 @@
+//! Whether each number belongs to one board, asked before something is changed (D-24).
+use std::collections::BTreeMap;
+
+use crate::master::engine::{Link, MS, Open};
+use crate::master::error::Error;
+use crate::master::procedures::exchange::TRIES;
+use ucom::{Function, ToBoard};
+
+/// So old an answer to PC_INFO may be and still show who has a number, µs.
+const FRESH: u64 = 2_000 * MS;
+/// Between two questions, µs: the answers of 31 boards do not come as one burst.
+const SPACING: u64 = 2 * MS;
+/// Sees that each of these numbers belongs to one board: nobody else answers PC_INFO within the time that a board may take. A
+/// number that nobody answers to is not refused.
+pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Error> {
+    let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));
+    let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
+    loop {
+        let patience = link.times().info;
+        // What was waited for here is as old as the driver is late.
+        let oldest = if round == 0 { FRESH } else { u64::MAX };
+        let mut until = None;
+        let mut ask = Vec::new();
+        for board in boards {
+            match link.with(|core| core.holders.open(*board, core.fired, patience, oldest)) {
+                Open::Nothing => {}
+                Open::Wait(end) => until = until.max(Some(end)),
+                Open::AskAgain => ask.push(link.board(*board)?),
+                Open::Ask => {
+                    let times = silent.entry(*board).or_default();
+                    *times += 1;
+                    if *times < TRIES {
+                        ask.push(link.board(*board)?);
+                    }
+                }
+            }
+        }
+        if let Some(error) = link.with(|core| core.holders.shared(mask)) {
+            return Err(error);
+        }
+        if (ask.is_empty() && until.is_none()) || round > 2 * TRIES {
+            return Ok(());
+        }
+        round += 1;
+        link.listen(mask, &[Function::DspInfo]);
+        for board in ask {
+            link.send(board, ToBoard::Info).await;
+            until = until.max(Some(link.now() + patience));
+            link.sleep(SPACING).await;
+        }
+        out_of_words(link, until.unwrap_or_default()).await;
+    }
+}
+
+/// The same for every number.
+pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Error> {
+    link.listen(u32::MAX, &[Function::DspInfo]);
+    let asked = match link.profile().broadcast_number() {
+        Some(broadcast) => vec![broadcast],
+        None => link.profile().board_numbers().collect(),
+    };
+    for number in asked {
+        link.send(number, ToBoard::Info).await;
+        link.sleep(SPACING).await;
+    }
+    out_of_words(link, link.now() + link.times().info).await;
+    let doubtful = link.with(|core| core.holders.doubtful());
+    one_board_each(link, &doubtful).await?;
+    link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
+}
+
+/// Waits until nobody can answer any more what these boards (by bit) were asked last: whoever shares a number with one of
+/// them may come late.
+pub(crate) async fn last_answers(link: &Link, boards: u32) {
+    let patience = link.times().info;
+    if let Some(asked_at) = link.with(|core| core.holders.last_asked(boards)) {
+        link.sleep_until(asked_at + patience).await;
+    }
+}
+
+/// Waits until then, and until an answer that has begun is at its end.
+async fn out_of_words(link: &Link, mut until: u64) {
+    let (gap, limit) = (link.times().gap, until + 20 * link.times().gap);
+    while link.next(until).await.is_some() && link.now() < limit {
+        until = until.max(link.now() + gap).min(limit);
+    }
+}

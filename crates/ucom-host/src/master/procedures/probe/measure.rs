@@ -1,0 +1,173 @@
+//! The questions of a probe. Answers are kept as raw payloads: how to read them is what is being asked.
+
+use crate::master::engine::{Link, MS, Times};
+use crate::master::error::Error;
+use crate::master::procedures::ask_reports::{REPORTS, collect_reports};
+use crate::master::procedures::control::start_application;
+use crate::master::procedures::exchange::{admin, mca_start, numbers};
+use crate::master::procedures::init::init;
+use crate::master::procedures::probe::judge::Seen;
+use crate::master::procedures::probe::judge::{alive, judge, status_of};
+use crate::master::reports::{InitOptions, Outcome, ProbeOptions, Reports};
+use std::collections::BTreeMap;
+use ucom::profile::AliveMode;
+use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status, ToBoard};
+
+/// How often each board is asked: one lost frame must not decide.
+const ROUNDS: usize = 3;
+
+pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
+    let mut seen = Seen { before: link.profile(), image: options.image.clone(), ..Default::default() };
+    // Everything is to be received raw, so nothing may be refused for its length.
+    use_profile(&link, Profile { dlc_strict: false, ..seen.before });
+    seen.reports = all_reports(&link).await;
+    if options.init {
+        link.become_master(options.force).await?;
+        seen.raised = pin_raised(&link).await?;
+        // The chain as a whole; what the base profile reads wrong is judged below.
+        let whole = InitOptions { force: options.force, ..Default::default() };
+        link.bear_shared_numbers(true);
+        init(link.clone(), whole).await?;
+        link.bear_shared_numbers(false);
+    }
+    seen.broadcast = [Sequence::ZERO, Sequence::MAX].map(|_| 0);
+    for (place, to) in [Sequence::ZERO, Sequence::MAX].into_iter().enumerate() {
+        let answers = raw_infos(&link, &[to], 0).await;
+        if let Some(count) = seen.broadcast.get_mut(place) {
+            *count = answers.keys().filter(|from| **from != to.number()).count();
+        }
+        seen.zero_answers |= to == Sequence::ZERO && answers.contains_key(&0);
+    }
+    let all: Vec<Sequence> = Sequence::all().filter(|n| n.number() > 0).collect();
+    for _ in 0..ROUNDS {
+        for (from, answer) in raw_infos(&link, &all, 0).await {
+            seen.infos.entry(from).or_default().push(answer);
+        }
+    }
+    if let Some(board) = seen.first_board() {
+        let padded = raw_infos(&link, &[board], 8).await;
+        seen.padded = Some(padded.contains_key(&board.number()));
+    }
+    for board in seen.started_boards() {
+        seen.offsets.push(initial_offsets(&link, board).await);
+    }
+    let mut report = judge(&seen);
+    use_profile(&link, report.profile);
+    if options.alive
+        && let Some(board) = seen.first_board()
+    {
+        link.become_master(options.force).await?;
+        let by = alive_form(&link, board.number()).await?;
+        alive(&mut report, by);
+        use_profile(&link, report.profile);
+    }
+    Ok(Outcome::Probe(report))
+}
+
+fn use_profile(link: &Link, profile: Profile) {
+    link.with(|core| {
+        core.profile = profile;
+        core.times = Times::of(&profile);
+    });
+}
+
+/// The reports of all boards as they are, of several requests: a board may be booting, a frame may be lost.
+async fn all_reports(link: &Link) -> Vec<ucom::Report> {
+    let mut reports = Vec::new();
+    for _ in 0..ROUNDS {
+        link.listen(0, &REPORTS);
+        link.ask(link.broadcast_number(), ToBoard::Report).await;
+        let until = link.now() + link.times().report_ask;
+        while let Some(received) = link.next(until).await {
+            if let FromBoard::Report(report) = received.message {
+                reports.push(report);
+            }
+            if link.now() >= until || reports.len() > 1000 {
+                break;
+            }
+        }
+    }
+    reports
+}
+
+/// PC_RESET, PC_INIT to the first board, and whether its status shows OPINIT at once; `None`: nobody took the number.
+async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
+    link.listen(0, &REPORTS);
+    link.ask(link.broadcast_number(), ToBoard::Reset).await;
+    link.with(|core| {
+        core.boards.clear();
+        core.data.clear();
+    });
+    collect_reports(link, link.times().report_window, &mut Reports::default()).await;
+    let Some(first) = link.profile().board_numbers().next() else { return Ok(None) };
+    link.listen(u32::MAX, &[Function::InitAck]);
+    link.ask(first, ToBoard::Init).await;
+    link.next(link.now() + link.times().init_ack).await;
+    let answers = raw_infos(link, &[first], 0).await;
+    let status = answers.get(&first.number()).and_then(|frames| frames.first()).and_then(status_of);
+    Ok(status.map(|status| status.has(Status::OPINIT)))
+}
+
+/// PC_INFO with so many bytes of padding to some numbers; the frames of each answer until 100 ms of silence.
+async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8, Vec<Payload>> {
+    link.listen(u32::MAX, &[Function::DspInfo]);
+    let mut answers: BTreeMap<u8, Vec<Payload>> = BTreeMap::new();
+    for number in to {
+        let zeros = [0; 8];
+        let data = zeros.get(..padding).unwrap_or(&zeros);
+        if let Some(frame) = Frame::new(Function::Info.id(*number), data) {
+            link.send_frame(frame).await;
+        }
+        // The answers of many boards shall not come as one burst.
+        link.sleep(2 * MS).await;
+    }
+    let (times, limit) = (link.times(), link.now() + 5_000 * MS);
+    let gap = times.info.max(times.gap);
+    while let Some(received) = link.next((link.now() + gap).min(limit)).await {
+        if let FromBoard::Info(payload) = received.message {
+            answers.entry(received.from).or_default().push(payload);
+        }
+        if link.now() >= limit {
+            break;
+        }
+    }
+    answers
+}
+
+/// Offsets of the packages that answer MCA_DUMP_CI, as the profile in use reads them.
+async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
+    link.listen(1 << board.number(), &[Function::DspCi]);
+    link.ask(board, ToBoard::DumpCi).await;
+    let limit = link.now() + 1_000 * MS;
+    let mut offsets = Vec::new();
+    while let Some(received) = link.next((link.now() + link.times().gap).min(limit)).await {
+        if let FromBoard::Ci(package) = received.message {
+            offsets.push(package.offset);
+        }
+        if link.now() >= limit {
+            break;
+        }
+    }
+    offsets
+}
+
+/// Whether a control loop goes on with broadcast heartbeats only, and with those to its number only.
+async fn alive_form(link: &Link, board: u8) -> Result<[bool; 2], Error> {
+    start_application(link, board).await?;
+    let mut held = [false; 2];
+    let before = link.profile();
+    for (place, alive_mode) in [AliveMode::Broadcast, AliveMode::Unicast].into_iter().enumerate() {
+        use_profile(link, Profile { alive_mode, ..before });
+        mca_start(link, board).await?;
+        link.sleep(u64::from(before.alive_pc_lost) * MS + 1_000 * MS).await;
+        let info = numbers(link, board).await?;
+        if let Some(held) = held.get_mut(place) {
+            *held = info.status.has(Status::MCARUN);
+        }
+        if info.status.has(Status::MCARUN) {
+            admin(link, board, Admin::default()).await?;
+        }
+    }
+    use_profile(link, before);
+    Ok(held)
+}

@@ -1,0 +1,60 @@
+//! PC_SETSTATUS as the formula has it, value bits outside the mask included (D-22): for whoever knows why.
+use crate::master::engine::{Link, MS};
+use crate::master::error::Error;
+use crate::master::procedures::exchange::numbers;
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::reports::{Outcome, RawStatus, expected_status};
+use ucom::{Status, ToBoard};
+
+/// One frame, to one board or to all, and what it did. `seen` are the boards to look at.
+pub(crate) async fn raw_status(
+    link: Link,
+    to: Option<u8>,
+    seen: Vec<u8>,
+    (mask, value): (u8, u8),
+    force: bool,
+) -> Result<Outcome, Error> {
+    let address = match to {
+        Some(board) => link.board(board)?,
+        None => link.broadcast_number(),
+    };
+    let mut before = Vec::new();
+    for board in &seen {
+        before.push((*board, numbers(&link, *board).await?));
+    }
+    let running: Vec<u8> =
+        before.iter().filter(|(_, info)| info.status.has(Status::MCARUN)).map(|(board, _)| *board).collect();
+    if !running.is_empty() && !force {
+        return Err(Error::LoopRuns { boards: running });
+    }
+    link.become_master(force).await?;
+    one_board_each(&link, &seen).await?;
+    // Never repeated: it is to do what it stands for, once.
+    link.send(address, ToBoard::SetStatus { mask, value }).await;
+    let limit = link.now() + link.times().start;
+    let mut boards = Vec::new();
+    for (board, before) in before {
+        let expected = expected_status(&before, mask, value);
+        let mut result = RawStatus { board, before, expected, after: None };
+        loop {
+            result.after = match numbers(&link, board).await {
+                Ok(info) => Some(info),
+                Err(Error::NoAnswer { .. }) => None,
+                Err(e) => return Err(e),
+            };
+            // Applications need a while to come up.
+            if result.as_expected() || link.now() >= limit {
+                break;
+            }
+            link.sleep(100 * MS).await;
+        }
+        if expected.has(Status::MSTART) != before.status.has(Status::MSTART) || !expected.has(Status::INIT) {
+            link.with(|core| core.forget_parameters(board));
+        }
+        if result.after.is_none() {
+            link.with(|core| *core.boards.of(board) = Default::default());
+        }
+        boards.push(result);
+    }
+    Ok(Outcome::RawStatus(boards))
+}

@@ -1,0 +1,181 @@
+//! One board gets its number back while the others keep theirs (section on initialisation: D-21, D-24).
+//!
+//! PC_INIT(n) is taken by *every* board without a number whose incoming pin is active. So for that moment no outgoing pin
+//! but the one before board n may be on, and the first board, whose incoming pin is always active, must have its number.
+//! Pins that stay low, as after a cancel, do no harm: they only matter to PC_INIT, and a repair raises the one it needs.
+
+use crate::master::engine::{Link, MS, head};
+use crate::master::error::Error;
+use crate::master::procedures::exchange::{TRIES, confirmed, set_status};
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::procedures::survey::statuses;
+use crate::master::procedures::take_number::take_number;
+use crate::master::reports::{BoardSeen, Outcome};
+use std::collections::BTreeMap;
+use ucom::{FromBoard, Function, Sequence, Status, ToBoard};
+
+/// Most rounds of PC_INFO that find out who has a number.
+const ROUNDS: u32 = 6;
+
+/// Gives board `number` its number back when it no longer answers. The flash number must be the expected one, and no
+/// other board may have taken the number as well.
+pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
+    link.board(number)?;
+    let mut lowered = Vec::new();
+    // Two boards that take the number are found here, and do not keep it.
+    link.bear_shared_numbers(true);
+    let given = give(link, number, flash_number, &mut lowered).await;
+    for board in lowered {
+        if set_status(link, board, Status::OPINIT, Status::OPINIT).await.is_err() {
+            link.note(format!("board {board} did not confirm that its outgoing pin is on again"));
+        }
+    }
+    link.bear_shared_numbers(false);
+    let seen = given?;
+    let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
+    Ok(BoardSeen { info: raised, ..seen })
+}
+
+/// The number for the one board that is meant. `lowered`: boards whose pin was on and is off now.
+async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>) -> Result<BoardSeen, Error> {
+    let since = link.now();
+    only_its_pin(link, number, lowered).await?;
+    if !take_number(link, number, true).await? {
+        return Err(link.no_answer(number, Function::Init, TRIES, since));
+    }
+    let found: Vec<u16> = holders(link, number).await?;
+    match found.as_slice() {
+        [found] if *found == flash_number => match one_board_each(link, &[number]).await {
+            Ok(()) => confirmed(link, number).await,
+            Err(shared) => Err(given_back(link, number, shared).await?),
+        },
+        [] => Err(link.no_answer(number, Function::Info, ROUNDS, since)),
+        // Whoever took it must not keep it, or the next command means the wrong board.
+        [other] => {
+            if !take_back(link, number).await? {
+                link.note(format!("board 0x{other:04X} does not give number {number} back"));
+            }
+            Err(Error::WrongBoard { board: number, wanted: flash_number, found: *other })
+        }
+        _ => {
+            let shared = Error::NumberShared { board: number, found, given_back: false };
+            Err(given_back(link, number, shared).await?)
+        }
+    }
+}
+
+/// No outgoing pin on but that of the board before `number`, which is.
+///
+/// Every number gets the command three times, whether it answers or not: a board may be alive with its answers lost. Who answers is read back.
+async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
+    let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
+    let before = statuses(link, &numbers).await;
+    let first = numbers.first().map_or(number, |n| n.number());
+    let feeder = (number > first).then(|| number - 1);
+    if let Some(feeder) = feeder {
+        // Only a board with a number holds its pin; without it nobody could take this one.
+        set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
+        if !before.contains_key(&first) && feeder != first {
+            return Err(Error::MayTakeNumber { board: number, other: first });
+        }
+    }
+    let others: Vec<Sequence> = numbers.into_iter().filter(|n| Some(n.number()) != feeder).collect();
+    let on = |board: &u8| before.get(board).is_some_and(|s| s.as_ref().is_ok_and(|s| s.has(Status::OPINIT)));
+    lowered.extend(others.iter().map(|n| n.number()).filter(|n| *n != number && on(n)));
+    for _ in 0..TRIES {
+        for other in &others {
+            link.send(*other, ToBoard::SetStatus { mask: Status::OPINIT.0, value: 0 }).await;
+        }
+        link.sleep(20 * MS).await;
+    }
+    for (board, status) in statuses(link, &others).await {
+        if !status.is_ok_and(|status| !status.has(Status::OPINIT)) {
+            // Three more times, each read back; then it is refused.
+            set_status(link, board, Status::OPINIT, Status(0)).await?;
+        }
+    }
+    Ok(())
+}
+
+/// The flash numbers of all boards that answer to this number. One that shows up only once is a damaged answer.
+async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
+    let mut seen: BTreeMap<u16, u32> = BTreeMap::new();
+    for round in 1..=ROUNDS {
+        for flash_number in answers(link, number).await? {
+            *seen.entry(flash_number).or_default() += 1;
+        }
+        let clear = seen.is_empty() || (seen.len() == 1 && seen.values().all(|times| *times > 1));
+        if round >= TRIES && clear {
+            break;
+        }
+    }
+    Ok(seen.into_iter().filter(|(_, times)| *times > 1).map(|(flash_number, _)| flash_number).collect())
+}
+
+/// One PC_INFO, and the flash number of every answer to it, not only of the first.
+async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
+    let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
+    link.listen(1 << number, &[Function::DspInfo]);
+    link.ask(to, ToBoard::Info).await;
+    let mut until = link.now() + times.info;
+    let limit = until + 20 * times.gap;
+    let mut found = Vec::new();
+    while let Some(received) = link.next(until).await {
+        if let (FromBoard::Info(payload), true) = (&received.message, received.from == number) {
+            found.extend(head(number, payload, &profile).map(|info| info.flash_number));
+        }
+        until = (link.now() + times.gap).min(limit);
+        if link.now() >= limit {
+            break;
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    Ok(found)
+}
+
+/// A number that two boards took: nobody keeps it.
+pub(crate) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
+    let Error::NumberShared { board, found, .. } = error else { return Ok(error) };
+    let given_back = take_back(link, number).await?;
+    Ok(Error::NumberShared { board, found, given_back })
+}
+
+/// Takes a number from whoever has it; `true`: nobody answers to it any more.
+async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
+    let to = link.board(number)?;
+    for _ in 0..TRIES {
+        link.send(to, ToBoard::SetStatus { mask: Status::INIT.0, value: 0 }).await;
+        link.sleep(20 * MS).await;
+    }
+    link.with(|core| *core.boards.of(number) = Default::default());
+    for _ in 0..TRIES {
+        if !answers(link, number).await?.is_empty() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Repair as a procedure of its own.
+pub(crate) async fn repair_procedure(
+    link: Link,
+    number: u8,
+    flash_number: u16,
+    force: bool,
+) -> Result<Outcome, Error> {
+    link.board(number)?;
+    link.become_master(force).await?;
+    match holders(&link, number).await?.as_slice() {
+        [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
+        // It is well: nothing is changed but its pin, which must be on.
+        [found] if *found == flash_number => {
+            one_board_each(&link, &[number]).await?;
+            let seen = confirmed(&link, number).await?;
+            let info = set_status(&link, number, Status::OPINIT, Status::OPINIT).await?;
+            Ok(Outcome::Repaired(BoardSeen { info, ..seen }))
+        }
+        [found] => Err(Error::WrongBoard { board: number, wanted: flash_number, found: *found }),
+        found => Err(Error::NumberShared { board: number, found: found.to_vec(), given_back: false }),
+    }
+}

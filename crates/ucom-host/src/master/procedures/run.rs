@@ -1,0 +1,213 @@
+//! From a started board to a running control loop, in the order of the protocol: description, initial inputs, inputs,
+//! parameters, heartbeats, loop, outputs.
+
+use crate::master::engine::{Core, Life, Link};
+use crate::master::error::Error;
+use crate::master::io::{DescriptionKey, IoDescription, Kind};
+use crate::master::load::LoadForecast;
+use crate::master::procedures::control::{change_flags, start_from};
+use crate::master::procedures::describe::{describe, read_initial_inputs};
+use crate::master::procedures::exchange::{info, mca_start};
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::procedures::stop::stop_board;
+use crate::master::reports::{AdminChange, Outcome, RunBoard, RunOptions, RunReport, StopLevel};
+use std::collections::BTreeMap;
+use ucom::profile::OnLost;
+use ucom::{Admin, BoardInfo, Dimensions, Status};
+
+/// A run ends with every board running, or with every board as far as it was found: idle, started, or running. A board that
+/// was found running goes on with what it was given until then: inputs and parameters of the user, none but these.
+pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Error> {
+    let mut begun = Vec::new();
+    let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
+    if let Err(error) = &result
+        && !matches!(error, Error::Bus { .. })
+    {
+        link.bear_shared_numbers(true);
+        let undone = link.or_cancel(async {
+            undo(&link, &begun).await;
+            Ok(())
+        });
+        if undone.await.is_err() {
+            link.note("not every board that was started is stopped".into());
+        }
+    }
+    result.map(Outcome::Running)
+}
+
+/// What a run has begun on a board, and takes back when it fails.
+struct Begun {
+    board: u8,
+    /// How far it is stopped then, so that it is as far as it was found.
+    back: Option<StopLevel>,
+    /// Its loop ran already.
+    ran: bool,
+}
+
+async fn undo(link: &Link, begun: &[Begun]) {
+    for Begun { board, back, .. } in begun.iter().rev() {
+        if let Some(level) = back
+            && let Err(error) = stop_board(link, *board, *level).await
+        {
+            link.note(format!("board {board} may still be started: {error}"));
+        }
+    }
+}
+
+async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) -> Result<RunReport, Error> {
+    for plan in &options.boards {
+        link.board(plan.board)?;
+    }
+    link.become_master(options.force).await?;
+    // First everything that can be refused, and as much of it as is known before anything is started: names, load.
+    let mut found = Vec::new();
+    let mut described = BTreeMap::new();
+    for plan in &options.boards {
+        let seen = info(link, plan.board).await?;
+        if let Some(description) = known_description(link, &seen.info) {
+            add(link, options, plan, description, &mut described)?;
+        }
+        found.push(seen);
+    }
+    one_board_each(link, &options.boards.iter().map(|plan| plan.board).collect::<Vec<_>>()).await?;
+    for (plan, seen) in options.boards.iter().zip(found) {
+        // What does not run yet is stopped as far as it was; what runs is not ours to stop.
+        let status = seen.info.status;
+        let back = match (status.has(Status::MSTART), status.has(Status::MCARUN)) {
+            (false, _) => Some(StopLevel::Application),
+            (true, false) => Some(StopLevel::Loop),
+            (true, true) => None,
+        };
+        begun.push(Begun { board: plan.board, back, ran: back.is_none() });
+        let seen = start_from(link, seen).await?;
+        let description = describe(link, plan.board, &seen.info).await?;
+        // What is to be written was chosen by the names that were known.
+        if described.get(&plan.board).is_some_and(|known| *known != description) {
+            return Err(Error::StaleNames { board: plan.board });
+        }
+        add(link, options, plan, description, &mut described)?;
+    }
+    let mut boards = Vec::new();
+    for (plan, begun) in options.boards.iter().zip(begun) {
+        let Some(description) = described.get(&plan.board) else { continue };
+        nobody_lost(link, options)?;
+        boards.push((plan.board, start_loop(link, options, plan, description, begun).await?));
+    }
+    nobody_lost(link, options)?;
+    Ok(RunReport { boards, load: forecast(link, &described) })
+}
+
+/// The description of the program on a board, if it is known already.
+fn known_description(link: &Link, info: &BoardInfo) -> Option<IoDescription> {
+    let key = DescriptionKey::of(info);
+    link.with(|core| core.descriptions.get(&key).filter(|_| info.has_application()).cloned())
+}
+
+/// One more board is described: its names must be those that are meant, and the load bearable.
+fn add(
+    link: &Link,
+    options: &RunOptions,
+    plan: &RunBoard,
+    description: IoDescription,
+    described: &mut BTreeMap<u8, IoDescription>,
+) -> Result<(), Error> {
+    for (kind, settings) in [(Kind::Ci, &plan.ci), (Kind::Par, &plan.par)] {
+        for setting in settings {
+            description.find(plan.board, kind, &setting.name)?;
+        }
+    }
+    described.insert(plan.board, description);
+    let load = forecast(link, described);
+    if load.exceeds() && !options.force { Err(Error::Load(load)) } else { Ok(()) }
+}
+
+/// Inputs, parameters, the loop, and the outputs if they are wanted.
+async fn start_loop(
+    link: &Link,
+    options: &RunOptions,
+    plan: &RunBoard,
+    description: &IoDescription,
+    begun: &mut Begun,
+) -> Result<Admin, Error> {
+    let board = plan.board;
+    // Only this PC itself can know what was sent to a board that runs; what another one sent is not overwritten by initial
+    // values unasked.
+    let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
+    let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
+    let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;
+    let mut ci = given.filter(|_| begun.ran).unwrap_or(initial);
+    for setting in &plan.ci {
+        let index = description.find(board, Kind::Ci, &setting.name)?;
+        if let Some(place) = ci.get_mut(usize::from(index)) {
+            *place = setting.value;
+        }
+    }
+    link.with(|core| {
+        if let Some(data) = core.data.get_mut(&board) {
+            data.ci = ci;
+        }
+        if give {
+            core.send_inputs(board);
+        }
+    });
+    for setting in &plan.par {
+        let index = description.find(board, Kind::Par, &setting.name)?;
+        link.with(|core| core.send_parameter(board, index, setting.value));
+    }
+    // Nothing may start before its values have left.
+    link.flush().await;
+    let flags = mca_start(link, board).await?;
+    if begun.back.is_none() && !flags.active && options.active {
+        begun.back = Some(StopLevel::Outputs);
+    }
+    if give {
+        repeat_inputs(link, board);
+    }
+    let running = AdminChange { run: Some(true), ..Default::default() };
+    let admin = change_flags(link, board, running).await?;
+    if !options.active {
+        return Ok(admin);
+    }
+    change_flags(link, board, AdminChange { active: Some(true), ..running }).await
+}
+
+/// Where the loss of one board stops all, none is started after it.
+fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
+    let lost = |core: &mut Core, number: u8| {
+        core.boards.get(number).is_some_and(|b| b.life == Life::Lost || b.rebooted)
+    };
+    let lost = link.with(|core| {
+        let stops = core.profile.on_lost == OnLost::StopAll;
+        options.boards.iter().map(|plan| plan.board).find(|board| stops && lost(core, *board))
+    });
+    lost.map_or(Ok(()), |board| Err(Error::Lost { board }))
+}
+
+fn repeat_inputs(link: &Link, board: u8) {
+    link.with(|core| {
+        let next = core.now + core.times.ci;
+        if let Some(data) = core.data.get_mut(&board) {
+            data.repeat = Some(next);
+        }
+    });
+}
+
+/// With the boards that run already (P-19).
+fn forecast(link: &Link, described: &BTreeMap<u8, IoDescription>) -> LoadForecast {
+    link.with(|core| {
+        let now = core.now;
+        let mut all: BTreeMap<u8, Dimensions> =
+            described.iter().map(|(board, description)| (*board, description.dimensions())).collect();
+        for (number, board) in core.boards.iter().filter(|(_, b)| b.running(now)) {
+            if let Some(data) = core.data.get(&number) {
+                let so = data.so.dimension() as u16;
+                let known = Dimensions { ci: data.ci.len() as u16, so, par: 0 };
+                all.entry(number).or_insert(known);
+            } else if board.so_at.is_some() {
+                // Its size is not known here: at least one package each way.
+                all.entry(number).or_insert(Dimensions { ci: 1, so: 1, par: 0 });
+            }
+        }
+        LoadForecast::new(all.values(), &core.profile)
+    })
+}

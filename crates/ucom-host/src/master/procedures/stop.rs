@@ -1,0 +1,81 @@
+//! Stopping a board: outputs, the control loop, the application; also one that does not answer.
+use crate::master::engine::{Link, MS};
+use crate::master::error::Error;
+use crate::master::procedures::control::change_flags;
+use crate::master::procedures::exchange::TRIES;
+use crate::master::procedures::exchange::{admin, info, set_status};
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::reports::{AdminChange, Outcome, StopLevel};
+use ucom::{Admin, BoardInfo, Status, ToBoard};
+
+pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -> Result<Outcome, Error> {
+    link.board(board)?;
+    link.become_master(force).await?;
+    let info = stop_board(&link, board, level).await;
+    // Only reported, by its event, and only now: both boards were commanded to stop.
+    let _ = one_board_each(&link, &[board]).await;
+    Ok(Outcome::Status { board, info: info? })
+}
+
+/// Outputs off, then the loop, then the application: the start order in reverse. A step that gets no answer does not keep
+/// the next ones from being taken; the first that failed is reported.
+pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
+    let mut known = match info(link, board).await {
+        Ok(seen) => seen.info,
+        Err(error) => {
+            stop_silent(link, board, level).await?;
+            return Err(error);
+        }
+    };
+    if !known.status.has(Status::MSTART) && level == StopLevel::Application {
+        known = stop_starting(link, board, known).await?;
+    }
+    if !known.status.has(Status::MSTART) {
+        return Ok(known);
+    }
+    let off = AdminChange { active: Some(false), ..Default::default() };
+    let mut done = change_flags(link, board, off).await.map(drop);
+    if level != StopLevel::Outputs {
+        link.with(|core| core.stop_inputs(board));
+        let ended = change_flags(link, board, AdminChange { run: Some(false), ..off }).await;
+        done = done.and(ended.map(drop));
+    }
+    if level == StopLevel::Application {
+        link.with(|core| core.boards.of(board).application_ended());
+        done = done.and(set_status(link, board, Status::MSTART, Status(0)).await.map(drop));
+    }
+    done?;
+    Ok(info(link, board).await?.info)
+}
+
+/// A board that was commanded to start and does not show it yet may do so any time until `start.timeout` has passed: it is
+/// commanded to stop whatever its status is, and read again then.
+async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
+    let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
+    let answer = set_status(link, board, Status::MSTART, Status(0)).await;
+    let up = since + link.times().start;
+    if link.now() < up {
+        link.sleep_until(up).await;
+    }
+    let now = info(link, board).await.map(|seen| seen.info).or(answer)?;
+    link.with(|core| core.boards.of(board).starting_since = None);
+    Ok(now)
+}
+
+/// The stop of a board that does not answer PC_INFO: it may run all the same. What it knows of flags is not read first.
+async fn stop_silent(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
+    let to = link.board(board)?;
+    let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();
+    let run = flags.run && level == StopLevel::Outputs;
+    link.with(|core| core.stop_inputs(board));
+    // No answer is what is expected here.
+    let _ = admin(link, board, Admin { run, active: false, ..flags }).await;
+    for _ in 0..TRIES {
+        link.send(to, ToBoard::Admin(Admin { run, active: false, ..flags })).await;
+        if level == StopLevel::Application {
+            link.send(to, ToBoard::SetStatus { mask: Status::MSTART.0, value: 0 }).await;
+        }
+        link.sleep(20 * MS).await;
+    }
+    Ok(())
+}

@@ -1,0 +1,49 @@
+//! PC_INIT to one board (D-21, D-24).
+use crate::master::engine::{Link, MS};
+use crate::master::error::Error;
+use crate::master::procedures::exchange::TRIES;
+use crate::master::procedures::exchange::{Answer, ask_info};
+use ucom::{ErrorCode, FromBoard, Function, Status, ToBoard};
+
+/// PC_INIT until the board acknowledges or answers PC_INFO, at most three times. `lower`: the board's own pin goes down
+/// before it is repeated, as a board that raises it by itself would let its neighbour take the number as well.
+pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<bool, Error> {
+    let to = link.board(number)?;
+    let nobody = link.profile().unnumbered().number();
+    for tried in 0..TRIES {
+        if lower && tried > 0 {
+            link.send(to, ToBoard::SetStatus { mask: Status::OPINIT.0, value: 0 }).await;
+            link.sleep(20 * MS).await;
+        }
+        link.listen(u32::MAX, &[Function::InitAck, Function::DspInfo]);
+        link.ask(to, ToBoard::Init).await;
+        let mut until = link.now() + link.times().init_ack;
+        let mut acknowledged = false;
+        while let Some(received) = link.next(until).await {
+            match received.message {
+                FromBoard::InitAck(data) if received.from == number || data == number => {
+                    if received.from != data {
+                        return Err(Error::AckMismatch { id: received.from, data });
+                    }
+                    acknowledged = true;
+                    break;
+                }
+                // The acknowledge of before has not left the board yet (D-24): give it time.
+                FromBoard::Error(ErrorCode::Reinit) if received.from == nobody || received.from == number => {
+                    until = until.max(link.now() + 100 * MS);
+                }
+                _ => {}
+            }
+        }
+        if acknowledged {
+            return Ok(true);
+        }
+        // The acknowledge may have been lost: never repeat PC_INIT blindly. Half an answer is enough: somebody has this
+        // number, and who it is will be asked again.
+        link.listen(1 << number, &[Function::DspInfo]);
+        if !matches!(ask_info(link, number).await?, Answer::Silence) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}

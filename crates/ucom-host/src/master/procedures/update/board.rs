@@ -1,0 +1,208 @@
+//! One board: attempts, each from its exloader to the read-back (U-4 to U-10).
+use crate::master::engine::Link;
+use crate::master::error::Error;
+use crate::master::procedures::control::{enter_exloader, start_application};
+use crate::master::procedures::exchange::{confirmed, identity, info, numbers};
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::procedures::update::session::{Stage, UpdateSession};
+use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
+use crate::master::reports::update::{UpdateFailure, UpdateOutcome, UpdatePlan};
+use ucom::{BoardInfo, ErrorCode, Status, ToBoard};
+
+/// Whether the board shows what the plan shall bring about.
+pub(super) fn has(known: &BoardInfo, plan: &UpdatePlan) -> bool {
+    known.has_application() && plan.expected.is_some_and(|expected| expected.is(known))
+}
+
+pub(super) async fn shows(link: &Link, board: u8, plan: &UpdatePlan) -> bool {
+    confirmed(link, board).await.is_ok_and(|seen| has(&seen.info, plan))
+}
+
+/// One board, from attempt number `first` on.
+pub(super) async fn one(
+    link: &Link,
+    session: &mut UpdateSession,
+    board: u8,
+    first: u32,
+) -> Result<(), Error> {
+    let plan = session.plan(link, Some(board))?;
+    let profile = link.profile();
+    let mut gap_us = u64::from(profile.prog_frame_gap_us);
+    let since = link.now();
+    for number in first..=profile.prog_attempts.max(first) {
+        session.begin(board);
+        if let Some(result) = session.result(board) {
+            result.attempts = number;
+        }
+        let again = attempt(link, session, board, &plan, number, gap_us).await;
+        if let Some(result) = session.result(board) {
+            result.time_us = link.now().saturating_sub(since);
+        }
+        match again {
+            None => break,
+            // Overruns: the board needs more time between frames.
+            Some(Broken::Device { code: ErrorCode::Overrun | ErrorCode::CanOverrun, .. }) => {
+                gap_us = (gap_us * 2).max(500);
+            }
+            Some(_) => {}
+        }
+        if number < profile.prog_attempts {
+            link.note(format!("board {board}: attempt {number} failed, once more"));
+        }
+    }
+    session.active.retain(|b| *b != board);
+    Ok(())
+}
+
+/// The board that was checked, in its exloader with programming enabled.
+///
+/// Asked before each XRESET: since the check, or the attempt before, another board may have been put in its place.
+pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Result<(), Error> {
+    let flash_number = session.flash_number(board);
+    if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
+        && seen.flash_number != wanted
+    {
+        // One damaged answer is not another board.
+        let found = confirmed(link, board).await?.info.flash_number;
+        if found != wanted {
+            return Err(Error::WrongBoard { board, wanted, found });
+        }
+    }
+    one_board_each(link, &[board]).await?;
+    let entered = enter_exloader(link, board, flash_number).await;
+    if entered.is_err() {
+        // Whoever took the XRESET must not take the program data of another board's update.
+        leave_programming(link, board).await;
+    }
+    entered.map(drop)
+}
+
+async fn leave_programming(link: &Link, board: u8) {
+    if let Ok(to) = link.board(board) {
+        link.send(to, ToBoard::SetStatus { mask: Status::PROG.0, value: 0 }).await;
+    }
+}
+
+/// One attempt with one board; `Some`: it failed in a way that another attempt may heal (the result shows how).
+async fn attempt(
+    link: &Link,
+    session: &mut UpdateSession,
+    board: u8,
+    plan: &UpdatePlan,
+    number: u32,
+    gap_us: u64,
+) -> Option<Broken> {
+    if let Err(error) = enter(link, session, board).await {
+        session.fail_with(board, error);
+        return None;
+    }
+    let to = link.board(board).ok()?;
+    let since = link.now();
+    let boards = vec![board];
+    let attempt = Attempt { link, plan, to, boards, number, gap_us, since };
+    let Transferred { broken, .. } = attempt.run(|_, _| session.reach(board, Stage::Erased)).await;
+    judge(link, session, board, plan, number, broken.first().map(|(_, b)| *b)).await
+}
+
+/// Read-back, or what an early end means.
+pub(super) async fn judge(
+    link: &Link,
+    session: &mut UpdateSession,
+    board: u8,
+    plan: &UpdatePlan,
+    attempts: u32,
+    broken: Option<Broken>,
+) -> Option<Broken> {
+    let erased = session.may_be_erased(board);
+    let failure = match broken {
+        None => {
+            verify(link, session, board, plan).await;
+            return None;
+        }
+        Some(Broken::NoFinish { .. }) if shows(link, board, plan).await => {
+            // U-9: only DSP_PROGFINISHED was lost.
+            verify(link, session, board, plan).await;
+            return None;
+        }
+        Some(Broken::NoFinish { waited_ms }) => {
+            let block = plan.frames(1).saturating_sub(1) / 8;
+            UpdateFailure::Timeout { cycle: 2, block, waited_ms, attempts, erased }
+        }
+        Some(Broken::Timeout { cycle, block, waited_ms }) => {
+            UpdateFailure::Timeout { cycle, block, waited_ms, attempts, erased }
+        }
+        Some(Broken::Device { code, cycle, block }) => {
+            UpdateFailure::Device { code, cycle, block, attempts, erased }
+        }
+    };
+    // The board must not take what comes next for the rest of this transfer. It gets the command while it still counts as at
+    // work: a cancel in this moment sends the command, too.
+    leave_programming(link, board).await;
+    // Another board that has taken the number since complains of program data, or takes them out of turn.
+    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+        session.fail_with(board, error);
+        return None;
+    }
+    session.fail(board, failure);
+    // U-7: the image or the board is wrong, another attempt would end the same.
+    let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
+    broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
+}
+
+/// U-10: the board must show the new program; then, if wanted, it must run.
+pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) {
+    session.reach(board, Stage::Written);
+    let known = match confirmed(link, board).await {
+        Ok(seen) => seen.info,
+        // The board reported that it is done; only the read-back is missing.
+        Err(e) => return session.fail_with(board, e),
+    };
+    // Whoever shares the number was written, too, or is what has just answered.
+    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+        return session.fail_with(board, error);
+    }
+    if let Some(result) = session.result(board) {
+        result.after = Some(known);
+    }
+    let BoardInfo { program_id, date, status, .. } = known;
+    let outcome = match plan.expected {
+        Some(_) if has(&known, plan) => {
+            session.reach(board, Stage::Verified);
+            UpdateOutcome::Verified
+        }
+        Some(wanted) => {
+            let (wanted_id, wanted_date) = (wanted.program_id, wanted.date);
+            let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
+            return session.fail(board, failure);
+        }
+        // Nobody knows what the board must show; it must show an application at least, and not run another one.
+        None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
+        None => return session.fail(board, UpdateFailure::NotValid { program_id, date, status }),
+    };
+    session.end(board, outcome, None);
+    if session.options.start {
+        start(link, session, board, &known).await;
+    }
+}
+
+/// Starts the application of a board that shows `known`, and sees that it runs.
+pub(super) async fn start(link: &Link, session: &mut UpdateSession, board: u8, known: &BoardInfo) {
+    session.begin(board);
+    session.starting = Some(board);
+    let started = match start_application(link, board).await {
+        Ok(_) => info(link, board).await,
+        Err(e) => Err(e),
+    };
+    match started {
+        Ok(seen) if identity(&seen.info) == identity(known) && seen.info.status.has(Status::MSTART) => {
+            session.end(board, UpdateOutcome::Running, None);
+        }
+        Ok(seen) => {
+            let what = "the application does not run";
+            let error = Error::NotReached { board, what, waited_ms: 0, status: seen.info.status };
+            session.fail(board, UpdateFailure::NotRunning(Box::new(error)));
+        }
+        Err(e) => session.fail(board, UpdateFailure::NotRunning(Box::new(e))),
+    }
+    session.starting = None;
+}

@@ -1,0 +1,117 @@
+//! Several boards at once, by broadcast PC_PROG: each board with PROG = 1 takes it, so all others must be known not to.
+use crate::master::engine::{Link, MS};
+use crate::master::error::Error;
+use crate::master::procedures::exchange::TRIES;
+use crate::master::procedures::exchange::{confirmed, identity, set_status};
+use crate::master::procedures::survey::statuses;
+use crate::master::procedures::update::board::{enter, has, judge, one, verify};
+use crate::master::procedures::update::session::{Stage, UpdateSession};
+use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
+use ucom::{Sequence, Status, ToBoard};
+
+/// All open boards at once by broadcast; those that fall behind get attempts of their own.
+///
+/// Where the broadcast could reach a board that must not have it, boards stay open and are updated one by one.
+pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
+    let Some(broadcast) = link.profile().broadcast_number() else {
+        link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
+        return Ok(());
+    };
+    let selected = session.open();
+    if let Err(error) = silence_others(link, &selected).await {
+        session.refuse(&error);
+        return Ok(());
+    }
+    let plan = session.plan(link, None)?;
+    let since = link.now();
+    let (boards, stray) = gather(link, session, &selected).await;
+    if stray {
+        link.note("a board that does not answer may listen: no broadcast, the others one by one".into());
+        // Those that came up stay at work: a cancel takes them out of programming.
+        return Ok(());
+    }
+    for board in &boards {
+        if let Some(result) = session.result(*board) {
+            result.attempts = 1;
+        }
+    }
+    let gap_us = u64::from(link.profile().prog_frame_gap_us);
+    let since_transfer = link.now();
+    let attempt =
+        Attempt { link, plan: &plan, to: broadcast, boards, number: 1, gap_us, since: since_transfer };
+    let erasing = |boards: &[u8], left: &[(u8, Broken)]| {
+        boards.iter().for_each(|board| session.reach(*board, Stage::Erased));
+        let listening = left.iter().filter(|(_, why)| !why.ended_transfer());
+        listening.for_each(|(board, _)| session.reach(*board, Stage::MaybeErased));
+    };
+    let Transferred { finished, broken } = attempt.run(erasing).await;
+    for board in finished {
+        judge(link, session, board, &plan, 1, None).await;
+        if let Some(result) = session.result(board) {
+            result.time_us = link.now().saturating_sub(since);
+        }
+    }
+    for (board, why) in broken {
+        if !why.ended_transfer()
+            && let Ok(seen) = confirmed(link, board).await
+        {
+            let had = session.before(board).is_some_and(|before| has(&before, &plan));
+            if has(&seen.info, &plan) && !had {
+                // A board whose READY was lost may have gone on with the others and be done. One that had this program
+                // before proves nothing by it.
+                verify(link, session, board, &plan).await;
+                continue;
+            }
+            let same = session.before(board).is_some_and(|before| identity(&before) == identity(&seen.info));
+            if same && seen.info.has_application() {
+                session.proved_untouched(board);
+            } else if session.stage(board) == Stage::MaybeErased {
+                session.reach(board, Stage::Erased);
+            }
+        }
+        if judge(link, session, board, &plan, 1, Some(why)).await.is_some()
+            && link.profile().prog_attempts > 1
+        {
+            one(link, session, board, 2).await?;
+        }
+    }
+    Ok(())
+}
+
+/// Takes every number that is not selected out of programming, and reads that back.
+///
+/// A number that does not answer has got the command as well, three times; who has no number takes no PC_PROG.
+async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
+    let others: Vec<Sequence> =
+        link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();
+    for _ in 0..TRIES {
+        for number in &others {
+            link.send(*number, ToBoard::SetStatus { mask: Status::PROG.0, value: 0 }).await;
+        }
+        link.sleep(20 * MS).await;
+    }
+    for (board, status) in statuses(link, &others).await {
+        if status?.has(Status::PROG) {
+            // Three more times, each read back; then it is refused.
+            set_status(link, board, Status::PROG, Status(0)).await?;
+        }
+    }
+    Ok(())
+}
+
+/// The selected boards in their exloaders. `true`: one failed, and did not report that it left programming either: it would
+/// be erased by the group's frames unnoticed.
+async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
+    let (mut boards, mut stray) = (Vec::new(), false);
+    for board in selected {
+        session.active.push(*board);
+        match enter(link, session, *board).await {
+            Ok(()) => boards.push(*board),
+            Err(error) => {
+                stray |= set_status(link, *board, Status::PROG, Status(0)).await.is_err();
+                session.fail_with(*board, error);
+            }
+        }
+    }
+    (boards, stray)
+}

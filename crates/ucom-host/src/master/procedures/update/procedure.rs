@@ -1,0 +1,242 @@
+//! The update as a whole: checks U-1 to U-3, then boards one by one or as a group; what is left when it is ended early.
+
+use crate::master::engine::Link;
+use crate::master::error::{Error, PlanError};
+use crate::master::procedures::byte_order::right_order;
+use crate::master::procedures::exchange::{confirmed, numbers, set_status};
+use crate::master::procedures::one_board::one_board_each;
+use crate::master::procedures::survey::board_states;
+use crate::master::procedures::update::board::{has, one, start};
+use crate::master::procedures::update::group::group;
+use crate::master::procedures::update::session::{Stage, UpdateSession};
+use crate::master::reports::Outcome;
+use crate::master::reports::update::{UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
+use std::collections::BTreeSet;
+use ucom::Status;
+
+/// Updates all boards that need it.
+pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome, Error> {
+    let mut seen = BTreeSet::new();
+    if options.targets.is_empty() {
+        return Err(PlanError::NoTarget.into());
+    }
+    for target in &options.targets {
+        link.board(target.board)?;
+        if !seen.insert(target.board) {
+            return Err(PlanError::Twice { board: target.board }.into());
+        }
+    }
+    let mut session = UpdateSession::new(options);
+    let plan = session.plan(&link, None)?;
+    let mut end = link.or_cancel(all(&link, &mut session)).await;
+    link.bear_shared_numbers(true);
+    if let Err(error @ (Error::Cancelled | Error::NumberShared { .. })) = end {
+        end = link.or_cancel(broken_off(&link, &mut session, &error)).await;
+    }
+    if let Err(error) = &end {
+        for board in core::mem::take(&mut session.programming) {
+            leave_programming_to_user(&mut session, board, error);
+        }
+    }
+    match end {
+        Ok(()) => {}
+        // Asked once more: what was still to be undone is not.
+        Err(Error::Cancelled) => {
+            session.unfinished().into_iter().for_each(|board| session.cancel(board));
+            session.cancel_starts();
+        }
+        // Nothing can be sent any more, but what is known of the boards is still worth reporting.
+        Err(error @ Error::Bus { .. }) => {
+            let waiting = core::mem::take(&mut session.to_start);
+            for board in session.unfinished().into_iter().chain(waiting) {
+                session.fail_with(board, error.clone());
+            }
+        }
+        Err(e) => return Err(e),
+    }
+    let report = UpdateReport {
+        dry_run: session.options.dry_run,
+        program_id: plan.program_id(),
+        date: session.options.date,
+        bytes: plan.total_bytes(),
+        images: plan.images,
+        unverifiable: plan.unverifiable,
+        accept_unverified: session.options.accept_unverified,
+        boards: session.results,
+    };
+    Ok(Outcome::Update(report))
+}
+
+/// The boards at work are commanded to forget the transfer; nothing half written is ever valid. `why`: the user ended it, or two
+/// boards have one number.
+async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
+    for board in session.active.clone() {
+        // PC_START may have been taken already: what this update has started it stops again.
+        if session.starting == Some(board) && set_status(link, board, Status::MSTART, Status(0)).await.is_ok()
+        {
+            session.starting = None;
+        }
+        // Best effort: what the board does not take now, its own time limit and the next XRESET undo.
+        if set_status(link, board, Status::PROG, Status(0)).await.is_err() {
+            link.note(format!("board {board} did not confirm that it left programming"));
+        }
+        match why {
+            Error::Cancelled => session.cancel(board),
+            why => session.fail_with(board, why.clone()),
+        }
+    }
+    still_programming(link, session, why).await;
+    if *why != Error::Cancelled {
+        session.refuse(why);
+        let waiting = core::mem::take(&mut session.to_start);
+        waiting
+            .into_iter()
+            .for_each(|board| session.fail(board, UpdateFailure::NotRunning(Box::new(why.clone()))));
+    }
+    session.open().into_iter().for_each(|board| session.cancel(board));
+    session.cancel_starts();
+    Ok(())
+}
+
+/// A board that has the image already may still be in programming mode, as after an update whose tool was killed: it would take
+/// program data that are meant for others.
+async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
+    while let Some(board) = session.programming.first().copied() {
+        let ended = match link.become_master(session.options.force).await {
+            Ok(()) => set_status(link, board, Status::PROG, Status(0)).await.map(drop),
+            Err(error) => Err(error),
+        };
+        match ended {
+            Ok(()) => link.note(format!("board {board} was in programming mode: ended")),
+            Err(error) => {
+                leave_programming_to_user(session, board, &error);
+            }
+        }
+        session.programming.retain(|b| *b != board);
+    }
+    Ok(())
+}
+
+/// Boards that were found in programming mode and are still to be taken out of it when the update is ended early: they are, where
+/// this PC is the master already; else they are named, as nothing may be sent to them (D-08).
+async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
+    while let Some(board) = session.programming.first().copied() {
+        let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
+        match ended {
+            true => link.note(format!("board {board} was in programming mode: ended")),
+            false => leave_programming_to_user(session, board, why),
+        }
+        session.programming.retain(|b| *b != board);
+    }
+}
+
+fn leave_programming_to_user(session: &mut UpdateSession, board: u8, why: &Error) {
+    let failure = UpdateFailure::StillProgramming(Box::new(why.clone()));
+    session.end(board, UpdateOutcome::UpToDate, Some(failure));
+    session.to_start.retain(|b| *b != board);
+}
+
+async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
+    check(link, session).await;
+    end_programming(link, session).await?;
+    let failed = session.results.iter().find(|r| r.failure.is_some()).map(|r| r.board);
+    if let Some(after) = failed.filter(|_| !session.options.keep_going) {
+        session.skip_open(after);
+    }
+    if session.open().is_empty() {
+        if session.to_start.is_empty() || failed.is_some_and(|_| !session.options.keep_going) {
+            return Ok(());
+        }
+        link.become_master(session.options.force).await?;
+        return start_rest(link, session).await;
+    }
+    // D-10: the numbers of the header would come out with their bytes exchanged.
+    let flash_numbers: Vec<u16> = session.results.iter().filter_map(|result| result.flash_number).collect();
+    if !session.options.force
+        && let Err(error) = right_order(link, &flash_numbers).await
+    {
+        session.refuse(&error);
+        return Ok(());
+    }
+    // U-2: program data outrank the process data of a running board.
+    let states = board_states(link).await;
+    let running: Vec<u8> = states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b).collect();
+    if !running.is_empty() && !session.options.force {
+        session.refuse(&Error::Running { boards: running });
+        return Ok(());
+    }
+    // D-08, in a dry run as well: what it reports must be what would happen.
+    if let Err(error) = link.look_for_master(session.options.force).await {
+        session.refuse(&error);
+        return Ok(());
+    }
+    if session.options.dry_run {
+        return Ok(());
+    }
+    link.become_master(true).await?;
+    if session.options.mode == UpdateMode::Group && session.open().len() > 1 {
+        group(link, session).await?;
+    }
+    for board in session.open() {
+        one(link, session, board, 1).await?;
+        let failed = session.results.iter().any(|r| r.board == board && r.failure.is_some());
+        if failed && !session.options.keep_going {
+            session.skip_open(board);
+            return Ok(());
+        }
+    }
+    start_rest(link, session).await
+}
+
+/// Starts the boards that had the image already.
+async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
+    while let Some(board) = session.to_start.first().copied() {
+        // PC_INFO has shown the program.
+        session.reach(board, Stage::Verified);
+        session.begin(board);
+        session.to_start.retain(|b| *b != board);
+        match numbers(link, board).await {
+            Ok(known) => start(link, session, board, &known).await,
+            Err(error) => session.fail(board, UpdateFailure::NotRunning(Box::new(error))),
+        }
+    }
+    Ok(())
+}
+
+/// U-1 and U-3, by questions only.
+async fn check(link: &Link, session: &mut UpdateSession) {
+    for target in session.options.targets.clone() {
+        let board = target.board;
+        let known = match confirmed(link, board).await {
+            Ok(seen) => seen.info,
+            Err(e) => {
+                session.fail(board, UpdateFailure::Refused(Box::new(e)));
+                continue;
+            }
+        };
+        if let Err(error) = one_board_each(link, &[board]).await {
+            session.fail(board, UpdateFailure::Refused(Box::new(error)));
+            continue;
+        }
+        let found = known.flash_number;
+        if let Some(result) = session.result(board) {
+            result.flash_number = Some(found);
+            result.before = Some(known);
+        }
+        if let Some(wanted) = target.flash_number.filter(|wanted| *wanted != found) {
+            let error = Error::WrongBoard { board, wanted, found };
+            session.fail(board, UpdateFailure::Refused(Box::new(error)));
+            continue;
+        }
+        let there = session.plan(link, Some(board)).is_ok_and(|plan| has(&known, &plan));
+        if there && !session.options.force {
+            session.end(board, UpdateOutcome::UpToDate, None);
+            if known.status.has(Status::PROG) && !session.options.dry_run {
+                session.programming.push(board);
+            }
+            if session.options.start && !session.options.dry_run {
+                session.to_start.push(board);
+            }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! The update session: the state of all boards of an update, which survives a cancel and a bus that fails.
+
+use crate::master::engine::Link;
+use crate::master::error::Error;
+use crate::master::reports::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdatePlan, UpdateResult};
+use host_kit::ErrorKind;
+use std::collections::BTreeMap;
+use ucom::{BoardInfo, Header};
+
+/// How far the memory of a board has changed. It only grows, but for [`UpdateSession::proved_untouched`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Stage {
+    /// It has what it had.
+    #[default]
+    Untouched,
+    /// Frames that erase went past it while it may have listened.
+    MaybeErased,
+    /// It was commanded to erase.
+    Erased,
+    /// It reported that it is done.
+    Written,
+    /// PC_INFO showed the new program.
+    Verified,
+}
+
+/// The state of all boards of an update.
+pub(super) struct UpdateSession {
+    pub options: UpdateOptions,
+    pub results: Vec<UpdateResult>,
+    /// Boards between XRESET and their end.
+    pub active: Vec<u8>,
+    /// The board that is commanded to start its application.
+    pub starting: Option<u8>,
+    /// Boards that have the image already and are still to be started.
+    pub to_start: Vec<u8>,
+    /// Boards that have the image already and are in programming mode.
+    pub programming: Vec<u8>,
+    stages: BTreeMap<u8, Stage>,
+}
+
+impl UpdateSession {
+    pub fn new(options: UpdateOptions) -> Self {
+        let results = options.targets.iter().map(|t| UpdateResult::new(t.board)).collect();
+        let (active, to_start, programming) = (Vec::new(), Vec::new(), Vec::new());
+        Self { options, results, active, starting: None, to_start, programming, stages: BTreeMap::new() }
+    }
+
+    pub fn result(&mut self, board: u8) -> Option<&mut UpdateResult> {
+        self.results.iter_mut().find(|r| r.board == board)
+    }
+
+    /// The board is at work, beside others of its group.
+    pub fn begin(&mut self, board: u8) {
+        if !self.active.contains(&board) {
+            self.active.push(board);
+        }
+    }
+
+    pub fn stage(&self, board: u8) -> Stage {
+        self.stages.get(&board).copied().unwrap_or_default()
+    }
+
+    /// Something of the old application is, or may be, gone.
+    pub fn may_be_erased(&self, board: u8) -> bool {
+        self.stage(board) > Stage::Untouched
+    }
+
+    pub fn reach(&mut self, board: u8, stage: Stage) {
+        let known = self.stages.entry(board).or_default();
+        *known = stage.max(*known);
+    }
+
+    /// PC_INFO shows what it showed before: the frames that might have erased the board did not.
+    pub fn proved_untouched(&mut self, board: u8) {
+        if self.stage(board) == Stage::MaybeErased {
+            self.stages.remove(&board);
+        }
+    }
+
+    pub fn end(&mut self, board: u8, outcome: UpdateOutcome, failure: Option<UpdateFailure>) {
+        self.active.retain(|b| *b != board);
+        if let Some(result) = self.result(board) {
+            result.outcome = outcome;
+            result.failure = failure;
+        }
+    }
+
+    /// The board's outcome is how far its memory has changed.
+    pub fn fail(&mut self, board: u8, failure: UpdateFailure) {
+        let outcome = match self.stage(board) {
+            Stage::Untouched if matches!(failure, UpdateFailure::Cancelled { .. }) => {
+                UpdateOutcome::Cancelled
+            }
+            Stage::Untouched => UpdateOutcome::NotStarted,
+            Stage::MaybeErased => UpdateOutcome::Unknown,
+            Stage::Erased => UpdateOutcome::Incomplete,
+            Stage::Written => UpdateOutcome::Written,
+            Stage::Verified => UpdateOutcome::Verified,
+        };
+        self.end(board, outcome, Some(failure));
+    }
+
+    /// An error of a step, named by what it left behind.
+    pub fn fail_with(&mut self, board: u8, error: Error) {
+        let (kind, error) = (error.kind(), Box::new(error));
+        let failure = match self.stage(board) {
+            Stage::Untouched => match kind {
+                ErrorKind::Refused => UpdateFailure::Refused(error),
+                ErrorKind::Device => UpdateFailure::Reported(error),
+                ErrorKind::Usage | ErrorKind::NoLink | ErrorKind::Fault => UpdateFailure::NoAnswer(error),
+            },
+            Stage::MaybeErased => UpdateFailure::MayBeErased(error),
+            _ => UpdateFailure::After(error),
+        };
+        self.fail(board, failure);
+    }
+
+    /// The user ended it. A board that was commanded to start, and is not known to be stopped, may run.
+    pub fn cancel(&mut self, board: u8) {
+        self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
+        let started = self.starting == Some(board);
+        if let Some(result) = self.result(board) {
+            let left = if started { UpdateOutcome::Running } else { result.outcome };
+            result.failure = Some(UpdateFailure::Cancelled { left });
+        }
+    }
+
+    /// Boards that were done but for their start.
+    pub fn cancel_starts(&mut self) {
+        let left = UpdateOutcome::UpToDate;
+        for board in core::mem::take(&mut self.to_start) {
+            self.end(board, left, Some(UpdateFailure::Cancelled { left }));
+        }
+    }
+
+    /// Boards whose turn has not come.
+    pub fn open(&self) -> Vec<u8> {
+        let open = |r: &&UpdateResult| r.failure.is_none() && r.outcome == UpdateOutcome::NotStarted;
+        self.results.iter().filter(open).map(|r| r.board).collect()
+    }
+
+    /// No board is begun.
+    pub fn refuse(&mut self, error: &Error) {
+        for board in self.open() {
+            self.fail(board, UpdateFailure::Refused(Box::new(error.clone())));
+        }
+    }
+
+    /// No other board is begun after one that failed.
+    pub fn skip_open(&mut self, after: u8) {
+        for board in self.open() {
+            self.fail(board, UpdateFailure::Skipped { after });
+        }
+    }
+
+    /// Boards that are at work or whose turn has not come.
+    pub fn unfinished(&self) -> Vec<u8> {
+        let mut boards = self.active.clone();
+        boards.extend(self.open().iter().filter(|b| !self.active.contains(b)));
+        boards
+    }
+
+    pub fn flash_number(&self, board: u8) -> Option<u16> {
+        self.results.iter().find(|r| r.board == board).and_then(|r| r.flash_number)
+    }
+
+    /// What the board showed before the update.
+    pub fn before(&self, board: u8) -> Option<BoardInfo> {
+        self.results.iter().find(|r| r.board == board).and_then(|r| r.before)
+    }
+
+    /// What is sent to a board, or to a group.
+    pub fn plan(&self, link: &Link, board: Option<u8>) -> Result<UpdatePlan, Error> {
+        let named = board.and_then(|b| self.flash_number(b)).filter(|_| self.options.name_target);
+        Ok(UpdatePlan::new(&self.options, named.unwrap_or(Header::ANY_BOARD), &link.profile())?)
+    }
+}

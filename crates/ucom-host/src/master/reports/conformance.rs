@@ -1,0 +1,108 @@
+//! What the conformance tests may do, and how each ended.
+use crate::master::error::Error;
+use host_kit::ErrorKind;
+use serde::Serialize;
+
+/// What the tests may do.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ConformanceOptions {
+    /// The boards; empty: all that answer.
+    pub boards: Vec<u8>,
+    /// Reset and number the chain anew, set and clear status bits.
+    pub init: bool,
+    /// Start applications and control loops, outputs safe.
+    pub run: bool,
+    /// Program one board.
+    pub program: Option<ConformanceProgram>,
+    /// Only the tests with these names; empty: all.
+    pub only: Vec<String>,
+    /// Also when another PC is on the bus.
+    pub force: bool,
+}
+
+impl ConformanceOptions {
+    /// Whether tests are allowed that change something on a board.
+    pub fn changes(&self) -> bool {
+        self.init || self.run || self.program.is_some()
+    }
+}
+
+/// What one board is programmed with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ConformanceProgram {
+    /// Its number.
+    pub board: u8,
+    /// The flash number that it must have; the header of the image names it, so that no other board takes it.
+    pub flash_number: u16,
+    /// The program.
+    pub image: Vec<u8>,
+    /// Where it is loaded to, in words.
+    pub address: u32,
+    /// Flash date, in the form of the profile's `prog.date`.
+    pub date: u16,
+}
+
+/// How a test ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase", tag = "verdict", content = "why")]
+pub enum Verdict {
+    /// The board does what was expected.
+    Pass,
+    /// It does not; what came instead.
+    Fail(String),
+    /// Not done; why.
+    Skipped(String),
+}
+
+/// One test of one board, or of the chain.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ConformanceTest {
+    /// Its name, as `D-T10`.
+    pub id: &'static str,
+    /// The board; `None`: the chain as a whole.
+    pub board: Option<u8>,
+    /// What was expected.
+    pub expected: &'static str,
+    /// How it ended.
+    #[serde(flatten)]
+    pub verdict: Verdict,
+    /// The option that would have allowed it; `None`: it was allowed.
+    pub needs: Option<&'static str>,
+    /// Frames that were sent, in candump's form.
+    pub sent: Vec<String>,
+    /// Frames that came, at most 64 of them.
+    pub came: Vec<String>,
+}
+
+/// All tests.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ConformanceReport {
+    /// In the order in which they were done.
+    pub tests: Vec<ConformanceTest>,
+    /// What is not as it was found, and the command that helps.
+    pub left: Vec<String>,
+    /// Why the tests ended before the last one; those that were left are skipped.
+    #[serde(skip)]
+    pub error: Option<Error>,
+}
+
+impl ConformanceReport {
+    /// Tests that failed.
+    pub fn failed(&self) -> usize {
+        self.tests.iter().filter(|t| matches!(t.verdict, Verdict::Fail(_))).count()
+    }
+
+    /// Tests that were passed.
+    pub fn passed(&self) -> usize {
+        self.tests.iter().filter(|t| t.verdict == Verdict::Pass).count()
+    }
+
+    /// What kind of failure it is: that of the error that ended the tests; of the board when a test failed, or a board is not
+    /// as it was found. `None`: every test was passed.
+    pub fn failure(&self) -> Option<ErrorKind> {
+        match &self.error {
+            Some(error) => Some(error.kind()),
+            None => (self.failed() > 0 || !self.left.is_empty()).then_some(ErrorKind::Device),
+        }
+    }
+}

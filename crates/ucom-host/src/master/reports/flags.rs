@@ -1,0 +1,46 @@
+//! Changes to the flags of a board, and how far it is stopped.
+use ucom::Admin;
+
+/// Changes to the flags of a board; `None` leaves one as it is (D-37).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AdminChange {
+    /// The control loop runs.
+    pub run: Option<bool>,
+    /// Outputs are enabled.
+    pub active: Option<bool>,
+    /// The module sends its texts.
+    pub debug: Option<bool>,
+    /// All texts of the board are sent.
+    pub global_debug: Option<bool>,
+}
+
+impl AdminChange {
+    /// The flags after the change.
+    pub fn apply(&self, old: Admin) -> Admin {
+        let run = self.run.unwrap_or(old.run);
+        Admin {
+            run,
+            // Outputs need a running loop.
+            active: self.active.unwrap_or(old.active) && run,
+            debug: self.debug.unwrap_or(old.debug),
+            global_debug: self.global_debug.unwrap_or(old.global_debug),
+        }
+    }
+
+    /// Whether it only ends something that moves: such a change is neither delayed nor refused.
+    pub fn only_ends(&self) -> bool {
+        let sets = [self.run, self.active, self.debug, self.global_debug].contains(&Some(true));
+        !sets && (self.run == Some(false) || self.active == Some(false))
+    }
+}
+
+/// How far to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopLevel {
+    /// Outputs off, the control loop runs on.
+    Outputs,
+    /// The control loop ends, the application stays.
+    Loop,
+    /// Back to the exloader.
+    Application,
+}

@@ -1,0 +1,139 @@
+//! How a chain is numbered, and what came of it.
+use crate::master::counted::counted;
+use crate::master::error::{Error, MEASURE_ORDER, other_order};
+use crate::master::reports::scan::Reports;
+use crate::master::reports::seen::BoardSeen;
+use host_kit::ErrorKind;
+use ucom::profile::Endian;
+
+/// How to number a chain.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct InitOptions {
+    /// Flash numbers by position, from an inventory: another order is a finding.
+    pub expected: Vec<(u8, u16)>,
+    /// Also when another PC is on the bus.
+    pub force: bool,
+}
+
+/// What an init brought about.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct InitReport {
+    /// Who reported after the reset.
+    pub reports: Reports,
+    /// Boards in the order of the chain.
+    pub boards: Vec<BoardSeen>,
+    /// What is wrong; empty: ok.
+    pub findings: Vec<InitFinding>,
+}
+
+impl InitReport {
+    /// Every board that is there has a number, and nothing is odd.
+    pub fn is_ok(&self) -> bool {
+        self.findings.is_empty()
+    }
+
+    /// What kind of failure it is; `None`: ok.
+    pub fn failure(&self) -> Option<ErrorKind> {
+        match self.findings.as_slice() {
+            [] => None,
+            [InitFinding::NoBoards] => Some(ErrorKind::NoLink),
+            _ => Some(ErrorKind::Device),
+        }
+    }
+}
+
+/// A named outcome of an init other than ok.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InitFinding {
+    /// Nobody reported and nobody took number 1.
+    #[error(
+        "no board reported and none took a number: is the bus connected, powered, and at this bit rate? `ucom doctor`"
+    )]
+    NoBoards,
+    /// Boards reported but got no number.
+    #[error(
+        "board reported but not reached: UCoM id {} after position {after}; the init wire behind that board may be broken",
+        hex(ids)
+    )]
+    NotReached {
+        /// Position of the last board that was reached.
+        after: u8,
+        /// Low bytes of the flash numbers that reported and were not reached.
+        ids: Vec<u8>,
+    },
+    /// The flash numbers fit the reports only with their bytes exchanged (D-10).
+    #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
+    ByteOrder {
+        /// The order that the profile has.
+        endian: Endian,
+    },
+    /// More boards than reports: boards share the low byte of their flash number.
+    #[error(
+        "more boards than reports: {}, {}; flash ids must be unique in their low byte",
+        counted(*boards as usize, "board"),
+        counted(*reports as usize, "report")
+    )]
+    MoreBoardsThanReports {
+        /// Boards with a number.
+        boards: u32,
+        /// Different reports.
+        reports: u32,
+    },
+    /// A board that did not report.
+    #[error("board {board} took a number but did not report")]
+    NotReported {
+        /// Its number.
+        board: u8,
+    },
+    /// Two boards with one flash number.
+    #[error("duplicate flash number 0x{flash_number:04X}: boards {first} and {second}")]
+    DuplicateFlash {
+        /// The number.
+        flash_number: u16,
+        /// One board.
+        first: u8,
+        /// The other.
+        second: u8,
+    },
+    /// Another board than the inventory has at a position.
+    #[error(
+        "unexpected board order: position {board} has flash number 0x{found:04X}, the inventory has 0x{expected:04X}"
+    )]
+    UnexpectedOrder {
+        /// The position.
+        board: u8,
+        /// By the inventory.
+        expected: u16,
+        /// On the wire.
+        found: u16,
+    },
+    /// The inventory has a board where the chain has ended.
+    #[error("board {board} (flash number 0x{expected:04X}) of the inventory is missing")]
+    Missing {
+        /// Its position.
+        board: u8,
+        /// Its flash number.
+        expected: u16,
+    },
+    /// A board that was refused: the chain is numbered up to the one before it.
+    #[error("position {board}: {error}")]
+    Refused {
+        /// Its position.
+        board: u8,
+        /// Why.
+        error: Error,
+    },
+    /// Two flash ids that share an identifier.
+    #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
+    Ambiguous {
+        /// The lower one.
+        low: u8,
+        /// The higher one.
+        high: u8,
+    },
+}
+
+fn hex(ids: &[u8]) -> String {
+    ids.iter().map(|id| format!("0x{id:02X}")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,22 @@
+//! What goes in and comes out: requests with their options, outcomes with their reports and findings. Nothing here sends or
+//! waits.
+mod conformance;
+mod flags;
+mod init;
+mod probe;
+mod raw_status;
+mod request;
+mod run;
+mod scan;
+mod seen;
+pub mod update;
+
+pub use conformance::{ConformanceOptions, ConformanceProgram, ConformanceReport, ConformanceTest, Verdict};
+pub use flags::{AdminChange, StopLevel};
+pub use init::{InitFinding, InitOptions, InitReport};
+pub use probe::{ProbeOptions, ProbeReport, ProbeRow};
+pub use raw_status::{RawStatus, expected_status};
+pub use request::{Outcome, ProcedureId, Request};
+pub use run::{RunBoard, RunOptions, RunReport, Setting};
+pub use scan::{Reports, ScanFinding, ScanReport};
+pub use seen::BoardSeen;

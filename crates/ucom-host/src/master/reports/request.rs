@@ -1,0 +1,235 @@
+//! What a master can be asked to do, and what comes of it.
+use crate::master::io::IoDescription;
+use crate::master::reports::conformance::{ConformanceOptions, ConformanceReport};
+use crate::master::reports::flags::{AdminChange, StopLevel};
+use crate::master::reports::init::{InitOptions, InitReport};
+use crate::master::reports::probe::{ProbeOptions, ProbeReport};
+use crate::master::reports::raw_status::RawStatus;
+use crate::master::reports::run::{RunOptions, RunReport};
+use crate::master::reports::scan::{Reports, ScanReport};
+use crate::master::reports::seen::BoardSeen;
+use crate::master::reports::update::{UpdateOptions, UpdateReport};
+use ucom::{Admin, BoardInfo, Status};
+
+/// Names a procedure while it runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ProcedureId(pub(crate) u64);
+
+/// A procedure to start. `force`: also when another PC is on the bus, or another check refuses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Request {
+    /// Who is there; changes nothing.
+    Scan,
+    /// Numbers for the whole chain.
+    Init(InitOptions),
+    /// Gives one board its number back.
+    Repair {
+        /// Its number.
+        board: u8,
+        /// The flash number that must stand there.
+        flash_number: u16,
+        /// See above.
+        force: bool,
+    },
+    /// PC_INFO; changes nothing.
+    Info {
+        /// The board.
+        board: u8,
+    },
+    /// PC_SETSTATUS with read-back.
+    SetStatus {
+        /// The board.
+        board: u8,
+        /// Bits to change.
+        mask: Status,
+        /// Their values; bits outside the mask are not sent.
+        value: Status,
+        /// See above.
+        force: bool,
+    },
+    /// One PC_SETSTATUS as the formula has it, value bits outside the mask included; never repeated.
+    RawStatus {
+        /// The board it goes to; `None`: all at once.
+        board: Option<u8>,
+        /// The boards to look at before and after.
+        seen: Vec<u8>,
+        /// First byte.
+        mask: u8,
+        /// Second byte.
+        value: u8,
+        /// See above; also when control loops run.
+        force: bool,
+    },
+    /// PC_RESET.
+    Reset {
+        /// The board; `None`: all.
+        board: Option<u8>,
+        /// See above.
+        force: bool,
+    },
+    /// PC_XRESET until the exloader runs with programming enabled.
+    XReset {
+        /// The board.
+        board: u8,
+        /// See above.
+        force: bool,
+    },
+    /// PC_START until the application is up.
+    Start {
+        /// The board.
+        board: u8,
+        /// See above.
+        force: bool,
+    },
+    /// The start order in reverse.
+    Stop {
+        /// The board.
+        board: u8,
+        /// How far.
+        level: StopLevel,
+        /// See above.
+        force: bool,
+    },
+    /// Flags of a board, read, changed and written.
+    Admin {
+        /// The board.
+        board: u8,
+        /// What changes.
+        change: AdminChange,
+        /// See above.
+        force: bool,
+    },
+    /// Firmware.
+    Update(UpdateOptions),
+    /// Descriptions of inputs, outputs and parameters; changes nothing.
+    Describe {
+        /// The board.
+        board: u8,
+        /// Read it anew although it is known.
+        fresh: bool,
+    },
+    /// MCA_DUMP_CI; changes nothing.
+    InitialInputs {
+        /// The board.
+        board: u8,
+    },
+    /// The whole way to a running control loop.
+    Run(RunOptions),
+    /// Measures what a board reads otherwise.
+    Probe(ProbeOptions),
+    /// Whether boards follow the protocol page.
+    Conformance(ConformanceOptions),
+}
+
+impl Request {
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Scan => "scan",
+            Self::Init(_) => "init",
+            Self::Repair { .. } => "repair",
+            Self::Info { .. } => "info",
+            Self::SetStatus { .. } | Self::RawStatus { .. } => "status",
+            Self::Reset { .. } => "reset",
+            Self::XReset { .. } => "xreset",
+            Self::Start { .. } => "start",
+            Self::Stop { .. } => "stop",
+            Self::Admin { .. } => "admin",
+            Self::Update(_) => "update",
+            Self::Describe { .. } => "io",
+            Self::InitialInputs { .. } => "ci",
+            Self::Run(_) => "run",
+            Self::Probe(_) => "probe",
+            Self::Conformance(_) => "conformance",
+        }
+    }
+
+    /// Whether two boards with one number do not end it: a stop stops both, and must not wait; the others find them
+    /// themselves and report more.
+    pub(crate) fn bears_shared_numbers(&self) -> bool {
+        match self {
+            Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,
+            Self::Admin { change, .. } => change.only_ends(),
+            _ => false,
+        }
+    }
+
+    /// The boards that it works with, by bit: one procedure at a time works with a board.
+    pub(crate) fn claims(&self) -> u32 {
+        let one = |board: &u8| 1_u32.checked_shl((*board).into()).unwrap_or(0);
+        match self {
+            Self::Scan | Self::Init(_) | Self::Reset { board: None, .. } | Self::Probe(_) => u32::MAX,
+            Self::RawStatus { .. } | Self::Conformance(_) => u32::MAX,
+            // The broadcast of a group reaches all, and one board's program data must not meet another's start.
+            Self::Update(_) => u32::MAX,
+            Self::Repair { board, .. }
+            | Self::Info { board }
+            | Self::SetStatus { board, .. }
+            | Self::Reset { board: Some(board), .. }
+            | Self::XReset { board, .. }
+            | Self::Start { board, .. }
+            | Self::Stop { board, .. }
+            | Self::Admin { board, .. }
+            | Self::Describe { board, .. }
+            | Self::InitialInputs { board } => one(board),
+            Self::Run(options) => options.boards.iter().fold(0, |mask, b| mask | one(&b.board)),
+        }
+    }
+}
+
+/// What a procedure brought about.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Outcome {
+    /// Of [`Request::Scan`].
+    Scan(ScanReport),
+    /// Of [`Request::Init`]; look at [`InitReport::findings`].
+    Init(InitReport),
+    /// Of [`Request::Repair`].
+    Repaired(BoardSeen),
+    /// Of [`Request::Info`].
+    Info(BoardSeen),
+    /// Of [`Request::SetStatus`], [`Request::XReset`] and [`Request::Stop`].
+    Status {
+        /// The board.
+        board: u8,
+        /// As read back.
+        info: BoardInfo,
+    },
+    /// Of [`Request::Reset`].
+    Reset(Reports),
+    /// Of [`Request::Start`].
+    Started(BoardSeen),
+    /// Of [`Request::Admin`].
+    Admin {
+        /// The board.
+        board: u8,
+        /// Its flags now.
+        admin: Admin,
+    },
+    /// Of [`Request::Update`]; look at each board's result.
+    Update(UpdateReport),
+    /// Of [`Request::Describe`].
+    Description {
+        /// The board.
+        board: u8,
+        /// Its text.
+        description: IoDescription,
+    },
+    /// Of [`Request::InitialInputs`].
+    InitialInputs {
+        /// The board.
+        board: u8,
+        /// The words.
+        values: Vec<u16>,
+    },
+    /// Of [`Request::Run`].
+    Running(RunReport),
+    /// Of [`Request::Probe`].
+    Probe(ProbeReport),
+    /// Of [`Request::RawStatus`].
+    RawStatus(Vec<RawStatus>),
+    /// Of [`Request::Conformance`]; look at each verdict, and at what ended the tests.
+    Conformance(ConformanceReport),
+}

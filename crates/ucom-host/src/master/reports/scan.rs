@@ -1,0 +1,139 @@
+//! Who reports, who has a number, and what is odd about it.
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::master::error::{Error, MEASURE_ORDER, other_order};
+use crate::master::reports::seen::BoardSeen;
+use ucom::Report;
+use ucom::profile::Endian;
+
+/// Reports of boards after PC_RESET or PC_REPORT.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reports {
+    /// Low bytes of the flash numbers: what distinguishes boards.
+    pub ids: BTreeSet<u8>,
+    /// How many frames each sent.
+    pub frames: BTreeMap<u8, u32>,
+    /// Those whose identifier has another id than the data, under `report.mode = flash7`.
+    pub disagree: BTreeSet<u8>,
+}
+
+impl Reports {
+    pub(crate) fn add(&mut self, report: &Report) {
+        self.ids.insert(report.ucom_id);
+        *self.frames.entry(report.ucom_id).or_default() += 1;
+        if !report.agrees() {
+            self.disagree.insert(report.ucom_id);
+        }
+    }
+
+    /// Flash ids that differ only in bit 7: they share an identifier (D-07).
+    pub fn ambiguous(&self) -> Vec<(u8, u8)> {
+        self.ids
+            .iter()
+            .filter(|id| **id < 128 && self.ids.contains(&(**id | 128)))
+            .map(|id| (*id, id | 128))
+            .collect()
+    }
+}
+
+/// What a scan found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ScanReport {
+    /// Who reported.
+    pub reports: Reports,
+    /// Boards with a number.
+    pub boards: Vec<BoardSeen>,
+    /// What is worth a word.
+    pub findings: Vec<ScanFinding>,
+}
+
+/// Something about the chain that its user should know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ScanFinding {
+    /// Boards without a number.
+    #[error("board with UCoM id 0x{ucom_id:02X} has no number: `ucom init`")]
+    Unnumbered {
+        /// Low byte of its flash number.
+        ucom_id: u8,
+    },
+    /// A board with a number that did not report.
+    #[error("board {board} has a number but did not report")]
+    NotReported {
+        /// Its number.
+        board: u8,
+    },
+    /// Two numbers, one flash number.
+    #[error("boards {first} and {second} have the same flash number 0x{flash_number:04X}")]
+    SameFlash {
+        /// One board.
+        first: u8,
+        /// The other.
+        second: u8,
+        /// The number.
+        flash_number: u16,
+    },
+    /// Two flash ids that share an identifier.
+    #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
+    Ambiguous {
+        /// The lower one.
+        low: u8,
+        /// The higher one.
+        high: u8,
+    },
+    /// Identifier and data of a report disagree.
+    #[error("the report of UCoM id 0x{ucom_id:02X} came with another identifier: `ucom probe` may show why")]
+    Disagrees {
+        /// By the data.
+        ucom_id: u8,
+    },
+    /// The flash numbers fit the reports only with their bytes exchanged (D-10).
+    #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
+    ByteOrder {
+        /// The order that the profile has.
+        endian: Endian,
+    },
+    /// Answers that contradict each other.
+    #[error("the answers of board {board} contradict each other: two boards may have this number")]
+    Contradicts {
+        /// Its number.
+        board: u8,
+    },
+    /// Two boards have one number (D-24).
+    #[error("{}", shared(*board, [*first, *second]))]
+    NumberShared {
+        /// The number.
+        board: u8,
+        /// Flash number of one.
+        first: u16,
+        /// Flash number of another; the same when they cannot be distinguished.
+        second: u16,
+    },
+    /// A status that cannot be.
+    #[error("board {board}: {problem}")]
+    Status {
+        /// Its number.
+        board: u8,
+        /// Why not.
+        problem: &'static str,
+    },
+    /// The description never came whole.
+    #[error("the description of board {board} never came whole")]
+    NoDescription {
+        /// Its number.
+        board: u8,
+    },
+}
+
+fn shared(board: u8, found: [u16; 2]) -> Error {
+    Error::NumberShared { board, found: found.to_vec(), given_back: false }
+}
+
+impl ScanFinding {
+    /// As the error that other commands end with, where they refuse to work with such a chain.
+    pub fn error(&self) -> Option<Error> {
+        match self {
+            Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),
+            _ => None,
+        }
+    }
+}

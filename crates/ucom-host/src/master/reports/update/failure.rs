@@ -1,0 +1,187 @@
+//! Why a board was not updated, with the facts, the kind and what helps.
+use crate::master::error::Error;
+use crate::master::reports::update::outcome::UpdateOutcome;
+use host_kit::ErrorKind;
+use ucom::{ErrorCode, Status};
+
+/// Why a board was not updated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UpdateFailure {
+    /// A check refused it; nothing was erased.
+    #[error("{0}")]
+    Refused(Box<Error>),
+    /// No answer before anything was erased.
+    #[error("{0}")]
+    NoAnswer(Box<Error>),
+    /// The board answered, but did not do what was asked, before anything was erased.
+    #[error("{0}")]
+    Reported(Box<Error>),
+    /// The board reported an error.
+    #[error("{code} in cycle {cycle}, block {block}, after {attempts} attempts: {}", code.meaning())]
+    Device {
+        /// The code.
+        code: ErrorCode,
+        /// 1 or 2.
+        cycle: u32,
+        /// From 0, the header's block.
+        block: usize,
+        /// How many.
+        attempts: u32,
+        /// Something was erased.
+        erased: bool,
+    },
+    /// The board did not take a block in time.
+    #[error(
+        "no DSP_READY for block {block} of cycle {cycle} within {waited_ms} ms, after {attempts} attempts"
+    )]
+    Timeout {
+        /// 1 or 2.
+        cycle: u32,
+        /// From 0, the header's block.
+        block: usize,
+        /// How long was waited, ms.
+        waited_ms: u64,
+        /// How many.
+        attempts: u32,
+        /// Something was erased.
+        erased: bool,
+    },
+    /// DSP_PROGFINISHED came, or should have, and the board shows another program.
+    #[error(
+        "the board shows Program ID 0x{program_id:04X}, date 0x{date:04X} instead of 0x{wanted_id:04X}{}",
+        wanted_date.map_or_else(String::new, |date| format!(", 0x{date:04X}"))
+    )]
+    NotVerified {
+        /// On the board.
+        program_id: u16,
+        /// On the board.
+        date: u16,
+        /// Of the image.
+        wanted_id: u16,
+        /// Of the image; `None`: not known.
+        wanted_date: Option<u16>,
+    },
+    /// DSP_PROGFINISHED came, and the board shows no application in its exloader.
+    #[error(
+        "the board reports that it is done, but shows no valid application in its exloader: Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
+    )]
+    NotValid {
+        /// On the board.
+        program_id: u16,
+        /// On the board.
+        date: u16,
+        /// Of the board.
+        status: Status,
+    },
+    /// The image is on the board, but the application did not start.
+    #[error("the image is on the board, but: {0}")]
+    NotRunning(Box<Error>),
+    /// The image was on the board already, but programming mode, in which it was found, could not be ended.
+    #[error("the image is on the board already, but it may still be in programming mode: {0}")]
+    StillProgramming(Box<Error>),
+    /// A step after something was erased failed.
+    #[error("{0}")]
+    After(Box<Error>),
+    /// The frames of a group may have erased a board that had left it and does not answer.
+    #[error("it may be erased, the group's frames went past it: {0}")]
+    MayBeErased(Box<Error>),
+    /// The user ended it.
+    #[error("cancelled: {}", left_behind(*left))]
+    Cancelled {
+        /// What it left behind, the board's outcome.
+        left: UpdateOutcome,
+    },
+    /// Another board of the list failed before its turn came.
+    #[error("not begun: board {after} failed before")]
+    Skipped {
+        /// The one that failed.
+        after: u8,
+    },
+}
+
+impl UpdateFailure {
+    /// What kind of failure it is: whatever fails or is cancelled once something may be erased is a fault.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {
+                kind @ (ErrorKind::Usage | ErrorKind::NoLink) => kind,
+                ErrorKind::Refused | ErrorKind::Device | ErrorKind::Fault => ErrorKind::Refused,
+            },
+            Self::NoAnswer(_) | Self::Timeout { erased: false, .. } => ErrorKind::NoLink,
+            Self::Device { erased: false, .. } | Self::Reported(_) => ErrorKind::Device,
+            Self::Skipped { .. }
+            | Self::Cancelled { left: UpdateOutcome::Cancelled | UpdateOutcome::UpToDate } => {
+                ErrorKind::Refused
+            }
+            Self::Device { .. }
+            | Self::Timeout { .. }
+            | Self::NotVerified { .. }
+            | Self::NotValid { .. }
+            | Self::NotRunning(_)
+            | Self::After(_)
+            | Self::MayBeErased(_)
+            | Self::Cancelled { .. } => ErrorKind::Fault,
+        }
+    }
+
+    /// A short name for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::After(e) => e.code(),
+            Self::MayBeErased(_) => "may-be-erased",
+            Self::StillProgramming(_) => "still-programming",
+            Self::NotValid { .. } => "not-valid",
+            Self::Device { .. } => "device-error",
+            Self::Timeout { .. } => "timeout",
+            Self::NotVerified { .. } => "not-verified",
+            Self::NotRunning(_) => "not-running",
+            Self::Cancelled { .. } => "cancelled",
+            Self::Skipped { .. } => "skipped",
+        }
+    }
+
+    /// The likely cause and what helps.
+    pub fn hint(&self) -> String {
+        match self {
+            Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::NotRunning(e) => e.hint(),
+            Self::StillProgramming(e) => match e.hint() {
+                hint if hint.is_empty() => "`ucom status N --clear PROG` ends it".into(),
+                hint => format!("{hint}; `ucom status N --clear PROG` ends it"),
+            },
+            Self::After(e) => format!("{}; then run the update again to get an application back", e.hint()),
+            Self::MayBeErased(_) => {
+                "when the board answers again (`ucom repair`, `ucom init`): run the update again".into()
+            }
+            Self::NotValid { .. } => {
+                "is it an image for this board, and does the profile's `prog.plan` fit? run the update again".into()
+            }
+            Self::Device { code, .. } => code.reaction().into(),
+            Self::Timeout { .. } => {
+                "frames get lost or the board is slower than the profile has it (`prog.ready_timeout`): `ucom doctor`".into()
+            }
+            Self::NotVerified { .. } => {
+                "the board may compute its Program ID otherwise (`prog.checksum`): `ucom probe --image FILE`".into()
+            }
+            Self::Cancelled { left: UpdateOutcome::Running } => "`ucom stop` stops it".into(),
+            Self::Cancelled { left: UpdateOutcome::Incomplete } => {
+                "run the update again to get an application back".into()
+            }
+            Self::Cancelled { .. } | Self::Skipped { .. } => {
+                "run the update again: boards that are done are skipped".into()
+            }
+        }
+    }
+}
+
+/// What a cancel left behind, in words.
+fn left_behind(outcome: UpdateOutcome) -> &'static str {
+    match outcome {
+        UpdateOutcome::Incomplete => "the old application is erased, the board waits in its exloader",
+        UpdateOutcome::Unknown => "the old application may be erased",
+        UpdateOutcome::Written => "the board reported that it is done, nobody has read it back",
+        UpdateOutcome::UpToDate => "the image was there already, its application was not started",
+        UpdateOutcome::Running => "the new application is on the board, and it may be started",
+        UpdateOutcome::Verified => "the new application is on the board, but not started",
+        _ => "nothing was erased, the board has what it had",
+    }
+}

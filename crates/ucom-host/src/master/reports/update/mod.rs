@@ -1,0 +1,12 @@
+//! Firmware update: what it is asked to do, what it sends, how it ends for each board.
+mod failure;
+mod options;
+mod outcome;
+mod plan;
+mod report;
+
+pub use failure::UpdateFailure;
+pub use options::{UpdateImage, UpdateMode, UpdateOptions, UpdateTarget};
+pub use outcome::UpdateOutcome;
+pub use plan::{Expected, PlannedImage, Unverifiable, UpdatePlan};
+pub use report::{Progress, UpdateReport, UpdateResult};

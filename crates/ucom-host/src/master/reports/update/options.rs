@@ -1,0 +1,80 @@
+//! Which boards are updated with what, and how.
+
+/// An image with its place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UpdateImage {
+    /// Bytes in wire order.
+    pub bytes: Vec<u8>,
+    /// Load address, words.
+    pub address_words: u32,
+}
+
+/// A board to be updated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UpdateTarget {
+    /// Its number.
+    pub board: u8,
+    /// The flash number it must have (U-1); `None`: any.
+    pub flash_number: Option<u16>,
+}
+
+/// How several boards are updated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpdateMode {
+    /// One after the other.
+    #[default]
+    OneByOne,
+    /// All at once, by broadcast; boards that fall behind are updated one by one afterwards.
+    Group,
+}
+
+/// What to update, and how.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UpdateOptions {
+    /// The boards.
+    pub targets: Vec<UpdateTarget>,
+    /// The image.
+    pub image: UpdateImage,
+    /// What the other cycle carries under the plans `exloader-app` (first), `pmem-xmem` and `raw` (second).
+    pub second: Option<UpdateImage>,
+    /// Program ID that the board must show at the end, where the image does not contain it (plan `raw`, `prog.header` or
+    /// `prog.checksum` `none`); elsewhere the image must have it.
+    pub expect_program_id: Option<u16>,
+    /// Flash date as 16 bits, see [`DateForm`](ucom::DateForm).
+    pub date: u16,
+    /// The header names the board's flash number: another board then refuses the image.
+    pub name_target: bool,
+    /// One after the other, or all at once.
+    pub mode: UpdateMode,
+    /// Only the checks, the look for another PC among them: nothing but PC_INFO is sent.
+    pub dry_run: bool,
+    /// Also when boards run (U-2), another PC is on the bus, or the image is there already (U-3).
+    pub force: bool,
+    /// Start the application at the end.
+    pub start: bool,
+    /// An image that cannot be verified is as good as one that was: no failure (plan `raw`, `prog.header` or
+    /// `prog.checksum` `none`, without [`expect_program_id`](Self::expect_program_id)).
+    pub accept_unverified: bool,
+    /// Go on with the next board after one has failed.
+    pub keep_going: bool,
+}
+
+impl UpdateOptions {
+    /// One image for some boards, one after the other, with all checks.
+    pub fn new(targets: Vec<UpdateTarget>, image: UpdateImage, date: u16) -> Self {
+        Self {
+            targets,
+            image,
+            second: None,
+            expect_program_id: None,
+            date,
+            name_target: false,
+            mode: UpdateMode::OneByOne,
+            dry_run: false,
+            force: false,
+            start: false,
+            accept_unverified: false,
+            keep_going: false,
+        }
+    }
+}

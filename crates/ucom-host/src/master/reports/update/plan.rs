@@ -1,0 +1,254 @@
+//! What goes over the wire: the blocks of both cycles (D-40, D-41).
+use core::fmt;
+
+use crate::master::error::PlanError;
+use crate::master::reports::update::options::{UpdateImage, UpdateOptions};
+use ucom::profile::{HeaderForm, Plan};
+use ucom::{BLOCK_LEN, BoardInfo, Checksum, Header, Memory, Profile, block_count, checksum, data_block};
+
+/// One cycle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Cycle {
+    pub header: Option<[u8; BLOCK_LEN]>,
+    pub bytes: Vec<u8>,
+}
+
+impl Cycle {
+    /// Blocks with the header's.
+    pub(crate) fn blocks(&self) -> usize {
+        block_count(self.bytes.len()) + usize::from(self.header.is_some())
+    }
+
+    /// The `i`-th block.
+    pub(crate) fn block(&self, i: usize) -> Option<[u8; BLOCK_LEN]> {
+        match (self.header, i.checked_sub(1)) {
+            (Some(header), None) => Some(header),
+            (Some(_), Some(data)) => data_block(&self.bytes, data),
+            (None, _) => data_block(&self.bytes, i),
+        }
+    }
+}
+
+/// What a board shall show at the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Expected {
+    /// Its Program ID.
+    pub program_id: u16,
+    /// Its flash date; `None`: not known, because no header of ours carries it.
+    pub date: Option<u16>,
+}
+
+impl Expected {
+    /// The board shows it.
+    pub fn is(&self, known: &BoardInfo) -> bool {
+        known.program_id == self.program_id && self.date.is_none_or(|date| date == known.date)
+    }
+}
+
+/// Why nobody knows what a board must show after the update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unverifiable {
+    /// Plan `raw`: the files hide their Program ID.
+    RawPlan,
+    /// `prog.header` is `none`: the board makes Program ID and date by itself.
+    NoHeader,
+    /// `prog.checksum` is `none`: Program IDs are no checksums of images.
+    NoChecksum,
+}
+
+impl fmt::Display for Unverifiable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::RawPlan => "with `prog.plan` raw the file hides its Program ID",
+            Self::NoHeader => "with `prog.header` none the board makes its Program ID by itself",
+            Self::NoChecksum => "with `prog.checksum` none the Program ID cannot be computed",
+        })
+    }
+}
+
+impl Unverifiable {
+    /// How it can be verified all the same.
+    pub fn hint(&self) -> &'static str {
+        "to have it verified name the Program ID that the board must show: `--expect-program-id 0x…`"
+    }
+}
+
+/// One image as it is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlannedImage {
+    /// The cycles that carry it, first and last: 1, 2 or both.
+    pub cycles: (u32, u32),
+    /// Where it goes; `None`: only the file knows (plan `raw`).
+    pub memory: Option<Memory>,
+    /// Load address, words; `None`: it is not sent.
+    pub address_words: Option<u32>,
+    /// Its length, bytes.
+    pub bytes: usize,
+    /// Its Program ID (D-44); `None`: hidden, or not computed.
+    pub program_id: Option<u16>,
+}
+
+/// What a board gets, and what it shall show afterwards.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UpdatePlan {
+    pub(crate) cycles: [Cycle; 2],
+    /// What was given, the image first.
+    pub images: Vec<PlannedImage>,
+    /// What the board shows at the end; `None`: nobody knows.
+    pub expected: Option<Expected>,
+    /// Why nobody knows.
+    pub unverifiable: Option<Unverifiable>,
+    /// The first cycle that may erase flash, 1 or 2: before it nothing is lost.
+    pub erases_from: u32,
+}
+
+impl UpdatePlan {
+    /// For a board, `target` in the header.
+    pub fn new(options: &UpdateOptions, target: u16, profile: &Profile) -> Result<Self, PlanError> {
+        let plan = profile.prog_plan;
+        let image = &options.image;
+        for one in [Some(image), options.second.as_ref()].into_iter().flatten() {
+            if one.bytes.is_empty() {
+                return Err(PlanError::Empty);
+            }
+            if plan != Plan::Raw && one.bytes.len() % 2 == 1 {
+                return Err(PlanError::HalfWord { bytes: one.bytes.len() });
+            }
+        }
+        let other = options.second.as_ref();
+        let second = || other.ok_or(PlanError::SecondMissing { plan });
+        let [first, last] = match plan {
+            Plan::VerifyWrite if other.is_some() => return Err(PlanError::SecondUnused { plan }),
+            Plan::VerifyWrite => [(image, Memory::Program); 2],
+            Plan::ExloaderApp => [(second()?, Memory::Ram), (image, Memory::Program)],
+            Plan::PmemXmem => [(image, Memory::Program), (second()?, Memory::Data)],
+            Plan::Raw => [(image, Memory::Program), (other.unwrap_or(image), Memory::Program)],
+        };
+        let erases_from = match plan {
+            // The first cycle only checks, or fills RAM: the application in flash stays valid.
+            Plan::VerifyWrite | Plan::ExloaderApp => 2,
+            // The first cycle writes program flash; what raw files make a board do only their makers know.
+            Plan::PmemXmem | Plan::Raw => 1,
+        };
+        let unverifiable = match (plan, profile.prog_header, profile.prog_checksum) {
+            (Plan::Raw, ..) => Some(Unverifiable::RawPlan),
+            (_, HeaderForm::None, _) => Some(Unverifiable::NoHeader),
+            (.., Checksum::None) => Some(Unverifiable::NoChecksum),
+            _ => None,
+        };
+        let with_header = plan != Plan::Raw && profile.prog_header == HeaderForm::V1;
+        let id = |image: &UpdateImage| checksum(profile.prog_checksum, profile.prog_endian, &image.bytes);
+        let header = |cycle, (image, memory): (&UpdateImage, Memory)| Header {
+            cycle,
+            memory: memory.number(),
+            address: image.address_words,
+            length: (image.bytes.len() / 2) as u32,
+            program_id: id(image),
+            date: options.date,
+            target,
+        };
+        let cycle = |number, part: (&UpdateImage, Memory)| Cycle {
+            header: with_header.then(|| header(number, part).build(profile.prog_endian)),
+            bytes: part.0.bytes.clone(),
+        };
+        let sent = |image: &UpdateImage, memory, cycles| PlannedImage {
+            cycles,
+            memory: (plan != Plan::Raw).then_some(memory),
+            address_words: with_header.then_some(image.address_words),
+            bytes: image.bytes.len(),
+            program_id: unverifiable.is_none().then(|| id(image)),
+        };
+        let images = match (plan, other) {
+            (_, None) => vec![sent(image, first.1, (1, 2))],
+            (Plan::ExloaderApp, Some(other)) => {
+                vec![sent(image, last.1, (2, 2)), sent(other, first.1, (1, 1))]
+            }
+            (_, Some(other)) => vec![sent(image, first.1, (1, 1)), sent(other, last.1, (2, 2))],
+        };
+        let program_id = id(image);
+        if with_header && program_id == 0xFFFF && options.date == 0xFFFF {
+            return Err(PlanError::Void);
+        }
+        let expected = match (unverifiable, options.expect_program_id) {
+            (None, Some(expected)) if expected != program_id => {
+                return Err(PlanError::OtherProgram { image: program_id, expected });
+            }
+            (None, _) => Some(Expected { program_id, date: Some(options.date) }),
+            (Some(_), Some(program_id)) => {
+                Some(Expected { program_id, date: with_header.then_some(options.date) })
+            }
+            (Some(_), None) => None,
+        };
+        let unverifiable = unverifiable.filter(|_| expected.is_none());
+        Ok(Self { cycles: [cycle(1, first), cycle(2, last)], images, expected, unverifiable, erases_from })
+    }
+
+    /// Program ID that the board shall show; `None`: nobody knows.
+    pub fn program_id(&self) -> Option<u16> {
+        self.expected.map(|expected| expected.program_id)
+    }
+
+    /// Bytes of both cycles on the wire.
+    pub fn total_bytes(&self) -> u64 {
+        self.cycles.iter().map(|c| (c.blocks() * BLOCK_LEN) as u64).sum()
+    }
+
+    /// PC_PROG frames of one cycle, 0 or 1.
+    pub fn frames(&self, cycle: usize) -> usize {
+        self.cycles.get(cycle).map_or(0, |c| c.blocks() * 8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::master::reports::update::options::UpdateTarget;
+
+    fn options(bytes: Vec<u8>) -> UpdateOptions {
+        let image = UpdateImage { bytes, address_words: 0 };
+        UpdateOptions::new(vec![UpdateTarget { board: 1, flash_number: None }], image, 0x3AC1)
+    }
+
+    /// The golden update: 1000 bytes, 17 blocks and 136 frames a cycle, Program ID 0x4B3F.
+    #[test]
+    fn d41_golden_plan() {
+        let bytes: Vec<u8> = (0..1000).map(|i| (37 * i + 11) as u8).collect();
+        let plan = UpdatePlan::new(&options(bytes), Header::ANY_BOARD, &Profile::default()).unwrap();
+        assert_eq!((plan.frames(0), plan.frames(1), plan.total_bytes()), (136, 136, 2 * 17 * 64));
+        assert_eq!(plan.expected, Some(Expected { program_id: 0x4B3F, date: Some(0x3AC1) }));
+        let first = plan.cycles[0].block(0).unwrap();
+        assert_eq!(first[..10], [0x43, 0x55, 1, 0, 1, 0, 0, 0, 0, 0]);
+        assert_eq!(first[62..], [0xDC, 0x22]);
+        assert_eq!(plan.cycles[0].block(1).unwrap()[..8], [0x0B, 0x30, 0x55, 0x7A, 0x9F, 0xC4, 0xE9, 0x0E]);
+        assert_eq!(plan.cycles[1].block(16).unwrap()[40..], [0xFF; 24]);
+        assert_eq!(plan.cycles[1].block(17), None);
+    }
+
+    #[test]
+    fn d40_other_plans_need_their_images() {
+        let two = UpdateOptions {
+            second: Some(UpdateImage { bytes: vec![9; 64], address_words: 5 }),
+            ..options(vec![1; 128])
+        };
+        let planned = |options: &UpdateOptions, prog_plan| {
+            UpdatePlan::new(options, Header::ANY_BOARD, &Profile { prog_plan, ..Profile::default() })
+        };
+        assert!(matches!(planned(&two, Plan::VerifyWrite), Err(PlanError::SecondUnused { .. })));
+        assert!(matches!(
+            planned(&options(vec![1; 2]), Plan::ExloaderApp),
+            Err(PlanError::SecondMissing { .. })
+        ));
+        let plan = planned(&two, Plan::ExloaderApp).unwrap();
+        assert_eq!((plan.cycles[0].block(0).unwrap()[6], plan.cycles[1].block(0).unwrap()[6]), (0x10, 0));
+        let plan = planned(&two, Plan::PmemXmem).unwrap();
+        assert_eq!((plan.cycles[0].block(0).unwrap()[6], plan.cycles[1].block(0).unwrap()[6]), (0, 1));
+        let raw = planned(&options(vec![7; 65]), Plan::Raw).unwrap();
+        assert_eq!((raw.frames(0), raw.expected), (16, None));
+        assert_eq!(raw.cycles[0].block(0), Some([7; 64]));
+        assert!(matches!(planned(&options(vec![]), Plan::Raw), Err(PlanError::Empty)));
+        assert!(matches!(
+            planned(&options(vec![1]), Plan::VerifyWrite),
+            Err(PlanError::HalfWord { bytes: 1 })
+        ));
+    }
+}

@@ -10,6 +10,7 @@ mod frame;
 #[doc(hidden)]
 pub mod fuzzing;
 mod multicast;
+mod open;
 mod slcan;
 #[cfg(target_os = "linux")]
 mod socket_can;
@@ -19,11 +20,12 @@ mod timed;
 mod url;
 mod virtual_bus;
 
-pub use bus::{CanBus, open, open_url};
+pub use bus::CanBus;
 pub use error::CanError;
 pub use faulty::{FaultConfig, FaultSchedule, FaultStats, Faulty};
 pub use frame::{CanFrame, Id, InvalidFrame};
 pub use multicast::MulticastBus;
+pub use open::{open, open_url};
 pub use slcan::{AdapterError, SlcanAdapter, SlcanBus, SlcanOptions};
 #[cfg(target_os = "linux")]
 pub use socket_can::SocketCanBus;

@@ -2,9 +2,8 @@
 
 use std::io::{self, Read, Write};
 
-use super::BIT_RATES;
-use super::DATA_RATES;
 use super::line::{BELL, Lines, Piece, flags, parse_frame, push_frame};
+use super::options::{BIT_RATES, DATA_RATES};
 use crate::{CanBus, CanError, CanFrame, ControllerState};
 
 /// Bytes that wait for a host that does not read; beyond that frames are lost, as in a small adapter.

@@ -5,8 +5,9 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use super::line::{Lines, Piece, parse_flags, parse_frame, parse_state, push_frame};
+use super::options::{BIT_RATES, DATA_RATES, SlcanOptions};
 use super::port::Port;
-use super::{BIT_RATES, DATA_RATES};
+
 use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState};
 
 /// How long an adapter may take to answer its first question; it may still be starting.
@@ -25,29 +26,6 @@ const RETRY: Duration = Duration::from_millis(1);
 const SLICE: Duration = Duration::from_millis(20);
 /// Received frames that are kept while something else is waited for.
 const RECEIVE_QUEUE: usize = 100_000;
-
-/// How to talk to an adapter.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SlcanOptions {
-    /// `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`.
-    pub device: String,
-    /// Bit rate of the bus, bit/s; none leaves the adapter's own.
-    pub rate: Option<u32>,
-    /// Bit rate of the data phase of CAN FD, bit/s; none leaves the adapter's own.
-    pub data_rate: Option<u32>,
-    /// Rate of the serial line, bit/s; USB adapters do not care.
-    pub baud: u32,
-}
-
-impl SlcanOptions {
-    /// Rate of the serial line if nothing else is asked for, bit/s.
-    pub const BAUD: u32 = 115_200;
-
-    fn url(&self) -> String {
-        let Self { device, rate, data_rate, baud } = self.clone();
-        CanUrl::Slcan { device, rate, data_rate, baud }.to_string()
-    }
-}
 
 /// An adapter's answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,7 +71,8 @@ pub struct SlcanBus {
 impl SlcanBus {
     /// Opens the port, sets the rates and opens the adapter's channel.
     pub fn open(options: &SlcanOptions) -> Result<Self, CanError> {
-        let url = options.url();
+        let SlcanOptions { device, rate, data_rate, baud } = options.clone();
+        let url = CanUrl::Slcan { device, rate, data_rate, baud }.to_string();
         let wrong_rate = |what: &'static str, rate: u32, possible: String| CanError::Rate {
             url: url.clone(),
             what,

@@ -4,9 +4,8 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
-use super::server::{Channel, Route};
-use super::session::ClientAction;
-use super::{ClientId, ServerStats, SocketcandServer};
+use super::shared::{Channel, ClientAction, ClientId, Route};
+use super::{ServerStats, SocketcandServer};
 use crate::{CanError, CanFrame, ErrorState, VirtualHub};
 
 /// What clients did and the host has not taken yet; beyond that their connections wait.

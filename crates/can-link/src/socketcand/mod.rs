@@ -8,11 +8,13 @@ mod client;
 mod gateway;
 mod server;
 mod session;
+mod shared;
 pub(crate) mod text;
 
 pub use client::SocketcandBus;
 pub use gateway::{ClientEvent, FromClient, SocketcandGateway};
-pub use server::{ClientId, ServerStats, SocketcandServer};
+pub use server::{ServerStats, SocketcandServer};
+pub use shared::ClientId;
 
 /// The protocol's usual TCP port.
 pub const SOCKETCAND_PORT: u16 = 29536;

@@ -1,31 +1,20 @@
 //! The server: listens, counts, ends.
 
-use std::collections::BTreeMap;
-use std::fmt;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::session;
-use crate::{CanError, CanFrame, CanUrl, ErrorState, VirtualBus, VirtualHub};
+use super::shared::{Channel, Client, ClientId, Inner, Route};
+use crate::{CanError, CanFrame, CanUrl, ErrorState, VirtualHub};
 
 /// Clients at a time.
 const MOST_CLIENTS: usize = 64;
 /// How long the end waits for the clients' threads.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
-
-/// Identifies a client of a server; never used twice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ClientId(u64);
-
-impl fmt::Display for ClientId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "client {}", self.0)
-    }
-}
 
 /// What happened at a server so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,72 +35,6 @@ pub struct ServerStats {
     pub not_carried: u64,
     /// Commands that were none.
     pub not_understood: u64,
-}
-
-/// Where the frames of a channel's clients go.
-pub(super) enum Route {
-    /// Straight to the other members of the hub.
-    Hub,
-    /// To the host, which puts them on its bus and delivers them.
-    Host(Box<dyn Fn(ClientId, session::ClientAction) -> bool + Send + Sync>),
-}
-
-/// A bus of the server: clients are guests of the hub.
-pub(super) struct Channel {
-    pub(super) name: String,
-    pub(super) hub: VirtualHub,
-    pub(super) route: Route,
-}
-
-/// What the threads share.
-pub(super) struct Inner {
-    pub(super) channels: Vec<Channel>,
-    pub(super) closing: AtomicBool,
-    clients: Mutex<BTreeMap<ClientId, Client>>,
-    gone: Condvar,
-    accepted: AtomicU64,
-    turned_away: AtomicU64,
-    pub(super) received: AtomicU64,
-    pub(super) sent: AtomicU64,
-    missed: AtomicU64,
-    pub(super) not_carried: AtomicU64,
-    pub(super) not_understood: AtomicU64,
-}
-
-struct Client {
-    stream: TcpStream,
-    /// Channel and membership of its hub.
-    opened: Option<(usize, VirtualBus)>,
-}
-
-impl Inner {
-    fn clients(&self) -> MutexGuard<'_, BTreeMap<ClientId, Client>> {
-        // No code that can panic runs while the lock is held.
-        self.clients.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn set_opened(&self, client: ClientId, channel: usize, member: &VirtualBus) {
-        if let Some(client) = self.clients().get_mut(&client) {
-            client.opened = Some((channel, member.second_handle()));
-        }
-    }
-
-    /// Channel and number in its hub.
-    fn member_number(&self, client: ClientId) -> Option<(usize, u64)> {
-        let clients = self.clients();
-        let (channel, member) = clients.get(&client)?.opened.as_ref()?;
-        Some((*channel, member.number()))
-    }
-
-    fn forget(&self, client: ClientId) {
-        let mut clients = self.clients();
-        if let Some(Client { opened: Some((_, member)), .. }) = clients.remove(&client) {
-            self.missed.fetch_add(member.missed(), Ordering::Relaxed);
-            member.leave();
-        }
-        drop(clients);
-        self.gone.notify_all();
-    }
 }
 
 /// A server of the socketcand protocol, as python-can's `socketcand` interface and SavvyCAN know it.
@@ -154,19 +77,7 @@ impl SocketcandServer {
         let failed = |source| CanError::Listen { address: asked.clone(), source };
         let listener = TcpListener::bind(address).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        let inner = Arc::new(Inner {
-            channels,
-            closing: AtomicBool::new(false),
-            clients: Mutex::default(),
-            gone: Condvar::new(),
-            accepted: AtomicU64::new(0),
-            turned_away: AtomicU64::new(0),
-            received: AtomicU64::new(0),
-            sent: AtomicU64::new(0),
-            missed: AtomicU64::new(0),
-            not_carried: AtomicU64::new(0),
-            not_understood: AtomicU64::new(0),
-        });
+        let inner = Arc::new(Inner { channels, ..Inner::default() });
         let shared = Arc::clone(&inner);
         let thread = std::thread::Builder::new().name("socketcand".into());
         let acceptor = thread.spawn(move || accept(&listener, &shared)).map_err(failed)?;

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use super::server::{ClientId, Inner, Route};
+use super::shared::{ClientAction, ClientId, Inner, Route};
 use super::text::{Request, Splitter, has_form, push_frame, push_state};
 use crate::virtual_bus::Received;
-use crate::{CanBus, CanFrame, VirtualBus};
+use crate::{CanBus, VirtualBus};
 
 /// No frame leaves so soon after the answer to `rawmode`: python-can compares all that one read gives with that answer.
 const HELD_BACK: Duration = Duration::from_millis(20);
@@ -23,13 +23,6 @@ const BATCH: usize = 64;
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// A client that asks for nothing and has not opened a bus is gone.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(30);
-
-/// An action of a client, for a host that runs the bus itself.
-pub(super) enum ClientAction {
-    Joined,
-    Sent(CanFrame),
-    Left,
-}
 
 /// The socket as both threads write to it.
 struct Out {

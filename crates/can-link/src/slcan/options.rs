@@ -1,0 +1,27 @@
+//! What an adapter is opened with, and the rates that the protocol has codes for.
+
+/// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 is LAWICEL's; some firmware of CANable adapters takes it for 750,000.
+pub(crate) const BIT_RATES: [u32; 9] =
+    [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
+
+/// Data bit rates of CAN FD, bit/s, and their `Y` codes on CANable 2.
+pub(crate) const DATA_RATES: [(u32, u8); 4] =
+    [(1_000_000, 1), (2_000_000, 2), (4_000_000, 4), (5_000_000, 5)];
+
+/// How to talk to an adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlcanOptions {
+    /// `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`.
+    pub device: String,
+    /// Bit rate of the bus, bit/s; none leaves the adapter's own.
+    pub rate: Option<u32>,
+    /// Bit rate of the data phase of CAN FD, bit/s; none leaves the adapter's own.
+    pub data_rate: Option<u32>,
+    /// Rate of the serial line, bit/s; USB adapters do not care.
+    pub baud: u32,
+}
+
+impl SlcanOptions {
+    /// Rate of the serial line if nothing else is asked for, bit/s.
+    pub const BAUD: u32 = 115_200;
+}

@@ -11,6 +11,7 @@ pub mod output_file;
 pub mod pages;
 mod screen;
 mod signal;
+mod stdout;
 #[cfg(feature = "trial")]
 pub mod trial;
 pub mod usage;
@@ -19,8 +20,9 @@ pub mod view;
 pub use bar::{Stderr, draws_bars};
 pub use indicatif::ProgressBar;
 pub use keys::{Key, Keys};
-pub use lines::{Lines, stdout_is_stuck};
+pub use lines::Lines;
 pub use output::{Output, figure, table};
 pub use output_file::OutputFile;
 pub use screen::{Screen, restore_terminal};
 pub use signal::Stop;
+pub use stdout::stdout_is_stuck;

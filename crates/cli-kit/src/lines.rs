@@ -2,25 +2,16 @@
 
 use std::collections::VecDeque;
 use std::io::Write;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::Output;
 use crate::bar::Stderr;
+use crate::stdout;
 
 /// Most lines that wait.
 const WAITING: usize = 1000;
 /// At the end, a reader that takes nothing for so long is not waited for.
 const PATIENCE: Duration = Duration::from_secs(1);
-
-/// Stdout is held by a line that nobody reads.
-static STUCK: AtomicBool = AtomicBool::new(false);
-
-/// Whether whoever prints to stdout now would wait for ever.
-pub fn stdout_is_stuck() -> bool {
-    STUCK.load(Ordering::Relaxed)
-}
 
 /// A queue of lines and the thread that prints them.
 pub struct Lines {
@@ -112,7 +103,9 @@ impl Lines {
         while !state.gone && (state.writing || !state.waiting.is_empty()) {
             let left = PATIENCE.saturating_sub(since.elapsed());
             if left.is_zero() {
-                STUCK.fetch_or(self.is_stdout, Ordering::Relaxed);
+                if self.is_stdout {
+                    stdout::set_stuck();
+                }
                 return state.dropped + state.waiting.len() as u64 + u64::from(state.writing);
             }
             let waited = self.shared.changed.wait_timeout(state, left);
@@ -148,7 +141,7 @@ fn print(shared: &Shared, mut writer: impl Write, is_stdout: bool) {
             if let Err(e) = &result {
                 state.gone = true;
                 if is_stdout {
-                    Output::lose(e);
+                    stdout::lose(e);
                 }
             }
             shared.changed.notify_all();

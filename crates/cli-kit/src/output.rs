@@ -4,7 +4,6 @@
 //! its result alone. A reader that does not read holds no command: events wait in a queue and are dropped where too many do.
 
 use std::io::{IsTerminal, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
@@ -14,11 +13,7 @@ use serde_json::{Value, json};
 
 use crate::bar::{self, suspended};
 use crate::lines::Lines;
-
-/// Why the first result that was lost could not be printed. A command goes on without its output; its exit code shows it in the end.
-static LOST: OnceLock<String> = OnceLock::new();
-/// A write to stdout has failed, for whatever reason.
-static GONE: AtomicBool = AtomicBool::new(false);
+use crate::stdout;
 
 /// Events of this process that wait for their reader; none where it streams nothing.
 static STREAM: OnceLock<Mutex<Stream>> = OnceLock::new();
@@ -95,27 +90,24 @@ impl Output {
         suspended(|| {
             let mut stdout = std::io::stdout().lock();
             if let Err(e) = stdout.write_all(bytes).and_then(|()| stdout.flush()) {
-                Self::lose(&e);
+                stdout::lose(&e);
             }
         });
     }
 
     /// Remembers why something that was meant for stdout was lost. A reader that has gone (`… | head`) has seen what it wanted: that is no loss.
     pub fn lose(why: &std::io::Error) {
-        GONE.store(true, Ordering::Relaxed);
-        if why.kind() != std::io::ErrorKind::BrokenPipe {
-            let _ = LOST.set(why.to_string());
-        }
+        stdout::lose(why);
     }
 
     /// Nothing printed from now on is read: a command that only prints may end.
     pub fn gone() -> bool {
-        GONE.load(Ordering::Relaxed)
+        stdout::is_gone()
     }
 
     /// Why a result could not be printed, where that was so: the command did its work, and nobody can read of it.
     pub fn lost() -> Option<&'static str> {
-        LOST.get().map(String::as_str)
+        stdout::lost()
     }
 
     /// One line of a log. A terminal that has gone is no reason to leave a machine alone: what cannot be printed is dropped.

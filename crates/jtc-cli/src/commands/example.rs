@@ -4,7 +4,7 @@ use cli_kit::{Output, table};
 use jtc_host::example::{EXAMPLES, Example};
 use serde_json::json;
 
-use super::traj::typed;
+use super::job::typed;
 use crate::args::ExampleArgs;
 use crate::failure::Failure;
 use cli_kit::OutputFile;

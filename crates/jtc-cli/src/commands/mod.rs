@@ -8,6 +8,7 @@ mod dynamics;
 mod example;
 mod explain;
 mod help;
+mod job;
 mod maintain;
 mod monitor;
 mod params;

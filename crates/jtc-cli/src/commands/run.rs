@@ -16,8 +16,8 @@ use jtc_host::{CheckOptions, CheckedTrajectory, Error, Sample, Session, words};
 use jtc_wire::{ControllerState, NodeState, Status};
 use serde_json::json;
 
+use super::job::Job;
 use super::run_report;
-use super::traj::Job;
 use crate::args::RunArgs;
 use crate::failure::{FAULT, Failure};
 use crate::limits;

@@ -12,7 +12,7 @@ use jtc_host::words;
 use jtc_wire::ControllerState;
 use serde_json::json;
 
-use super::traj::typed;
+use super::job::typed;
 use crate::args::{LinkArgs, TeachCommand};
 use crate::failure::{FAULT, Failure};
 use crate::operator::ended_at_once;

@@ -3,23 +3,19 @@
 use std::path::Path;
 
 use cli_kit::{Output, figure, table};
-use jtc_core::{Config, JOINTS};
-use jtc_host::arm::Arm;
-use jtc_host::check::{Checker, Suspicion, Verdict};
+use jtc_host::check::Verdict;
 use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
-use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
-use jtc_host::{Error, Session, plan};
+use jtc_host::trajectory::{Form, Loaded};
+use jtc_host::{Error, Session};
 use jtc_wire::Joint;
 use serde_json::json;
 
+use super::job::{Job, typed};
 use super::run;
 use crate::args::{CheckArgs, LinkArgs, TrajCommand};
 use crate::failure::{Failure, REFUSED};
 use crate::progress::Progress;
-
-/// Speeds tried between one that passes and one that does not.
-const TRIES: usize = 4;
 
 /// Does one of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
@@ -72,176 +68,6 @@ fn may_be_moving(failure: Failure) -> Failure {
         failure.hint
     );
     Failure { hint, ..failure }
-}
-
-/// A path as it can be typed in a shell.
-pub fn typed(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    }
-}
-
-/// A trajectory at the speed asked for, and the arm that it is checked against.
-pub struct Job {
-    /// What the file was, and what was derived from it.
-    pub loaded: Loaded,
-    /// At the speed asked for.
-    pub trajectory: Trajectory,
-    /// Masses, friction, names.
-    pub arm: Arm,
-    /// Limits and settings that count.
-    pub config: Config,
-    /// File and arm, as they are typed.
-    words: String,
-    /// Percent of the file's own speed.
-    speed: f64,
-}
-
-impl Job {
-    /// Reads the files; notes and warnings go to stderr.
-    pub fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
-        let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);
-        for warning in &arm.warnings {
-            out.note(format!("note: {warning}"));
-        }
-        let loaded = Loaded::load(file, Some(&arm.joint_names))?;
-        let loaded = if args.deg { loaded.in_degrees().map_err(|e| e.in_file(file))? } else { loaded };
-        let overshoot = overshoot_words(&loaded.overshoot);
-        for note in loaded.notes.iter().chain(&overshoot) {
-            out.note(format!("note: {note}"));
-        }
-        let trajectory = if args.speed == 100.0 {
-            loaded.trajectory.clone()
-        } else {
-            plan::at_speed(&loaded.trajectory, args.speed).map_err(Failure::usage)?
-        };
-        let config = arm.config();
-        let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
-        let words = typed(file) + if args.deg { " --deg" } else { "" } + &arm_words;
-        Ok(Self { loaded, trajectory, arm, config, words, speed: args.speed })
-    }
-
-    /// What helps after a verdict, with the names that the person typed and the [passing speed](Self::passing_speed).
-    fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> String {
-        if verdict.suspicion() == Suspicion::Degrees && self.passes_as_degrees() {
-            let words = &self.words;
-            let columns = match self.loaded.form {
-                Form::Csv => "; for good, name its columns q1_deg..q6_deg",
-                _ => "",
-            };
-            return format!(
-                "the positions look like degrees, and as such they pass: `jtc traj check {words} --deg`{columns}"
-            );
-        }
-        verdict.hint_with(&self.words, self.speed, passing_speed)
-    }
-
-    /// The file's numbers are degrees, and nothing else is wrong with them.
-    fn passes_as_degrees(&self) -> bool {
-        let degrees = self.loaded.clone().in_degrees().map(|loaded| loaded.trajectory);
-        let at_speed = degrees.ok().and_then(|t| plan::at_speed(&t, self.speed).ok());
-        at_speed.is_some_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
-    }
-
-    /// The highest whole percentage that is tried and passes; none where no speed does, or speed is not what is wrong.
-    pub fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
-        let passes = |percent: f64| {
-            let slower = plan::at_speed(&self.loaded.trajectory, percent);
-            slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
-        };
-        // The estimate may be too bold where torque is what is short, or too timid.
-        let mut good = verdict.slower(self.speed)?;
-        let mut bad = self.speed;
-        while !passes(good) {
-            bad = good;
-            good = (0.7 * good).floor();
-            if good < 1.0 {
-                return None;
-            }
-        }
-        for _ in 0..TRIES {
-            let middle = (0.5 * (good + bad)).floor();
-            if middle <= good {
-                break;
-            }
-            if passes(middle) { good = middle } else { bad = middle }
-        }
-        Some(good)
-    }
-
-    /// Prints a verdict that refuses, and ends with exit code 4.
-    pub fn refuse(&self, verdict: &Verdict, out: &Output) -> Failure {
-        let passing_speed = self.passing_speed(verdict);
-        let hint = self.hint(verdict, passing_speed);
-        let value = json!({
-            "outcome": "refused",
-            "suspicion": verdict.suspicion(),
-            "passing_speed_percent": passing_speed,
-            "verdict": verdict,
-            "error": { "code": "check", "message": verdict.to_string(), "hint": hint, "exit": REFUSED },
-        });
-        if out.is_json() {
-            out.result(&value, String::new);
-        }
-        out.note(format!("jtc: {verdict}\n     {hint}"));
-        Failure::printed(REFUSED)
-    }
-
-    /// A failure of this job, with the file's name where its hint leaves it open.
-    pub fn named(&self, failure: Failure) -> Failure {
-        let hint = failure.hint.replace("traj run FILE", &format!("traj run {}", self.words));
-        Failure { hint, ..failure }
-    }
-
-    /// Parts of the torque that the check leaves out because the arm file does not give them.
-    fn left_out(&self) -> Vec<&'static str> {
-        let arm = &self.arm;
-        let rotors = (0..JOINTS).any(|j| !arm.rotors_given[j] && self.config.joints[j].rotor_inertia == 0.0);
-        let parts = [(arm.friction().is_none(), "friction"), (rotors, "rotor inertia")];
-        parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
-    }
-
-    /// What the torques leave out, and how to give it; none where nothing is left out.
-    fn without(&self) -> Option<String> {
-        let parts = self.left_out();
-        (!parts.is_empty()).then(|| {
-            format!(
-                "torques are computed without {}, which the file of arm {} does not give: the arm needs more. A copy of \
-                 arms/avena.toml with the numbers of this arm gives all, by --arm",
-                parts.join(" and "),
-                self.arm.name
-            )
-        })
-    }
-
-    /// Says what the torques leave out, as a note.
-    pub fn say_what_is_left_out(&self, out: &Output) {
-        if let Some(words) = self.without() {
-            out.note(format!("note: {words}"));
-        }
-    }
-
-    /// Limits of every point and between points, torque by the arm model; the start pose, where it is given.
-    pub fn verdict(
-        &self,
-        trajectory: &Trajectory,
-        start: Option<[f64; 6]>,
-        upload: UploadOptions,
-    ) -> Verdict {
-        let friction = self.arm.friction();
-        let checker = Checker {
-            model: Some(&self.arm.model),
-            friction: friction.as_ref(),
-            start,
-            upload,
-            ..Checker::new(&self.config)
-        };
-        checker.check(trajectory)
-    }
 }
 
 fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {

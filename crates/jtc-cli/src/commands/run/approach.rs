@@ -9,7 +9,7 @@ use jtc_host::{Error, plan};
 use jtc_wire::Status;
 use serde_json::json;
 
-use super::super::traj::{Job, typed};
+use super::super::job::{Job, typed};
 use super::APPROACH;
 use crate::args::RunArgs;
 use crate::failure::{Failure, REFUSED};

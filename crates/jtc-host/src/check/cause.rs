@@ -6,26 +6,8 @@ use std::fmt;
 use jtc_wire::Joint;
 use serde::Serialize;
 
-use super::HOLD_SHARE;
 use super::kind::ProblemKind;
-use super::verdict::Problem;
-
-/// A place of the path where something is wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Seen {
-    /// `None`: the trajectory as a whole.
-    pub joint: Option<Joint>,
-    /// Point (from 0); with `ms` > 0 between this and the next.
-    pub point: usize,
-    /// ms after `point`.
-    pub ms: f64,
-    /// Time along the path, s.
-    pub time_s: f64,
-    /// In the unit of its kind.
-    pub value: f64,
-    /// Its limit, or what the other channel says.
-    pub limit: f64,
-}
+use super::problem::{Problem, Seen};
 
 /// All problems of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -119,48 +101,5 @@ fn joints(joints: &[Joint]) -> String {
         None => "the whole trajectory".into(),
         Some((last, [])) => format!("joint {last}"),
         Some((last, others)) => format!("joints {} and {last}", others.join(", ")),
-    }
-}
-
-impl Seen {
-    /// What is wrong there, with value, limit, point and time.
-    pub(super) fn words(&self, kind: ProblemKind) -> String {
-        use ProblemKind::*;
-        let Self { joint, point, ms, time_s, value, limit } = self;
-        let (unit, words, next) = (kind.unit(), kind.words(), point + 1);
-        let joint = joint.map_or(String::new(), |joint| format!("{joint}: "));
-        let place = if *ms > 0.0 {
-            format!("{ms} ms after point {point} ({time_s:.3} s)")
-        } else {
-            format!("at point {point} ({time_s:.3} s)")
-        };
-        let what = match kind {
-            Empty | StepTime => words.to_owned(),
-            TooManyPoints | TooManySegments => format!("{words}: {value}, at most {limit}"),
-            SegmentPoints => format!("{words}: {value}, 1 to {limit} are possible"),
-            Jump => format!(
-                "jump of {value:+.4} rad between points {point} and {next} ({time_s:.3} s; at most {limit:.4} rad in a step)"
-            ),
-            StartPose => format!("{value:+.4} rad away from the first point (tolerance {limit} rad)"),
-            NoStop => format!(
-                "a stop in time from {ms} ms after point {point} ({time_s:.3} s) needs {value:+.1} N·m, more than the {limit} N·m \
-                 that there are"
-            ),
-            HoldTorque => {
-                let most = limit.abs() / HOLD_SHARE;
-                let (share, limit) = (100.0 * value.abs() / most, limit.abs());
-                format!(
-                    "standing still at point {point} ({time_s:.3} s) takes {value:+.1} N·m, {share:.1} % of the torque limit \
-                     ({most:.1} N·m); at most {:.0} % ({limit:.1} N·m), or the noise of the encoder drops the arm later",
-                    100.0 * HOLD_SHARE
-                )
-            }
-            NotAtRest => format!("{words}: {value:+.4} {unit} {place}"),
-            VelocityMismatch | AccelerationMismatch => format!(
-                "{words}: {value:+.4} {unit} between points {point} and {next} ({time_s:.3} s) where {limit:+.4} {unit} is said"
-            ),
-            _ => format!("{words}: {value:+.4} {unit} (limit {limit}) {place}"),
-        };
-        joint + &what
     }
 }

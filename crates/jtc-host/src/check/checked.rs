@@ -10,8 +10,7 @@ use jtc_wire::RawPoint;
 use super::{Checker, Verdict};
 use crate::Error;
 use crate::arm::Arm;
-use crate::session::UploadOptions;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Trajectory, UploadOptions};
 
 /// Counts the checks that were passed, so that two trajectories are never taken for one another.
 static PASSED: AtomicU64 = AtomicU64::new(1);

@@ -8,10 +8,7 @@ use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
 use jtc_wire::Joint;
 
-use super::{ProblemKind, Verdict};
-
-/// Share of a joint's torque limit that holding it may take, friction not counted: 98 % have been seen to fall.
-pub const HOLD_SHARE: f64 = 0.97;
+use super::{HOLD_SHARE, ProblemKind, Verdict};
 
 /// Slower than this, rad/s, each joint stands: the wire's least velocity is some 0.1 mrad/s.
 const STANDS: f64 = 0.001;

@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+/// Share of a joint's torque limit that holding it may take, friction not counted: 98 % have been seen to fall.
+pub const HOLD_SHARE: f64 = 0.97;
+
 /// What can be wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -10,6 +10,7 @@ mod checked;
 mod hint;
 mod holding;
 mod kind;
+mod problem;
 mod stopping;
 mod verdict;
 
@@ -21,14 +22,13 @@ use jtc_core::{
 use jtc_dynamics::{ArmModel, Dynamics};
 use jtc_wire::Joint;
 
-pub use cause::{Cause, Seen};
+pub use cause::Cause;
 pub use checked::{CheckOptions, CheckedTrajectory};
-pub use holding::HOLD_SHARE;
-pub use kind::ProblemKind;
-pub use verdict::{JointFigures, Problem, Suspicion, Verdict};
+pub use kind::{HOLD_SHARE, ProblemKind};
+pub use problem::{Problem, Seen};
+pub use verdict::{JointFigures, Suspicion, Verdict};
 
-use crate::session::UploadOptions;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Trajectory, UploadOptions};
 
 /// What a trajectory is checked against.
 #[derive(Clone, Debug)]

@@ -6,67 +6,13 @@ use jtc_core::JOINTS;
 use jtc_wire::Joint;
 use serde::Serialize;
 
-use super::cause::{Cause, Places, Seen, causes};
+use super::cause::{Cause, Places, causes};
 use super::kind::ProblemKind;
+use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
-
-/// Problems of one kind in one joint; jumps are listed one by one.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Problem {
-    /// What is wrong.
-    pub kind: ProblemKind,
-    /// `None`: the trajectory as a whole.
-    pub joint: Option<Joint>,
-    /// Where it is first along the path.
-    pub first: Seen,
-    /// Point (from 0) where it is worst.
-    pub point: usize,
-    /// ms after `point` where it is worst.
-    pub ms: f64,
-    /// Time along the path where it is worst, s.
-    pub time_s: f64,
-    /// Worst value, in the unit of its kind.
-    pub value: f64,
-    /// Its limit, or what the other channel says.
-    pub limit: f64,
-    /// Milliseconds (or points, or steps) in which it is.
-    pub count: usize,
-    /// The trajectory can run all the same; only the feed-forward is not what it could be.
-    pub warning: bool,
-}
 
 /// Places with contradicting channels that existing files have where their pieces meet.
 const SEAMS: usize = 20;
-
-impl Problem {
-    /// Where it is worst.
-    pub(super) fn worst(&self) -> Seen {
-        let Self { joint, point, ms, time_s, value, limit, .. } = *self;
-        Seen { joint, point, ms, time_s, value, limit }
-    }
-
-    /// How far it is over its limit, as a multiple of that where there is one.
-    pub(super) fn excess(&self) -> f64 {
-        match self.kind {
-            ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
-                (self.value - self.limit).abs()
-            }
-            _ if self.limit == 0.0 => self.value.abs(),
-            _ if self.value.is_nan() => f64::INFINITY,
-            _ => self.value.abs() / self.limit.abs(),
-        }
-    }
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.worst().words(self.kind))?;
-        if self.count > 1 && self.kind != ProblemKind::HoldTorque {
-            write!(f, "; {} times, first at point {}", self.count, self.first.point)?;
-        }
-        Ok(())
-    }
-}
 
 /// What a joint does along the path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

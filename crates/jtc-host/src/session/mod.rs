@@ -22,7 +22,9 @@ pub use params::Pushed;
 pub use recover::{ParameterSource, RecoverStep};
 pub use run::Run;
 pub use statistics::LinkStatistics;
-pub use upload::{Progress, UploadOptions, UploadReport};
+pub use upload::{Progress, UploadReport};
+
+pub use crate::trajectory::UploadOptions;
 
 use crate::Error;
 use crate::error::accepted;

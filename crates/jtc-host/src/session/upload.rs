@@ -1,47 +1,24 @@
 //! Upload of a trajectory: several frames in flight, each segment confirmed, what was lost is sent again.
-//!
-//! Frames are short (113 points, 4,082 bytes): beyond 4,095 bytes CRC-16 misses some double bit errors, because x has order
-//! 32,767 modulo its polynomial.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
+use jtc_core::{POINTS_MAX, SEGMENTS_MAX};
 use jtc_wire::{DataStatus, EncodeError, FrameStatus, RawPoint, Response, STATUS_LEN, TrajectoryState};
 
 use super::{Flow, Session};
 use crate::check::CheckedTrajectory;
 use crate::error::accepted;
 use crate::port::{Port, line_time};
+use crate::trajectory::UploadOptions;
 use crate::{Error, frame};
 
-/// Points of a segment whose frame CRC-16 protects against every double bit error.
-const SEGMENT_POINTS: usize = 113;
-/// Points of a segment when 113 would need more than 100 segments.
-const SEGMENT_POINTS_LONG: usize = 120;
 /// Times that one segment is sent.
 const SEGMENT_TRIES: u32 = 16;
 /// Times that the whole is begun again.
 const RESTARTS: u32 = 3;
 /// Records that the controller queues, less one for safety.
 const WINDOW_MAX: usize = 7;
-
-/// How to upload.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct UploadOptions {
-    /// Points per segment; `None` chooses.
-    pub points_per_segment: Option<usize>,
-    /// Number of the trajectory.
-    pub number: u16,
-}
-
-impl UploadOptions {
-    /// Points per segment for a trajectory of `points`.
-    pub fn segment_points(&self, points: usize) -> usize {
-        let usual = if points > SEGMENT_POINTS * SEGMENTS_MAX { SEGMENT_POINTS_LONG } else { SEGMENT_POINTS };
-        self.points_per_segment.unwrap_or(usual).clamp(1, SEGMENT_POINTS_MAX)
-    }
-}
 
 /// How far an upload is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]

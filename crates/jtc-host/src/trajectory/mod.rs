@@ -4,6 +4,7 @@ mod csv;
 pub mod fit;
 mod overshoot;
 mod replay;
+mod segments;
 mod structured;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ use jtc_core::JOINTS;
 use jtc_wire::{ACCELERATION_SCALE, Joint, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 pub use overshoot::{Overshoot, overshoot_words};
+pub use segments::UploadOptions;
 
 use crate::file::{FileError, read_text};
 

@@ -1,0 +1,123 @@
+//! One thing that is wrong with a trajectory: what, in which joint, where first and where worst.
+
+use std::fmt;
+
+use jtc_wire::Joint;
+use serde::Serialize;
+
+use super::kind::{HOLD_SHARE, ProblemKind};
+
+/// A place of the path where something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Seen {
+    /// `None`: the trajectory as a whole.
+    pub joint: Option<Joint>,
+    /// Point (from 0); with `ms` > 0 between this and the next.
+    pub point: usize,
+    /// ms after `point`.
+    pub ms: f64,
+    /// Time along the path, s.
+    pub time_s: f64,
+    /// In the unit of its kind.
+    pub value: f64,
+    /// Its limit, or what the other channel says.
+    pub limit: f64,
+}
+
+/// Problems of one kind in one joint; jumps are listed one by one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Problem {
+    /// What is wrong.
+    pub kind: ProblemKind,
+    /// `None`: the trajectory as a whole.
+    pub joint: Option<Joint>,
+    /// Where it is first along the path.
+    pub first: Seen,
+    /// Point (from 0) where it is worst.
+    pub point: usize,
+    /// ms after `point` where it is worst.
+    pub ms: f64,
+    /// Time along the path where it is worst, s.
+    pub time_s: f64,
+    /// Worst value, in the unit of its kind.
+    pub value: f64,
+    /// Its limit, or what the other channel says.
+    pub limit: f64,
+    /// Milliseconds (or points, or steps) in which it is.
+    pub count: usize,
+    /// The trajectory can run all the same; only the feed-forward is not what it could be.
+    pub warning: bool,
+}
+
+impl Problem {
+    /// Where it is worst.
+    pub(super) fn worst(&self) -> Seen {
+        let Self { joint, point, ms, time_s, value, limit, .. } = *self;
+        Seen { joint, point, ms, time_s, value, limit }
+    }
+
+    /// How far it is over its limit, as a multiple of that where there is one.
+    pub(super) fn excess(&self) -> f64 {
+        match self.kind {
+            ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
+                (self.value - self.limit).abs()
+            }
+            _ if self.limit == 0.0 => self.value.abs(),
+            _ if self.value.is_nan() => f64::INFINITY,
+            _ => self.value.abs() / self.limit.abs(),
+        }
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.worst().words(self.kind))?;
+        if self.count > 1 && self.kind != ProblemKind::HoldTorque {
+            write!(f, "; {} times, first at point {}", self.count, self.first.point)?;
+        }
+        Ok(())
+    }
+}
+
+impl Seen {
+    /// What is wrong there, with value, limit, point and time.
+    pub(super) fn words(&self, kind: ProblemKind) -> String {
+        use ProblemKind::*;
+        let Self { joint, point, ms, time_s, value, limit } = self;
+        let (unit, words, next) = (kind.unit(), kind.words(), point + 1);
+        let joint = joint.map_or(String::new(), |joint| format!("{joint}: "));
+        let place = if *ms > 0.0 {
+            format!("{ms} ms after point {point} ({time_s:.3} s)")
+        } else {
+            format!("at point {point} ({time_s:.3} s)")
+        };
+        let what = match kind {
+            Empty | StepTime => words.to_owned(),
+            TooManyPoints | TooManySegments => format!("{words}: {value}, at most {limit}"),
+            SegmentPoints => format!("{words}: {value}, 1 to {limit} are possible"),
+            Jump => format!(
+                "jump of {value:+.4} rad between points {point} and {next} ({time_s:.3} s; at most {limit:.4} rad in a step)"
+            ),
+            StartPose => format!("{value:+.4} rad away from the first point (tolerance {limit} rad)"),
+            NoStop => format!(
+                "a stop in time from {ms} ms after point {point} ({time_s:.3} s) needs {value:+.1} N·m, more than the {limit} N·m \
+                 that there are"
+            ),
+            HoldTorque => {
+                let most = limit.abs() / HOLD_SHARE;
+                let (share, limit) = (100.0 * value.abs() / most, limit.abs());
+                format!(
+                    "standing still at point {point} ({time_s:.3} s) takes {value:+.1} N·m, {share:.1} % of the torque limit \
+                     ({most:.1} N·m); at most {:.0} % ({limit:.1} N·m), or the noise of the encoder drops the arm later",
+                    100.0 * HOLD_SHARE
+                )
+            }
+            NotAtRest => format!("{words}: {value:+.4} {unit} {place}"),
+            VelocityMismatch | AccelerationMismatch => format!(
+                "{words}: {value:+.4} {unit} between points {point} and {next} ({time_s:.3} s) where {limit:+.4} {unit} is said"
+            ),
+            _ => format!("{words}: {value:+.4} {unit} (limit {limit}) {place}"),
+        };
+        joint + &what
+    }
+}

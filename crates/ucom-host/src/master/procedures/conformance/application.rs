@@ -150,6 +150,7 @@ async fn judge_alone(
 }
 
 pub(super) async fn alive(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    bench.link.note(format!("board {board}: D-T14 takes more than 60 s"));
     need!(bench.started(board).await?);
     bench.send(Function::McaStart, board, &[]).await;
     bench.receive(bench.link.times().admin).await;

@@ -14,8 +14,8 @@ pub(super) fn only_reports(frames: &[Frame]) -> Vec<Frame> {
     all
 }
 
-/// The frames that boards with these flash numbers report with (D-07).
-pub(super) fn expected_reports(bench: &Bench<'_>, boards: &[BoardSeen]) -> Option<Vec<Frame>> {
+/// The frames that the boards report with (D-07).
+pub(super) fn expected_reports(bench: &Bench<'_>) -> Option<Vec<Frame>> {
     if bench.profile().report_mode != ReportMode::Flash7 {
         return None;
     }
@@ -23,12 +23,13 @@ pub(super) fn expected_reports(bench: &Bench<'_>, boards: &[BoardSeen]) -> Optio
         let report = Report::flash7(b.info.flash_number);
         FromBoard::Report(report).encode(report.id_field, &bench.profile())
     };
-    let mut frames: Vec<Frame> = boards.iter().map(frame).collect();
+    let mut frames: Vec<Frame> = bench.found.boards.iter().map(frame).collect();
     frames.sort_by_key(|f| (f.id(), f.data().first().copied()));
     Some(frames)
 }
 
-pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Result<Verdict, Error> {
+pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error> {
+    let boards = &bench.found.boards;
     let window = bench.link.times().report_ask;
     let broadcast = bench.link.broadcast_number().number();
     let mut seen = Vec::new();
@@ -41,7 +42,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Resu
         return Ok(Verdict::Fail(format!("first {}; then {}", list(first), list(second))));
     }
     // A board of the chain may be left out of the test, so there may be more.
-    if let Some(missing) = expected_reports(bench, boards)
+    if let Some(missing) = expected_reports(bench)
         .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
     {
         return Ok(Verdict::Fail(format!("{missing} is not there exactly once: {}", list(first))));
@@ -55,17 +56,12 @@ pub(super) async fn reports(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Resu
     Ok(Verdict::Pass)
 }
 
-pub(super) async fn init_again(
-    bench: &mut Bench<'_>,
-    board: u8,
-    strangers: bool,
-    force: bool,
-) -> Result<Verdict, Error> {
-    if strangers {
+pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    if bench.found.strangers {
         let why = "a board that is not tested, or has no number, could take this one";
         return Ok(Verdict::Skipped(why.into()));
     }
-    match bench.link.look_for_master(force).await {
+    match bench.link.look_for_master(bench.options.force).await {
         Err(e @ Error::CompetingMaster { .. }) => return Ok(Verdict::Skipped(e.to_string())),
         other => other?,
     }

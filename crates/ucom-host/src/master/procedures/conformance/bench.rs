@@ -3,7 +3,7 @@
 use crate::master::engine::{Forget, Link, MS, Session};
 use crate::master::error::Error;
 use crate::master::procedures::control::start_application;
-use crate::master::reports::Verdict;
+use crate::master::reports::{BoardSeen, ConformanceOptions, Verdict};
 use ucom::{BoardInfo, Frame, Function, Profile, Sequence, Status};
 
 /// Functions that come by themselves and answer nothing.
@@ -12,16 +12,25 @@ const NOISE: [Function; 3] = [Function::So, Function::Alive, Function::Debug];
 /// Most frames of one test that are kept.
 const KEPT: usize = 64;
 
+/// How the boards were before the first test.
+pub(super) struct Found {
+    pub boards: Vec<BoardSeen>,
+    /// A board that nobody tests could take a number.
+    pub strangers: bool,
+}
+
 /// One conversation.
 pub(super) struct Bench<'a> {
     pub link: &'a Link,
+    pub options: &'a ConformanceOptions,
+    pub found: &'a Found,
     sent: Vec<String>,
     came: Vec<String>,
 }
 
 impl<'a> Bench<'a> {
-    pub fn new(link: &'a Link) -> Self {
-        Self { link, sent: Vec::new(), came: Vec::new() }
+    pub fn new(link: &'a Link, options: &'a ConformanceOptions, found: &'a Found) -> Self {
+        Self { link, options, found, sent: Vec::new(), came: Vec::new() }
     }
 
     pub fn profile(&self) -> Profile {

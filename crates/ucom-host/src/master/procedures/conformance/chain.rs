@@ -3,7 +3,7 @@ use crate::master::engine::MS;
 use crate::master::error::Error;
 use crate::master::procedures::conformance::ask::{expected_reports, only_reports};
 use crate::master::procedures::conformance::bench::{Bench, list, verdict};
-use crate::master::reports::{BoardSeen, Verdict};
+use crate::master::reports::Verdict;
 use ucom::{Function, Status};
 
 /// PC_RESET to all, and time for all to be ready.
@@ -16,21 +16,21 @@ async fn reset_all(bench: &mut Bench<'_>) -> Vec<ucom::Frame> {
     bench.receive(bench.link.times().report_window).await
 }
 
-pub(super) async fn reset(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict {
+pub(super) async fn reset(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error> {
     let came = reset_all(bench).await;
-    let Some(expected) = expected_reports(bench, boards) else {
-        return Verdict::Skipped("the profile's report.mode is another than flash7".into());
+    let Some(expected) = expected_reports(bench) else {
+        return Ok(Verdict::Skipped("the profile's report.mode is another than flash7".into()));
     };
     let reports = only_reports(&came);
     let pass = expected.iter().all(|f| reports.iter().filter(|r| *r == f).count() == 1)
         && reports.len() == came.len();
-    verdict(pass, &came)
+    Ok(verdict(pass, &came))
 }
 
-pub(super) async fn unnumbered(bench: &mut Bench<'_>) -> Verdict {
+pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error> {
     reset_all(bench).await;
     let Some(first) = bench.profile().board_numbers().next().map(|n| n.number()) else {
-        return Verdict::Pass;
+        return Ok(Verdict::Pass);
     };
     let requests: [(Function, &[u8]); 9] = [
         (Function::Info, &[]),
@@ -47,28 +47,28 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>) -> Verdict {
         bench.send(function, first, data).await;
         let came = bench.receive(60 * MS).await;
         if !came.is_empty() {
-            return Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came)));
+            return Ok(Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came))));
         }
     }
     // By broadcast, too: a board without a number does not take it (D-04, D-06).
     bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
     let came = bench.receive(150 * MS).await;
-    verdict(came.is_empty(), &came)
+    Ok(verdict(came.is_empty(), &came))
 }
 
-pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict {
+pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error> {
     if bench.profile().chain_auto_opinit {
-        return Verdict::Skipped("by the profile boards raise their pin by themselves".into());
+        return Ok(Verdict::Skipped("by the profile boards raise their pin by themselves".into()));
     }
     reset_all(bench).await;
     let ack = bench.link.times().init_ack;
     let numbers: Vec<u8> = bench.profile().board_numbers().map(|n| n.number()).collect();
-    for (i, n) in numbers.iter().take(boards.len()).enumerate() {
+    for (i, n) in numbers.iter().take(bench.found.boards.len()).enumerate() {
         bench.send(Function::Init, *n, &[]).await;
         let came = bench.receive(ack).await;
         let pass = matches!(came.as_slice(), [f] if f.id() == 0x0C0 + u16::from(*n) && f.data() == [*n]);
         if !pass {
-            return Verdict::Fail(format!("PC_INIT({n}): {}", list(&came)));
+            return Ok(Verdict::Fail(format!("PC_INIT({n}): {}", list(&came))));
         }
         // Nobody else is enabled yet.
         if let Some(next) = numbers.get(i + 1) {
@@ -77,10 +77,10 @@ pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict
                 let came = bench.receive(ack).await;
                 if !came.is_empty() {
                     let name = function.name();
-                    return Verdict::Fail(format!(
+                    return Ok(Verdict::Fail(format!(
                         "{name}({next}) before the pin of board {n} is up: {}",
                         list(&came)
-                    ));
+                    )));
                 }
             }
         }
@@ -88,10 +88,10 @@ pub(super) async fn wire(bench: &mut Bench<'_>, boards: &[BoardSeen]) -> Verdict
         bench.receive(10 * MS).await;
         match bench.info(*n).await {
             Some(info) if info.status.has(Status::OPINIT) => {}
-            other => return Verdict::Fail(format!("board {n}: OPINIT is not set: {other:?}")),
+            other => return Ok(Verdict::Fail(format!("board {n}: OPINIT is not set: {other:?}"))),
         }
     }
-    Verdict::Pass
+    Ok(Verdict::Pass)
 }
 
 /// One PC_SETSTATUS, and the status afterwards.
@@ -134,15 +134,21 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
 }
 
 /// The numbers must be new: the reset in it gives `first.number` to whoever is first on the wire.
-pub(super) async fn autostart(bench: &mut Bench<'_>, first: &BoardSeen) -> Verdict {
+pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
+        return Ok(Verdict::Skipped("there is no such board".into()));
+    };
     if !first.info.has_application() {
-        return Verdict::Skipped("there is no application that could start".into());
+        return Ok(Verdict::Skipped("there is no application that could start".into()));
     }
-    let (board, flash) = (first.number, first.info.flash_number);
+    let flash = first.info.flash_number;
     let kept = first.info.status.has(Status::ASTART);
     match bench.info(board).await {
         Some(info) if info.flash_number == flash => {}
-        other => return Verdict::Fail(format!("it is not 0x{flash:04X} that has its number: {other:?}")),
+        other => {
+            let text = format!("it is not 0x{flash:04X} that has its number: {other:?}");
+            return Ok(Verdict::Fail(text));
+        }
     }
     set(bench, board, 0x40, 0x40).await;
     reset_all(bench).await;
@@ -157,10 +163,10 @@ pub(super) async fn autostart(bench: &mut Bench<'_>, first: &BoardSeen) -> Verdi
     if now.is_some_and(|info| info.flash_number == flash) {
         set(bench, board, 0x44, if kept { 0x40 } else { 0 }).await;
     }
-    match now {
+    Ok(match now {
         Some(i) if i.flash_number == flash && !i.status.has(Status::MSTART) && acknowledged => Verdict::Pass,
         other => {
             Verdict::Fail(format!("acknowledged: {acknowledged}, afterwards {other:?}, {}", list(&came)))
         }
-    }
+    })
 }

@@ -1,18 +1,21 @@
 //! The tests as a whole: which boards are there, every test that is allowed, and all as it was found.
 use crate::master::engine::Link;
 use crate::master::error::Error;
-use crate::master::procedures::conformance::order::{Run, who_reports};
-use crate::master::procedures::conformance::restore::{Found, put_all_back};
+use crate::master::procedures::ask_reports::ask_reports;
+use crate::master::procedures::conformance::bench::Found;
+use crate::master::procedures::conformance::restore::put_all_back;
+use crate::master::procedures::conformance::runner::Runner;
 use crate::master::procedures::exchange::confirmed;
 use crate::master::procedures::one_board::one_board_each;
 use crate::master::procedures::survey::board_states;
-use crate::master::reports::{ConformanceOptions, Outcome};
+use crate::master::reports::{BoardSeen, ConformanceOptions, Outcome, Reports};
+use std::collections::BTreeSet;
 use ucom::{Function, Status};
 
 pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Result<Outcome, Error> {
-    let (found, strangers) = link.or_cancel(look(&link, &options)).await?;
+    let found = link.or_cancel(look(&link, &options)).await?;
     link.tap(true);
-    let mut tests = Run::new(&link, &options, &found, strangers);
+    let mut tests = Runner::new(&link, &options, &found);
     let result = link.or_cancel(tests.all()).await;
     link.tap(false);
     link.bear_shared_numbers(true);
@@ -25,7 +28,7 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
         tests.skip_rest(&why);
         tests.report.error = Some(error);
     }
-    let Run { mut report, unnumbered, at, .. } = tests;
+    let Runner { mut report, unnumbered, at, .. } = tests;
     if options.changes() && !matches!(report.error, Some(Error::Bus { .. })) {
         let at = at.filter(|_| report.error.is_some());
         let back = put_all_back(&link, &found, &options, unnumbered, at, &mut report.left);
@@ -39,7 +42,7 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
 }
 
 /// Which boards are there, and whether the tests may be done with them. Changes nothing.
-async fn look(link: &Link, options: &ConformanceOptions) -> Result<(Found, bool), Error> {
+async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error> {
     let mut boards = Vec::new();
     let asked: Vec<u8> = match options.boards.is_empty() {
         true => link.profile().board_numbers().map(|n| n.number()).collect(),
@@ -82,5 +85,16 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<(Found, bool)
     if options.changes() {
         link.become_master(options.force).await?;
     }
-    Ok((Found { boards }, !all))
+    Ok(Found { boards, strangers: !all })
+}
+
+/// Whether who reports is who has a number, each with a flash id of its own.
+async fn who_reports(link: &Link, boards: &[BoardSeen]) -> (usize, bool) {
+    let mut reports = Reports::default();
+    for _ in 0..2 {
+        ask_reports(link, &mut reports).await;
+    }
+    let low = boards.iter().map(|b| b.info.flash_number as u8);
+    let all = reports.ids.len() == boards.len() && low.collect::<BTreeSet<_>>() == reports.ids;
+    (reports.ids.len(), all)
 }

@@ -50,8 +50,11 @@ async fn answer(bench: &mut Bench<'_>, us: u64) -> Option<Frame> {
     }
 }
 
-pub(super) async fn update(bench: &mut Bench<'_>, program: &ConformanceProgram) -> Result<Verdict, Error> {
-    let (board, flash) = (program.board, Some(program.flash_number));
+pub(super) async fn update(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    let Some(program) = &bench.options.program else {
+        return Ok(Verdict::Skipped("only with --program IMAGE".into()));
+    };
+    let flash = Some(program.flash_number);
     if let Some(verdict) = unfit(bench) {
         return Ok(verdict);
     }
@@ -86,8 +89,11 @@ pub(super) async fn update(bench: &mut Bench<'_>, program: &ConformanceProgram) 
     })
 }
 
-pub(super) async fn refusals(bench: &mut Bench<'_>, program: &ConformanceProgram) -> Result<Verdict, Error> {
-    let (board, flash) = (program.board, Some(program.flash_number));
+pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
+    let Some(program) = &bench.options.program else {
+        return Ok(Verdict::Skipped("only with --program IMAGE".into()));
+    };
+    let flash = Some(program.flash_number);
     if let Some(verdict) = unfit(bench) {
         return Ok(verdict);
     }

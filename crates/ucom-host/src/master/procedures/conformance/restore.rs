@@ -1,17 +1,13 @@
 //! Boards as they were found: after the tests, and when these end before their time.
 use crate::master::engine::{Link, MS, Session};
 use crate::master::error::Error;
+use crate::master::procedures::conformance::bench::Found;
 use crate::master::procedures::control::{start_application, wait_status};
 use crate::master::procedures::exchange::{confirmed, numbers, set_status};
 use crate::master::procedures::init::init;
 use crate::master::procedures::repair::repair;
 use crate::master::reports::{BoardSeen, ConformanceOptions, InitOptions, Outcome};
 use ucom::{Admin, BoardInfo, Status, ToBoard};
-
-/// How the boards were before the first test.
-pub(super) struct Found {
-    pub boards: Vec<BoardSeen>,
-}
 
 /// Numbers for the chain anew; every board must have the one that it had.
 pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {

@@ -1,88 +1,150 @@
-//! Which tests there are, and what each needs to be allowed.
+//! Every test once: what it is called, what must be allowed, whom it is of, what it expects, how it is done.
+use core::pin::Pin;
 
-/// What a test needs to be allowed.
+use crate::master::error::Error;
+use crate::master::procedures::conformance::bench::Bench;
+use crate::master::procedures::conformance::{application, ask, chain, program};
+use crate::master::reports::{ConformanceOptions, Verdict};
+
+/// What a test does to boards, and so what must be allowed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
+    /// It changes nothing.
     Ask,
+    /// It resets and numbers boards, or sets bits of their status.
     Init,
+    /// It starts the application and its control loop.
     Run,
+    /// It writes a program.
     Program,
-    /// It cannot be done from here; why.
+}
+
+impl Level {
+    /// The option that it needs; `None`: it may be done.
+    pub(super) fn needs(self, options: &ConformanceOptions) -> Option<&'static str> {
+        match self {
+            Self::Init if !options.init => Some("--init"),
+            Self::Run if !options.run => Some("--run"),
+            Self::Program if options.program.is_none() => Some("--program IMAGE"),
+            _ => None,
+        }
+    }
+}
+
+/// Whom a test is of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scope {
+    /// The chain as a whole.
+    Chain,
+    /// The same; boards may be without their numbers before and after it.
+    Numbers,
+    /// Each board.
+    Board,
+    /// The board that has the first number; boards may be without their numbers after it.
+    First,
+    /// The board that is programmed.
+    Programmed,
+}
+
+/// The conversation of a test with a board; with the chain as a whole the number means nothing.
+pub(super) type Talk =
+    for<'a> fn(&'a mut Bench<'_>, u8) -> Pin<Box<dyn Future<Output = Result<Verdict, Error>> + Send + 'a>>;
+
+/// How a test is done.
+pub(super) enum Run {
+    /// By a conversation.
+    Talk(Talk),
+    /// Not from here; why.
     Elsewhere(&'static str),
 }
 
-/// Name, level and expectation of every test; the numbers are those of the acceptance tests.
-pub(super) const TESTS: [(&str, Level, &str); 21] = [
-    (
-        "D-T1",
-        Level::Init,
-        "PC_RESET: one report of each board within 500 ms and its delay, under the identifier of its flash id",
-    ),
-    ("D-T2", Level::Ask, "PC_REPORT twice: the same reports, and nothing is forgotten"),
-    ("D-T3", Level::Init, "boards without a number answer nothing but reset, report and PC_INIT"),
-    (
-        "D-T4",
-        Level::Init,
-        "numbers follow the init wire: the next board is silent until the pin before it is raised",
-    ),
-    ("D-T5", Level::Ask, "PC_INIT with its own number: acknowledged again, by this board alone"),
-    ("D-T6", Level::Init, "PC_SETSTATUS 0040 sets ASTART (the formula, literally), 4000 clears it"),
-    ("D-T7", Level::Init, "PC_SETSTATUS of IPINIT, EXLRUN, MCARUN changes nothing: they mirror reality"),
-    (
-        "D-T8",
-        Level::Run,
-        "status walk: PC_XRESET 1F, PC_START 8B, MCA_PC_START AB, run = 0 8B, MSTART = 0 1B (pins as they are)",
-    ),
-    (
-        "D-T9",
-        Level::Run,
-        "PC_START: MCA_DSP_READY within 2 s and EXLRUN = 0; without an application error 11",
-    ),
-    (
-        "D-T10",
-        Level::Ask,
-        "IO description: dimensions, then exactly 1 + CI + SO + PAR strings; with one byte of data no answer",
-    ),
-    ("D-T11", Level::Ask, "MCA_DUMP_CI: packages at 0, 3, 6 …, surplus words 0"),
-    ("D-T12", Level::Run, "CI at the dimension: error 5; surplus words behind the last one are ignored"),
-    (
-        "D-T13",
-        Level::Run,
-        "no heartbeat of the PC: loop ends after 1.5 s, flags 0, no outputs; a heartbeat does not restart it, MCA_PC_START does",
-    ),
-    ("D-T14", Level::Run, "heartbeats for 60 s: runs; one missing: runs; three missing: safe"),
-    ("D-T15", Level::Run, "flags 02000000: ignored; flags of three bytes: error 7"),
-    ("D-T16", Level::Init, "PC_XRESET within 300 ms of PC_INIT prevents the autostart"),
-    (
-        "D-T17",
-        Level::Program,
-        "update by frames: DSP_READY after each block, then DSP_PROGFINISHED; PC_INFO shows Program ID and date",
-    ),
-    (
-        "D-T18",
-        Level::Program,
-        "a wrong length, a pause, a bad header, another board's, beyond the memory, other cycle 2: errors 7 10 5 2 2 10, once each, and the application stays",
-    ),
-    (
-        "D-T19",
-        Level::Elsewhere(
-            "would program several boards at once: `ucom update --group` does, and shows what each took",
-        ),
-        "broadcast program data: boards with PROG = 1 take them, the others are silent",
-    ),
-    (
-        "D-T20",
-        Level::Elsewhere("needs a bus that holds the acknowledge back: the simulator's fault ack-held does"),
-        "PC_INIT before the last DSP_INITACK has left: error 9",
-    ),
-    (
-        "D-T21",
-        Level::Elsewhere("needs two boards with one flash id: `ucom sim --flash-ids 0x21,0x21` has them"),
-        "two boards with one flash id: one report is seen, and the PC reports that there are more boards than reports",
-    ),
+/// A test.
+pub(super) struct Test {
+    pub id: &'static str,
+    pub level: Level,
+    pub scope: Scope,
+    /// What it expects, in words.
+    pub expects: &'static str,
+    pub run: Run,
+}
+
+impl Test {
+    /// Both are done with one board before the next one's turn comes.
+    pub(super) fn goes_with(&self, next: &Self) -> bool {
+        let board = |test: &Self| matches!(test.scope, Scope::Board | Scope::Programmed);
+        board(self) && board(next) && (self.level == next.level || next.level == Level::Program)
+    }
+}
+
+macro_rules! talk {
+    ($test:path) => {
+        Run::Talk(|bench, board| Box::pin($test(bench, board)))
+    };
+}
+
+/// All tests in the order in which they are done; the numbers are those of the acceptance tests.
+#[rustfmt::skip]
+pub(super) static TESTS: [Test; 21] = [
+    Test { id: "D-T2", level: Level::Ask, scope: Scope::Chain, run: talk!(ask::reports),
+        expects: "PC_REPORT twice: the same reports, and nothing is forgotten" },
+    Test { id: "D-T5", level: Level::Ask, scope: Scope::Board, run: talk!(ask::init_again),
+        expects: "PC_INIT with its own number: acknowledged again, by this board alone" },
+    Test { id: "D-T10", level: Level::Ask, scope: Scope::Board, run: talk!(ask::description),
+        expects: "IO description: dimensions, then exactly 1 + CI + SO + PAR strings; with one byte of data no answer" },
+    Test { id: "D-T11", level: Level::Ask, scope: Scope::Board, run: talk!(ask::initial_inputs),
+        expects: "MCA_DUMP_CI: packages at 0, 3, 6 …, surplus words 0" },
+    Test { id: "D-T1", level: Level::Init, scope: Scope::Numbers, run: talk!(chain::reset),
+        expects: "PC_RESET: one report of each board within 500 ms and its delay, under the identifier of its flash id" },
+    Test { id: "D-T3", level: Level::Init, scope: Scope::Numbers, run: talk!(chain::unnumbered),
+        expects: "boards without a number answer nothing but reset, report and PC_INIT" },
+    Test { id: "D-T4", level: Level::Init, scope: Scope::Numbers, run: talk!(chain::wire),
+        expects: "numbers follow the init wire: the next board is silent until the pin before it is raised" },
+    Test { id: "D-T6", level: Level::Init, scope: Scope::Board, run: talk!(chain::formula),
+        expects: "PC_SETSTATUS 0040 sets ASTART (the formula, literally), 4000 clears it" },
+    Test { id: "D-T7", level: Level::Init, scope: Scope::Board, run: talk!(chain::mirrors),
+        expects: "PC_SETSTATUS of IPINIT, EXLRUN, MCARUN changes nothing: they mirror reality" },
+    Test { id: "D-T16", level: Level::Init, scope: Scope::First, run: talk!(chain::autostart),
+        expects: "PC_XRESET within 300 ms of PC_INIT prevents the autostart" },
+    Test { id: "D-T8", level: Level::Run, scope: Scope::Board, run: talk!(application::walk),
+        expects: "status walk: PC_XRESET 1F, PC_START 8B, MCA_PC_START AB, run = 0 8B, MSTART = 0 1B (pins as they are)" },
+    Test { id: "D-T9", level: Level::Run, scope: Scope::Board, run: talk!(application::start),
+        expects: "PC_START: MCA_DSP_READY within 2 s and EXLRUN = 0; without an application error 11" },
+    Test { id: "D-T12", level: Level::Run, scope: Scope::Board, run: talk!(application::inputs),
+        expects: "CI at the dimension: error 5; surplus words behind the last one are ignored" },
+    Test { id: "D-T13", level: Level::Run, scope: Scope::Board, run: talk!(application::alone),
+        expects: "no heartbeat of the PC: loop ends after 1.5 s, flags 0, no outputs; a heartbeat does not restart it, MCA_PC_START does" },
+    Test { id: "D-T14", level: Level::Run, scope: Scope::Board, run: talk!(application::alive),
+        expects: "heartbeats for 60 s: runs; one missing: runs; three missing: safe" },
+    Test { id: "D-T15", level: Level::Run, scope: Scope::Board, run: talk!(application::flags),
+        expects: "flags 02000000: ignored; flags of three bytes: error 7" },
+    Test { id: "D-T18", level: Level::Program, scope: Scope::Programmed, run: talk!(program::refusals),
+        expects: "a wrong length, a pause, a bad header, another board's, beyond the memory, other cycle 2: errors 7 10 5 2 2 10, once each, and the application stays" },
+    Test { id: "D-T17", level: Level::Program, scope: Scope::Programmed, run: talk!(program::update),
+        expects: "update by frames: DSP_READY after each block, then DSP_PROGFINISHED; PC_INFO shows Program ID and date" },
+    Test { id: "D-T19", level: Level::Ask, scope: Scope::Chain,
+        expects: "broadcast program data: boards with PROG = 1 take them, the others are silent",
+        run: Run::Elsewhere("would program several boards at once: `ucom update --group` does, and shows what each took") },
+    Test { id: "D-T20", level: Level::Ask, scope: Scope::Chain,
+        expects: "PC_INIT before the last DSP_INITACK has left: error 9",
+        run: Run::Elsewhere("needs a bus that holds the acknowledge back: the simulator's fault ack-held does") },
+    Test { id: "D-T21", level: Level::Ask, scope: Scope::Chain,
+        expects: "two boards with one flash id: one report is seen, and the PC reports that there are more boards than reports",
+        run: Run::Elsewhere("needs two boards with one flash id: `ucom sim --flash-ids 0x21,0x21` has them") },
 ];
 
 /// Names of all tests, for a command line.
 pub fn test_names() -> impl Iterator<Item = &'static str> {
-    TESTS.iter().map(|(id, ..)| *id)
+    let mut names: Vec<&str> = TESTS.iter().map(|test| test.id).collect();
+    names.sort_by_key(|name| (name.len(), *name));
+    names.into_iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_test_stands_once() {
+        assert!(test_names().eq((1..=21).map(|number| format!("D-T{number}"))));
+    }
 }

@@ -1,0 +1,161 @@
+//! The tests one after the other.
+use crate::master::engine::{Event, Link};
+use crate::master::error::Error;
+use crate::master::procedures::conformance::bench::{Bench, Found};
+use crate::master::procedures::conformance::restore::{put_back, renumber};
+use crate::master::procedures::conformance::table::{Level, Run, Scope, TESTS, Test};
+use crate::master::procedures::exchange::set_status;
+use crate::master::reports::{ConformanceOptions, ConformanceReport, ConformanceTest, Verdict};
+use ucom::Status;
+
+/// A test, and the board it is of; `None`: the chain as a whole.
+type Planned = (&'static Test, Option<u8>);
+
+/// The tests under way.
+pub(super) struct Runner<'a> {
+    link: &'a Link,
+    options: &'a ConformanceOptions,
+    /// What is to be as it was.
+    found: &'a Found,
+    pub report: ConformanceReport,
+    /// Boards may be without their numbers.
+    pub unnumbered: bool,
+    /// The board whose test is under way.
+    pub at: Option<u8>,
+}
+
+impl<'a> Runner<'a> {
+    pub fn new(link: &'a Link, options: &'a ConformanceOptions, found: &'a Found) -> Self {
+        Self { link, options, found, report: Default::default(), unnumbered: false, at: None }
+    }
+
+    /// All tests that are wanted, in their order.
+    fn planned(&self) -> Vec<Planned> {
+        let only = &self.options.only;
+        let wanted = |test: &&Test| only.is_empty() || only.iter().any(|o| o.eq_ignore_ascii_case(test.id));
+        let mut all = Vec::new();
+        for together in TESTS.chunk_by(Test::goes_with) {
+            let Some(first) = together.first() else { continue };
+            for board in self.boards_of(first) {
+                let of_it = together.iter().filter(wanted).filter(|test| self.is_of(test, board));
+                all.extend(of_it.map(|test| (test, board)));
+            }
+        }
+        all
+    }
+
+    fn boards_of(&self, test: &Test) -> Vec<Option<u8>> {
+        let boards = self.found.boards.iter().map(|b| b.number);
+        match test.scope {
+            Scope::Chain | Scope::Numbers => vec![None],
+            // That they are not allowed is said once.
+            _ if test.level == Level::Init && !self.options.init => vec![None],
+            Scope::First => boards.min().into_iter().map(Some).collect(),
+            Scope::Board | Scope::Programmed => boards.map(Some).collect(),
+        }
+    }
+
+    fn is_of(&self, test: &Test, board: Option<u8>) -> bool {
+        let programmed = self.options.program.as_ref().filter(|_| test.scope == Scope::Programmed);
+        programmed.is_none_or(|program| Some(program.board) == board)
+    }
+
+    /// Does every test that may be done; the others are skipped with their reason.
+    pub async fn all(&mut self) -> Result<(), Error> {
+        let planned = self.planned();
+        for (i, (test, board)) in planned.iter().copied().enumerate() {
+            let talk = match (test.level.needs(self.options), &test.run) {
+                (Some(option), _) => {
+                    self.skip(test, board, format!("only with {option}"), Some(option));
+                    continue;
+                }
+                (None, Run::Elsewhere(why)) => {
+                    self.skip(test, board, (*why).into(), None);
+                    continue;
+                }
+                (None, Run::Talk(talk)) => talk,
+            };
+            self.at = board;
+            if test.scope != Scope::Numbers {
+                self.numbered().await?;
+            }
+            self.unnumbered = matches!(test.scope, Scope::Numbers | Scope::First);
+            let mut bench = Bench::new(self.link, self.options, self.found);
+            let verdict = talk(&mut bench, board.unwrap_or_default()).await?;
+            if test.scope == Scope::First {
+                self.numbered().await?;
+                self.autostart_as_found(board).await?;
+            }
+            let (sent, came) = bench.log();
+            self.note(test, board, verdict, sent, came);
+            let own = |test: &Test| matches!(test.level, Level::Run | Level::Program);
+            let more =
+                |(next, of): &Planned| *of == board && own(next) && next.level.needs(self.options).is_none();
+            if let Some(number) = board.filter(|_| own(test))
+                && !planned.iter().skip(i + 1).any(more)
+            {
+                self.board_back(number).await?;
+            }
+        }
+        self.numbered().await
+    }
+
+    async fn board_back(&mut self, number: u8) -> Result<(), Error> {
+        if let Some(before) = self.found.boards.iter().find(|b| b.number == number) {
+            put_back(self.link, before, self.options, false, &mut self.report.left).await?;
+        }
+        Ok(())
+    }
+
+    /// ASTART of a board that a test has set it on.
+    async fn autostart_as_found(&self, board: Option<u8>) -> Result<(), Error> {
+        if let Some(before) = self.found.boards.iter().find(|b| Some(b.number) == board) {
+            let kept = before.info.status & Status::ASTART;
+            set_status(self.link, before.number, Status::ASTART, kept).await?;
+        }
+        Ok(())
+    }
+
+    /// Every board has its number again.
+    async fn numbered(&mut self) -> Result<(), Error> {
+        if self.unnumbered {
+            // True as long as it may not be so.
+            renumber(self.link, self.found).await?;
+            self.unnumbered = false;
+        }
+        Ok(())
+    }
+
+    /// What was not done, because the tests ended before.
+    pub fn skip_rest(&mut self, why: &str) {
+        for (test, board) in self.planned() {
+            if self.report.tests.iter().any(|t| t.id == test.id && t.board == board) {
+                continue;
+            }
+            match test.level.needs(self.options) {
+                Some(option) => self.skip(test, board, format!("only with {option}"), Some(option)),
+                None => self.skip(test, board, why.into(), None),
+            }
+        }
+    }
+
+    fn skip(&mut self, test: &Test, board: Option<u8>, why: String, needs: Option<&'static str>) {
+        let (id, expected, verdict) = (test.id, test.expects, Verdict::Skipped(why));
+        let (sent, came) = (Vec::new(), Vec::new());
+        self.report.tests.push(ConformanceTest { id, board, expected, verdict, needs, sent, came });
+    }
+
+    fn note(
+        &mut self,
+        test: &Test,
+        board: Option<u8>,
+        verdict: Verdict,
+        sent: Vec<String>,
+        came: Vec<String>,
+    ) {
+        let (id, expected) = (test.id, test.expects);
+        let test = ConformanceTest { id, board, expected, verdict, needs: None, sent, came };
+        self.link.with(|core| core.event(Event::Tested { id: self.link.id, test: test.clone() }));
+        self.report.tests.push(test);
+    }
+}

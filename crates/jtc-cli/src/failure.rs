@@ -3,8 +3,10 @@
 use std::fmt::Display;
 
 use cli_kit::output_file::OutputError;
+use jtc_host::file::FileError;
 use jtc_host::port::PortError;
 use jtc_host::recording::RecordingError;
+use jtc_host::{CheckError, LinkError, ParametersError, StateError};
 
 pub use cli_kit::exit::{FAULT, NO_LINK, REFUSED, USAGE};
 
@@ -84,17 +86,18 @@ impl From<jtc_host::Error> for Failure {
     }
 }
 
-impl From<PortError> for Failure {
-    fn from(e: PortError) -> Self {
-        jtc_host::Error::from(e).into()
-    }
+/// The library's errors of single operations.
+macro_rules! from_library {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Failure {
+            fn from(e: $error) -> Self {
+                jtc_host::Error::from(e).into()
+            }
+        }
+    )*};
 }
 
-impl From<jtc_host::file::FileError> for Failure {
-    fn from(e: jtc_host::file::FileError) -> Self {
-        jtc_host::Error::from(e).into()
-    }
-}
+from_library!(PortError, FileError, LinkError, StateError, ParametersError, CheckError);
 
 impl From<RecordingError> for Failure {
     fn from(e: RecordingError) -> Self {

@@ -23,7 +23,9 @@ pub mod words;
 
 pub use arm::Arm;
 pub use check::{CheckOptions, CheckedTrajectory};
-pub use error::Error;
+pub use error::{
+    CheckError, Diagnosis, Error, LinkError, MotionError, ParametersError, StateError, UploadError,
+};
 pub use host_kit::ErrorKind;
 pub use port::{Port, PortError};
 pub use sample::{JointSample, Sample};

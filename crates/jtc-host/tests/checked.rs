@@ -6,7 +6,10 @@ use std::time::Duration;
 use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, Outcome};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session, Trajectory, plan};
+use jtc_host::{
+    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, ErrorKind, LinkError, MotionError, Session,
+    Trajectory, plan,
+};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
@@ -26,7 +29,7 @@ fn motion(to: f64) -> Trajectory {
     plan::joint_move(&[0.0; 6], &target, &Config::avena(), 60.0).unwrap()
 }
 
-fn check(trajectory: &Trajectory) -> Result<CheckedTrajectory, Error> {
+fn check(trajectory: &Trajectory) -> Result<CheckedTrajectory, CheckError> {
     CheckedTrajectory::check(trajectory, &Arm::avena(), &[0.0; 6], &CheckOptions::default())
 }
 
@@ -35,12 +38,13 @@ fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
     let mut fast = motion(0.5);
     fast.step_ms = 2;
     let error = check(&fast).unwrap_err();
-    assert!(matches!(&error, Error::Check(verdict) if !verdict.is_ok()), "{error}");
-    assert_eq!((error.code(), error.kind()), ("check", ErrorKind::Refused));
+    assert!(matches!(&error, CheckError::Refused(verdict) if !verdict.is_ok()), "{error}");
+    let diagnosis = error.diagnosis();
+    assert_eq!((diagnosis.code, diagnosis.kind), ("check", ErrorKind::Refused));
     // A number that no frame carries.
     let mut wild = motion(0.5);
     wild.points[3].velocity[2] = f64::NAN;
-    assert!(matches!(check(&wild), Err(Error::Check(_))));
+    assert!(matches!(check(&wild), Err(CheckError::Refused(_))));
     // More torque than there is, by the arm model.
     let mut arm = Arm::avena();
     arm.joints[1].torque_max = 1.0;
@@ -72,7 +76,8 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
         CheckedTrajectory::check(trajectory, arm, &[0.0; 6], &options)
     };
     let error = check(&arm, &motion(0.5), false).unwrap_err();
-    assert_eq!((error.code(), error.kind()), ("device-limits", ErrorKind::Refused));
+    let diagnosis = error.diagnosis();
+    assert_eq!((diagnosis.code, diagnosis.kind), ("device-limits", ErrorKind::Refused));
     assert!(error.to_string().contains("joint 1, acceleration_max_rad_s2: "), "{error}");
     assert!(check(&arm, &motion(0.5), true).is_ok());
     // The gravity that the controller computes with, whatever the file says: an arm without weight would pass.
@@ -95,7 +100,7 @@ fn an_arm_that_is_none_checks_nothing() {
     arm.model.links[3].mass = f64::NAN;
     let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
     let error = CheckedTrajectory::check(&motion(0.5), &arm, &[0.0; 6], &options).unwrap_err();
-    assert!(matches!(error, Error::File(_)), "{error}");
+    assert!(matches!(error, CheckError::Arm(_)), "{error}");
 }
 
 /// Execution is asked for of what is in the controller, and of nothing else.
@@ -106,7 +111,7 @@ fn only_what_was_uploaded_is_executed() {
     let refused = |s: &mut Sim, t: &CheckedTrajectory| {
         let sent = s.statistics().frames_sent;
         let error = s.execute(t).unwrap_err();
-        assert!(matches!(error, Error::NotUploaded), "{error}");
+        assert!(matches!(error, Error::Motion(MotionError::NotUploaded)), "{error}");
         assert_eq!((s.statistics().frames_sent, error.kind()), (sent, ErrorKind::Refused), "nothing is sent");
     };
     refused(&mut s, &first);
@@ -146,5 +151,5 @@ fn a_run_has_an_outcome_and_its_figures() {
     assert_eq!(summary.joints[0].torque_limit_nm, Some(Arm::avena().joints[0].torque_max));
     // A second run from the end of the first: the controller refuses it (J-34), and the run says so.
     let run = s.run(&checked, |_| Flow::Continue);
-    assert!(matches!(run.outcome, Err(Error::Refused { .. })), "{:?}", run.outcome);
+    assert!(matches!(run.outcome, Err(Error::Link(LinkError::Refused { .. }))), "{:?}", run.outcome);
 }

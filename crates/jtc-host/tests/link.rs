@@ -8,7 +8,10 @@ use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
 use jtc_host::port::sim::SimPort;
 use jtc_host::port::{Port, PortError};
 use jtc_host::session::{Flow, Outcome, ParameterSource, RecoverStep, UploadOptions, UploadReport};
-use jtc_host::{CheckOptions, CheckedTrajectory, Error, ErrorKind, Session, Trajectory, plan};
+use jtc_host::{
+    CheckOptions, CheckedTrajectory, Error, ErrorKind, MotionError, ParametersError, Session, Trajectory,
+    UploadError, plan,
+};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
@@ -214,7 +217,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     });
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
-    let Error::RunFault { point, .. } = &error else { panic!("{error}") };
+    let Error::Motion(MotionError::RunFault { point, .. }) = &error else { panic!("{error}") };
     // That of the last status on the path: up to 40 ms before the fault.
     assert!((459..600).contains(point), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
@@ -251,8 +254,9 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     use jtc_host::port::test::ScriptedPort;
     let mut silent = Session::new(ScriptedPort::new(Some(115_200), |_, _| Vec::new()));
     let error = silent.next_status().unwrap_err();
-    assert_eq!((error.kind(), error.code()), (ErrorKind::NoLink, "no-link"));
-    assert_eq!(silent.clear(true, 0).unwrap_err().kind(), ErrorKind::NoLink);
+    let diagnosis = error.diagnosis();
+    assert_eq!((diagnosis.kind, diagnosis.code), (ErrorKind::NoLink, "no-link"));
+    assert_eq!(silent.clear(true, 0).unwrap_err().diagnosis().kind, ErrorKind::NoLink);
     // A file is none of the things that one can plug in.
     let error = jtc_host::port::SerialPort::open("Cargo.toml", 115_200).map(drop).unwrap_err();
     assert_eq!(error.to_string(), "Cargo.toml is no serial port");
@@ -261,7 +265,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert!(error.hint().contains("nothing to pause or stop"), "{}", error.hint());
     let mut s = session(Some(921_600));
     let error = upload(&mut s, &trajectory(50)).unwrap_err();
-    assert!(matches!(error, Error::SegmentRefused { segment: 0, .. }), "{error}");
+    assert!(matches!(error, Error::Upload(UploadError::SegmentRefused { segment: 0, .. })), "{error}");
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
@@ -322,7 +326,10 @@ fn j34_resume_only_after_a_pause() {
             Duration::MAX,
         );
         let error = s.resume().unwrap_err();
-        assert!(matches!(error, Error::NotPaused { trajectory: t, .. } if t == trajectory), "{error}");
+        assert!(
+            matches!(error, Error::Motion(MotionError::NotPaused { trajectory: t, .. }) if t == trajectory),
+            "{error}"
+        );
         assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
         // Only a motion that may be slowing down can be resumed by the same command a little later.
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
@@ -379,7 +386,10 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     let mut s = session(Some(921_600));
     let (sent, mut steps) = (s.statistics().frames_sent, 0);
     let error = s.recover(ParameterSource::None, |_| steps += 1).unwrap_err();
-    assert!(matches!(&error, Error::NoParameters { missing } if missing.len() == 3), "{error}");
+    assert!(
+        matches!(&error, Error::Parameters(ParametersError::NoSource { missing }) if missing.len() == 3),
+        "{error}"
+    );
     assert_eq!((error.kind(), s.statistics().frames_sent, steps), (ErrorKind::Refused, sent, 0));
     assert!(error.hint().contains("--arm FILE") && error.hint().contains("--defaults"), "{}", error.hint());
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use cli_kit::{Output, Stop};
 use jtc_host::arm::Arm;
 use jtc_host::session::ParameterSource;
-use jtc_host::words;
+use jtc_host::{Error, ParametersError, words};
 use serde_json::json;
 
 use super::status;
@@ -90,7 +90,7 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         },
     );
     let s = done.map_err(|e| match &e {
-        jtc_host::Error::Cancelled => {
+        Error::Cancelled => {
             let during = steps.last().map_or("its start", String::as_str);
             Failure { message: format!("cancelled, after: {during}"), ..Failure::of(&e) }
                 .hint("the rest of the way was not gone: `jtc status`, then `jtc recover` again")
@@ -103,10 +103,12 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
 }
 
 /// A recovery that failed is not mended by the same command: what keeps the error is to be looked at.
-fn not_itself(e: jtc_host::Error) -> Failure {
+fn not_itself(e: Error) -> Failure {
     let failure = Failure::of(&e);
     // Without numbers for the arm it is the same command with an option that helps.
-    if matches!(e, jtc_host::Error::NoParameters { .. }) || !failure.hint.contains("jtc recover") {
+    if matches!(e, Error::Parameters(ParametersError::NoSource { .. }))
+        || !failure.hint.contains("jtc recover")
+    {
         return failure;
     }
     failure.hint(

@@ -12,7 +12,9 @@ use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
 use jtc_host::report::{self, ReportInput, RunFailure, Summary};
 use jtc_host::session::{Flow, Outcome, Run, UploadOptions, UploadReport};
 use jtc_host::trajectory::Trajectory;
-use jtc_host::{CheckOptions, CheckedTrajectory, Error, Sample, Session, words};
+use jtc_host::{
+    CheckError, CheckOptions, CheckedTrajectory, Error, MotionError, Sample, Session, StateError, words,
+};
 use jtc_wire::{ControllerState, NodeState, Status};
 use serde_json::json;
 
@@ -67,7 +69,7 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
     };
     let mut motion = job.checked(&job.trajectory, &status, args, options);
     let mut broken_off = None;
-    if let Err(Error::Check(verdict)) = &motion
+    if let Err(CheckError::Refused(verdict)) = &motion
         && args.approach
         && verdict.problems.iter().any(|p| p.kind == ProblemKind::StartPose)
     {
@@ -102,7 +104,11 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
         Err(e) => {
             let found = RunFailure::find(&info, &samples);
             let found = found.unwrap_or_else(|| RunFailure::ended_by(&info, &samples, e.to_string()));
-            Some(if let Error::RunFault { status, .. } = e { found.with_status(status) } else { found })
+            Some(if let Error::Motion(MotionError::RunFault { status, .. }) = e {
+                found.with_status(status)
+            } else {
+                found
+            })
         }
     };
     let word = match &outcome {
@@ -226,7 +232,7 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
             s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error]) || operator.wants_the_end()
         })?;
         if status.state == ControllerState::Error {
-            return Err(Error::Device { status: Box::new(status) }.into());
+            return Err(StateError::Device { status: Box::new(status) }.into());
         }
     }
     if operator.wants_the_end() {
@@ -257,15 +263,15 @@ impl Job {
         status: &Status,
         args: &RunArgs,
         upload: UploadOptions,
-    ) -> Result<CheckedTrajectory, Error> {
+    ) -> Result<CheckedTrajectory, CheckError> {
         let options = CheckOptions { upload, accept_device_limits: args.accept.accept_device_limits };
         CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &options)
     }
 
     /// Prints what forbids to run it.
-    fn not_checked(&self, error: Error, out: &Output) -> Failure {
+    fn not_checked(&self, error: CheckError, out: &Output) -> Failure {
         match error {
-            Error::Check(verdict) => self.refuse(&verdict, out),
+            CheckError::Refused(verdict) => self.refuse(&verdict, out),
             other => other.into(),
         }
     }

@@ -8,8 +8,8 @@ use jtc_core::JOINTS;
 use jtc_wire::RawPoint;
 
 use super::{Checker, Verdict};
-use crate::Error;
 use crate::arm::Arm;
+use crate::error::CheckError;
 use crate::trajectory::{Trajectory, UploadOptions};
 
 /// Counts the checks that were passed, so that two trajectories are never taken for one another.
@@ -83,21 +83,21 @@ impl CheckedTrajectory {
     ///
     /// # Errors
     ///
-    /// [`Error::DeviceLimits`] when the arm has values that the controller uses otherwise, unless the options accept them.
-    /// [`Error::Check`] with the verdict when anything forbids to run it: a limit exceeded at or between points, a jump, not at rest
+    /// [`CheckError::DeviceLimits`] when the arm has values that the controller uses otherwise, unless the options accept them.
+    /// [`CheckError::Refused`] with the verdict when anything forbids to run it: a limit exceeded at or between points, a jump, not at rest
     /// at its ends, too much torque, no room to stop, too many points or segments, or the arm not at the first point. An arm whose
-    /// numbers are not physical is [`Error::File`]. Nothing is sent in either case.
+    /// numbers are not physical is [`CheckError::Arm`]. Nothing is sent in either case.
     pub fn check(
         trajectory: &Trajectory,
         arm: &Arm,
         start: &[f64; JOINTS],
         options: &CheckOptions,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, CheckError> {
         // The fields of an arm are public: numbers that make the dynamics senseless would pass for any torque.
         arm.is_physical()?;
         let differences = arm.device_differences();
         if !differences.is_empty() && !options.accept_device_limits {
-            return Err(Error::DeviceLimits { arm: arm.name.clone(), differences });
+            return Err(CheckError::DeviceLimits { arm: arm.name.clone(), differences });
         }
         let (config, friction) = (arm.config_on_device(), arm.friction());
         let checker = Checker {
@@ -117,7 +117,7 @@ impl CheckedTrajectory {
                 number: PASSED.fetch_add(1, Ordering::Relaxed),
             }),
             // A number that no frame carries is among the problems of the verdict.
-            _ => Err(Error::Check(Box::new(verdict))),
+            _ => Err(CheckError::Refused(Box::new(verdict))),
         }
     }
 

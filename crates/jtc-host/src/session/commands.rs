@@ -5,9 +5,8 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, ExecCommand, FrameType, NodeState, Status, TrajectoryState, fixed};
 
 use super::{Session, not_allowed};
-use crate::Error;
 use crate::check::CheckedTrajectory;
-use crate::error::accepted;
+use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::port::Port;
 
 /// Longest that a controller waits with teaching until the arm is held, and a little more.
@@ -53,9 +52,9 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
-    /// [`Error::Port`] of the line.
-    pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), Error> {
+    /// [`LinkError::Refused`] when the controller does not allow it in its state; [`LinkError::NotConfirmed`], [`LinkError::NoLink`] and
+    /// [`LinkError::Port`] of the line.
+    pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), LinkError> {
         self.command(&fixed::clear_current_errors(jtc, nodes))
     }
 
@@ -63,9 +62,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
-    /// [`Error::Port`] of the line.
-    pub fn clear_occurred(&mut self) -> Result<(), Error> {
+    /// Those of [`Session::clear`].
+    pub fn clear_occurred(&mut self) -> Result<(), LinkError> {
         self.command(&fixed::CLEAR_OCCURRED_ERRORS)
     }
 
@@ -73,9 +71,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
-    /// [`Error::Port`] of the line.
-    pub fn reset(&mut self, nodes: u8) -> Result<(), Error> {
+    /// Those of [`Session::clear`].
+    pub fn reset(&mut self, nodes: u8) -> Result<(), LinkError> {
         self.command(&fixed::reset_can_devices(nodes))
     }
 
@@ -83,11 +80,10 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
-    /// [`Error::Port`] of the line. [`Error::StateTimeout`] when teaching does not begin, because the arm does not come to rest.
+    /// Those of [`Session::clear`]; [`StateError::Timeout`] when teaching does not begin, because the arm does not come to rest.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
         if !on {
-            return self.command(&fixed::empty(FrameType::TeachingModeDisable));
+            return Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?);
         }
         self.command(&fixed::empty(FrameType::TeachingModeEnable))?;
         let taught = self.wait_for("teaching", TEACHING, |s| {
@@ -100,9 +96,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
-    /// [`Error::Port`] of the line.
-    pub fn gripper(&mut self, pump: bool) -> Result<(), Error> {
+    /// Those of [`Session::clear`].
+    pub fn gripper(&mut self, pump: bool) -> Result<(), LinkError> {
         self.command(&fixed::gripper_control(pump))
     }
 
@@ -110,9 +105,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when the controller does not allow it in its state; [`Error::NotConfirmed`], [`Error::NoLink`] and
-    /// [`Error::Port`] of the line.
-    pub fn use_default(&mut self, parameter: Parameter) -> Result<(), Error> {
+    /// Those of [`Session::clear`].
+    pub fn use_default(&mut self, parameter: Parameter) -> Result<(), LinkError> {
         self.command(&fixed::empty(parameter.use_default()))
     }
 
@@ -121,7 +115,7 @@ impl<P: Port> Session<P> {
     /// # Errors
     ///
     /// Those of [`Session::use_default`], of the first that is not accepted.
-    pub fn use_defaults(&mut self) -> Result<(), Error> {
+    pub fn use_defaults(&mut self) -> Result<(), LinkError> {
         [Parameter::FrictionPolynomial, Parameter::Pid, Parameter::ArmModel]
             .into_iter()
             .try_for_each(|p| self.use_default(p))
@@ -131,13 +125,13 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::NotUploaded`], and nothing is sent, unless this session uploaded exactly this trajectory and the controller still
-    /// holds it. [`Error::Refused`] when the controller does not start it: the arm is not at the first point (J-34), or is not held.
-    /// [`Error::LinkLost`] when no confirmation came: the arm may be moving.
+    /// [`MotionError::NotUploaded`], and nothing is sent, unless this session uploaded exactly this trajectory and the controller still
+    /// holds it. [`LinkError::Refused`] when the controller does not start it: the arm is not at the first point (J-34), or is not held.
+    /// [`MotionError::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
         self.catch_up()?;
         if self.uploaded != Some(checked.number()) {
-            return Err(Error::NotUploaded);
+            return Err(MotionError::NotUploaded.into());
         }
         self.go()
     }
@@ -151,14 +145,14 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::NotPaused`], and nothing is sent, when nothing is paused; [`Error::Refused`] when the arm was moved since;
-    /// [`Error::LinkLost`] when no confirmation came.
+    /// [`MotionError::NotPaused`], and nothing is sent, when nothing is paused; [`LinkError::Refused`] when the arm was moved since;
+    /// [`MotionError::LinkLost`] when no confirmation came.
     pub fn resume(&mut self) -> Result<(), Error> {
         let status = self.fresh_status()?;
         if status.trajectory == TrajectoryState::Pause {
             self.go()
         } else {
-            Err(Error::NotPaused { state: status.state, trajectory: status.trajectory })
+            Err(MotionError::NotPaused { state: status.state, trajectory: status.trajectory }.into())
         }
     }
 
@@ -166,7 +160,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when nothing moves; [`Error::LinkLost`] when no confirmation came: the arm may be moving.
+    /// [`LinkError::Refused`] when nothing moves; [`MotionError::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn pause(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Pause, |s| s.trajectory == TrajectoryState::Pause)
     }
@@ -175,7 +169,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Refused`] when there is nothing to stop; [`Error::LinkLost`] when no confirmation came: the arm may be moving.
+    /// [`LinkError::Refused`] when there is nothing to stop; [`MotionError::LinkLost`] when no confirmation came: the arm may be moving.
     pub fn stop(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
@@ -194,34 +188,28 @@ impl<P: Port> Session<P> {
         {
             return Ok(());
         }
-        Err(self.refused(record))
+        Err(self.refused(record).into())
     }
 
-    /// An error of the link while the arm moves or may move, with what is known about the motion; other errors as they are.
-    pub(super) fn link_lost(&self, error: Error, stop_sent: bool) -> Error {
-        match error {
-            Error::Port(_) | Error::NoLink { .. } | Error::NotConfirmed { .. } => {
-                Error::LinkLost { last: self.last.map(Box::new), stop_sent, source: Box::new(error) }
-            }
-            other => other,
+    /// An error of the link while the arm moves or may move, with what is known about the motion; a refusal as it is.
+    pub(super) fn link_lost(&self, error: LinkError, stop_sent: bool) -> Error {
+        if !error.is_loss() {
+            return error.into();
         }
+        MotionError::LinkLost { last: self.last.map(Box::new), stop_sent, source: Box::new(error) }.into()
     }
 
     /// Waits until the controller is in HoldPos; an error at once when it reports errors.
     ///
     /// # Errors
     ///
-    /// [`Error::Device`] when the controller reports errors, [`Error::StateTimeout`] when it is not in HoldPos in this time,
-    /// [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
+    /// [`StateError::Device`] when the controller reports errors, [`StateError::Timeout`] when it is not in HoldPos in this time;
+    /// those of [`Session::next_status`].
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| {
             s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error])
         })?;
-        if status.state == ControllerState::Error {
-            Err(Error::Device { status: Box::new(status) })
-        } else {
-            Ok(status)
-        }
+        without_error(status)
     }
 
     /// Waits until the controller holds the arm in HoldPos with every drive enabled; an error at once when it reports errors. The
@@ -229,8 +217,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Device`] when the controller reports errors, [`Error::StateTimeout`] when it does not hold the arm in this time (it
-    /// may still lack parameters), [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone.
+    /// [`StateError::Device`] when the controller reports errors, [`StateError::Timeout`] when it does not hold the arm in this time (it
+    /// may still lack parameters); those of [`Session::next_status`].
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
         let ready = |s: &Status| {
             s.state == ControllerState::HoldPos && s.joints.iter().all(|j| j.state == NodeState::ENABLED)
@@ -238,10 +226,13 @@ impl<P: Port> Session<P> {
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {
             s.state == ControllerState::Error || ready(s)
         })?;
-        if status.state == ControllerState::Error {
-            Err(Error::Device { status: Box::new(status) })
-        } else {
-            Ok(status)
-        }
+        without_error(status)
     }
+}
+
+fn without_error(status: Status) -> Result<Status, Error> {
+    if status.state == ControllerState::Error {
+        return Err(StateError::Device { status: Box::new(status) }.into());
+    }
+    Ok(status)
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, ExecCommand, Status, TrajectoryState, fixed};
 
 use super::Session;
-use crate::Error;
+use crate::error::{Error, LinkError, MotionError};
 use crate::port::Port;
 
 /// What a callback wants.
@@ -43,8 +43,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::RunFault`] when the controller ended the motion with an error, [`Error::PausedByController`] when it paused it
-    /// because of one, [`Error::Cancelled`] when `each` left it, [`Error::LinkLost`] when nothing is received any more: the arm
+    /// [`MotionError::RunFault`] when the controller ended the motion with an error, [`MotionError::PausedByController`] when it paused it
+    /// because of one, [`Error::Cancelled`] when `each` left it, [`MotionError::LinkLost`] when nothing is received any more: the arm
     /// may be moving.
     pub fn follow(&mut self, mut each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         let start = self.port.now();
@@ -63,11 +63,13 @@ impl<P: Port> Session<P> {
             }
             let flow = each(&status);
             if status.state == ControllerState::Error || status.errors != 0 {
-                return Err(Error::RunFault { point, status: Box::new(status) });
+                return Err(MotionError::RunFault { point, status: Box::new(status) }.into());
             }
             let before = *occurred.get_or_insert(errors_occurred(&status));
             if status.trajectory == TrajectoryState::Pause && errors_occurred(&status) != before {
-                return Err(Error::PausedByController { point, before, status: Box::new(status) });
+                return Err(
+                    MotionError::PausedByController { point, before, status: Box::new(status) }.into()
+                );
             }
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
@@ -77,7 +79,7 @@ impl<P: Port> Session<P> {
                 | (_, Some(ControllerState::Start | ControllerState::Init))
                     if begun =>
                 {
-                    return Err(Error::RunFault { point, status: Box::new(status) });
+                    return Err(MotionError::RunFault { point, status: Box::new(status) }.into());
                 }
                 _ => {}
             }
@@ -97,7 +99,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Nothing comes back any more; what goes out may still arrive, and an arm that nobody follows had better stand.
-    fn lost_in_motion(&mut self, error: Error) -> Error {
+    fn lost_in_motion(&mut self, error: LinkError) -> Error {
         let sent =
             self.last.is_none_or(|s| s.is_executing()) && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
         self.link_lost(error, sent)
@@ -112,7 +114,7 @@ fn errors_occurred(status: &Status) -> [u16; 6] {
 /// A pause or stop may cross with the end of the motion: it is refused then, and that is no failure.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
-        Err(Error::Refused { trajectory, .. })
+        Err(Error::Link(LinkError::Refused { trajectory, .. }))
             if trajectory.is_in(&[
                 TrajectoryState::Stop,
                 TrajectoryState::Pause,

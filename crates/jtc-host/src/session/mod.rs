@@ -26,8 +26,7 @@ pub use upload::{Progress, UploadReport};
 
 pub use crate::trajectory::UploadOptions;
 
-use crate::Error;
-use crate::error::accepted;
+use crate::error::{Error, LinkError, StateError, accepted};
 use crate::port::{Port, line_time};
 
 /// Called with each status and the port's time.
@@ -134,8 +133,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Port`] when the port is gone.
-    pub fn poll(&mut self, timeout: Duration) -> Result<Option<Status>, Error> {
+    /// [`LinkError::Port`] when the port is gone.
+    pub fn poll(&mut self, timeout: Duration) -> Result<Option<Status>, LinkError> {
         let end = self.port.now() + timeout;
         loop {
             if let Some(status) = self.arrived.pop_front() {
@@ -152,12 +151,12 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::NoLink`] when none comes within [`Patience::status`], [`Error::Port`] when the port is gone.
-    pub fn next_status(&mut self) -> Result<Status, Error> {
+    /// [`LinkError::NoLink`] when none comes within [`Patience::status`], [`LinkError::Port`] when the port is gone.
+    pub fn next_status(&mut self) -> Result<Status, LinkError> {
         let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
         match self.poll(self.patience.status)? {
             Some(status) => Ok(status),
-            None => Err(Error::NoLink {
+            None => Err(LinkError::NoLink {
                 port: self.port.name(),
                 baud: self.port.baud(),
                 waited_s: (self.port.now() - start).as_secs_f64(),
@@ -171,13 +170,13 @@ impl<P: Port> Session<P> {
     /// # Errors
     ///
     /// Those of [`Session::next_status`].
-    pub fn fresh_status(&mut self) -> Result<Status, Error> {
+    pub fn fresh_status(&mut self) -> Result<Status, LinkError> {
         self.catch_up()?;
         self.next_status()
     }
 
     /// Takes in what has arrived, without waiting.
-    fn catch_up(&mut self) -> Result<(), Error> {
+    fn catch_up(&mut self) -> Result<(), LinkError> {
         // Bounded, so that a line that never stops talking cannot hold us.
         for _ in 0..64 {
             if self.read(Duration::ZERO)? == 0 {
@@ -188,7 +187,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    fn read(&mut self, timeout: Duration) -> Result<usize, Error> {
+    fn read(&mut self, timeout: Duration) -> Result<usize, LinkError> {
         let mut buffer = [0; 4096];
         let n = self.port.read(&mut buffer, timeout)?;
         self.statistics.bytes_received += n as u64;
@@ -220,7 +219,7 @@ impl<P: Port> Session<P> {
         Ok(n)
     }
 
-    fn write(&mut self, frame: &[u8]) -> Result<(), Error> {
+    fn write(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         self.port.write_all(frame)?;
         self.statistics.bytes_sent += frame.len() as u64;
         self.statistics.frames_sent += 1;
@@ -234,7 +233,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Sends a frame and waits for its record; frames that arrive damaged are sent again. Not public: a frame can start a motion.
-    fn request(&mut self, frame: &[u8]) -> Result<Response, Error> {
+    fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = frame.get(1).copied().unwrap_or(0);
         let mut bad = None;
         self.catch_up()?;
@@ -251,11 +250,11 @@ impl<P: Port> Session<P> {
         if self.port.now() - self.last_heard > self.patience.status {
             self.next_status()?;
         }
-        Err(Error::NotConfirmed { request: frame_type(kind), tries: self.patience.tries, last: bad })
+        Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.patience.tries, last: bad })
     }
 
     /// The record of the frame just sent; `None` when none came in time.
-    fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, Error> {
+    fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, LinkError> {
         let end = self.port.now() + self.confirmation_time(len);
         loop {
             while let Some(record) = self.records.pop_front() {
@@ -273,14 +272,14 @@ impl<P: Port> Session<P> {
     }
 
     /// Sends a command; an error when it is refused.
-    fn command(&mut self, frame: &[u8]) -> Result<(), Error> {
+    fn command(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         let record = self.request(frame)?;
         if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
     }
 
-    fn refused(&self, record: Response) -> Error {
+    fn refused(&self, record: Response) -> LinkError {
         let last = self.last.unwrap_or_default();
-        Error::Refused {
+        LinkError::Refused {
             request: frame_type(record.frame_type),
             code: record.data,
             state: last.state,
@@ -292,8 +291,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::StateTimeout`] with the last status, [`Error::NoLink`] when the controller falls silent, [`Error::Port`] when the
-    /// port is gone.
+    /// [`StateError::Timeout`] with the last status, and those of [`Session::next_status`].
     pub fn wait_for(
         &mut self,
         what: &'static str,
@@ -308,11 +306,8 @@ impl<P: Port> Session<P> {
             }
             let waited = self.port.now() - start;
             if waited >= timeout {
-                return Err(Error::StateTimeout {
-                    what,
-                    waited_s: waited.as_secs_f64(),
-                    status: Box::new(status),
-                });
+                let waited_s = waited.as_secs_f64();
+                return Err(StateError::Timeout { what, waited_s, status: Box::new(status) }.into());
             }
         }
     }

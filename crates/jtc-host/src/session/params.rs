@@ -5,8 +5,9 @@ use jtc_wire::{DataStatus, FrameType};
 
 use super::{Parameter, Session};
 use crate::arm::ParameterSet;
+use crate::error::{Error, LinkError, ParametersError};
+use crate::frame;
 use crate::port::Port;
-use crate::{Error, frame};
 
 /// A parameter that the controller confirmed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -26,9 +27,9 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] before anything is sent, for numbers that no frame carries or that are not physical;
-    /// [`Error::BeyondBounds`] or [`Error::Refused`] when the controller refuses one, which keeps what it had;
-    /// [`Error::NotConfirmed`], [`Error::NoLink`] and [`Error::Port`] of the line.
+    /// [`ParametersError::Value`] before anything is sent, for numbers that no frame carries or that are not physical;
+    /// [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] when the controller refuses one, which keeps what it had;
+    /// the other [`LinkError`]s of the line.
     pub fn push(&mut self, set: &ParameterSet, mut done: impl FnMut(&Pushed)) -> Result<Vec<Pushed>, Error> {
         set.check()?;
         let mut frames = Vec::new();
@@ -62,13 +63,18 @@ impl<P: Port> Session<P> {
 }
 
 /// A refused value by its name, where one of the set is beyond the bounds of the controllers that are known.
-fn explained(error: Error, set: &ParameterSet) -> Error {
-    let Error::Refused { request, code: DataStatus::IncorrectValue, .. } = error else { return error };
+fn explained(error: LinkError, set: &ParameterSet) -> Error {
+    let LinkError::Refused { request, code: DataStatus::IncorrectValue, .. } = error else {
+        return error.into();
+    };
     // Only what this frame carried.
     let part = match request {
         FrameType::PidParam => ParameterSet { pid: set.pid, ..ParameterSet::default() },
         FrameType::ArmModel => ParameterSet { model: set.model, ..ParameterSet::default() },
         _ => ParameterSet { friction: set.friction.clone(), ..ParameterSet::default() },
     };
-    part.beyond(&Config::avena()).map_or(error, |beyond| Error::BeyondBounds { request, beyond })
+    match part.beyond(&Config::avena()) {
+        Some(beyond) => ParametersError::BeyondBounds { request, beyond }.into(),
+        None => error.into(),
+    }
 }

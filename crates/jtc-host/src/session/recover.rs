@@ -7,8 +7,9 @@ use jtc_wire::{ControllerState, Status, error};
 
 use super::Session;
 use crate::arm::ParameterSet;
+use crate::error::{Error, LinkError, ParametersError, StateError};
 use crate::port::Port;
-use crate::{Error, words};
+use crate::words;
 
 /// Whose friction, gains and arm model a controller is given that misses some (J-55).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -114,8 +115,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::NoParameters`] and [`Error::IncompleteArm`], before anything is sent, when there is nothing to give the
-    /// controller; [`Error::Device`] and [`Error::StateTimeout`] when an error does not go away; those of the line.
+    /// [`ParametersError::NoSource`] and [`ParametersError::IncompleteArm`], before anything is sent, when there is nothing to give the
+    /// controller; [`StateError::Device`] and [`StateError::Timeout`] when an error does not go away; those of the line.
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,
@@ -149,7 +150,7 @@ impl<P: Port> Session<P> {
     fn give(&mut self, parameters: ParameterSource<'_>) -> Result<(), Error> {
         match parameters {
             ParameterSource::None => Ok(()),
-            ParameterSource::ControllerDefaults => self.use_defaults(),
+            ParameterSource::ControllerDefaults => Ok(self.use_defaults()?),
             ParameterSource::Arm { set, .. } => self.push(set, |_| {}).map(|_| ()),
         }
     }
@@ -233,7 +234,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
             }
             status = self.session.fresh_status()?;
         }
-        Err(Error::Device { status: Box::new(status) })
+        Err(StateError::Device { status: Box::new(status) }.into())
     }
 
     fn start_up(&mut self) -> Result<(), Error> {
@@ -252,7 +253,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
         (self.say)(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
         let up = |s: &Status| !s.is_coming_up() || (self.ended)();
         match self.session.wait_for("nodes ready", NODE_TIME, up) {
-            Err(Error::StateTimeout { status, .. }) if !self.reset_slow => {
+            Err(Error::State(StateError::Timeout { status, .. })) if !self.reset_slow => {
                 self.reset_slow = true;
                 self.reset_nodes(status.node_init)
             }
@@ -263,7 +264,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
     fn end_motion(&mut self) -> Result<(), Error> {
         (self.say)(&RecoverStep::Stop);
         match self.session.stop() {
-            Ok(()) | Err(Error::Refused { .. }) => {}
+            Ok(()) | Err(Error::Link(LinkError::Refused { .. })) => {}
             Err(e) => return Err(e),
         }
         let stands = |s: &Status| s.state != ControllerState::Operate;
@@ -294,7 +295,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
         self.clear(nodes)?;
         self.clears += 1;
         if self.clears > CLEARS_MAX {
-            return Err(Error::Device { status: Box::new(self.session.fresh_status()?) });
+            return Err(StateError::Device { status: Box::new(self.session.fresh_status()?) }.into());
         }
         Ok(())
     }
@@ -306,7 +307,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
             self.session.port.now()
         });
         if self.session.port.now() - since > PERSON_TIME {
-            return Err(Error::Device { status: Box::new(*status) });
+            return Err(StateError::Device { status: Box::new(*status) }.into());
         }
         self.acts_left += 1;
         self.clear(0)
@@ -329,21 +330,21 @@ impl ParameterSource<'_> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] or [`Error::IncompleteArm`] for a set that cannot be given whole.
-    pub fn check(&self) -> Result<(), Error> {
+    /// [`ParametersError::IncompleteArm`] for a set that cannot be given whole.
+    pub fn check(&self) -> Result<(), ParametersError> {
         match self {
             ParameterSource::Arm { name, set } if !set.missing().is_empty() => {
-                Err(Error::IncompleteArm { arm: (*name).to_owned(), missing: set.missing() })
+                Err(ParametersError::IncompleteArm { arm: (*name).to_owned(), missing: set.missing() })
             }
             _ => Ok(()),
         }
     }
 
     /// A controller that misses parameters needs a source.
-    fn enough_for(&self, status: &Status) -> Result<(), Error> {
+    fn enough_for(&self, status: &Status) -> Result<(), ParametersError> {
         match self {
             ParameterSource::None if status.jtc_init != 0 => {
-                Err(Error::NoParameters { missing: words::missing_parameters(status.jtc_init) })
+                Err(ParametersError::NoSource { missing: words::missing_parameters(status.jtc_init) })
             }
             _ => Ok(()),
         }

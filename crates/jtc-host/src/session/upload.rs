@@ -8,10 +8,10 @@ use jtc_wire::{DataStatus, EncodeError, FrameStatus, RawPoint, Response, STATUS_
 
 use super::{Flow, Session};
 use crate::check::CheckedTrajectory;
-use crate::error::accepted;
+use crate::error::{Error, UploadError, accepted};
+use crate::frame;
 use crate::port::{Port, line_time};
 use crate::trajectory::UploadOptions;
-use crate::{Error, frame};
 
 /// Times that one segment is sent.
 const SEGMENT_TRIES: u32 = 16;
@@ -178,9 +178,9 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`Error::SegmentRefused`] when the controller refuses a segment, for example because it does not hold the arm or because its
-    /// own check (J-36) found a problem; [`Error::UploadFailed`] when the line lost too much to complete it; [`Error::Cancelled`]
-    /// when `progress` ended it; [`Error::NoLink`] and [`Error::Port`] when the controller or the port is gone. The controller then
+    /// [`UploadError::SegmentRefused`] when the controller refuses a segment, for example because it does not hold the arm or because its
+    /// own check (J-36) found a problem; [`UploadError::Incomplete`] when the line lost too much to complete it; [`Error::Cancelled`]
+    /// when `progress` ended it; [`LinkError::NoLink`] and [`LinkError::Port`] when the controller or the port is gone. The controller then
     /// holds no complete trajectory, and nothing can be executed.
     pub fn upload(
         &mut self,
@@ -204,7 +204,7 @@ impl<P: Port> Session<P> {
     ) -> Result<UploadReport, Error> {
         let per_segment = options.segment_points(points.len());
         let segments = points.len().div_ceil(per_segment);
-        let refused = |code| Error::SegmentRefused { segment: 0, segments, code };
+        let refused = |code| Error::from(UploadError::SegmentRefused { segment: 0, segments, code });
         if points.is_empty() {
             return Err(refused(DataStatus::IncorrectValue));
         }
@@ -228,7 +228,7 @@ impl<P: Port> Session<P> {
                 break;
             }
             if up.restarts >= RESTARTS {
-                return Err(self.upload_failed(&up));
+                return Err(self.upload_failed(&up).into());
             }
             up.restart();
         }
@@ -246,8 +246,8 @@ impl<P: Port> Session<P> {
         })
     }
 
-    fn upload_failed(&self, up: &Upload) -> Error {
-        Error::UploadFailed {
+    fn upload_failed(&self, up: &Upload) -> UploadError {
+        UploadError::Incomplete {
             confirmed: up.confirmed,
             segments: up.frames.len(),
             restarts: up.restarts,
@@ -328,7 +328,10 @@ impl<P: Port> Session<P> {
                 Ok(())
             }
             DataStatus::IncorrectSegmentOrder => self.start_over(up),
-            code => Err(Error::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }),
+            code => {
+                Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
+                    .into())
+            }
         }
     }
 
@@ -353,7 +356,7 @@ impl<P: Port> Session<P> {
     /// Lets what is in flight come to its end, then goes back to the first segment that is not confirmed.
     fn start_over(&mut self, up: &mut Upload) -> Result<(), Error> {
         if up.tries >= SEGMENT_TRIES {
-            return Err(self.upload_failed(up));
+            return Err(self.upload_failed(up).into());
         }
         if let Some((index, at)) = up.writing.take() {
             self.port.write_all(&up.frames[index][at..])?;

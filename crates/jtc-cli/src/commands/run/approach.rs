@@ -5,7 +5,7 @@ use std::path::Path;
 use cli_kit::Output;
 use jtc_host::check::CheckedTrajectory;
 use jtc_host::session::UploadOptions;
-use jtc_host::{Error, plan};
+use jtc_host::{CheckError, plan};
 use jtc_wire::Status;
 use serde_json::json;
 
@@ -28,7 +28,7 @@ pub fn approach(
     let path = plan::approach(&here, &first, &job.config, Some(&job.arm.model), speed)
         .map_err(|e| refused(&e.to_string(), &args.file))?;
     let checked = job.checked(&path, status, args, UploadOptions::default()).map_err(|e| {
-        let Error::Check(verdict) = e else { return e.into() };
+        let CheckError::Refused(verdict) = e else { return e.into() };
         let failure = refused(&verdict.to_string(), &args.file);
         if !out.is_json() {
             return failure;

@@ -1,0 +1,54 @@
+//! Errors of a check for a run.
+
+use host_kit::ErrorKind;
+
+use super::Diagnosis;
+use crate::arm::{Difference, NOT_CARRIED};
+use crate::check::Verdict;
+use crate::file::FileError;
+
+/// Why a trajectory may not be run; nothing was sent.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckError {
+    /// The check found problems.
+    #[error("{0}")]
+    Refused(Box<Verdict>),
+    /// The arm has values that no frame carries and that the controller uses otherwise (J-55).
+    #[error("{arm}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent ({})", values(differences.len()), listed(differences))]
+    DeviceLimits {
+        /// Name of the arm.
+        arm: String,
+        /// What differs.
+        differences: Vec<Difference>,
+    },
+    /// The numbers of the arm are not physical.
+    #[error(transparent)]
+    Arm(#[from] FileError),
+}
+
+fn values(n: usize) -> String {
+    if n == 1 { "1 value".into() } else { format!("{n} values") }
+}
+
+fn listed(differences: &[Difference]) -> String {
+    differences.iter().map(Difference::to_string).collect::<Vec<_>>().join("; ")
+}
+
+impl CheckError {
+    /// Kind, name and what helps.
+    pub fn diagnosis(&self) -> Diagnosis {
+        match self {
+            Self::Refused(verdict) => Diagnosis::new(ErrorKind::Refused, "check", verdict.hint()),
+            Self::DeviceLimits { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "device-limits",
+                format!(
+                    "no frame carries {NOT_CARRIED}. Build the firmware for this arm, or, where the controller's values are safe for \
+                     it, accept them (`--accept-device-limits`)"
+                ),
+            ),
+            Self::Arm(e) => Diagnosis::new(ErrorKind::Usage, "file", e.hint()),
+        }
+    }
+}

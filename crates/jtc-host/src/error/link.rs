@@ -1,0 +1,140 @@
+//! Errors of an exchange with the controller.
+
+use host_kit::ErrorKind;
+use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Response, TrajectoryState};
+
+use super::Diagnosis;
+use crate::port::PortError;
+use crate::words;
+
+/// Why a request got no answer, or not the one that was asked for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The port cannot be used.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// No status came.
+    #[error("{port}: no status within {waited_s:.1} s ({})", heard(*bytes))]
+    NoLink {
+        /// Name of the port.
+        port: String,
+        /// Rate of the line, Bd.
+        baud: Option<u32>,
+        /// How long was waited, s.
+        waited_s: f64,
+        /// Bytes that came meanwhile.
+        bytes: u64,
+    },
+    /// A request was not confirmed, although statuses come.
+    #[error("{}: not confirmed in {tries} tries", words::request(*request))]
+    NotConfirmed {
+        /// The request.
+        request: FrameType,
+        /// How often it was sent.
+        tries: u32,
+        /// The last bad record for it, if one came.
+        last: Option<Response>,
+    },
+    /// The controller refused a request.
+    #[error("{}: {} (state {}, trajectory {})", words::request(*request), words::data_status(*code), state, trajectory)]
+    Refused {
+        /// The request.
+        request: FrameType,
+        /// Why.
+        code: DataStatus,
+        /// State of the controller then.
+        state: Code<ControllerState>,
+        /// Trajectory execution state then.
+        trajectory: Code<TrajectoryState>,
+    },
+}
+
+fn heard(bytes: u64) -> String {
+    match bytes {
+        0 => "no byte came".into(),
+        n => format!("{n} bytes came, but no frame in them"),
+    }
+}
+
+impl LinkError {
+    /// Kind, name and what helps.
+    pub fn diagnosis(&self) -> Diagnosis {
+        let no_link = |code, next: String| Diagnosis::new(ErrorKind::NoLink, code, next);
+        match self {
+            Self::Port(e) => no_link("port", e.hint()),
+            Self::NoLink { bytes: 0, .. } => no_link(
+                "no-link",
+                "check cable and power of the controller, then `jtc doctor`; is it the right one of `jtc ports`?".into(),
+            ),
+            Self::NoLink { baud, .. } => {
+                let baud = baud.map_or("none".into(), |b| b.to_string());
+                no_link(
+                    "no-link",
+                    format!("the rate is probably wrong ({baud} Bd here): try `--baud`, `jtc doctor` tries them all"),
+                )
+            }
+            Self::NotConfirmed { .. } => {
+                no_link("not-confirmed", "the line towards the controller loses bytes: `jtc doctor`".into())
+            }
+            Self::Refused { request, code, state, trajectory } => {
+                let next = match request {
+                    FrameType::TrajSetExecStatus => after_refused_execution(*code, *state, *trajectory),
+                    _ => None,
+                };
+                Diagnosis::new(ErrorKind::Device, "refused", next.unwrap_or_else(|| after_refusal(*code, *state)))
+            }
+        }
+    }
+
+    /// The line or the port failed: whether the controller received the request is not known.
+    pub(crate) fn is_loss(&self) -> bool {
+        !matches!(self, Self::Refused { .. })
+    }
+}
+
+/// What helps where execute, pause or stop was refused for a reason of its own.
+fn after_refused_execution(
+    code: DataStatus,
+    state: Code<ControllerState>,
+    trajectory: Code<TrajectoryState>,
+) -> Option<&'static str> {
+    use TrajectoryState::*;
+    if trajectory == Pause && is_place(code) {
+        return Some(
+            "the arm was moved since it was paused: resume needs each joint where it paused, to 0.02 rad. `jtc traj stop`, then \
+             `jtc traj run FILE --approach`",
+        );
+    }
+    // Execution from there is refused for another reason, and resume is not sent.
+    let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
+    (idle && code == DataStatus::NotAllowed).then_some(
+        "nothing is being executed, so there is nothing to pause or stop; `jtc status` shows the state",
+    )
+}
+
+/// The arm is not where the command needs it. On a line that did not ask for more, code 6 stands for 7 and 8 (J-51).
+fn is_place(code: DataStatus) -> bool {
+    matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
+}
+
+/// What helps after a refusal with this code in this state.
+pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> &'static str {
+    match (code, state.known()) {
+        (DataStatus::NotAllowed, Some(ControllerState::Start | ControllerState::Init)) => {
+            "the controller is not ready yet: `jtc doctor` names what is missing"
+        }
+        (DataStatus::NotAllowed, Some(ControllerState::Error)) => "the controller is in Error: `jtc recover`",
+        (DataStatus::NotAllowed, Some(ControllerState::Teaching)) => "`jtc teach off` first",
+        (DataStatus::NotAllowed, _) => "`jtc status` shows the state; `jtc traj stop` ends a trajectory",
+        (DataStatus::StartPositionMismatch, _) => {
+            "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first"
+        }
+        _ => "`jtc explain` tells about each code",
+    }
+}
+
+/// A record says that its frame was taken.
+pub(crate) fn accepted(r: &Response) -> bool {
+    r.status == FrameStatus::NoError && r.data == DataStatus::NoError
+}

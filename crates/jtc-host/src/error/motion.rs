@@ -1,0 +1,147 @@
+//! Errors of an execution: before it begins, and on the way.
+
+use host_kit::ErrorKind;
+use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
+
+use super::{Diagnosis, LinkError};
+use crate::words;
+
+/// Why a motion did not begin, or did not end as asked for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MotionError {
+    /// Execution was asked for of a trajectory that this session did not upload, or that the controller lost since; nothing was
+    /// sent.
+    #[error(
+        "the controller does not hold this trajectory: it was not uploaded, another one was since, or an error made the controller forget it; nothing was sent"
+    )]
+    NotUploaded,
+    /// Resume was asked for, and nothing is paused.
+    #[error("{} (state {}, trajectory {})", not_paused(*trajectory), state, trajectory)]
+    NotPaused {
+        /// State of the controller.
+        state: Code<ControllerState>,
+        /// Trajectory execution state.
+        trajectory: Code<TrajectoryState>,
+    },
+    /// The motion did not end as asked for.
+    #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::errors_line(status))]
+    RunFault {
+        /// Index of the 1 ms point where it ended.
+        point: u32,
+        /// The status that says so.
+        status: Box<Status>,
+    },
+    /// The controller paused the motion because of an error that it could still act upon (J-66).
+    #[error("the controller paused the motion at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::occurred_since(before, status))]
+    PausedByController {
+        /// Index of the 1 ms point where it is paused.
+        point: u32,
+        /// Errors of each joint that had occurred before the motion.
+        before: [u16; 6],
+        /// The status that says so.
+        status: Box<Status>,
+    },
+    /// The link was lost while the arm moves, or may move.
+    #[error("{source}. {}", where_the_arm_is(last.as_deref(), *stop_sent))]
+    LinkLost {
+        /// The last status that came.
+        last: Option<Box<Status>>,
+        /// A stop was written to the port afterwards.
+        stop_sent: bool,
+        /// What happened to the link.
+        source: Box<LinkError>,
+    },
+}
+
+/// What is known about the motion when the link is gone.
+fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
+    match last {
+        Some(s) if s.trajectory == TrajectoryState::Pause => format!(
+            "The trajectory was paused at point {}: the arm should stand there, but nothing confirms it any more",
+            s.point
+        ),
+        Some(s) if s.is_executing() => format!(
+            "THE ARM MAY BE MOVING: at the last status it was at point {} ({:.3} s) of its trajectory, and {}",
+            s.point,
+            f64::from(s.point) * 1e-3,
+            if stop_sent {
+                "a stop was sent; whether it arrived is not known"
+            } else {
+                "the controller goes on without this program"
+            }
+        ),
+        _ if stop_sent => "THE ARM MAY BE MOVING: a stop was sent; whether it arrived is not known".into(),
+        _ => "THE ARM MAY BE MOVING: whether the command arrived is not known".into(),
+    }
+}
+
+/// Right after a pause the trajectory state is still Execute, until the arm stands.
+fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
+    if trajectory == TrajectoryState::Execute {
+        "nothing is paused yet: the motion is still slowing down after a pause, or nobody paused it"
+    } else {
+        "nothing is paused: resume would start a motion, not go on with one"
+    }
+}
+
+impl MotionError {
+    /// Kind, name and what helps.
+    pub fn diagnosis(&self) -> Diagnosis {
+        let (kind, code, next) = match self {
+            Self::NotUploaded => (
+                ErrorKind::Refused,
+                "not-uploaded",
+                "check it again from the pose of the arm, upload it, then execute it (`jtc traj run FILE`)",
+            ),
+            Self::NotPaused { trajectory, .. } => (
+                ErrorKind::Refused,
+                "not-paused",
+                if *trajectory == TrajectoryState::Execute {
+                    "a pause takes up to half a second: `jtc traj resume` again once `jtc status` shows Pause"
+                } else {
+                    "`jtc traj run FILE` checks a trajectory and starts it"
+                },
+            ),
+            Self::RunFault { .. } => (
+                ErrorKind::Fault,
+                "run-fault",
+                "`jtc status` shows what is wrong, `jtc recover` leads back to HoldPos",
+            ),
+            Self::PausedByController { .. } => (
+                ErrorKind::Fault,
+                "paused-by-controller",
+                "look what keeps the arm from its path: it is held where it gave way, with little torque. `jtc traj resume` goes on \
+                 once each joint is back within 0.02 rad of the path, `jtc traj stop` gives it up",
+            ),
+            Self::LinkLost { .. } => (
+                ErrorKind::NoLink,
+                "link-lost",
+                "press the emergency stop if it must stand; or restore the link, then `jtc traj stop` and `jtc status`",
+            ),
+        };
+        Diagnosis::new(kind, code, next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// J-34: resume right after pause finds Execute until the arm stands.
+    #[test]
+    fn a_resume_too_early_is_told_from_one_without_a_pause() {
+        let early = MotionError::NotPaused {
+            state: ControllerState::Operate.into(),
+            trajectory: TrajectoryState::Execute.into(),
+        };
+        assert!(early.to_string().contains("still slowing down"), "{early}");
+        assert!(early.diagnosis().next.contains("resume` again"), "{}", early.diagnosis().next);
+        let never = MotionError::NotPaused {
+            state: ControllerState::HoldPos.into(),
+            trajectory: TrajectoryState::Finish.into(),
+        };
+        assert!(never.to_string().contains("would start a motion"), "{never}");
+        assert_eq!([early.diagnosis().kind, never.diagnosis().kind], [ErrorKind::Refused; 2]);
+    }
+}

@@ -1,0 +1,66 @@
+//! Errors of giving friction, gains and arm model to the controller.
+
+use host_kit::ErrorKind;
+use jtc_wire::{DataStatus, FrameType};
+
+use super::Diagnosis;
+use crate::arm::{Beyond, ParameterError};
+use crate::words;
+
+/// Why the controller was not given its parameters.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParametersError {
+    /// A value does not fit into its frame or is not physical.
+    #[error(transparent)]
+    Value(#[from] ParameterError),
+    /// The controller refused a parameter, and this is beyond the bounds of known controllers.
+    #[error("{}: {}: {beyond}", words::request(*request), words::data_status(DataStatus::IncorrectValue))]
+    BeyondBounds {
+        /// The request.
+        request: FrameType,
+        /// Joint, value and bounds.
+        beyond: Beyond,
+    },
+    /// The controller needs parameters, and nobody said whose.
+    #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
+    NoSource {
+        /// What it misses.
+        missing: Vec<&'static str>,
+    },
+    /// An arm file does not hold all that a controller needs.
+    #[error("{arm}: {} missing; parts of another arm are not filled in, nothing was sent", missing.join(", "))]
+    IncompleteArm {
+        /// Name of the arm.
+        arm: String,
+        /// What it lacks.
+        missing: Vec<&'static str>,
+    },
+}
+
+impl ParametersError {
+    /// Kind, name and what helps.
+    pub fn diagnosis(&self) -> Diagnosis {
+        match self {
+            Self::Value(e) => Diagnosis::new(ErrorKind::Usage, "parameter", e.hint()),
+            Self::BeyondBounds { .. } => Diagnosis::new(
+                ErrorKind::Device,
+                "beyond-bounds",
+                "such a number would throw or drop the arm: correct the file (`jtc params show FILE`); what the controller had before \
+                 is unchanged",
+            ),
+            Self::NoSource { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "no-parameters",
+                "`jtc recover --arm FILE` gives the numbers of your arm; `jtc recover --defaults` those of the arm that is built into \
+                 the controller, when it is that one",
+            ),
+            Self::IncompleteArm { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "incomplete-arm",
+                "a URDF holds neither friction nor gains: copy arms/avena.toml and put in all numbers of this arm, or name all files \
+                 with `jtc params push`",
+            ),
+        }
+    }
+}

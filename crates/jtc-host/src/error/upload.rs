@@ -1,0 +1,52 @@
+//! Errors of an upload.
+
+use host_kit::ErrorKind;
+use jtc_wire::{Code, ControllerState, DataStatus, TrajectoryState};
+
+use super::Diagnosis;
+use super::link::after_refusal;
+use crate::words;
+
+/// Why the controller does not hold the whole trajectory.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UploadError {
+    /// The controller refused a segment for good.
+    #[error("segment {segment} of {segments}: {}", words::data_status(*code))]
+    SegmentRefused {
+        /// Number from 0.
+        segment: usize,
+        /// How many there are.
+        segments: usize,
+        /// Why.
+        code: DataStatus,
+    },
+    /// The upload did not end with a complete trajectory.
+    #[error(
+        "upload given up after {restarts} restarts; segments confirmed: {confirmed} of {segments}, trajectory {}",
+        trajectory
+    )]
+    Incomplete {
+        /// Segments known to have arrived.
+        confirmed: usize,
+        /// How many there are.
+        segments: usize,
+        /// Times the whole was begun again.
+        restarts: u32,
+        /// Trajectory execution state at the end.
+        trajectory: Code<TrajectoryState>,
+    },
+}
+
+impl UploadError {
+    /// Kind, name and what helps.
+    pub fn diagnosis(&self) -> Diagnosis {
+        let (code, next) = match self {
+            Self::SegmentRefused { code, .. } => {
+                ("segment-refused", after_refusal(*code, ControllerState::HoldPos.into()))
+            }
+            Self::Incomplete { .. } => ("upload-failed", "`jtc doctor` looks at the line; then run it again"),
+        };
+        Diagnosis::new(ErrorKind::Device, code, next)
+    }
+}

@@ -5,8 +5,9 @@
 //! commanded, which stops every load that it can hold, and the set position *sags* behind the joint: by as much as the computed
 //! torque exceeds the limit. So the joint comes to rest where the limit has stopped it. Held at its old position instead, it
 //! would be thrown upwards and fall again, for ever when there is little friction.
-use crate::config::{Config, JointConfig};
+use crate::config::Config;
 use crate::deceleration::moves;
+use crate::limits::JointConfig;
 
 /// How long a joint has to have been at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a
 /// swing.

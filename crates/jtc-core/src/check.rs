@@ -15,9 +15,10 @@ mod tests;
 use jtc_wire::{POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
 
 use crate::JOINTS;
-use crate::config::{Config, TableOf};
+use crate::config::Config;
 use crate::friction;
 use crate::interpolation::SetPoint;
+use crate::parameters::TableOf;
 use curve::{Leaves, bound_crossed, leaves};
 pub(crate) use screen::SpeedRange;
 use screen::{Screen, Steps};

@@ -1,31 +1,12 @@
-//! Settings and parameters of the controller.
+//! Settings of the controller.
 use jtc_bus::config;
-use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
-use crate::parameters::ParameterBounds;
+use crate::bounds::ParameterBounds;
+use crate::limits::JointConfig;
 
 /// Half of the drives' working area, rad either way from zero (J-43).
 pub const WORKING_AREA: f64 = 2.9905;
-
-/// Settings of one joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointConfig {
-    /// Lowest position, rad.
-    pub position_min: f64,
-    /// Highest position, rad.
-    pub position_max: f64,
-    /// Highest speed, rad/s.
-    pub velocity_max: f64,
-    /// Highest acceleration, rad/s².
-    pub acceleration_max: f64,
-    /// Highest torque at the joint, N·m.
-    pub torque_max: f64,
-    /// Largest difference of commanded and measured position, rad.
-    pub position_error_max: f64,
-    /// Reflected inertia of the drive's rotor, kg·m² at the joint (J-40).
-    pub rotor_inertia: f64,
-}
 
 /// Settings of the device. They are not sent by the host.
 #[derive(Clone, Debug, PartialEq)]
@@ -233,53 +214,6 @@ impl Config {
         }
         Ok(())
     }
-}
-
-/// Gains of one joint (J-41).
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct PidGains {
-    /// N·m/rad.
-    pub kp: f64,
-    /// N·m/(rad·s).
-    pub ki: f64,
-    /// N·m·s/rad.
-    pub kd: f64,
-    /// Lower bound of the integral of the error, rad·s.
-    pub int_min: f64,
-    /// Upper bound of the integral of the error, rad·s.
-    pub int_max: f64,
-}
-
-/// Friction table of one joint: rows are velocities.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TableOf<T> {
-    /// rad/s, strictly increasing.
-    pub velocity: [T; 20],
-    /// °C, strictly increasing.
-    pub temperature: [T; 20],
-    /// N·m, `[velocity][temperature]`.
-    pub torque: [[T; 20]; 20],
-}
-
-/// Friction compensation (J-42).
-#[derive(Clone, Debug, PartialEq)]
-#[allow(clippy::large_enum_variant)]
-pub enum Friction {
-    /// c0..c5 per joint, ascending; c4 = 0 means no temperature factor.
-    Polynomial([[f64; 6]; JOINTS]),
-    /// One table per joint.
-    Table([TableOf<f32>; JOINTS]),
-}
-
-/// What the host sends, or the defaults (section 7).
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parameters {
-    /// Kinematics and masses.
-    pub model: ArmModel,
-    /// Per joint.
-    pub pid: [PidGains; JOINTS],
-    /// Friction compensation.
-    pub friction: Friction,
 }
 
 #[cfg(test)]

@@ -1,46 +1,22 @@
 //! The controller: state machine and tick (section 4).
-use jtc_dynamics::Dynamics;
-use jtc_wire::{RawPoint, Response, STATUS_LEN, missing_parameter};
+use jtc_wire::{RawPoint, Response, STATUS_LEN};
 
 use crate::check::{TrajectoryCheck, Violation};
-use crate::config::{Config, PidGains, TableOf};
-use crate::defaults;
+use crate::config::Config;
 use crate::errors::Errors;
 use crate::execution::Path;
-use crate::host::{Overtaking, SliceProgress};
+use crate::host::overtaking::Overtaking;
+use crate::host::slices::SliceProgress;
 use crate::io::{Inputs, Outputs};
 use crate::late::LateTicks;
-use crate::motion::{ControlMode, ControlParameters, Motion};
+use crate::motion::{ControlMode, Motion};
 use crate::nodes::{Goal, Nodes};
 use crate::path::PathClock;
+use crate::received::ReceivedParameters;
 use crate::response_queue::{HOST_LINES, ResponseQueues};
 use crate::store::Store;
 use crate::telemetry::Telemetry;
 use crate::{ControllerState, JOINTS, TrajectoryState};
-
-/// The parameters received from the host: one bit each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct ReceivedParameters(u8);
-
-impl ReceivedParameters {
-    pub const FRICTION: u8 = missing_parameter::FRICTION;
-    pub const PID: u8 = missing_parameter::PID;
-    pub const MODEL: u8 = missing_parameter::MODEL;
-
-    pub fn set(&mut self, bit: u8) {
-        self.0 |= bit;
-    }
-
-    /// The host has to send it again.
-    pub fn withdraw(&mut self, bit: u8) {
-        self.0 &= !bit;
-    }
-
-    /// The byte of the status: 1 = missing.
-    pub fn missing(self) -> u8 {
-        !self.0 & (Self::FRICTION | Self::PID | Self::MODEL)
-    }
-}
 
 /// The joint trajectory controller. `M` is the memory of its trajectory: [`crate::POINTS_MAX`] points.
 ///
@@ -52,13 +28,8 @@ pub struct Controller<M> {
     pub(crate) state: ControllerState,
     pub(crate) errors: Errors,
     pub(crate) nodes: Nodes,
-    // Parameters received from the host.
-    pub(crate) received: ReceivedParameters,
-    pub(crate) dynamics: Dynamics,
-    pub(crate) pid: [PidGains; JOINTS],
-    pub(crate) polynomial: [[f64; 6]; JOINTS],
-    pub(crate) tables: [TableOf<f32>; JOINTS],
-    pub(crate) friction_is_table: bool,
+    // Received from the host.
+    pub(crate) parameters: ReceivedParameters,
     pub(crate) teaching: bool,
     /// Milliseconds for which teaching has waited until the arm is held.
     teaching_waits_ms: u32,
@@ -67,8 +38,6 @@ pub struct Controller<M> {
     pub(crate) store: Store<M>,
     pub(crate) check: TrajectoryCheck,
     pub(crate) violation: Option<Violation>,
-    /// Friction was received since the trajectory was checked.
-    pub(crate) friction_is_new: bool,
     pub(crate) trajectory: TrajectoryState,
     pub(crate) clock: PathClock,
     pub(crate) path: Path,
@@ -92,19 +61,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             state: ControllerState::Start,
             errors: Errors::default(),
             nodes: Nodes::new(&config),
-            received: ReceivedParameters::default(),
-            dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
-            pid: defaults::PID,
-            polynomial: defaults::POLYNOMIAL,
-            tables: core::array::from_fn(|j| *defaults::friction_table(j)),
-            friction_is_table: false,
+            parameters: ReceivedParameters::new(&config),
             teaching: false,
             teaching_waits_ms: 0,
             pump: false,
             store: Store::new(points),
             check: TrajectoryCheck::new(&config, 1, None),
             violation: None,
-            friction_is_new: false,
             trajectory: TrajectoryState::Null,
             clock: PathClock::default(),
             path: Path::BEGIN,
@@ -239,12 +202,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Priority: Error, Init, Teaching, HoldPos, Operate.
     fn select_state(&mut self) {
         // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
-        let initialised = self.received.missing() == 0
+        let initialised = self.parameters.missing() == 0
             && !self.nodes.clearing()
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
-        if initialised && !self.powered() && !self.holdable(&self.dynamics) {
+        if initialised && !self.powered() && !self.parameters.holdable(self.nodes.positions(), &self.config) {
             // Received before the positions were known: the host has to send it again.
-            self.received.withdraw(ReceivedParameters::MODEL);
+            self.parameters.withdraw_model();
             return self.enter(if self.errors.any() {
                 ControllerState::Error
             } else {
@@ -289,10 +252,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
             ControllerState::HoldPos if last == ControllerState::Teaching => {
-                self.motion.end_teaching(&self.nodes, &self.config, &self.pid);
+                self.motion.end_teaching(&self.nodes, &self.config, &self.parameters.pid);
             }
             ControllerState::Teaching => {
-                self.motion.begin_teaching(&self.nodes, &self.config, &self.dynamics)
+                self.motion.begin_teaching(&self.nodes, &self.config, &self.parameters.dynamics)
             }
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
@@ -349,13 +312,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Torques of the control law, and the joint errors found on the way.
     fn compute(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
         let braking = self.brake();
-        let parameters = ControlParameters {
-            dynamics: &self.dynamics,
-            pid: &self.pid,
-            polynomial: &self.polynomial,
-            table: self.friction_is_table.then_some(&self.tables),
-        };
-        self.motion.control(mode, braking, &self.nodes, &self.config, &parameters)
+        self.motion.control(mode, braking, &self.nodes, &self.config, &self.parameters.control())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Deceleration to rest of a joint that moves when it begins to be held, because a hand still led it, or because it sagged or
 //! fell while it was enabled (J-16, J-25).
-use crate::config::{Config, JointConfig};
+use crate::config::Config;
+use crate::limits::JointConfig;
 use crate::motion::smooth;
 
 /// Highest speed at which a joint counts as standing, rad/s.

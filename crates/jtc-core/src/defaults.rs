@@ -1,8 +1,10 @@
 //! What the device starts with (rules, section 7): made from `arms/avena.toml` at build time.
 use jtc_dynamics::{ArmModel, Link, Origin};
 
-use crate::config::{Config, Friction, JointConfig, Parameters, PidGains, TableOf};
-use crate::parameters::ParameterBounds;
+use crate::bounds::ParameterBounds;
+use crate::config::Config;
+use crate::limits::JointConfig;
+use crate::parameters::{Friction, Parameters, PidGains, TableOf};
 
 /// The constants as the build script wrote them.
 #[allow(clippy::excessive_precision)]

@@ -93,7 +93,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// From standstill on the path to full speed.
     fn go_on(&mut self) {
         self.clock.go();
-        self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
+        self.motion.begin_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
     /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
@@ -104,7 +104,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 if leave.replace(to).is_none() {
                     self.clock.halt();
                     self.braking_ms = Some(0);
-                    self.motion.begin_ramp(&self.nodes, &self.config, &self.dynamics);
+                    self.motion.begin_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
                 }
             }
             // It comes to rest at point 0 by itself.

@@ -1,6 +1,6 @@
 //! Friction compensation of one joint (J-42).
-use crate::config::TableOf;
 use crate::interpolation::ROUNDING;
+use crate::parameters::TableOf;
 
 /// Sign of a speed, smoothed: a straight line between −`width` and `width` (rad/s).
 fn smooth_sign(v: f64, width: f64) -> f64 {

@@ -1,4 +1,7 @@
 //! The host's commands: executed in bounded slices, answered by one record each (J-04, J-06).
+pub(crate) mod overtaking;
+pub(crate) mod slices;
+
 use jtc_wire::{
     Command, DataStatus, EVENTS_MAX, ExecCommand, LinkEvent, RawPoint, Response, Segment, UrgentCommand,
 };
@@ -10,6 +13,8 @@ use crate::friction::celsius;
 use crate::io::{HostEvent, Inputs};
 use crate::nodes::GRIPPER;
 use crate::{ControllerState, JOINTS, TrajectoryState};
+use overtaking::Overtaking;
+use slices::{SliceOutcome, SliceProgress};
 
 /// Ticks that the check of a segment takes at most (J-36), and ticks for copying it: with the record, less than 40 ms.
 const CHECK_TICKS: usize = 28;
@@ -21,40 +26,6 @@ const COPIED_PER_TICK: usize = 64;
 /// Joints and gripper in a mask of nodes.
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
-
-/// How far a long frame has been executed, a slice in each tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum SliceProgress {
-    #[default]
-    Begin,
-    /// Points checked.
-    PointCheck(usize),
-    /// Points copied.
-    PointCopy(usize),
-    /// Joints whose table is checked.
-    TableCheck(usize),
-    /// Joints whose table is copied.
-    TableCopy(usize),
-}
-
-/// What became of the urgent commands of a line whose frames have not had their turn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Overtaking {
-    /// Stops and Pauses that were accepted and have no record yet.
-    stops: u8,
-    pauses: u8,
-    /// An Execute was cancelled by them.
-    cancelled: bool,
-}
-
-impl Overtaking {
-    fn accepted(&mut self, command: UrgentCommand) -> &mut u8 {
-        match command {
-            UrgentCommand::Stop => &mut self.stops,
-            UrgentCommand::Pause => &mut self.pauses,
-        }
-    }
-}
 
 /// How an event was served.
 enum Served {
@@ -91,8 +62,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if self.execute(command.into()).is_ok()
             && let Some(overtaking) = self.overtaking.get_mut(line)
         {
-            let accepted = overtaking.accepted(command);
-            *accepted = accepted.saturating_add(count);
+            overtaking.accept(command, count);
         }
     }
 
@@ -109,12 +79,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let (data, served) = match Command::parse(frame) {
                     Err(status) => (status, Served::Quickly),
                     Ok(command) => {
-                        let served = if self.is_quick(&command) { Served::Quickly } else { Served::Fully };
                         let (progress, served) = match command {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
-                                (self.overtaken(received.line, exec).into(), Served::Quickly)
+                                (overtaking.overtaken(exec, self.trajectory).into(), Served::Quickly)
                             }
-                            command => (self.carry_out(command), served),
+                            command => {
+                                let quick = self.is_quick(&command);
+                                (self.carry_out(command), if quick { Served::Quickly } else { Served::Fully })
+                            }
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
@@ -138,25 +110,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         served
     }
 
-    /// Data status of an execution command that an urgent one has overtaken (J-04). A Stop or a Pause has acted: it was
-    /// accepted, or it has cancelled an Execute, and the trajectory is in the commanded state.
-    fn overtaken(&mut self, line: usize, exec: ExecCommand) -> Result<(), DataStatus> {
-        let overtaking = self.overtaking.get_mut(line).ok_or(DataStatus::NotAllowed)?;
-        let Some(command) = UrgentCommand::from_exec(exec) else {
-            overtaking.cancelled = true;
-            return Err(DataStatus::NotAllowed);
-        };
-        let rests = match command {
-            UrgentCommand::Stop => TrajectoryState::Stop,
-            UrgentCommand::Pause => TrajectoryState::Pause,
-        };
-        let cancelled = core::mem::take(&mut overtaking.cancelled) && self.trajectory == rests;
-        let accepted = overtaking.accepted(command);
-        let acted = *accepted > 0;
-        *accepted = accepted.saturating_sub(1);
-        if acted || cancelled { Ok(()) } else { Err(DataStatus::NotAllowed) }
-    }
-
     /// The command takes a few instructions and leaves the state of the controller as it is, on which the next one depends.
     fn is_quick(&self, command: &Command<'_>) -> bool {
         match command {
@@ -173,6 +126,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // Parameters would change the torque under a moving arm.
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);
+        let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
+        let at = (!self.nodes.fallen_back()).then_some(self.nodes.positions());
         match command {
             Command::ClearCurrentErrors { jtc, nodes } => {
                 if jtc {
@@ -217,20 +172,26 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::GripperControl { .. } => SliceOutcome::Refused(DataStatus::NotAllowed),
             _ if !settable => SliceOutcome::Refused(DataStatus::NotAllowed),
-            Command::PidParam(floats) => self.take_pid(&floats).into(),
-            Command::PidParamUseDefault => self.set_pid(defaults::PID).into(),
-            Command::ArmModel(floats) => self.take_model(&floats).into(),
-            Command::ArmModelUseDefault => self.set_model(&defaults::MODEL).into(),
-            Command::FrictionPolynomial(floats) => self.take_polynomial(&floats).into(),
+            Command::PidParam(floats) => {
+                parameters.take_pid(&floats, config).map(|()| motion.change_mode()).into()
+            }
+            Command::PidParamUseDefault => {
+                parameters.set_pid(defaults::PID, config).map(|()| motion.change_mode()).into()
+            }
+            Command::ArmModel(floats) => {
+                parameters.take_model(&floats, at, config).map(|()| motion.change_model()).into()
+            }
+            Command::ArmModelUseDefault => {
+                parameters.set_model(&defaults::MODEL, at, config).map(|()| motion.change_model()).into()
+            }
+            Command::FrictionPolynomial(floats) => parameters.take_polynomial(&floats, config).into(),
             Command::FrictionPolynomialUseDefault => {
-                self.polynomial = defaults::POLYNOMIAL;
-                self.friction_received(false);
+                parameters.take_default_polynomial();
                 SliceOutcome::Done
             }
-            Command::FrictionTable(floats) => self.take_table(&floats),
+            Command::FrictionTable(floats) => parameters.take_table(&floats, self.slice_progress, config),
             Command::FrictionTableUseDefault => {
-                self.tables = core::array::from_fn(|j| *defaults::friction_table(j));
-                self.friction_received(true);
+                parameters.take_default_tables();
                 SliceOutcome::Done
             }
         }
@@ -257,7 +218,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Segment 0 begins a trajectory, others go on behind what was received.
     fn begin_check(&mut self, segment: &Segment<'_>) {
-        let tables = self.friction_is_table.then_some(&self.tables);
+        let tables = self.parameters.tables_in_use();
         let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
         self.check = match self.store.tail() {
             Some((points, last, speeds)) if segment.segment > 0 => check.behind(points, last, speeds),
@@ -284,7 +245,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.store.begin(segment);
         if segment.segment == 0 {
             self.set_trajectory(TrajectoryState::Null);
-            self.friction_is_new = false;
+            self.parameters.friction_is_new = false;
         }
         SliceOutcome::Unfinished(SliceProgress::PointCopy(0))
     }
@@ -336,34 +297,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// J-36: bearings inside the temperatures of the friction table and, if friction was received since the trajectory was
     /// loaded, the path inside its velocities. No other parameter that is accepted in HoldPos bears on that check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
-        if !self.friction_is_table {
-            return Ok(());
-        }
+        let Some(tables) = self.parameters.tables_in_use() else { return Ok(()) };
         let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));
-        let mut verdict = check::temperatures_inside(&temperatures, &self.tables);
-        if self.friction_is_new {
-            verdict = verdict.and(check::inside_tables(self.store.speeds(), &self.tables));
+        let mut verdict = check::temperatures_inside(&temperatures, tables);
+        if self.parameters.friction_is_new {
+            verdict = verdict.and(check::inside_tables(self.store.speeds(), tables));
         }
         verdict.map_err(|violation| {
             self.violation = Some(violation);
             DataStatus::IncorrectValue
         })
-    }
-}
-
-/// Outcome of a slice.
-pub(crate) enum SliceOutcome {
-    Done,
-    Refused(DataStatus),
-    Unfinished(SliceProgress),
-}
-
-impl From<Result<(), DataStatus>> for SliceOutcome {
-    fn from(result: Result<(), DataStatus>) -> Self {
-        match result {
-            Ok(()) => Self::Done,
-            Err(status) => Self::Refused(status),
-        }
     }
 }
 

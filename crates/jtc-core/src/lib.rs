@@ -2,6 +2,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod bounds;
 mod catch;
 pub mod check;
 mod config;
@@ -23,19 +24,22 @@ mod parameters;
 mod path;
 mod pid;
 mod reaction;
+mod received;
 mod report;
 mod response_queue;
 mod store;
 mod teach;
 mod telemetry;
 
+pub use bounds::{OutOfBounds, ParameterBounds};
 pub use check::{TrajectoryCheck, Violation};
-pub use config::{Config, ConfigError, Friction, JointConfig, Parameters, PidGains, TableOf, WORKING_AREA};
+pub use config::{Config, ConfigError, WORKING_AREA};
 pub use controller::Controller;
 pub use interpolation::{SetPoint, interpolate, position_speed};
 pub use io::{BusState, HostEvent, Inputs, Outputs};
 pub use jtc_wire::{ControllerState, TrajectoryState, error, joint_error};
-pub use parameters::{OutOfBounds, ParameterBounds};
+pub use limits::JointConfig;
+pub use parameters::{Friction, Parameters, PidGains, TableOf};
 pub use response_queue::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};
 

@@ -1,7 +1,25 @@
-//! Limits of a joint (J-43).
-use crate::config::JointConfig;
+//! Limits of a joint (J-43), and what else is set for it.
 use crate::interpolation::ROUNDING;
 use crate::joint_error;
+
+/// Settings of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointConfig {
+    /// Lowest position, rad.
+    pub position_min: f64,
+    /// Highest position, rad.
+    pub position_max: f64,
+    /// Highest speed, rad/s.
+    pub velocity_max: f64,
+    /// Highest acceleration, rad/s².
+    pub acceleration_max: f64,
+    /// Highest torque at the joint, N·m.
+    pub torque_max: f64,
+    /// Largest difference of commanded and measured position, rad.
+    pub position_error_max: f64,
+    /// Reflected inertia of the drive's rotor, kg·m² at the joint (J-40).
+    pub rotor_inertia: f64,
+}
 
 /// Ticks in which torque at its limit is counted.
 const WINDOW: u16 = 100;

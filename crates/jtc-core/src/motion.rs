@@ -7,12 +7,13 @@ use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
 use crate::catch::Catch;
-use crate::config::{Config, PidGains};
+use crate::config::Config;
 use crate::deceleration::{Deceleration, moves};
 use crate::interpolation::SetPoint;
 use crate::limits::Saturation;
 use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
+use crate::parameters::PidGains;
 use crate::pid::Pid;
 use crate::teach::Payload;
 pub(crate) use law::{ControlMode, ControlParameters, JointTorque};

@@ -1,338 +1,51 @@
-//! The parameters received from the host: gains, model and friction, taken whole or not at all (J-06).
-use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
-use jtc_wire::{DataStatus, Floats, RawPoint};
+//! What the host sends besides commands: model, gains and friction.
+use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
-use crate::config::{JointConfig, PidGains, TableOf};
-use crate::controller::{Controller, ReceivedParameters};
-use crate::friction;
-use crate::host::{SliceOutcome, SliceProgress};
 
-/// Floats of one joint's friction table; a tick checks or copies one joint.
-const TABLE_FLOATS: usize = 20 + 20 + 400;
+/// Gains of one joint (J-41).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct PidGains {
+    /// N·m/rad.
+    pub kp: f64,
+    /// N·m/(rad·s).
+    pub ki: f64,
+    /// N·m·s/rad.
+    pub kd: f64,
+    /// Lower bound of the integral of the error, rad·s.
+    pub int_min: f64,
+    /// Upper bound of the integral of the error, rad·s.
+    pub int_max: f64,
+}
 
-/// Share of the velocity limit up to which friction has been measured; a curve fitted to it may do anything beyond.
-const MEASURED: f64 = 0.5;
-/// Speeds at which a friction polynomial is checked: a cubic does not get far between them.
-const SPEEDS: u8 = 16;
-
-/// Bounds of gains, masses and friction: what lies beyond is no arm of these drives, and would throw or drop one (J-06).
+/// Friction table of one joint: rows are velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ParameterBounds {
-    /// Highest Kp, N·m/rad. No such drive is known to run with more than 28 000.
-    pub kp_max: f64,
-    /// Highest Ki, N·m/(rad·s). No such drive is known to run with more than 24 000.
-    pub ki_max: f64,
-    /// Highest Kd, N·m·s/rad. No such drive is known to run with more than 300.
-    pub kd_max: f64,
-    /// Largest magnitude of IntMin and IntMax, rad·s. Up to 120 is in use.
-    pub integral_max: f64,
-    /// Largest torque that bounds of the integral which leave out zero may force on a joint at rest, as a share of its torque
-    /// limit.
-    pub integral_bias_max: f64,
-    /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, holds 50 kg no further out than 0.73 m.
-    pub link_mass_max: f64,
-    /// Largest moment or product of inertia of a link, kg·m²: what those 50 kg have at 1.4 m.
-    pub link_inertia_max: f64,
-    /// Largest friction torque of a joint at a speed, as a share of its torque limit; of a polynomial without the factor of
-    /// its temperature. Up to 1.19 is in use.
-    pub friction_max: f64,
-    /// The same up to half of the velocity limit. Up to 0.82 is in use.
-    pub slow_friction_max: f64,
-    /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of
-    /// the torque limit: what noise of a measurement may be.
-    pub friction_reversed_max: f64,
-    /// Largest friction torque at standstill, as a share of the torque limit.
-    pub rest_friction_max: f64,
+pub struct TableOf<T> {
+    /// rad/s, strictly increasing.
+    pub velocity: [T; 20],
+    /// °C, strictly increasing.
+    pub temperature: [T; 20],
+    /// N·m, `[velocity][temperature]`.
+    pub torque: [[T; 20]; 20],
 }
 
-/// A parameter beyond its bounds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OutOfBounds {
-    /// What it is, with its unit.
-    pub what: &'static str,
-    /// Velocity that it belongs to, rad/s: friction only.
-    pub velocity: Option<f64>,
-    /// The value.
-    pub value: f64,
-    /// Lowest value.
-    pub low: f64,
-    /// Highest value.
-    pub high: f64,
+/// Friction compensation (J-42).
+#[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)]
+pub enum Friction {
+    /// c0..c5 per joint, ascending; c4 = 0 means no temperature factor.
+    Polynomial([[f64; 6]; JOINTS]),
+    /// One table per joint.
+    Table([TableOf<f32>; JOINTS]),
 }
 
-impl OutOfBounds {
-    /// Written so that a NaN is refused.
-    fn unless_within(what: &'static str, value: f64, low: f64, high: f64) -> Result<(), Self> {
-        if value >= low && value <= high {
-            Ok(())
-        } else {
-            Err(Self { what, velocity: None, value, low, high })
-        }
-    }
+/// What the host sends, or the defaults (section 7).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameters {
+    /// Kinematics and masses.
+    pub model: ArmModel,
+    /// Per joint.
+    pub pid: [PidGains; JOINTS],
+    /// Friction compensation.
+    pub friction: Friction,
 }
-
-impl From<OutOfBounds> for DataStatus {
-    fn from(_: OutOfBounds) -> Self {
-        Self::IncorrectValue
-    }
-}
-
-impl ParameterBounds {
-    /// For the known drives.
-    pub const fn known_drives() -> Self {
-        Self {
-            kp_max: 50_000.0,
-            ki_max: 50_000.0,
-            kd_max: 500.0,
-            integral_max: 1_000.0,
-            integral_bias_max: 0.25,
-            link_mass_max: 50.0,
-            link_inertia_max: 100.0,
-            friction_max: 1.5,
-            slow_friction_max: 1.0,
-            friction_reversed_max: 0.05,
-            rest_friction_max: 0.25,
-        }
-    }
-
-    /// Gains of a joint.
-    pub fn check_gains(&self, gains: &PidGains, joint: &JointConfig) -> Result<(), OutOfBounds> {
-        let PidGains { kp, ki, kd, int_min, int_max } = *gains;
-        let within = OutOfBounds::unless_within;
-        within("Kp (N·m/rad)", kp, 0.0, self.kp_max)?;
-        within("Ki (N·m/(rad·s))", ki, 0.0, self.ki_max)?;
-        within("Kd (N·m·s/rad)", kd, 0.0, self.kd_max)?;
-        within("IntMin (rad·s)", int_min, -self.integral_max, int_max)?;
-        within("IntMax (rad·s)", int_max, int_min, self.integral_max)?;
-        // The integral nearest to zero.
-        let least = int_min.max(0.0) - int_max.min(0.0);
-        within(
-            "torque that the bounds of the integral force on a joint at rest (N·m)",
-            ki * least,
-            0.0,
-            self.integral_bias_max * joint.torque_max,
-        )
-    }
-
-    /// Masses and inertias of a model that is physical.
-    pub fn check_masses(&self, model: &ArmModel) -> Result<(), OutOfBounds> {
-        for link in &model.links {
-            OutOfBounds::unless_within("mass of a link (kg)", link.mass, 0.0, self.link_mass_max)?;
-            let most = self.link_inertia_max;
-            for &inertia in &link.inertia {
-                OutOfBounds::unless_within("inertia of a link (kg·m²)", inertia, -most, most)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The torque (N·m) that compensates friction of a joint at a velocity (rad/s).
-    fn check_friction(&self, torque: f64, velocity: f64, joint: &JointConfig) -> Result<(), OutOfBounds> {
-        let speed = velocity.abs();
-        let (low, high) = if speed == 0.0 {
-            (-self.rest_friction_max, self.rest_friction_max)
-        } else if speed <= MEASURED * joint.velocity_max {
-            (-self.friction_reversed_max, self.slow_friction_max)
-        } else {
-            (-self.friction_max, self.friction_max)
-        };
-        // Against the motion is positive for both directions.
-        let along = if velocity < 0.0 { -torque } else { torque };
-        OutOfBounds::unless_within(
-            "friction torque (N·m)",
-            along,
-            low * joint.torque_max,
-            high * joint.torque_max,
-        )
-        .map_err(|e| OutOfBounds { velocity: Some(velocity), ..e })
-    }
-
-    /// A polynomial at all speeds that the joint may have. Its temperature factor is bounded by itself (J-42).
-    pub fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), OutOfBounds> {
-        let [c0, c1, c2, c3, ..] = *coefficients;
-        let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
-        let step = joint.velocity_max / f64::from(SPEEDS);
-        // Arms often move slowly: as many speeds again within the first step.
-        let slow = (1..SPEEDS).map(|k| step * f64::from(k) / f64::from(SPEEDS));
-        slow.chain((1..=SPEEDS).map(|k| step * f64::from(k))).try_for_each(|v| {
-            // The sign is smoothed around standstill, where there is no torque.
-            self.check_friction(friction::polynomial(&without_temperature, v, 0.0, v), v, joint)
-        })
-    }
-
-    /// A table at its own velocities, and at standstill.
-    pub fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), OutOfBounds> {
-        for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
-            for &torque in row {
-                // Standstill is checked below, where most tables have no row.
-                if velocity != 0.0 {
-                    self.check_friction(torque.into(), velocity.into(), joint)?;
-                }
-            }
-        }
-        for &temperature in &table.temperature {
-            // A table without standstill is good for no path (J-36).
-            if let Some(torque) = friction::table(table, 0.0, temperature.into()) {
-                self.check_friction(torque, 0.0, joint)?;
-            }
-        }
-        Ok(())
-    }
-}
-
-impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    pub(crate) fn take_pid(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
-        let mut gains = [PidGains::default(); JOINTS];
-        for (j, gain) in gains.iter_mut().enumerate() {
-            let at = |i: usize| finite(floats, 5 * j + i);
-            *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
-        }
-        self.set_pid(gains)
-    }
-
-    pub(crate) fn set_pid(&mut self, gains: [PidGains; JOINTS]) -> Result<(), DataStatus> {
-        let bounds = &self.config.parameter_bounds;
-        for (gains, joint) in gains.iter().zip(&self.config.joints) {
-            bounds.check_gains(gains, joint)?;
-        }
-        self.pid = gains;
-        self.received.set(ReceivedParameters::PID);
-        self.motion.change_mode();
-        Ok(())
-    }
-
-    pub(crate) fn take_model(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
-        let mut next = Reader { floats, next: 0 };
-        let mut model = ArmModel::default();
-        for joint in &mut model.joints {
-            *joint = next.origin()?;
-        }
-        for link in &mut model.links {
-            *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
-        }
-        self.set_model(&model)
-    }
-
-    pub(crate) fn set_model(&mut self, model: &ArmModel) -> Result<(), DataStatus> {
-        model.check().map_err(|_| DataStatus::IncorrectValue)?;
-        self.config.parameter_bounds.check_masses(model)?;
-        let dynamics = Dynamics::new(model, self.config.gravity);
-        // Undecided before every position is known; it is checked again when Init ends.
-        if !self.nodes.fallen_back() && !self.holdable(&dynamics) {
-            return Err(DataStatus::IncorrectValue);
-        }
-        self.dynamics = dynamics;
-        self.received.set(ReceivedParameters::MODEL);
-        self.motion.change_model();
-        Ok(())
-    }
-
-    /// An arm like this can be held where it is, by the torque limits (J-06).
-    pub(crate) fn holdable(&self, dynamics: &Dynamics) -> bool {
-        let gravity = dynamics.gravity_torque(self.nodes.positions());
-        // Written so that NaN is too much.
-        let held = |(torque, joint): (&f64, &JointConfig)| torque.abs() <= joint.torque_max;
-        gravity.iter().zip(&self.config.joints).all(held)
-    }
-
-    pub(crate) fn take_polynomial(&mut self, floats: &Floats<'_>) -> Result<(), DataStatus> {
-        // 4 or 6 per joint, highest index first.
-        let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
-        let mut polynomial = [[0.0; 6]; JOINTS];
-        for (j, coefficients) in polynomial.iter_mut().enumerate() {
-            for (i, c) in coefficients.iter_mut().take(count).rev().enumerate() {
-                *c = finite(floats, count * j + i)?;
-            }
-        }
-        for (coefficients, joint) in polynomial.iter().zip(&self.config.joints) {
-            self.config.parameter_bounds.check_polynomial(coefficients, joint)?;
-        }
-        self.polynomial = polynomial;
-        self.friction_received(false);
-        Ok(())
-    }
-
-    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
-    pub(crate) fn take_table(&mut self, floats: &Floats<'_>) -> SliceOutcome {
-        match self.slice_progress {
-            SliceProgress::TableCopy(j) => {
-                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), read_table(floats, j)) {
-                    *slot = table;
-                }
-                if j + 1 < JOINTS {
-                    return SliceOutcome::Unfinished(SliceProgress::TableCopy(j + 1));
-                }
-                self.friction_received(true);
-                SliceOutcome::Done
-            }
-            progress => {
-                let j = if let SliceProgress::TableCheck(j) = progress { j } else { 0 };
-                let table = read_table(floats, j).and_then(|table| {
-                    let joint = self.config.joints.get(j).ok_or(DataStatus::IncorrectValue)?;
-                    self.config.parameter_bounds.check_table(&table, joint).map_err(DataStatus::from)
-                });
-                match table {
-                    Err(status) => SliceOutcome::Refused(status),
-                    Ok(()) if j + 1 < JOINTS => SliceOutcome::Unfinished(SliceProgress::TableCheck(j + 1)),
-                    Ok(()) => SliceOutcome::Unfinished(SliceProgress::TableCopy(0)),
-                }
-            }
-        }
-    }
-
-    pub(crate) fn friction_received(&mut self, table: bool) {
-        self.friction_is_table = table;
-        self.friction_is_new = true;
-        self.received.set(ReceivedParameters::FRICTION);
-    }
-}
-
-/// Float `i`, refused when it is NaN, infinite or not there (J-06).
-fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
-    floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
-}
-
-/// Takes finite floats one after the other.
-struct Reader<'a> {
-    floats: &'a Floats<'a>,
-    next: usize,
-}
-
-impl Reader<'_> {
-    fn float(&mut self) -> Result<f64, DataStatus> {
-        self.next += 1;
-        finite(self.floats, self.next - 1)
-    }
-
-    fn take<const N: usize>(&mut self) -> Result<[f64; N], DataStatus> {
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = self.float()?;
-        }
-        Ok(values)
-    }
-
-    fn origin(&mut self) -> Result<Origin, DataStatus> {
-        Ok(Origin { xyz: self.take()?, rpy: self.take()? })
-    }
-}
-
-fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataStatus> {
-    let mut table = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
-    let start = joint * TABLE_FLOATS;
-    let slots =
-        table.velocity.iter_mut().chain(&mut table.temperature).chain(table.torque.iter_mut().flatten());
-    for (i, slot) in slots.enumerate() {
-        *slot = floats.get(start + i).filter(|f| f.is_finite()).ok_or(DataStatus::IncorrectValue)?;
-    }
-    for axis in [&table.velocity, &table.temperature] {
-        if axis.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(DataStatus::IncorrectValue);
-        }
-    }
-    Ok(table)
-}
-
-#[cfg(test)]
-mod tests;

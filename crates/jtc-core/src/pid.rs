@@ -1,5 +1,5 @@
 //! PID controller of one joint (J-41).
-use crate::config::PidGains;
+use crate::parameters::PidGains;
 
 /// Length of a tick, s.
 const DT: f64 = 0.001;

@@ -9,7 +9,8 @@
 use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
-use crate::config::{Config, JointConfig};
+use crate::config::Config;
+use crate::limits::JointConfig;
 use crate::motion::smooth;
 
 /// Ticks over which the missing torque is averaged: the time constant of a low-pass filter.

@@ -2,9 +2,10 @@
 extern crate std;
 use std::vec::Vec;
 
-use jtc_wire::{FrameRef, FrameStatus, FrameType, UrgentCommands};
+use jtc_wire::{FrameRef, FrameStatus, FrameType, UrgentCommands, missing_parameter};
 
 use super::*;
+use crate::nodes::Nodes;
 use crate::{BusState, Config, HOST_LINES};
 
 type Bench = Controller<[RawPoint; 64]>;
@@ -140,12 +141,12 @@ fn j36_a_segment_is_checked_with_its_last_point() {
 #[test]
 fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     let mut controller = holding();
-    controller.friction_is_new = true;
+    controller.parameters.friction_is_new = true;
     load(&mut controller, 0, 4);
-    assert!(!controller.friction_is_new);
-    controller.friction_is_new = true;
+    assert!(!controller.parameters.friction_is_new);
+    controller.parameters.friction_is_new = true;
     load(&mut controller, 1, 4);
-    assert!(controller.friction_is_new);
+    assert!(controller.parameters.friction_is_new);
     assert_eq!(controller.trajectory, TrajectoryState::Stop);
 }
 
@@ -158,8 +159,8 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
         [(true, true, true), (true, false, false), (false, true, false), (false, false, false)]
     {
         let mut controller = holding();
-        (controller.friction_is_table, controller.friction_is_new) = (table, new);
-        for table in &mut controller.tables {
+        (controller.parameters.friction_is_table, controller.parameters.friction_is_new) = (table, new);
+        for table in &mut controller.parameters.tables {
             // Bearings of 0 °C.
             table.temperature = core::array::from_fn(|i| i as f32);
         }
@@ -170,5 +171,22 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
         let verdict = controller.check_friction();
         assert_eq!(verdict, if refused { Err(DataStatus::IncorrectValue) } else { Ok(()) }, "{table} {new}");
         assert_eq!(controller.violation.map(|v| v.joint), refused.then_some(3), "{table} {new}");
+    }
+}
+
+/// Gravity from the side, and limits that no arm keeps there.
+#[test]
+fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
+    for (known, torque_max, taken) in [(false, 0.01, true), (true, 0.01, false), (true, 500.0, true)] {
+        let mut controller = holding();
+        controller.config.gravity = [9.81, 0.0, 0.0];
+        controller.config.joints.iter_mut().for_each(|joint| joint.torque_max = torque_max);
+        if known {
+            controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        }
+        let outcome = controller.carry_out(Command::ArmModelUseDefault);
+        assert_eq!(matches!(outcome, SliceOutcome::Done), taken, "{known} {torque_max}");
+        let missing = controller.parameters.missing() & missing_parameter::MODEL;
+        assert_eq!(missing == 0, taken, "{known} {torque_max}");
     }
 }

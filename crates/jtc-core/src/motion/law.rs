@@ -2,8 +2,9 @@
 use jtc_dynamics::Dynamics;
 
 use super::Motion;
-use crate::config::{Config, PidGains, TableOf};
+use crate::config::Config;
 use crate::nodes::Nodes;
+use crate::parameters::{PidGains, TableOf};
 use crate::pid::PidTorque;
 use crate::{JOINTS, friction, joint_error, limits};
 

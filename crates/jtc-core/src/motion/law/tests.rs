@@ -2,8 +2,8 @@
 use super::*;
 use crate::Parameters;
 use crate::catch::Catch;
-use crate::config::Friction;
 use crate::deceleration::Deceleration;
+use crate::parameters::Friction;
 
 /// A bent arm: gravity loads joint 2 with some tens of N·m.
 const POSE: [f64; JOINTS] = [0.1, 0.9, 0.4, -0.2, 0.3, 0.5];

@@ -1,9 +1,8 @@
 //! The bounds of parameters (J-06): each is reached, and nothing is beyond.
-extern crate std;
-use std::vec::Vec;
+use jtc_dynamics::Link;
 
 use super::*;
-use crate::{Config, ControllerState};
+use crate::Config;
 
 const BOUNDS: ParameterBounds = ParameterBounds::known_drives();
 
@@ -157,65 +156,4 @@ fn j06_of_a_table_the_first_row_in_motion_is_named() {
         torque: core::array::from_fn(|i| [if i < 10 { 0.0 } else { 101.0 }; 20]),
     };
     assert_eq!(BOUNDS.check_table(&table, &joint()).map_err(|e| e.velocity), Err(Some(0.125)));
-}
-
-#[test]
-fn j06_a_model_may_need_the_whole_torque_limit() {
-    for (times, held) in [(1.0, true), (0.999, false), (1.001, true)] {
-        let mut controller = bench();
-        let dynamics = Dynamics::new(&crate::Parameters::avena().model, [9.81, 0.0, 0.0]);
-        let needed = dynamics.gravity_torque(controller.nodes.positions());
-        assert!(needed[1].abs() > 1.0, "{needed:?}");
-        for (joint, needed) in controller.config.joints.iter_mut().zip(needed) {
-            joint.torque_max = times * needed.abs();
-        }
-        assert_eq!(controller.holdable(&dynamics), held, "{times}");
-    }
-}
-
-fn bench() -> Controller<[RawPoint; 4]> {
-    let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
-    controller.state = ControllerState::HoldPos;
-    controller
-}
-
-/// Gravity from the side, and limits that no arm keeps there.
-#[test]
-fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
-    for (known, torque_max, taken) in [(false, 0.01, true), (true, 0.01, false), (true, 500.0, true)] {
-        let mut controller = bench();
-        controller.config.gravity = [9.81, 0.0, 0.0];
-        controller.config.joints.iter_mut().for_each(|joint| joint.torque_max = torque_max);
-        if known {
-            controller.nodes = crate::nodes::Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
-        }
-        let verdict = controller.set_model(&crate::Parameters::avena().model);
-        assert_eq!(verdict.is_ok(), taken, "{known} {torque_max}");
-        assert_eq!(
-            controller.received.missing() & ReceivedParameters::MODEL == 0,
-            taken,
-            "{known} {torque_max}"
-        );
-    }
-}
-
-/// A joint a tick: each is checked once and copied once.
-#[test]
-fn j06_a_table_takes_twelve_ticks() {
-    let crate::Friction::Table(tables) = crate::Parameters::avena_friction_table() else {
-        panic!("no table")
-    };
-    let numbers = tables.iter().flat_map(|table| {
-        table.velocity.into_iter().chain(table.temperature).chain(table.torque.into_iter().flatten())
-    });
-    let bytes: Vec<u8> = numbers.flat_map(f32::to_be_bytes).collect();
-    let mut controller = bench();
-    for tick in 1..=12 {
-        match controller.take_table(&Floats::new(&bytes)) {
-            SliceOutcome::Unfinished(next) => controller.slice_progress = next,
-            SliceOutcome::Done => assert_eq!(tick, 12),
-            SliceOutcome::Refused(status) => panic!("{status:?} in tick {tick}"),
-        }
-        assert_eq!(controller.friction_is_table, tick == 12, "{tick}");
-    }
 }

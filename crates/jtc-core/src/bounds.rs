@@ -1,0 +1,180 @@
+//! Bounds of the parameters that a host may send (J-06).
+use jtc_dynamics::ArmModel;
+use jtc_wire::DataStatus;
+
+use crate::friction;
+use crate::limits::JointConfig;
+use crate::parameters::{PidGains, TableOf};
+
+/// Share of the velocity limit up to which friction has been measured; a curve fitted to it may do anything beyond.
+const MEASURED: f64 = 0.5;
+/// Speeds at which a friction polynomial is checked: a cubic does not get far between them.
+const SPEEDS: u8 = 16;
+
+/// Bounds of gains, masses and friction: what lies beyond is no arm of these drives, and would throw or drop one (J-06).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterBounds {
+    /// Highest Kp, N·m/rad. No such drive is known to run with more than 28 000.
+    pub kp_max: f64,
+    /// Highest Ki, N·m/(rad·s). No such drive is known to run with more than 24 000.
+    pub ki_max: f64,
+    /// Highest Kd, N·m·s/rad. No such drive is known to run with more than 300.
+    pub kd_max: f64,
+    /// Largest magnitude of IntMin and IntMax, rad·s. Up to 120 is in use.
+    pub integral_max: f64,
+    /// Largest torque that bounds of the integral which leave out zero may force on a joint at rest, as a share of its torque
+    /// limit.
+    pub integral_bias_max: f64,
+    /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, holds 50 kg no further out than 0.73 m.
+    pub link_mass_max: f64,
+    /// Largest moment or product of inertia of a link, kg·m²: what those 50 kg have at 1.4 m.
+    pub link_inertia_max: f64,
+    /// Largest friction torque of a joint at a speed, as a share of its torque limit; of a polynomial without the factor of
+    /// its temperature. Up to 1.19 is in use.
+    pub friction_max: f64,
+    /// The same up to half of the velocity limit. Up to 0.82 is in use.
+    pub slow_friction_max: f64,
+    /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of
+    /// the torque limit: what noise of a measurement may be.
+    pub friction_reversed_max: f64,
+    /// Largest friction torque at standstill, as a share of the torque limit.
+    pub rest_friction_max: f64,
+}
+
+/// A parameter beyond its bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfBounds {
+    /// What it is, with its unit.
+    pub what: &'static str,
+    /// Velocity that it belongs to, rad/s: friction only.
+    pub velocity: Option<f64>,
+    /// The value.
+    pub value: f64,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+}
+
+impl OutOfBounds {
+    /// Written so that a NaN is refused.
+    fn unless_within(what: &'static str, value: f64, low: f64, high: f64) -> Result<(), Self> {
+        if value >= low && value <= high {
+            Ok(())
+        } else {
+            Err(Self { what, velocity: None, value, low, high })
+        }
+    }
+}
+
+impl From<OutOfBounds> for DataStatus {
+    fn from(_: OutOfBounds) -> Self {
+        Self::IncorrectValue
+    }
+}
+
+impl ParameterBounds {
+    /// For the known drives.
+    pub const fn known_drives() -> Self {
+        Self {
+            kp_max: 50_000.0,
+            ki_max: 50_000.0,
+            kd_max: 500.0,
+            integral_max: 1_000.0,
+            integral_bias_max: 0.25,
+            link_mass_max: 50.0,
+            link_inertia_max: 100.0,
+            friction_max: 1.5,
+            slow_friction_max: 1.0,
+            friction_reversed_max: 0.05,
+            rest_friction_max: 0.25,
+        }
+    }
+
+    /// Gains of a joint.
+    pub fn check_gains(&self, gains: &PidGains, joint: &JointConfig) -> Result<(), OutOfBounds> {
+        let PidGains { kp, ki, kd, int_min, int_max } = *gains;
+        let within = OutOfBounds::unless_within;
+        within("Kp (N·m/rad)", kp, 0.0, self.kp_max)?;
+        within("Ki (N·m/(rad·s))", ki, 0.0, self.ki_max)?;
+        within("Kd (N·m·s/rad)", kd, 0.0, self.kd_max)?;
+        within("IntMin (rad·s)", int_min, -self.integral_max, int_max)?;
+        within("IntMax (rad·s)", int_max, int_min, self.integral_max)?;
+        // The integral nearest to zero.
+        let least = int_min.max(0.0) - int_max.min(0.0);
+        within(
+            "torque that the bounds of the integral force on a joint at rest (N·m)",
+            ki * least,
+            0.0,
+            self.integral_bias_max * joint.torque_max,
+        )
+    }
+
+    /// Masses and inertias of a model that is physical.
+    pub fn check_masses(&self, model: &ArmModel) -> Result<(), OutOfBounds> {
+        for link in &model.links {
+            OutOfBounds::unless_within("mass of a link (kg)", link.mass, 0.0, self.link_mass_max)?;
+            let most = self.link_inertia_max;
+            for &inertia in &link.inertia {
+                OutOfBounds::unless_within("inertia of a link (kg·m²)", inertia, -most, most)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The torque (N·m) that compensates friction of a joint at a velocity (rad/s).
+    fn check_friction(&self, torque: f64, velocity: f64, joint: &JointConfig) -> Result<(), OutOfBounds> {
+        let speed = velocity.abs();
+        let (low, high) = if speed == 0.0 {
+            (-self.rest_friction_max, self.rest_friction_max)
+        } else if speed <= MEASURED * joint.velocity_max {
+            (-self.friction_reversed_max, self.slow_friction_max)
+        } else {
+            (-self.friction_max, self.friction_max)
+        };
+        // Against the motion is positive for both directions.
+        let along = if velocity < 0.0 { -torque } else { torque };
+        OutOfBounds::unless_within(
+            "friction torque (N·m)",
+            along,
+            low * joint.torque_max,
+            high * joint.torque_max,
+        )
+        .map_err(|e| OutOfBounds { velocity: Some(velocity), ..e })
+    }
+
+    /// A polynomial at all speeds that the joint may have. Its temperature factor is bounded by itself (J-42).
+    pub fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), OutOfBounds> {
+        let [c0, c1, c2, c3, ..] = *coefficients;
+        let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
+        let step = joint.velocity_max / f64::from(SPEEDS);
+        // Arms often move slowly: as many speeds again within the first step.
+        let slow = (1..SPEEDS).map(|k| step * f64::from(k) / f64::from(SPEEDS));
+        slow.chain((1..=SPEEDS).map(|k| step * f64::from(k))).try_for_each(|v| {
+            // The sign is smoothed around standstill, where there is no torque.
+            self.check_friction(friction::polynomial(&without_temperature, v, 0.0, v), v, joint)
+        })
+    }
+
+    /// A table at its own velocities, and at standstill.
+    pub fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), OutOfBounds> {
+        for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
+            for &torque in row {
+                // Standstill is checked below, where most tables have no row.
+                if velocity != 0.0 {
+                    self.check_friction(torque.into(), velocity.into(), joint)?;
+                }
+            }
+        }
+        for &temperature in &table.temperature {
+            // A table without standstill is good for no path (J-36).
+            if let Some(torque) = friction::table(table, 0.0, temperature.into()) {
+                self.check_friction(torque, 0.0, joint)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,47 @@
+//! Stop and Pause, which act before the frames in front of them have had their turn (J-04).
+use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
+
+use crate::TrajectoryState;
+
+/// What became of the urgent commands of a line whose frames have not had their turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Overtaking {
+    /// Stops and Pauses that were accepted and have no record yet.
+    pub(super) stops: u8,
+    pub(super) pauses: u8,
+    /// An Execute was cancelled by them.
+    pub(super) cancelled: bool,
+}
+
+impl Overtaking {
+    /// So many urgent commands were accepted.
+    pub fn accept(&mut self, command: UrgentCommand, count: u8) {
+        let accepted = self.accepted(command);
+        *accepted = accepted.saturating_add(count);
+    }
+
+    /// Data status of an execution command that an urgent one has overtaken. A Stop or a Pause has acted: it was accepted, or
+    /// it has cancelled an Execute, and the `trajectory` is in the commanded state.
+    pub fn overtaken(&mut self, exec: ExecCommand, trajectory: TrajectoryState) -> Result<(), DataStatus> {
+        let Some(command) = UrgentCommand::from_exec(exec) else {
+            self.cancelled = true;
+            return Err(DataStatus::NotAllowed);
+        };
+        let rests = match command {
+            UrgentCommand::Stop => TrajectoryState::Stop,
+            UrgentCommand::Pause => TrajectoryState::Pause,
+        };
+        let cancelled = core::mem::take(&mut self.cancelled) && trajectory == rests;
+        let accepted = self.accepted(command);
+        let acted = *accepted > 0;
+        *accepted = accepted.saturating_sub(1);
+        if acted || cancelled { Ok(()) } else { Err(DataStatus::NotAllowed) }
+    }
+
+    fn accepted(&mut self, command: UrgentCommand) -> &mut u8 {
+        match command {
+            UrgentCommand::Stop => &mut self.stops,
+            UrgentCommand::Pause => &mut self.pauses,
+        }
+    }
+}

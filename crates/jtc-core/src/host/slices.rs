@@ -1,0 +1,33 @@
+//! Frames that are too long for one tick: how far one has been executed, and what became of a slice of it (J-06).
+use jtc_wire::DataStatus;
+
+/// How far a long frame has been executed, a slice in each tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum SliceProgress {
+    #[default]
+    Begin,
+    /// Points checked.
+    PointCheck(usize),
+    /// Points copied.
+    PointCopy(usize),
+    /// Joints whose table is checked.
+    TableCheck(usize),
+    /// Joints whose table is copied.
+    TableCopy(usize),
+}
+
+/// Outcome of a slice.
+pub(crate) enum SliceOutcome {
+    Done,
+    Refused(DataStatus),
+    Unfinished(SliceProgress),
+}
+
+impl From<Result<(), DataStatus>> for SliceOutcome {
+    fn from(result: Result<(), DataStatus>) -> Self {
+        match result {
+            Ok(()) => Self::Done,
+            Err(status) => Self::Refused(status),
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The parameters received from the host: gains, model and friction, taken whole or not at all (J-06).
+use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
+use jtc_wire::{DataStatus, Floats, missing_parameter};
+
+use crate::JOINTS;
+use crate::config::Config;
+use crate::defaults;
+use crate::host::slices::{SliceOutcome, SliceProgress};
+use crate::limits::JointConfig;
+use crate::motion::ControlParameters;
+use crate::parameters::{PidGains, TableOf};
+
+/// Floats of one joint's friction table; a tick checks or copies one joint.
+const TABLE_FLOATS: usize = 20 + 20 + 400;
+
+/// The parameters in use, the defaults where the host has sent none, and which of them it has sent.
+#[derive(Clone, Debug)]
+pub(crate) struct ReceivedParameters {
+    /// One bit each ([`missing_parameter`]).
+    received: u8,
+    pub dynamics: Dynamics,
+    pub pid: [PidGains; JOINTS],
+    polynomial: [[f64; 6]; JOINTS],
+    pub tables: [TableOf<f32>; JOINTS],
+    pub friction_is_table: bool,
+    /// Friction was received since the trajectory was checked.
+    pub friction_is_new: bool,
+}
+
+impl ReceivedParameters {
+    /// Nothing was received yet.
+    pub fn new(config: &Config) -> Self {
+        Self {
+            received: 0,
+            dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
+            pid: defaults::PID,
+            polynomial: defaults::POLYNOMIAL,
+            tables: core::array::from_fn(|j| *defaults::friction_table(j)),
+            friction_is_table: false,
+            friction_is_new: false,
+        }
+    }
+
+    /// The byte of the status: 1 = missing.
+    pub fn missing(&self) -> u8 {
+        !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
+    }
+
+    /// The friction tables, unless polynomials are in use.
+    pub fn tables_in_use(&self) -> Option<&[TableOf<f32>; JOINTS]> {
+        self.friction_is_table.then_some(&self.tables)
+    }
+
+    /// What the control law needs of them.
+    pub fn control(&self) -> ControlParameters<'_> {
+        let (dynamics, pid, polynomial) = (&self.dynamics, &self.pid, &self.polynomial);
+        ControlParameters { dynamics, pid, polynomial, table: self.tables_in_use() }
+    }
+
+    /// The arm can be held at `position` (rad), by the torque limits (J-06).
+    pub fn holdable(&self, position: &[f64; JOINTS], config: &Config) -> bool {
+        holdable(&self.dynamics, position, config)
+    }
+
+    /// The host has to send the model again.
+    pub fn withdraw_model(&mut self) {
+        self.received &= !missing_parameter::MODEL;
+    }
+
+    pub fn take_pid(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
+        let mut gains = [PidGains::default(); JOINTS];
+        for (j, gain) in gains.iter_mut().enumerate() {
+            let at = |i: usize| finite(floats, 5 * j + i);
+            *gain = PidGains { kp: at(0)?, ki: at(1)?, kd: at(2)?, int_min: at(3)?, int_max: at(4)? };
+        }
+        self.set_pid(gains, config)
+    }
+
+    pub fn set_pid(&mut self, gains: [PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
+        for (gains, joint) in gains.iter().zip(&config.joints) {
+            config.parameter_bounds.check_gains(gains, joint)?;
+        }
+        self.pid = gains;
+        self.received |= missing_parameter::PID;
+        Ok(())
+    }
+
+    /// `at`: measured positions (rad), once all are known.
+    pub fn take_model(
+        &mut self,
+        floats: &Floats<'_>,
+        at: Option<&[f64; JOINTS]>,
+        config: &Config,
+    ) -> Result<(), DataStatus> {
+        let mut next = Reader { floats, next: 0 };
+        let mut model = ArmModel::default();
+        for joint in &mut model.joints {
+            *joint = next.origin()?;
+        }
+        for link in &mut model.links {
+            *link = Link { origin: next.origin()?, inertia: next.take()?, mass: next.float()? };
+        }
+        self.set_model(&model, at, config)
+    }
+
+    pub fn set_model(
+        &mut self,
+        model: &ArmModel,
+        at: Option<&[f64; JOINTS]>,
+        config: &Config,
+    ) -> Result<(), DataStatus> {
+        model.check().map_err(|_| DataStatus::IncorrectValue)?;
+        config.parameter_bounds.check_masses(model)?;
+        let dynamics = Dynamics::new(model, config.gravity);
+        // Undecided before every position is known; it is checked again when Init ends.
+        if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
+            return Err(DataStatus::IncorrectValue);
+        }
+        self.dynamics = dynamics;
+        self.received |= missing_parameter::MODEL;
+        Ok(())
+    }
+
+    pub fn take_polynomial(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
+        // 4 or 6 per joint, highest index first.
+        let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
+        let mut polynomial = [[0.0; 6]; JOINTS];
+        for (j, coefficients) in polynomial.iter_mut().enumerate() {
+            for (i, c) in coefficients.iter_mut().take(count).rev().enumerate() {
+                *c = finite(floats, count * j + i)?;
+            }
+        }
+        for (coefficients, joint) in polynomial.iter().zip(&config.joints) {
+            config.parameter_bounds.check_polynomial(coefficients, joint)?;
+        }
+        self.polynomial = polynomial;
+        self.friction_received(false);
+        Ok(())
+    }
+
+    pub fn take_default_polynomial(&mut self) {
+        self.polynomial = defaults::POLYNOMIAL;
+        self.friction_received(false);
+    }
+
+    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
+    pub fn take_table(
+        &mut self,
+        floats: &Floats<'_>,
+        progress: SliceProgress,
+        config: &Config,
+    ) -> SliceOutcome {
+        match progress {
+            SliceProgress::TableCopy(j) => {
+                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), read_table(floats, j)) {
+                    *slot = table;
+                }
+                if j + 1 < JOINTS {
+                    return SliceOutcome::Unfinished(SliceProgress::TableCopy(j + 1));
+                }
+                self.friction_received(true);
+                SliceOutcome::Done
+            }
+            progress => {
+                let j = if let SliceProgress::TableCheck(j) = progress { j } else { 0 };
+                let table = read_table(floats, j).and_then(|table| {
+                    let joint = config.joints.get(j).ok_or(DataStatus::IncorrectValue)?;
+                    config.parameter_bounds.check_table(&table, joint).map_err(DataStatus::from)
+                });
+                match table {
+                    Err(status) => SliceOutcome::Refused(status),
+                    Ok(()) if j + 1 < JOINTS => SliceOutcome::Unfinished(SliceProgress::TableCheck(j + 1)),
+                    Ok(()) => SliceOutcome::Unfinished(SliceProgress::TableCopy(0)),
+                }
+            }
+        }
+    }
+
+    pub fn take_default_tables(&mut self) {
+        self.tables = core::array::from_fn(|j| *defaults::friction_table(j));
+        self.friction_received(true);
+    }
+
+    fn friction_received(&mut self, table: bool) {
+        self.friction_is_table = table;
+        self.friction_is_new = true;
+        self.received |= missing_parameter::FRICTION;
+    }
+}
+
+/// An arm like this can be held at `position` (rad), by the torque limits (J-06).
+fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> bool {
+    let gravity = dynamics.gravity_torque(position);
+    // Written so that NaN is too much.
+    let held = |(torque, joint): (&f64, &JointConfig)| torque.abs() <= joint.torque_max;
+    gravity.iter().zip(&config.joints).all(held)
+}
+
+/// Float `i`, refused when it is NaN, infinite or not there (J-06).
+fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
+    floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
+}
+
+/// Takes finite floats one after the other.
+struct Reader<'a> {
+    floats: &'a Floats<'a>,
+    next: usize,
+}
+
+impl Reader<'_> {
+    fn float(&mut self) -> Result<f64, DataStatus> {
+        self.next += 1;
+        finite(self.floats, self.next - 1)
+    }
+
+    fn take<const N: usize>(&mut self) -> Result<[f64; N], DataStatus> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.float()?;
+        }
+        Ok(values)
+    }
+
+    fn origin(&mut self) -> Result<Origin, DataStatus> {
+        Ok(Origin { xyz: self.take()?, rpy: self.take()? })
+    }
+}
+
+fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataStatus> {
+    let mut table = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
+    let start = joint * TABLE_FLOATS;
+    let slots =
+        table.velocity.iter_mut().chain(&mut table.temperature).chain(table.torque.iter_mut().flatten());
+    for (i, slot) in slots.enumerate() {
+        *slot = floats.get(start + i).filter(|f| f.is_finite()).ok_or(DataStatus::IncorrectValue)?;
+    }
+    for axis in [&table.velocity, &table.temperature] {
+        if axis.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err(DataStatus::IncorrectValue);
+        }
+    }
+    Ok(table)
+}
+
+#[cfg(test)]
+mod tests;

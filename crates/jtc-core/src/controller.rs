@@ -9,7 +9,7 @@ use crate::host::overtaking::Overtaking;
 use crate::host::slices::SliceProgress;
 use crate::io::{Inputs, Outputs};
 use crate::late::LateTicks;
-use crate::motion::{ControlMode, Motion};
+use crate::motion::{ControlMode, LawInputs, Motion};
 use crate::nodes::{Goal, Nodes};
 use crate::path::PathClock;
 use crate::received::ReceivedParameters;
@@ -94,7 +94,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         // What has come in.
         let before = self.state;
-        self.nodes.take(inputs, &self.config, self.goal(), &self.motion.set.velocity);
+        self.nodes.take(inputs, &self.config, self.goal(), &self.motion.set.point.velocity);
         self.pump &= !self.nodes.gripper_lost();
         if self.late_ticks.count(inputs.missed_ticks) {
             self.errors.raise_device();
@@ -255,11 +255,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.end_teaching(&self.nodes, &self.config, &self.parameters.pid);
             }
             ControllerState::Teaching => {
-                self.motion.begin_teaching(&self.nodes, &self.config, &self.parameters.dynamics)
+                self.motion.law.begin_teaching(&self.nodes, &self.config, &self.parameters.dynamics)
             }
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
-        self.motion.change_mode();
+        self.motion.law.change_mode();
     }
 
     pub(crate) fn set_trajectory(&mut self, trajectory: TrajectoryState) {
@@ -274,12 +274,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         self.motion.latch(&self.nodes, &self.config);
-        self.motion.hold(&self.config);
+        self.motion.set.hold(&self.config);
         self.control(ControlMode::Hold)
     }
 
     fn teach(&mut self) -> [f64; JOINTS] {
-        self.motion.set = crate::SetPoint::still(*self.nodes.positions());
+        self.motion.set.point = crate::SetPoint::still(*self.nodes.positions());
         self.control(ControlMode::Teach)
     }
 
@@ -296,7 +296,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// The control law; returns the torque to command. Errors of the joints are acted upon, or raised.
     pub(crate) fn control(&mut self, mode: ControlMode) -> [f64; JOINTS] {
         // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
-        self.errors.raise_joints(&self.motion.too_fast(&self.nodes, &self.config));
+        self.errors.raise_joints(&self.motion.over_speed.watch(&self.nodes, &self.config));
         let (mut torque, mut errors) = self.compute(mode);
         if errors != [0; JOINTS] {
             if self.gives_way(&errors) {
@@ -312,7 +312,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Torques of the control law, and the joint errors found on the way.
     fn compute(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
         let braking = self.brake();
-        self.motion.control(mode, braking, &self.nodes, &self.config, &self.parameters.control())
+        let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
+        self.motion.control(&LawInputs { mode, braking, nodes, config, parameters })
     }
 }
 

@@ -1,15 +1,14 @@
 //! Deceleration to rest of a joint that moves when it begins to be held, because a hand still led it, or because it sagged or
 //! fell while it was enabled (J-16, J-25).
+use crate::DT;
 use crate::config::Config;
+use crate::interpolation::smooth;
 use crate::limits::JointConfig;
-use crate::motion::smooth;
 
 /// Highest speed at which a joint counts as standing, rad/s.
 const STANDING: f64 = 0.02;
 /// Highest deceleration of a joint that falls while it is enabled, rad/s²: most of its torque is gravity's.
 const CATCH_DECELERATION: f64 = 3.0;
-/// Length of a tick, s.
-const DT: f64 = 0.001;
 
 /// A joint with this velocity (rad/s) moves.
 pub(crate) fn moves(velocity: f64) -> bool {

@@ -51,7 +51,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.clock = PathClock::default();
         self.path = Path::BEGIN;
         self.braking_ms = None;
-        self.motion.stand_firm();
+        self.motion.law.stand_firm();
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
     }
@@ -68,23 +68,23 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !self.near(&paused) {
             return Err(DataStatus::StartPositionMismatch);
         }
-        if self.motion.yielding() && !self.motion.all_holding() {
+        if self.motion.law.yielding() && !self.motion.set.all_holding() {
             // It still comes to rest.
             return Err(DataStatus::NotAllowed);
         }
         self.braking_ms = None;
-        if self.motion.yielding() {
+        if self.motion.law.yielding() {
             // It is held somewhere beside the path; its way back begins where it is.
             self.motion.begin_at(self.nodes.positions());
-            self.motion.stand_firm();
+            self.motion.law.stand_firm();
         }
         self.path = if self.clock.time == 0.0 {
             Path::BEGIN
-        } else if self.motion.set.position == paused {
+        } else if self.motion.set.point.position == paused {
             self.go_on();
             Path::Running { leave: None }
         } else {
-            Path::Approaching { from: self.motion.set.position, elapsed_ms: 0.0, leave: None }
+            Path::Approaching { from: self.motion.set.point.position, elapsed_ms: 0.0, leave: None }
         };
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
@@ -93,7 +93,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// From standstill on the path to full speed.
     fn go_on(&mut self) {
         self.clock.go();
-        self.motion.begin_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
+        self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
     /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
@@ -104,7 +104,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 if leave.replace(to).is_none() {
                     self.clock.halt();
                     self.braking_ms = Some(0);
-                    self.motion.begin_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
+                    self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
                 }
             }
             // It comes to rest at point 0 by itself.
@@ -118,16 +118,19 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         match self.path {
             Path::Waiting { elapsed_ms } => {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
-                self.motion.hold(&self.config);
-                if !self.motion.all_holding() {
+                self.motion.set.hold(&self.config);
+                if !self.motion.set.all_holding() {
                     // The wait ends: the operator no longer expects a motion then (J-16).
                     self.path = Path::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_trajectory(TrajectoryState::Stop);
                     }
                 } else if self.near(&self.path_point()) {
-                    self.path =
-                        Path::Approaching { from: self.motion.set.position, elapsed_ms: 0.0, leave: None };
+                    self.path = Path::Approaching {
+                        from: self.motion.set.point.position,
+                        elapsed_ms: 0.0,
+                        leave: None,
+                    };
                 } else {
                     self.set_trajectory(TrajectoryState::Stop);
                 }
@@ -135,11 +138,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Path::Approaching { from, elapsed_ms, leave } => {
                 if elapsed_ms == 0.0 {
                     // The arm was held until now, without friction compensation.
-                    self.motion.change_mode();
+                    self.motion.law.change_mode();
                 }
                 let length = f64::from(self.config.ramp_ms.max(1));
                 let elapsed_ms = elapsed_ms + 1.0;
-                self.motion.approach(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
+                self.motion.set.approach(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
                 if elapsed_ms < length {
                     self.path = Path::Approaching { from, elapsed_ms, leave };
                 } else if let Some(trajectory) = leave {
@@ -177,7 +180,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn follow(&mut self) {
         let Some(at) = self.store.at(self.clock.time) else { return };
         if self.clock.ramping() {
-            let bounds = self.motion.slope_bounds(&at, self.clock.rate, self.clock.slope, &self.config);
+            let bounds = self.motion.ramp.slope_bounds(
+                &at,
+                &self.motion.law.torque,
+                self.clock.rate,
+                self.clock.slope,
+                &self.config,
+            );
             let ramp_ms = f64::from(self.config.ramp_ms);
             if self.clock.halting() {
                 self.clock.slow_down(ramp_ms, f64::from(self.config.stop_ms), &bounds);
@@ -187,12 +196,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         } else {
             self.clock.slope = 0.0;
         }
-        self.motion.follow(&at, self.clock.rate, self.clock.slope);
+        self.motion.set.follow(&at, self.clock.rate, self.clock.slope);
     }
 
     /// Positions at the present path time; without a trajectory (which Execute refuses) where the arm is held.
     fn path_point(&self) -> [f64; JOINTS] {
-        self.store.at(self.clock.time).map_or(self.motion.set.position, |at| at.position)
+        self.store.at(self.clock.time).map_or(self.motion.set.point.position, |at| at.position)
     }
 
     /// The last point was commanded in this tick (J-31).
@@ -212,7 +221,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// something else is a matter of the ordinary limits.
     pub(crate) fn brake(&mut self) -> bool {
         let Some(ms) = self.braking_ms else { return false };
-        let moving = self.motion.moving(&self.nodes);
+        let moving = self.motion.set.moving(&self.nodes);
         let stands = moving == [false; JOINTS];
         if let (TrajectoryState::Execute, Path::Running { leave: Some(trajectory) }) =
             (self.trajectory, self.path)

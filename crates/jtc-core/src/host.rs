@@ -173,16 +173,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Command::GripperControl { .. } => SliceOutcome::Refused(DataStatus::NotAllowed),
             _ if !settable => SliceOutcome::Refused(DataStatus::NotAllowed),
             Command::PidParam(floats) => {
-                parameters.take_pid(&floats, config).map(|()| motion.change_mode()).into()
+                parameters.take_pid(&floats, config).map(|()| motion.law.change_mode()).into()
             }
             Command::PidParamUseDefault => {
-                parameters.set_pid(defaults::PID, config).map(|()| motion.change_mode()).into()
+                parameters.set_pid(defaults::PID, config).map(|()| motion.law.change_mode()).into()
             }
             Command::ArmModel(floats) => {
-                parameters.take_model(&floats, at, config).map(|()| motion.change_model()).into()
+                parameters.take_model(&floats, at, config).map(|()| motion.law.change_model()).into()
             }
             Command::ArmModelUseDefault => {
-                parameters.set_model(&defaults::MODEL, at, config).map(|()| motion.change_model()).into()
+                parameters.set_model(&defaults::MODEL, at, config).map(|()| motion.law.change_model()).into()
             }
             Command::FrictionPolynomial(floats) => parameters.take_polynomial(&floats, config).into(),
             Command::FrictionPolynomialUseDefault => {

@@ -40,6 +40,12 @@ impl From<&RawPoint> for SetPoint {
 /// What rounding may add to a value between two points, in rad and rad/s: far below what any limit means.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
+/// Rises from 0 to 1 without a corner.
+pub(crate) fn smooth(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u * u * (3.0 - 2.0 * u)
+}
+
 /// Set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
 #[inline]
 pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {

@@ -53,3 +53,6 @@ pub const POINTS_MAX: usize = 12_000;
 pub const SEGMENTS_MAX: usize = 100;
 /// Points of a segment (J-30).
 pub const SEGMENT_POINTS_MAX: usize = 1_500;
+
+/// Length of a tick, s.
+pub(crate) const DT: f64 = 0.001;

@@ -6,6 +6,7 @@
 //! with all the torque there is. Then the slope is what the arm achieves at its torque limits, which are computed with the
 //! feedback torque in it: set values never run away from an arm that cannot follow (time scaling under torque limits, Dahl and
 //! Nielsen 1990).
+use crate::DT;
 
 /// Path time and how fast it goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,8 +37,6 @@ pub struct SlopeBounds {
     pub full: Bounds,
 }
 
-/// Length of a tick, s.
-const DT: f64 = 0.001;
 /// A slope in the wrong direction (a pause during a resume) is taken out this much faster than a ramp is rounded; a stop in a
 /// hurry changes its slope as fast.
 const REVERSAL: f64 = 8.0;

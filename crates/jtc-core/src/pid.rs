@@ -1,8 +1,7 @@
 //! PID controller of one joint (J-41).
+use crate::DT;
 use crate::parameters::PidGains;
 
-/// Length of a tick, s.
-const DT: f64 = 0.001;
 /// Ticks over which the derivative is taken.
 const WINDOW: usize = 5;
 /// 1/s: one over the length of the window.

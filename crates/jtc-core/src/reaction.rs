@@ -20,12 +20,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// it does not, or does already.
     pub(crate) fn gives_way(&mut self, errors: &[u16; JOINTS]) -> bool {
         let all = all(errors);
-        if all & GIVE_WAY == 0 || all & !(GIVE_WAY | STOP) != 0 || self.motion.yielding() {
+        if all & GIVE_WAY == 0 || all & !(GIVE_WAY | STOP) != 0 || self.motion.law.yielding() {
             return false;
         }
         self.errors.note_joints(errors);
         self.motion.give_way(&self.nodes, &self.config);
-        self.motion.hold(&self.config);
+        self.motion.set.hold(&self.config);
         self.clock.rest();
         self.braking_ms = None;
         if self.trajectory == TrajectoryState::Execute {
@@ -93,9 +93,9 @@ mod tests {
     fn j66_what_the_law_finds_in_motion_is_what_the_arm_reacts_to() {
         let found = |velocity: f64, offset: f64| {
             let mut controller = running();
-            controller.motion.hold_for_test();
-            controller.motion.set.velocity[1] = velocity;
-            controller.motion.set.position[1] = controller.nodes.positions()[1] + offset;
+            controller.motion.set.hold_for_test();
+            controller.motion.set.point.velocity[1] = velocity;
+            controller.motion.set.point.position[1] = controller.nodes.positions()[1] + offset;
             controller.control(ControlMode::Follow);
             (controller.path, controller.trajectory, controller.errors.word(), controller.errors.joint(1))
         };

@@ -17,7 +17,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         t.braking = self.braking_ms.is_some();
         t.records_lost = self.records.lost();
         for (j, out) in t.joints.iter_mut().enumerate() {
-            let (set, parts, report) = (&self.motion.set, &self.motion.torque[j], &self.nodes.node(j).report);
+            let (set, parts, report) =
+                (&self.motion.set.point, &self.motion.law.torque[j], &self.nodes.node(j).report);
             *out = JointTelemetry {
                 set_position: set.position[j],
                 set_velocity: set.velocity[j],
@@ -106,7 +107,7 @@ mod tests {
     #[test]
     fn j40_j41_j42_telemetry_tells_every_part_of_a_torque() {
         let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
-        controller.motion.torque[2] = JointTorque {
+        controller.motion.law.torque[2] = JointTorque {
             model: 1.0,
             pid: PidTorque { p: 2.0, i: 4.0, d: 8.0 },
             friction: 16.0,

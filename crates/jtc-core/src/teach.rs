@@ -10,8 +10,8 @@ use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
 use crate::config::Config;
+use crate::interpolation::smooth;
 use crate::limits::JointConfig;
-use crate::motion::smooth;
 
 /// Ticks over which the missing torque is averaged: the time constant of a low-pass filter.
 const AVERAGE_MS: f64 = 100.0;

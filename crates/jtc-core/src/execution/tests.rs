@@ -17,7 +17,7 @@ fn j33_braking_ends_where_the_arm_stands() {
     assert!(!stands.brake());
     assert_eq!(stands.braking_ms, None);
     let mut moves = braking(ControllerState::HoldPos, TrajectoryState::Pause);
-    moves.motion.set.velocity[2] = -0.03;
+    moves.motion.set.point.velocity[2] = -0.03;
     assert!(moves.brake());
     assert_eq!(moves.braking_ms, Some(6));
     let mut on_the_path = braking(ControllerState::Operate, TrajectoryState::Execute);
@@ -70,7 +70,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
         (TrajectoryState::Pause, most, false, 0),
     ] {
         let mut controller = pausing(ms);
-        (controller.trajectory, controller.motion.set.velocity[2]) = (trajectory, -0.03);
+        (controller.trajectory, controller.motion.set.point.velocity[2]) = (trajectory, -0.03);
         assert_eq!(controller.brake(), goes_on, "{trajectory:?} after {ms} ms");
         let found: [u16; JOINTS] = core::array::from_fn(|j| controller.errors.joint(j).0);
         assert_eq!(found, [0, 0, error, 0, 0, 0], "{trajectory:?} after {ms} ms");
@@ -90,7 +90,7 @@ fn j33_an_arm_that_stands_when_its_time_is_over_has_stopped() {
         (most, -0.03, TrajectoryState::Execute),
     ] {
         let mut controller = pausing(ms);
-        controller.motion.set.velocity[4] = velocity;
+        controller.motion.set.point.velocity[4] = velocity;
         controller.brake();
         assert_eq!(
             (controller.trajectory, controller.clock.standing()),
@@ -184,10 +184,10 @@ fn j66_an_arm_that_gave_way_goes_on_when_it_has_come_to_rest() {
     for (held, verdict) in [(false, Err(DataStatus::NotAllowed)), (true, Ok(()))] {
         let mut controller = braking(ControllerState::HoldPos, TrajectoryState::Pause);
         if held {
-            controller.motion.hold_for_test();
+            controller.motion.set.hold_for_test();
         }
         controller.motion.give_way(&controller.nodes, &controller.config);
         assert_eq!(controller.resume_path(), verdict);
-        assert_eq!(controller.motion.yielding(), !held, "it stands firm when it goes on");
+        assert_eq!(controller.motion.law.yielding(), !held, "it stands firm when it goes on");
     }
 }

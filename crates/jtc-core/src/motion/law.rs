@@ -1,12 +1,15 @@
-//! The control law: τ = τ_id + τ_pid + τ_fric and its limits, each tick, for each joint (section 6).
+//! The control law: τ = τ_id + τ_pid + τ_fric, each tick, for each joint (section 6).
 use jtc_dynamics::Dynamics;
 
-use super::Motion;
+use super::set_values::{Latched, SetValues};
+use super::torque::JointTorque;
+use super::transfer::Transfer;
 use crate::config::Config;
 use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
-use crate::pid::PidTorque;
-use crate::{JOINTS, friction, joint_error, limits};
+use crate::pid::Pid;
+use crate::teach::Payload;
+use crate::{JOINTS, friction, joint_error};
 
 /// Most that the brake of teaching takes from a speed, 1/s. Measured speeds are about 8 ms old, being averages of the drives: a
 /// brake above 200 1/s would drive a joint to and fro, and joints that move each other make that less.
@@ -14,8 +17,6 @@ const BRAKE_RATE: f64 = 100.0;
 
 /// Rotor inertia of a drive of which none is given, kg·m²: that of the known drives.
 const UNKNOWN_ROTOR: f64 = 0.7;
-/// Speed above which torque at its limit that drives the joint on catches nothing, rad/s.
-const DRIVEN: f64 = 0.05;
 
 /// Which parts of the control law act: the control mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +39,16 @@ impl ControlMode {
     }
 }
 
+/// What a tick of the control law is given.
+pub(crate) struct LawInputs<'a> {
+    pub mode: ControlMode,
+    /// The arm brakes with all the torque there is (J-33).
+    pub braking: bool,
+    pub nodes: &'a Nodes,
+    pub config: &'a Config,
+    pub parameters: ControlParameters<'a>,
+}
+
 /// Parameters of the control law: model, gains and friction.
 pub(crate) struct ControlParameters<'a> {
     pub dynamics: &'a Dynamics,
@@ -46,70 +57,106 @@ pub(crate) struct ControlParameters<'a> {
     pub table: Option<&'a [TableOf<f32>; JOINTS]>,
 }
 
-/// Parts of one joint's torque, N·m.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct JointTorque {
-    pub model: f64,
-    pub pid: PidTorque,
-    pub friction: f64,
-    /// What teaching carries besides the model.
-    pub payload: f64,
-    /// Brake of teaching.
-    pub brake: f64,
-    /// What is left of a step that is being blended out.
-    pub blend: f64,
+/// The state of the control law.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ControlLaw {
+    pid: [Pid; JOINTS],
+    /// Torque of the last tick.
+    pub torque: [JointTorque; JOINTS],
+    pub(super) payload: Payload,
+    transfer: Transfer,
+    /// The arm gives way: the control law adds only so much to the torque of the model (J-66).
+    pub(super) yielding: bool,
 }
 
-impl JointTorque {
-    /// All but the model.
-    pub fn correction(&self) -> f64 {
-        self.pid.sum() + self.friction + self.payload + self.brake + self.blend
+impl ControlLaw {
+    /// The control mode changes among HoldPos, Operate and Teaching: bumpless transfer, with no step but that of the model (J-44).
+    pub fn change_mode(&mut self) {
+        self.transfer.change_mode();
     }
 
-    pub fn sum(&self) -> f64 {
-        self.model + self.correction()
+    /// The model changes under the holding arm: bumpless transfer without any step.
+    pub fn change_model(&mut self) {
+        self.transfer.change_model();
     }
-}
 
-impl Motion {
-    /// The control law and its limits: torques to command, and joint errors found on the way. `braking`: with all the torque
-    /// there is, so that what this does to the torque, and on the path to position error and acceleration, is none (J-33).
-    pub fn control(
-        &mut self,
-        mode: ControlMode,
-        braking: bool,
-        nodes: &Nodes,
-        config: &Config,
-        parameters: &ControlParameters<'_>,
-    ) -> ([f64; JOINTS], [u16; JOINTS]) {
-        let missing = self.compute(mode, nodes, config, parameters);
-        if self.yielding {
-            self.soften(config);
+    /// Whatever comes next begins at rest, without a position error.
+    pub fn begin(&mut self) {
+        for pid in &mut self.pid {
+            pid.reset(0.0);
         }
-        let (torque, mut errors) = self.limit(mode, braking, nodes, config, parameters);
-        for (j, error) in errors.iter_mut().enumerate() {
-            if nodes.node(j).enabled() {
-                *error |= missing[j];
+    }
+
+    /// Joints that are not held any more, or not yet, begin anew.
+    pub fn latch(&mut self, latched: &Latched) {
+        for (pid, held) in self.pid.iter_mut().zip(latched.held) {
+            if !held {
+                pid.reset(0.0);
             }
         }
-        (torque, errors)
+        self.transfer.set_just_enabled(latched.just_enabled);
     }
 
-    /// Computes the torque of this tick into `self.torque`; returns joint errors found on the way (friction table).
-    fn compute(
+    /// From now on the arm gives way. The torque that the law had added is the torque that it has to let go of.
+    pub fn give_way(&mut self) {
+        self.transfer.let_go();
+        self.yielding = true;
+    }
+
+    /// The whole torque may be used again.
+    pub fn stand_firm(&mut self) {
+        self.yielding = false;
+    }
+
+    /// The arm gives way.
+    pub fn yielding(&self) -> bool {
+        self.yielding
+    }
+
+    /// What the arm carries is known, or is none of it: an arm that gives way has more likely a contact against it.
+    pub fn load_is_known(&self, config: &Config) -> bool {
+        self.yielding || self.payload.is_known(config)
+    }
+
+    /// Teaching begins: what HoldPos had found missing becomes a mass at the flange (J-25). What an arm that gives way has
+    /// against it is more likely a contact than a mass.
+    pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
+        self.stand_firm();
+        self.payload.fit(dynamics, nodes.positions(), config);
+    }
+
+    /// Teaching ends: the integral takes over what teaching carried.
+    pub fn end_teaching(&mut self, gains: &[PidGains; JOINTS]) {
+        for ((pid, gains), torque) in self.pid.iter_mut().zip(gains).zip(&self.torque) {
+            pid.take_over(gains, torque.payload);
+        }
+    }
+
+    /// The set positions of joints have sagged, rad: that is no motion.
+    pub fn sag(&mut self, sag: &[Option<f64>; JOINTS]) {
+        for (pid, sag) in self.pid.iter_mut().zip(sag) {
+            if let Some(way) = sag {
+                pid.shift(*way);
+            }
+        }
+    }
+
+    /// One tick: computes its torque, before any limit; returns joint errors found on the way (friction table).
+    pub fn step(
         &mut self,
-        mode: ControlMode,
-        nodes: &Nodes,
-        config: &Config,
-        parameters: &ControlParameters<'_>,
+        inputs: &LawInputs<'_>,
+        set: &SetValues,
+        saturated: &[bool; JOINTS],
     ) -> [u16; JOINTS] {
+        let LawInputs { mode, nodes, config, ref parameters, .. } = *inputs;
         let mut errors = [0; JOINTS];
         let before = self.transfer.begin(&self.torque);
         let q = nodes.positions();
         let v = nodes.velocities();
         // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere.
         let zero = [0.0; JOINTS];
-        let (qd, qdd) = if mode.moves() { (self.set.velocity, self.set.acceleration) } else { (zero, zero) };
+        let (qd, qdd) =
+            if mode.moves() { (set.point.velocity, set.point.acceleration) } else { (zero, zero) };
         let model = parameters.dynamics.inverse(q, &qd, &qdd);
         let payload = if mode == ControlMode::Teach {
             self.payload.torque(parameters.dynamics, q, v, config)
@@ -124,11 +171,10 @@ impl Motion {
                 ..JointTorque::default()
             };
             if mode != ControlMode::Teach {
-                let error = self.set.position[j] - q[j];
-                let at_rest = self.set.velocity[j] == 0.0 && self.set.acceleration[j] == 0.0;
+                let error = set.point.position[j] - q[j];
+                let at_rest = set.point.velocity[j] == 0.0 && set.point.acceleration[j] == 0.0;
                 let encoder_step = at_rest.then_some(config.encoder_step);
-                let saturated = self.saturation[j].saturated;
-                torque.pid = self.pid[j].step(&parameters.pid[j], error, saturated, encoder_step);
+                torque.pid = self.pid[j].step(&parameters.pid[j], error, saturated[j], encoder_step);
             }
             if mode.moves() {
                 let t = friction::celsius(nodes.node(j).report.temperature);
@@ -150,13 +196,16 @@ impl Motion {
             self.torque[j] = torque;
         }
         self.transfer.blend(before, &mut self.torque, nodes, config);
-        if mode == ControlMode::Hold && !self.yielding && self.all_holding() {
+        if mode == ControlMode::Hold && !self.yielding && set.all_holding() {
             self.payload.observe(&self.torque.map(|t| t.correction()));
         } else {
             self.payload.forget();
         }
         if mode == ControlMode::Teach {
             self.brake(nodes, config, parameters);
+        }
+        if self.yielding {
+            self.soften(config);
         }
         errors
     }
@@ -187,41 +236,6 @@ impl Motion {
             let correction = torque.correction();
             torque.blend += correction.max(-most).min(most) - correction;
         }
-    }
-
-    /// The torques to command and the joint errors found, both per joint (J-43).
-    fn limit(
-        &mut self,
-        mode: ControlMode,
-        braking: bool,
-        nodes: &Nodes,
-        config: &Config,
-        parameters: &ControlParameters<'_>,
-    ) -> ([f64; JOINTS], [u16; JOINTS]) {
-        let (mut torque, mut errors) = ([0.0; JOINTS], [0; JOINTS]);
-        // Only while path time runs: an arm that is pushed away from where the path stands is not to be fought (J-66).
-        let on_path = braking && mode == ControlMode::Follow;
-        let excused = if on_path { joint_error::POSITION_ERROR | joint_error::ACCELERATION } else { 0 };
-        for j in 0..JOINTS {
-            let limits = &config.joints[j];
-            let computed = self.torque[j].sum();
-            let catching = self.catch[j].step(nodes.velocities()[j]) && mode == ControlMode::Hold;
-            // Torque that drives a joint on, rather than stop it, is neither a catch nor a way to rest.
-            let driven = computed.signum() * nodes.velocities()[j] > DRIVEN;
-            let stopping = (catching || self.deceleration[j].is_some()) && !driven;
-            let (limited, torque_error) =
-                self.saturation[j].limit(computed, limits, config.torque_over_ms, braking || stopping);
-            let joint = (self.set.position[j], self.set.velocity[j], self.set.acceleration[j]);
-            let set_error =
-                limits::check_set(joint, nodes.positions()[j], limits, mode == ControlMode::Follow);
-            torque[j] = limited;
-            if catching && self.saturation[j].saturated {
-                self.sag(j, computed - limited, nodes, config, parameters);
-            }
-            errors[j] = torque_error
-                | if mode != ControlMode::Teach && self.holding[j] { set_error & !excused } else { 0 };
-        }
-        (torque, errors)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the arm can follow on a ramp of path time (J-33): slopes within its acceleration and torque limits.
 use jtc_dynamics::Dynamics;
 
-use super::Motion;
+use super::torque::JointTorque;
 use crate::JOINTS;
 use crate::config::Config;
 use crate::deceleration::moves;
@@ -14,9 +14,16 @@ use crate::path::{Bounds, SlopeBounds};
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
 
-impl Motion {
+/// The inertia of the arm at the start of a ramp.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PathRamp {
+    /// Mass matrix with rotors.
+    inertia: [[f64; JOINTS]; JOINTS],
+}
+
+impl PathRamp {
     /// A ramp of path time begins: its bounds need the inertia of the arm.
-    pub fn begin_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
+    pub fn begin(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         self.inertia = dynamics.mass_matrix(nodes.positions());
         for j in 0..JOINTS {
             self.inertia[j][j] += config.joints[j].rotor_inertia;
@@ -24,8 +31,15 @@ impl Motion {
     }
 
     /// Slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The torque that each joint
-    /// has left is counted from the last one computed, with all its parts: a joint that already falls behind has less.
-    pub fn slope_bounds(&self, at: &SetPoint, rate: f64, slope: f64, config: &Config) -> SlopeBounds {
+    /// has left is counted from the last `torque`, with all its parts: a joint that already falls behind has less.
+    pub fn slope_bounds(
+        &self,
+        at: &SetPoint,
+        torque: &[JointTorque; JOINTS],
+        rate: f64,
+        slope: f64,
+        config: &Config,
+    ) -> SlopeBounds {
         const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut easy, mut full) = (FREE, FREE);
         for j in 0..JOINTS {
@@ -36,7 +50,7 @@ impl Motion {
                 within(acceleration, at.velocity[j], RAMP_ACCELERATION * limit.acceleration_max),
             );
             let push: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * at.velocity[k]).sum();
-            let torque = self.torque[j].sum() - push * slope;
+            let torque = torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
             // No pace of the path helps a joint that does not move along it.
@@ -91,13 +105,14 @@ mod tests {
         ) {
             let config = Config::avena();
             let (nodes, dynamics) = (Nodes::new(&config), Dynamics::new(&Parameters::avena().model, config.gravity));
-            let mut motion = Motion::default();
-            motion.begin_ramp(&nodes, &config, &dynamics);
-            for j in 0..JOINTS {
-                motion.torque[j].model = share[j] * config.joints[j].torque_max;
-            }
+            let mut ramp = PathRamp::default();
+            ramp.begin(&nodes, &config, &dynamics);
+            let torque = core::array::from_fn(|j| JointTorque {
+                model: share[j] * config.joints[j].torque_max,
+                ..JointTorque::default()
+            });
             let at = SetPoint { position: [0.0; JOINTS], velocity, acceleration };
-            let SlopeBounds { easy, full } = motion.slope_bounds(&at, rate, slope, &config);
+            let SlopeBounds { easy, full } = ramp.slope_bounds(&at, &torque, rate, slope, &config);
 
             // What the arm needs for one more of slope.
             let zero = [0.0; JOINTS];

@@ -1,13 +1,24 @@
 //! Set values, what is held and what comes to rest (section 6).
 use super::*;
+use crate::DT;
+use crate::catch::Catch;
+use crate::deceleration::Deceleration;
+use crate::interpolation::SetPoint;
+
+/// An arm that holds these joints.
+fn holding(joints: [bool; JOINTS], yielding: bool) -> Motion {
+    let mut motion = Motion::default();
+    (motion.set.holding, motion.law.yielding) = (joints, yielding);
+    motion
+}
 
 #[test]
 fn j34_on_the_approach_the_velocity_is_the_derivative_of_the_position() {
     let (from, to) = ([0.1, -0.2, 0.3, 0.0, 1.0, -1.0], [0.13, -0.2, 0.28, 0.05, 1.0, -0.96]);
     let at = |ms: f64| {
         let mut motion = Motion::default();
-        motion.approach(&from, &to, ms / 200.0, 200.0);
-        motion.set
+        motion.set.approach(&from, &to, ms / 200.0, 200.0);
+        motion.set.point
     };
     for ms in 1..200 {
         let (before, now, after) = (at(f64::from(ms - 1)), at(f64::from(ms)), at(f64::from(ms + 1)));
@@ -25,49 +36,53 @@ fn j34_on_the_approach_the_velocity_is_the_derivative_of_the_position() {
 fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());
     let nodes = Nodes::new(&config);
-    motion.hold_for_test();
+    motion.set.hold_for_test();
     motion.hold_measured(&nodes, &config);
-    assert!(motion.all_holding());
+    assert!(motion.set.all_holding());
     motion.give_way(&nodes, &config);
-    assert!(motion.all_holding() && motion.yielding());
-    motion.stand_firm();
-    assert!(!motion.yielding());
+    assert!(motion.set.all_holding() && motion.law.yielding());
+    motion.law.stand_firm();
+    assert!(!motion.law.yielding());
 }
 
 #[test]
 fn j33_a_joint_moves_by_its_set_value_or_as_measured() {
     let (nodes, mut motion) = (Nodes::new(&Config::avena()), Motion::default());
-    assert_eq!(motion.moving(&nodes), [false; JOINTS]);
-    (motion.set.velocity[1], motion.set.velocity[4]) = (0.03, -0.03);
-    assert_eq!(motion.moving(&nodes), [false, true, false, false, true, false]);
+    assert_eq!(motion.set.moving(&nodes), [false; JOINTS]);
+    (motion.set.point.velocity[1], motion.set.point.velocity[4]) = (0.03, -0.03);
+    assert_eq!(motion.set.moving(&nodes), [false, true, false, false, true, false]);
     let nodes = Nodes::enabled_at([0.0; JOINTS], [0.03, 0.01, 0.0, 0.02, 0.0, -0.03]);
-    assert_eq!(motion.moving(&nodes), [true, true, false, false, true, true]);
+    assert_eq!(motion.set.moving(&nodes), [true, true, false, false, true, true]);
 }
 
 #[test]
 fn j33_on_a_ramp_of_path_time_velocity_and_acceleration_are_those_of_the_scaled_path() {
     let at = SetPoint { position: [0.5; JOINTS], velocity: [1.2; JOINTS], acceleration: [-3.0; JOINTS] };
     let mut motion = Motion::default();
-    motion.follow(&at, 0.5, -4.0);
+    motion.set.follow(&at, 0.5, -4.0);
     // q(s(t)): q'·ṡ, and q''·ṡ² + q'·s̈.
-    assert_eq!((motion.set.position, motion.set.velocity), (at.position, [0.6; JOINTS]));
-    assert!(motion.set.acceleration.iter().all(|a| (a - (-0.75 - 4.8)).abs() < 1e-12));
+    assert_eq!((motion.set.point.position, motion.set.point.velocity), (at.position, [0.6; JOINTS]));
+    assert!(motion.set.point.acceleration.iter().all(|a| (a - (-0.75 - 4.8)).abs() < 1e-12));
 }
 
 #[test]
 fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     let mut motion = Motion::default();
-    motion.hold_for_test();
-    assert!(motion.all_holding());
+    motion.set.hold_for_test();
+    assert!(motion.set.all_holding());
     let config = Config::avena();
     for j in 0..JOINTS {
         let mut decelerates = motion.clone();
-        decelerates.deceleration[j] = Some(Deceleration::led(0.0, 0.3, &config, &config.joints[j]));
+        decelerates.set.deceleration[j] = Some(Deceleration::led(0.0, 0.3, &config, &config.joints[j]));
         let mut catches = motion.clone();
-        catches.catch[j] = Catch::begin(&config);
+        catches.set.catch[j] = Catch::begin(&config);
         let mut off = motion.clone();
-        off.holding[j] = false;
-        assert!([decelerates, catches, off].iter().all(|motion| !motion.all_holding()), "joint {}", j + 1);
+        off.set.holding[j] = false;
+        assert!(
+            [decelerates, catches, off].iter().all(|motion| !motion.set.all_holding()),
+            "joint {}",
+            j + 1
+        );
     }
 }
 
@@ -82,9 +97,9 @@ fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
         (false, true, false, false),
         (false, true, true, false),
     ] {
-        let mut motion = Motion { holding: [held; JOINTS], yielding, ..Motion::default() };
+        let mut motion = holding([held; JOINTS], yielding);
         if known {
-            motion.payload.observe(&[0.0; JOINTS]);
+            motion.law.payload.observe(&[0.0; JOINTS]);
         }
         assert_eq!(motion.may_be_taught(&Config::avena()), may, "{held} {yielding} {known}");
     }
@@ -97,9 +112,10 @@ fn latched(held: bool, enabled: bool, velocity: f64) -> Motion {
     velocities[off] = velocity;
     let nodes = Nodes::enabled_at(at, velocities);
     let nodes = if enabled { nodes } else { nodes.with_torque_off(off) };
-    let mut motion = Motion { set: SetPoint::still([0.1; JOINTS]), ..Motion::default() };
-    motion.hold_for_test();
-    motion.holding[off] = held;
+    let mut motion = Motion::default();
+    motion.set.begin_at(&[0.1; JOINTS]);
+    motion.set.hold_for_test();
+    motion.set.holding[off] = held;
     motion.latch(&nodes, &config);
     motion
 }
@@ -120,14 +136,14 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
         let motion = latched(held, enabled, velocity);
         let what = (held, enabled, velocity);
         let position: [f64; JOINTS] = core::array::from_fn(|j| if follows && j == 3 { 0.3 } else { 0.1 });
-        assert_eq!(motion.set.position, position, "{what:?}");
-        assert_eq!(motion.catch.map(|catch| catch.busy()), [catches; JOINTS], "{what:?}");
+        assert_eq!(motion.set.point.position, position, "{what:?}");
+        assert_eq!(motion.set.catch.map(|catch| catch.busy()), [catches; JOINTS], "{what:?}");
         assert_eq!(
-            core::array::from_fn::<bool, JOINTS, _>(|j| motion.deceleration[j].is_some()),
+            core::array::from_fn::<bool, JOINTS, _>(|j| motion.set.deceleration[j].is_some()),
             core::array::from_fn(|j| falls && j == 3),
             "{what:?}"
         );
-        assert_eq!(motion.holding, core::array::from_fn(|j| enabled || j != 3), "{what:?}");
+        assert_eq!(motion.set.holding, core::array::from_fn(|j| enabled || j != 3), "{what:?}");
     }
 }
 
@@ -136,10 +152,10 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
         // One that moves is enough for all.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
-        let mut motion = Motion { holding: [true, true, true, false, true, true], ..Motion::default() };
+        let mut motion = holding([true, true, true, false, true, true], false);
         motion.hold_measured(&nodes, &Config::avena());
-        assert_eq!(motion.set, SetPoint::still([0.3; JOINTS]));
-        let found: [bool; JOINTS] = core::array::from_fn(|j| motion.deceleration[j].is_some());
+        assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
+        let found: [bool; JOINTS] = core::array::from_fn(|j| motion.set.deceleration[j].is_some());
         assert_eq!(found, core::array::from_fn(|j| decelerates && j != 3), "{velocity}");
     }
 }
@@ -149,21 +165,21 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
 fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
     for (velocity, catches) in [(0.0, false), (0.02, false), (0.3, true)] {
         let nodes = Nodes::enabled_at([0.3; JOINTS], [velocity; JOINTS]);
-        let mut motion = Motion { holding: [true; JOINTS], ..Motion::default() };
+        let mut motion = holding([true; JOINTS], false);
         motion.end_teaching(&nodes, &Config::avena(), &[PidGains::default(); JOINTS]);
-        assert_eq!(motion.catch.map(|catch| catch.busy()), [catches; JOINTS], "{velocity}");
-        assert_eq!(motion.all_holding(), !catches);
+        assert_eq!(motion.set.catch.map(|catch| catch.busy()), [catches; JOINTS], "{velocity}");
+        assert_eq!(motion.set.all_holding(), !catches);
     }
 }
 
 #[test]
 fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     let nodes = Nodes::enabled_at([0.3; JOINTS], [0.1; JOINTS]);
-    let mut motion = Motion { holding: [true; JOINTS], yielding: true, ..Motion::default() };
-    motion.torque[2].friction = 7.0;
-    motion.catch[1] = Catch::begin(&Config::avena());
+    let mut motion = holding([true; JOINTS], true);
+    motion.law.torque[2].friction = 7.0;
+    motion.set.catch[1] = Catch::begin(&Config::avena());
     motion.release(&nodes);
-    assert_eq!(motion.set, SetPoint::still([0.3; JOINTS]));
-    assert_eq!((motion.holding, motion.yielding, motion.torque), Default::default());
-    assert!(!motion.catch[1].busy());
+    assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
+    assert_eq!((motion.set.holding, motion.law.yielding, motion.law.torque), Default::default());
+    assert!(!motion.set.catch[1].busy());
 }

@@ -1,8 +1,8 @@
 //! Bumpless transfer: torque steps at a change of state, of the model or at enabling are blended out (J-25, J-44).
-use super::law::JointTorque;
-use super::smooth;
+use super::torque::JointTorque;
 use crate::JOINTS;
 use crate::config::Config;
+use crate::interpolation::smooth;
 use crate::nodes::Nodes;
 
 /// Which part of the last torque the next one continues.

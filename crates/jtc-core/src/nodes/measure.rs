@@ -6,6 +6,7 @@
 //! *offset*, which fades, so that neither the loss nor the return makes a step of position, nor of the derivative of its error.
 //! The offset has no part in the prediction: what is predicted depends on answers and commands alone, so that the position loop
 //! stays closed however often answers are lost.
+use crate::DT;
 use crate::config::Config;
 
 /// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
@@ -24,8 +25,6 @@ const FASTEST: f64 = 1.2;
 const FADING: f64 = 3.0;
 /// What is left of it when it ends, rad or rad/s.
 const FADED: f64 = 1e-9;
-/// Length of a tick, s.
-const DT: f64 = 0.001;
 
 /// Position and velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

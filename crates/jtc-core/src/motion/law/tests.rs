@@ -3,7 +3,10 @@ use super::*;
 use crate::Parameters;
 use crate::catch::Catch;
 use crate::deceleration::Deceleration;
+use crate::motion::Motion;
+use crate::motion::limiter::DRIVEN;
 use crate::parameters::Friction;
+use crate::pid::PidTorque;
 
 /// A bent arm: gravity loads joint 2 with some tens of N·m.
 const POSE: [f64; JOINTS] = [0.1, 0.9, 0.4, -0.2, 0.3, 0.5];
@@ -25,7 +28,7 @@ impl Arm {
         let config = Config::avena();
         let mut motion = Motion::default();
         motion.begin_at(&POSE);
-        motion.hold_for_test();
+        motion.set.hold_for_test();
         let Friction::Polynomial(polynomial) = Parameters::avena().friction else { unreachable!() };
         let dynamics = Dynamics::new(&Parameters::avena().model, config.gravity);
         Self { config, dynamics, pid: [gains; JOINTS], polynomial, table: None, motion }
@@ -44,7 +47,7 @@ impl Arm {
             polynomial: &self.polynomial,
             table: self.table.as_ref(),
         };
-        self.motion.control(mode, braking, nodes, &self.config, &parameters)
+        self.motion.control(&LawInputs { mode, braking, nodes, config: &self.config, parameters })
     }
 }
 
@@ -56,13 +59,13 @@ fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_onl
     for mode in MODES {
         let mut arm = Arm::held(NONE);
         let (qd, qdd) = ([0.5, -0.4, 0.3, 0.2, -0.1, 0.6], [1.0, 2.0, -3.0, 0.5, 1.0, -2.0]);
-        (arm.motion.set.velocity, arm.motion.set.acceleration) = (qd, qdd);
+        (arm.motion.set.point.velocity, arm.motion.set.point.acceleration) = (qd, qdd);
         arm.tick(mode, false, 0.0);
         let moves = matches!(mode, ControlMode::Follow | ControlMode::Approach);
         let (gravity, all) = (arm.dynamics.gravity_torque(&POSE), arm.dynamics.inverse(&POSE, &qd, &qdd));
         for j in 0..JOINTS {
             let model = if moves { all[j] + arm.config.joints[j].rotor_inertia * qdd[j] } else { gravity[j] };
-            let torque = &arm.motion.torque[j];
+            let torque = &arm.motion.law.torque[j];
             assert!((torque.model - model).abs() < 1e-9, "{mode:?}, joint {}: {torque:?}", j + 1);
             assert_eq!(torque.friction != 0.0, moves, "{mode:?}, joint {}: {torque:?}", j + 1);
         }
@@ -87,11 +90,11 @@ fn j42_a_table_without_standstill_is_no_error_while_the_arm_is_held() {
 fn j25_only_teaching_carries_what_was_found_missing() {
     let mut arm = Arm::held(NONE);
     let missing = arm.dynamics.flange_torque(&POSE).map(|torque| 2.0 * torque);
-    (0..1_000).for_each(|_| arm.motion.payload.observe(&missing));
-    arm.motion.begin_teaching(&Nodes::enabled_at(POSE, [0.0; JOINTS]), &arm.config, &arm.dynamics);
+    (0..1_000).for_each(|_| arm.motion.law.payload.observe(&missing));
+    arm.motion.law.begin_teaching(&Nodes::enabled_at(POSE, [0.0; JOINTS]), &arm.config, &arm.dynamics);
     for mode in MODES {
         arm.tick(mode, false, 0.0);
-        for (torque, missing) in arm.motion.torque.iter().zip(&missing) {
+        for (torque, missing) in arm.motion.law.torque.iter().zip(&missing) {
             let carried = if mode == ControlMode::Teach { *missing } else { 0.0 };
             assert!((torque.payload - carried).abs() < 0.01, "{mode:?}: {torque:?}, {missing}");
         }
@@ -105,12 +108,12 @@ fn j25_what_is_missing_is_observed_while_the_arm_is_held_at_rest_and_firmly() {
         arm.tick(ControlMode::Hold, false, 0.0);
         change(&mut arm);
         arm.tick(mode, false, 0.0);
-        arm.motion.payload.is_known(&arm.config)
+        arm.motion.law.payload.is_known(&arm.config)
     };
     assert!(observed(ControlMode::Hold, |_| ()));
     assert!(MODES.iter().all(|&mode| observed(mode, |_| ()) == (mode == ControlMode::Hold)));
-    assert!(!observed(ControlMode::Hold, |arm| arm.motion.yielding = true));
-    assert!(!observed(ControlMode::Hold, |arm| arm.motion.holding[3] = false));
+    assert!(!observed(ControlMode::Hold, |arm| arm.motion.law.yielding = true));
+    assert!(!observed(ControlMode::Hold, |arm| arm.motion.set.holding[3] = false));
 }
 
 /// In motion errors below the resolution of an encoder add up as well.
@@ -120,10 +123,11 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
         [(0.0, 0.0, true), (0.1, 0.0, false), (0.0, 0.1, false), (-0.1, 0.1, false)]
     {
         let mut arm = Arm::held(PidGains { ki: 1.0, ..NONE });
-        arm.motion.set.position = POSE.map(|q| q + 0.5 * arm.config.encoder_step);
-        (arm.motion.set.velocity, arm.motion.set.acceleration) = ([velocity; JOINTS], [acceleration; JOINTS]);
+        arm.motion.set.point.position = POSE.map(|q| q + 0.5 * arm.config.encoder_step);
+        (arm.motion.set.point.velocity, arm.motion.set.point.acceleration) =
+            ([velocity; JOINTS], [acceleration; JOINTS]);
         arm.tick(ControlMode::Follow, false, 0.0);
-        let still = arm.motion.torque.map(|torque| torque.pid.i == 0.0);
+        let still = arm.motion.law.torque.map(|torque| torque.pid.i == 0.0);
         assert_eq!(still, [held; JOINTS], "{velocity} rad/s, {acceleration} rad/s²");
     }
 }
@@ -150,10 +154,10 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         arm.config.joints[1].torque_max = 10.0;
         let limits = arm.config.joints[1];
         if catches {
-            arm.motion.catch[1] = Catch::begin(&arm.config);
+            arm.motion.set.catch[1] = Catch::begin(&arm.config);
         }
         if decelerates {
-            arm.motion.deceleration[1] = Some(Deceleration::led(POSE[1], 0.0, &arm.config, &limits));
+            arm.motion.set.deceleration[1] = Some(Deceleration::led(POSE[1], 0.0, &arm.config, &limits));
         }
         let found = (0..100).any(|_| arm.tick(mode, braking, along * speed).1[1] & joint_error::TORQUE != 0);
         assert_eq!(found, error, "{mode:?} {catches} {decelerates} {braking} {speed}");
@@ -172,8 +176,8 @@ fn j43_set_values_are_looked_at_where_the_law_holds_a_joint() {
         (ControlMode::Approach, true, true, joint_error::POSITION_ERROR),
     ] {
         let mut arm = Arm::held(NONE);
-        arm.motion.holding = [holding; JOINTS];
-        arm.motion.set.position[4] += 2.0 * arm.config.joints[4].position_error_max;
+        arm.motion.set.holding = [holding; JOINTS];
+        arm.motion.set.point.position[4] += 2.0 * arm.config.joints[4].position_error_max;
         let found = arm.tick(mode, braking, 0.0).1;
         assert_eq!(found, [0, 0, 0, 0, errors, 0], "{mode:?} {braking} {holding}");
     }
@@ -220,7 +224,7 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
         (ControlMode::Teach, 1.5 * Config::avena().teach_velocity_max, 0),
     ] {
         let mut arm = Arm::held(NONE);
-        arm.motion.holding[off] = false;
+        arm.motion.set.holding[off] = false;
         let axis = |from: f32| core::array::from_fn(|k| from + k as f32);
         arm.table =
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
@@ -229,9 +233,9 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
         for j in 0..JOINTS {
             assert_eq!(errors[j], if j == off { 0 } else { error }, "{mode:?}, joint {}", j + 1);
             let brakes = mode == ControlMode::Teach && j != off;
-            assert_eq!(arm.motion.torque[j].brake < 0.0, brakes, "{mode:?}, joint {}", j + 1);
+            assert_eq!(arm.motion.law.torque[j].brake < 0.0, brakes, "{mode:?}, joint {}", j + 1);
         }
-        assert_eq!((torque[off], arm.motion.torque[off]), (0.0, JointTorque::default()), "{mode:?}");
+        assert_eq!((torque[off], arm.motion.law.torque[off]), (0.0, JointTorque::default()), "{mode:?}");
     }
 }
 
@@ -239,16 +243,16 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
 fn j66_an_arm_that_gives_way_adds_a_little_to_the_torque_of_the_model() {
     for (yielding, direction) in [(false, 1.0), (true, 1.0), (true, -1.0), (false, -1.0)] {
         let mut arm = Arm::held(PidGains { kp: 1e6, ..NONE });
-        arm.motion.yielding = yielding;
-        arm.motion.set.position = POSE.map(|q| q + direction * 0.001);
+        arm.motion.law.yielding = yielding;
+        arm.motion.set.point.position = POSE.map(|q| q + direction * 0.001);
         arm.tick(ControlMode::Hold, false, 0.0);
-        for (torque, joint) in arm.motion.torque.iter().zip(&arm.config.joints) {
+        for (torque, joint) in arm.motion.law.torque.iter().zip(&arm.config.joints) {
             let most = if yielding { 0.3 * joint.torque_max } else { 1_000.0 };
             assert!((torque.correction() - direction * most).abs() < 1e-6, "{yielding}: {torque:?}");
         }
         // What is within that is not touched.
-        arm.motion.set.position = POSE.map(|q| q + direction * 1e-6);
+        arm.motion.set.point.position = POSE.map(|q| q + direction * 1e-6);
         arm.tick(ControlMode::Hold, false, 0.0);
-        assert!(arm.motion.torque.iter().all(|torque| (torque.correction() - direction).abs() < 1e-6));
+        assert!(arm.motion.law.torque.iter().all(|torque| (torque.correction() - direction).abs() < 1e-6));
     }
 }

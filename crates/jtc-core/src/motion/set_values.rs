@@ -1,0 +1,156 @@
+//! Set values (section 6): of the held arm, of what comes to rest, of the approach and of the path.
+use crate::catch::Catch;
+use crate::config::Config;
+use crate::deceleration::{Deceleration, moves};
+use crate::interpolation::SetPoint;
+use crate::limits::JointConfig;
+use crate::nodes::Nodes;
+use crate::{DT, JOINTS};
+
+/// Where the arm is wanted, and what is not at rest there yet. HoldPos steps it by [`hold`](Self::hold), Operate by
+/// [`approach`](Self::approach) and [`follow`](Self::follow).
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SetValues {
+    /// The set values of this tick.
+    pub point: SetPoint,
+    /// The joint is enabled and its set position latched.
+    pub(super) holding: [bool; JOINTS],
+    /// Joints whose load is being caught.
+    pub(super) catch: [Catch; JOINTS],
+    /// Joints that decelerate to rest.
+    pub(super) deceleration: [Option<Deceleration>; JOINTS],
+}
+
+impl SetValues {
+    /// Nothing is held; the set position is the measured one.
+    pub fn released(nodes: &Nodes) -> Self {
+        Self { point: SetPoint::still(*nodes.positions()), ..Self::default() }
+    }
+
+    /// Whatever comes next begins at rest at `position`.
+    pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
+        self.point = SetPoint::still(*position);
+        self.deceleration = [None; JOINTS];
+    }
+
+    /// Begin to hold where the arm is, coming to rest first if it moves.
+    pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
+        let (from, velocity) = (nodes.positions(), nodes.velocities());
+        self.begin_at(from);
+        let moving = velocity.iter().any(|&v| moves(v));
+        for j in 0..JOINTS {
+            // Joints that are enabled later begin on their own.
+            let decelerates = moving && self.holding[j];
+            self.deceleration[j] =
+                decelerates.then_some(Deceleration::led(from[j], velocity[j], config, &config.joints[j]));
+        }
+    }
+
+    /// A joint that comes to rest because a hand has led it is stopped like one with a falling load.
+    pub fn catch_decelerating(&mut self, config: &Config) {
+        for (catch, deceleration) in self.catch.iter_mut().zip(&self.deceleration) {
+            *catch = if deceleration.is_some() { Catch::begin(config) } else { *catch };
+        }
+    }
+
+    /// Joints that move, by their set values or as measured.
+    pub fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
+        core::array::from_fn(|j| moves(self.point.velocity[j]) || moves(nodes.velocities()[j]))
+    }
+
+    /// As if every joint were enabled and its position latched.
+    #[cfg(test)]
+    pub fn hold_for_test(&mut self) {
+        self.holding = [true; JOINTS];
+    }
+
+    /// Every joint is enabled and held at rest.
+    pub fn all_holding(&self) -> bool {
+        self.deceleration.iter().all(Option::is_none)
+            && self.holding.iter().all(|&h| h)
+            && !self.catch.iter().any(Catch::busy)
+    }
+
+    /// Latches the set position of joints that have just been enabled, and brings those to rest that move; joints that are
+    /// not enabled are followed, without torque. Returns which joints were held before, and which have just been enabled.
+    pub fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
+        let (measured, velocity) = (nodes.positions(), nodes.velocities());
+        let enabled = core::array::from_fn(|j| nodes.node(j).enabled());
+        let held = core::array::from_fn(|j| enabled[j] && self.holding[j]);
+        let just_enabled: [bool; JOINTS] = core::array::from_fn(|j| enabled[j] && !self.holding[j]);
+        let another = just_enabled.contains(&true);
+        for j in 0..JOINTS {
+            if !held[j] {
+                self.point.position[j] = measured[j];
+                self.catch[j] = if just_enabled[j] { Catch::begin(config) } else { Catch::default() };
+                let falls = just_enabled[j] && moves(velocity[j]);
+                self.deceleration[j] = falls.then_some(Deceleration::falling(
+                    measured[j],
+                    velocity[j],
+                    config,
+                    &config.joints[j],
+                ));
+            } else if another {
+                // Its load moves when that of another joint does.
+                self.catch[j] = Catch::begin(config);
+            }
+        }
+        self.holding = enabled;
+        Latched { held, just_enabled }
+    }
+
+    /// A tick of HoldPos: the held position.
+    pub fn hold(&mut self, config: &Config) {
+        (self.point.velocity, self.point.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
+        for j in 0..JOINTS {
+            let Some(deceleration) = &mut self.deceleration[j] else { continue };
+            let (position, velocity, rests) = deceleration.step(&config.joints[j]);
+            (self.point.position[j], self.point.velocity[j]) = (position, velocity);
+            if rests {
+                self.deceleration[j] = None;
+            }
+        }
+    }
+
+    /// A tick of the approach from a held position to the first point, at `u` (0..1) of `length_ms`: a minimum-jerk
+    /// (fifth-order) polynomial.
+    pub fn approach(&mut self, from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) {
+        let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
+        let speed = 30.0 * u * u * (1.0 - u) * (1.0 - u) / (length_ms * DT);
+        for j in 0..JOINTS {
+            self.point.position[j] = from[j] + (to[j] - from[j]) * rise;
+            self.point.velocity[j] = (to[j] - from[j]) * speed;
+            self.point.acceleration[j] = 0.0;
+        }
+    }
+
+    /// A tick on the path: full-speed values `at`, scaled by the rate of path time and its slope (1/s) (J-33).
+    pub fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
+        self.point.position = at.position;
+        for j in 0..JOINTS {
+            self.point.velocity[j] = at.velocity[j] * rate;
+            self.point.acceleration[j] = at.acceleration[j] * rate * rate + at.velocity[j] * slope;
+        }
+    }
+
+    /// The set position of a joint whose load is being caught moves on towards it, by as much as the torque is beyond the limit
+    /// (`excess`, N·m). Returns by how much, rad.
+    pub fn sag(&mut self, j: usize, excess: f64, kp: f64, measured: f64, limits: &JointConfig) -> f64 {
+        let error = self.point.position[j] - measured;
+        let step = self.catch[j].sag(excess, kp, error, limits);
+        self.point.position[j] += step;
+        if let Some(deceleration) = &mut self.deceleration[j] {
+            deceleration.shift(step);
+        }
+        step
+    }
+}
+
+/// What [`SetValues::latch`] found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Latched {
+    /// Joints that go on being held.
+    pub held: [bool; JOINTS],
+    /// Joints that were latched in this tick.
+    pub just_enabled: [bool; JOINTS],
+}

@@ -1,0 +1,27 @@
+//! The torque of one joint, in its parts.
+use crate::pid::PidTorque;
+
+/// Parts of one joint's torque, N·m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct JointTorque {
+    pub model: f64,
+    pub pid: PidTorque,
+    pub friction: f64,
+    /// What teaching carries besides the model.
+    pub payload: f64,
+    /// Brake of teaching.
+    pub brake: f64,
+    /// What is left of a step that is being blended out.
+    pub blend: f64,
+}
+
+impl JointTorque {
+    /// All but the model.
+    pub fn correction(&self) -> f64 {
+        self.pid.sum() + self.friction + self.payload + self.brake + self.blend
+    }
+
+    pub fn sum(&self) -> f64 {
+        self.model + self.correction()
+    }
+}

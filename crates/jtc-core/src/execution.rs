@@ -1,45 +1,12 @@
 //! The execution of a trajectory (section 5): from Execute to standstill, wherever that comes about.
+pub(crate) mod phase;
+
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};
 
 use crate::controller::Controller;
-use crate::motion::ControlMode;
 use crate::path::PathClock;
 use crate::{JOINTS, TrajectoryState, joint_error};
-
-/// Where in Operate the controller is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Path {
-    /// Waits until every joint is enabled, and for how long it has, ms.
-    Waiting { elapsed_ms: u32 },
-    /// The approach: from where the arm is held to the first point, or to the one where the path was paused.
-    Approaching { from: [f64; JOINTS], elapsed_ms: f64, leave: Option<TrajectoryState> },
-    /// At point 0, which the next tick commands.
-    AtStart,
-    /// On the path; `leave`: the state that follows at standstill.
-    Running { leave: Option<TrajectoryState> },
-}
-
-impl Path {
-    /// Nothing was waited for yet.
-    pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
-
-    /// The control mode.
-    pub fn mode(&self) -> ControlMode {
-        match self {
-            Self::Waiting { .. } => ControlMode::Hold,
-            Self::Approaching { .. } => ControlMode::Approach,
-            Self::AtStart | Self::Running { .. } => ControlMode::Follow,
-        }
-    }
-
-    /// The state that an accepted Pause or Stop leads to.
-    pub fn leave(&self) -> Option<TrajectoryState> {
-        match self {
-            Self::Approaching { leave, .. } | Self::Running { leave } => *leave,
-            Self::Waiting { .. } | Self::AtStart => None,
-        }
-    }
-}
+use phase::Phase;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Execute from Stop or Finish.
@@ -49,7 +16,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Err(DataStatus::StartPositionMismatch);
         }
         self.clock = PathClock::default();
-        self.path = Path::BEGIN;
+        self.phase = Phase::BEGIN;
         self.braking_ms = None;
         self.motion.law.stand_firm();
         self.set_trajectory(TrajectoryState::Execute);
@@ -78,13 +45,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.motion.begin_at(self.nodes.positions());
             self.motion.law.stand_firm();
         }
-        self.path = if self.clock.time == 0.0 {
-            Path::BEGIN
+        self.phase = if self.clock.time == 0.0 {
+            Phase::BEGIN
         } else if self.motion.set.point.position == paused {
             self.go_on();
-            Path::Running { leave: None }
+            Phase::Running { leave: None }
         } else {
-            Path::Approaching { from: self.motion.set.point.position, elapsed_ms: 0.0, leave: None }
+            Phase::Approaching { from: self.motion.set.point.position, elapsed_ms: 0.0, leave: None }
         };
         self.set_trajectory(TrajectoryState::Execute);
         Ok(())
@@ -99,8 +66,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
     pub(crate) fn leave_path(&mut self, command: ExecCommand) {
         let to = if command == ExecCommand::Pause { TrajectoryState::Pause } else { TrajectoryState::Stop };
-        match &mut self.path {
-            Path::Running { leave } => {
+        match &mut self.phase {
+            Phase::Running { leave } => {
                 if leave.replace(to).is_none() {
                     self.clock.halt();
                     self.braking_ms = Some(0);
@@ -108,25 +75,25 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
             }
             // It comes to rest at point 0 by itself.
-            Path::Approaching { leave, .. } => *leave = Some(to),
-            Path::Waiting { .. } | Path::AtStart => self.set_trajectory(to),
+            Phase::Approaching { leave, .. } => *leave = Some(to),
+            Phase::Waiting { .. } | Phase::AtStart => self.set_trajectory(to),
         }
     }
 
     /// Set values of Operate.
     pub(crate) fn walk(&mut self) {
-        match self.path {
-            Path::Waiting { elapsed_ms } => {
+        match self.phase {
+            Phase::Waiting { elapsed_ms } => {
                 // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
                 self.motion.set.hold(&self.config);
                 if !self.motion.set.all_holding() {
                     // The wait ends: the operator no longer expects a motion then (J-16).
-                    self.path = Path::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
+                    self.phase = Phase::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_trajectory(TrajectoryState::Stop);
                     }
                 } else if self.near(&self.path_point()) {
-                    self.path = Path::Approaching {
+                    self.phase = Phase::Approaching {
                         from: self.motion.set.point.position,
                         elapsed_ms: 0.0,
                         leave: None,
@@ -135,7 +102,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     self.set_trajectory(TrajectoryState::Stop);
                 }
             }
-            Path::Approaching { from, elapsed_ms, leave } => {
+            Phase::Approaching { from, elapsed_ms, leave } => {
                 if elapsed_ms == 0.0 {
                     // The arm was held until now, without friction compensation.
                     self.motion.law.change_mode();
@@ -144,23 +111,23 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let elapsed_ms = elapsed_ms + 1.0;
                 self.motion.set.approach(&from, &self.path_point(), (elapsed_ms / length).min(1.0), length);
                 if elapsed_ms < length {
-                    self.path = Path::Approaching { from, elapsed_ms, leave };
+                    self.phase = Phase::Approaching { from, elapsed_ms, leave };
                 } else if let Some(trajectory) = leave {
                     self.set_trajectory(trajectory);
                 } else if self.clock.time == 0.0 {
-                    self.path = Path::AtStart;
+                    self.phase = Phase::AtStart;
                 } else {
                     self.go_on();
-                    self.path = Path::Running { leave: None };
+                    self.phase = Phase::Running { leave: None };
                 }
             }
-            Path::AtStart => {
+            Phase::AtStart => {
                 self.clock = PathClock::start();
-                self.path = Path::Running { leave: None };
+                self.phase = Phase::Running { leave: None };
                 self.follow();
                 self.finish_at_end();
             }
-            Path::Running { leave } => {
+            Phase::Running { leave } => {
                 self.clock.advance(f64::from(self.store.duration_ms()));
                 self.follow();
                 match leave {
@@ -223,8 +190,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let Some(ms) = self.braking_ms else { return false };
         let moving = self.motion.set.moving(&self.nodes);
         let stands = moving == [false; JOINTS];
-        if let (TrajectoryState::Execute, Path::Running { leave: Some(trajectory) }) =
-            (self.trajectory, self.path)
+        if let (TrajectoryState::Execute, Phase::Running { leave: Some(trajectory) }) =
+            (self.trajectory, self.phase)
             && stands
             && ms >= self.config.stop_ms
         {

@@ -27,9 +27,11 @@ mod reaction;
 mod received;
 mod report;
 mod response_queue;
+mod states;
 mod store;
 mod teach;
 mod telemetry;
+mod tick;
 
 pub use bounds::{OutOfBounds, ParameterBounds};
 pub use check::{TrajectoryCheck, Violation};

@@ -6,7 +6,7 @@
 use jtc_wire::{ExecCommand, RawPoint};
 
 use crate::controller::Controller;
-use crate::execution::Path;
+use crate::execution::phase::Phase;
 use crate::motion::ControlMode;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
@@ -30,7 +30,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.braking_ms = None;
         if self.trajectory == TrajectoryState::Execute {
             // Where a Pause or Stop was on its way, that is what it ends in (J-33).
-            self.set_trajectory(self.path.leave().unwrap_or(TrajectoryState::Pause));
+            self.set_trajectory(self.phase.leave().unwrap_or(TrajectoryState::Pause));
         }
         true
     }
@@ -38,7 +38,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// The arm stops on its path because of these errors, or is about to. False when it is on none, or when the time for it is
     /// over.
     pub(crate) fn stops_on_path(&mut self, mode: ControlMode, errors: &[u16; JOINTS]) -> bool {
-        let Path::Running { leave } = self.path else { return false };
+        let Phase::Running { leave } = self.phase else { return false };
         if mode != ControlMode::Follow || all(errors) & !STOP != 0 {
             return false;
         }
@@ -67,7 +67,7 @@ mod tests {
 
     fn running() -> Bench {
         let mut controller = Bench::new(Config::avena(), [RawPoint::default(); 4]);
-        controller.path = Path::Running { leave: None };
+        controller.phase = Phase::Running { leave: None };
         controller.trajectory = TrajectoryState::Execute;
         controller
     }
@@ -78,7 +78,7 @@ mod tests {
         for bit in [joint_error::VELOCITY, joint_error::ACCELERATION, joint_error::FRICTION_TABLE] {
             let (mut controller, errors) = (running(), [0, bit, 0, 0, 0, 0]);
             assert!(controller.stops_on_path(ControlMode::Follow, &errors));
-            assert_eq!(controller.path, Path::Running { leave: Some(TrajectoryState::Pause) });
+            assert_eq!(controller.phase, Phase::Running { leave: Some(TrajectoryState::Pause) });
             assert_eq!((controller.errors.word(), controller.errors.joint(1)), (0, (0, bit)));
             // Still outside while it brakes; when the time for that is over, it is an error.
             controller.braking_ms = Some(700);
@@ -96,12 +96,13 @@ mod tests {
             controller.motion.set.hold_for_test();
             controller.motion.set.point.velocity[1] = velocity;
             controller.motion.set.point.position[1] = controller.nodes.positions()[1] + offset;
-            controller.control(ControlMode::Follow);
-            (controller.path, controller.trajectory, controller.errors.word(), controller.errors.joint(1))
+            let (torque, errors) = controller.control(ControlMode::Follow);
+            controller.form_error_flags_again(torque, &errors);
+            (controller.phase, controller.trajectory, controller.errors.word(), controller.errors.joint(1))
         };
         let limits = Config::avena().joints[1];
         let (too_fast, too_far) = (1.01 * limits.velocity_max, 1.01 * limits.position_error_max);
-        let stops = Path::Running { leave: Some(TrajectoryState::Pause) };
+        let stops = Phase::Running { leave: Some(TrajectoryState::Pause) };
         assert_eq!(found(too_fast, 0.0), (stops, TrajectoryState::Execute, 0, (0, joint_error::VELOCITY)));
         let (_, trajectory, word, joint) = found(0.0, too_far);
         assert_eq!((trajectory, word, joint), (TrajectoryState::Pause, 0, (0, joint_error::POSITION_ERROR)));
@@ -137,13 +138,13 @@ mod tests {
             [(Some(5), true, error::INTERNAL | error::INTERNAL_JOINTS), (None, false, 0)]
         {
             let mut controller = running();
-            let stop = Path::Running { leave: Some(TrajectoryState::Stop) };
-            (controller.path, controller.braking_ms) = (stop, braking_ms);
+            let stop = Phase::Running { leave: Some(TrajectoryState::Stop) };
+            (controller.phase, controller.braking_ms) = (stop, braking_ms);
             assert_eq!(
                 controller.stops_on_path(ControlMode::Follow, &[0, joint_error::VELOCITY, 0, 0, 0, 0]),
                 stops
             );
-            assert_eq!((controller.path, controller.braking_ms), (stop, braking_ms));
+            assert_eq!((controller.phase, controller.braking_ms), (stop, braking_ms));
             assert_eq!(controller.errors.occurred(), occurred, "{braking_ms:?}");
         }
     }

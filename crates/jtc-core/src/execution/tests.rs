@@ -53,7 +53,7 @@ fn j34_after_a_stop_the_path_begins_anew() {
 /// On the path, with a Pause accepted `ms` ago.
 fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
     let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
-    controller.path = Path::Running { leave: Some(TrajectoryState::Pause) };
+    controller.phase = Phase::Running { leave: Some(TrajectoryState::Pause) };
     controller.braking_ms = Some(ms);
     (controller.clock, controller.clock.time) = (PathClock::start(), 250.0);
     controller
@@ -107,8 +107,8 @@ fn j33_a_second_stop_gives_no_more_time_to_brake() {
     controller.leave_path(ExecCommand::Stop);
     assert_eq!(controller.braking_ms, Some(700));
     assert_eq!(
-        controller.path,
-        Path::Running { leave: Some(TrajectoryState::Stop) },
+        controller.phase,
+        Phase::Running { leave: Some(TrajectoryState::Stop) },
         "the later command holds"
     );
 }
@@ -126,9 +126,9 @@ fn j34_an_arm_exactly_at_the_tolerance_is_at_the_point() {
 #[test]
 fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     let leave = Some(TrajectoryState::Stop);
-    assert_eq!(Path::Running { leave }.leave(), leave);
-    assert_eq!(Path::Approaching { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
-    assert_eq!((Path::BEGIN.leave(), Path::AtStart.leave()), (None, None));
+    assert_eq!(Phase::Running { leave }.leave(), leave);
+    assert_eq!(Phase::Approaching { from: [0.0; JOINTS], elapsed_ms: 3.0, leave }.leave(), leave);
+    assert_eq!((Phase::BEGIN.leave(), Phase::AtStart.leave()), (None, None));
 }
 
 /// On the path of four points that are 100 ms apart, at this time, slowing down.
@@ -162,7 +162,7 @@ fn j16_an_execute_waits_for_the_joints_as_long_as_enabling_may_take() {
         [(0, TrajectoryState::Execute), (most - 1, TrajectoryState::Execute), (most, TrajectoryState::Stop)]
     {
         let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
-        controller.path = Path::Waiting { elapsed_ms };
+        controller.phase = Phase::Waiting { elapsed_ms };
         controller.walk();
         assert_eq!(controller.trajectory, trajectory, "after {elapsed_ms} ms");
     }
@@ -173,9 +173,9 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     let length = f64::from(Config::avena().ramp_ms);
     for (before, arrives) in [(0.0, false), (length - 2.0, false), (length - 1.0, true)] {
         let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
-        controller.path = Path::Approaching { from: [0.0; JOINTS], elapsed_ms: before, leave: None };
+        controller.phase = Phase::Approaching { from: [0.0; JOINTS], elapsed_ms: before, leave: None };
         controller.walk();
-        assert_eq!(controller.path == Path::AtStart, arrives, "{before} ms");
+        assert_eq!(controller.phase == Phase::AtStart, arrives, "{before} ms");
     }
 }
 

@@ -1,0 +1,36 @@
+//! The states of the controller: which one follows (section 6). docs/protocol-jtc.md draws this function.
+use crate::ControllerState;
+
+/// What the next state depends on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Conditions {
+    /// An error is latched (J-21).
+    pub error: bool,
+    /// A joint is still being cleared: the cause of its error is not gone.
+    pub clearing: bool,
+    /// Every parameter was received and every node brought up (J-20).
+    pub initialised: bool,
+    /// The host has enabled teaching.
+    pub teaching: bool,
+    /// The arm is held at rest, and what it carries is known (J-25).
+    pub teachable: bool,
+    /// A trajectory is being executed.
+    pub execute: bool,
+}
+
+/// The state that follows: the first of Error, Init, Teaching, Operate and HoldPos that applies.
+pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> ControllerState {
+    let Conditions { error, clearing, initialised, teaching, teachable, execute } = *conditions;
+    if error || (state == ControllerState::Error && clearing) {
+        ControllerState::Error
+    } else if !initialised {
+        ControllerState::Init
+    } else if teaching && (state == ControllerState::Teaching || teachable) {
+        // Accepted, it waits until every joint is held at rest: what the arm carries is found only then (J-25).
+        ControllerState::Teaching
+    } else if execute {
+        ControllerState::Operate
+    } else {
+        ControllerState::HoldPos
+    }
+}

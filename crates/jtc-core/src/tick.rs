@@ -1,0 +1,174 @@
+//! One millisecond of the controller, from top to bottom as docs/architecture.md lists it.
+use jtc_bus::Frame;
+use jtc_wire::{RawPoint, Response};
+
+use crate::controller::Controller;
+use crate::io::{Inputs, Outputs};
+use crate::motion::{ControlMode, LawInputs};
+use crate::{ControllerState, JOINTS, SetPoint};
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// One millisecond, with a bounded amount of work whatever the inputs.
+    pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
+        let before = self.state;
+        // 1. What has come in. The error flags are formed in front of the host's commands: a clear in the very tick in which a
+        // fault shows does not hide it. In Start nothing is carried out yet; the events are offered again.
+        self.take_answers(inputs);
+        self.form_error_flags(inputs);
+        if self.errors.any() {
+            self.enter(ControllerState::Error);
+        }
+        let host_done = if before == ControllerState::Start { 0 } else { self.serve_host(inputs) };
+
+        // 2. What state that makes. What persists is raised again, where a host may have cleared it.
+        if !inputs.host.is_empty() {
+            self.form_error_flags(inputs);
+        }
+        self.choose_state();
+
+        // 3. What to do in it.
+        let (torque, found) = self.work();
+
+        // 4. An error found now zeroes the torque of this same tick.
+        let torque = self.form_error_flags_again(torque, &found);
+
+        // 5. The frame for the bus.
+        let bus = self.frame(before, torque);
+        self.observe(&torque);
+
+        // 6. What the board and the host get.
+        // J-22: 0 in Start and while an internal error is latched.
+        let safety_output = self.state != ControllerState::Start && !self.errors.internal();
+        let status = self.status_due(inputs.status_free);
+        let record_line = if status { self.prepare_status() } else { None };
+        Outputs { bus: Some(bus), safety_output, status, record_line, host_done }
+    }
+
+    /// The answers of the nodes, and whether this tick comes in time.
+    fn take_answers(&mut self, inputs: &Inputs<'_>) {
+        self.nodes.take(inputs, &self.config, self.goal(), &self.motion.set.point.velocity);
+        self.pump &= !self.nodes.gripper_lost();
+        if self.late_ticks.count(inputs.missed_ticks) {
+            self.errors.raise_device();
+        }
+    }
+
+    /// Errors from outside the control law; they latch (J-21).
+    fn form_error_flags(&mut self, inputs: &Inputs<'_>) {
+        if !inputs.safety_input {
+            self.errors.raise_emergency_input();
+        }
+        self.errors.raise_can(self.nodes.can_flags(inputs, &self.config));
+        self.errors.show_can(self.nodes.gripper_flags(&self.config));
+        if self.nodes.external_error(self.powered()) {
+            self.errors.raise_external_joints();
+        }
+    }
+
+    /// The work of the state: torques within their limits, and the errors of joints found on the way.
+    fn work(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
+        match self.state {
+            ControllerState::Start | ControllerState::Init | ControllerState::Error => {
+                self.motion.release(&self.nodes);
+                ([0.0; JOINTS], [0; JOINTS])
+            }
+            ControllerState::Teaching => self.teach(),
+            ControllerState::HoldPos => self.hold(),
+            ControllerState::Operate => self.operate(),
+        }
+    }
+
+    fn hold(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
+        // The wait ends: the operator no longer expects the arm to go soft then.
+        self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
+        self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
+        self.motion.latch(&self.nodes, &self.config);
+        self.motion.set.hold(&self.config);
+        self.control(ControlMode::Hold)
+    }
+
+    fn teach(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
+        self.motion.set.point = SetPoint::still(*self.nodes.positions());
+        self.control(ControlMode::Teach)
+    }
+
+    /// The control step in Operate: a function of its own, so that its instructions can be counted. On the path they are the
+    /// same number in every tick.
+    #[inline(never)]
+    fn operate(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
+        self.motion.latch(&self.nodes, &self.config);
+        let mode = self.phase.mode();
+        self.walk();
+        self.control(mode)
+    }
+
+    /// The control law and its limits: the torques to command, and the errors that were not acted upon (J-66).
+    pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
+        // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
+        let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
+        let (mut torque, mut errors) = self.compute(mode);
+        if errors != [0; JOINTS] {
+            if self.gives_way(&errors) {
+                (torque, errors) = self.compute(ControlMode::Hold);
+            } else if self.stops_on_path(mode, &errors) {
+                errors = [0; JOINTS];
+            }
+        }
+        (torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
+    }
+
+    /// Torques of the control law, and the joint errors found on the way.
+    fn compute(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
+        let braking = self.brake();
+        let (nodes, config, parameters) = (&self.nodes, &self.config, self.parameters.control());
+        self.motion.control(&LawInputs { mode, braking, nodes, config, parameters })
+    }
+
+    /// Raises what the limits have `found`; returns the torque to command, which is none with an error latched (J-21).
+    pub(crate) fn form_error_flags_again(
+        &mut self,
+        torque: [f64; JOINTS],
+        found: &[u16; JOINTS],
+    ) -> [f64; JOINTS] {
+        self.errors.raise_joints(found);
+        if self.errors.any() {
+            self.enter(ControllerState::Error);
+            return [0.0; JOINTS];
+        }
+        torque
+    }
+
+    /// The one frame of this tick (J-12).
+    fn frame(&mut self, before: ControllerState, torque: [f64; JOINTS]) -> Frame {
+        // Drives keep their last torque: taking it away comes before everything else.
+        let new_error = self.state == ControllerState::Error && before != ControllerState::Error;
+        let must_move = new_error || (before.has_torque() && !self.powered());
+        self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move)
+    }
+
+    /// Puts the oldest record into a status; returns the line that it is for.
+    fn prepare_status(&mut self) -> Option<usize> {
+        let record = self.records.pop();
+        self.status_frame = self.status(record.map_or(Response::NONE, |(_, record)| record)).emit();
+        record.map(|(line, _)| line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+
+    /// An accepted teaching waits as long as enabling may take, and is over then: the operator no longer expects the arm to go soft.
+    #[test]
+    fn j25_teaching_waits_for_a_while_only() {
+        let most = Config::avena().enable_timeout_ms;
+        for (waited_ms, waits) in [(0, true), (most - 2, true), (most - 1, false), (most, false)] {
+            let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+            (controller.state, controller.teaching) = (ControllerState::HoldPos, true);
+            controller.teaching_waits_ms = waited_ms;
+            controller.hold();
+            assert_eq!(controller.teaching, waits, "{waited_ms} ms");
+        }
+    }
+}

@@ -34,3 +34,6 @@ pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> Con
         ControllerState::HoldPos
     }
 }
+
+#[cfg(test)]
+mod tests;

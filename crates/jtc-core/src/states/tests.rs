@@ -1,0 +1,181 @@
+//! The state machine under all its conditions, and its diagram in docs/protocol-jtc.md; `UPDATE_DOCS=1` draws it again.
+extern crate std;
+use std::format;
+use std::path::Path;
+use std::string::String;
+use std::vec::Vec;
+
+use jtc_wire::{ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Segment, UrgentCommands};
+
+use super::*;
+use crate::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, TrajectoryState};
+
+const STATES: [ControllerState; 6] = [
+    ControllerState::Start,
+    ControllerState::Init,
+    ControllerState::HoldPos,
+    ControllerState::Operate,
+    ControllerState::Teaching,
+    ControllerState::Error,
+];
+
+/// A condition, and what the diagram calls it where it holds and where it does not.
+type Named = (fn(&Conditions) -> bool, &'static str, &'static str);
+const NAMES: [Named; 6] = [
+    (|c| c.error, "an error", "errors cleared"),
+    (|c| c.clearing, "a joint is being cleared", "every joint cleared"),
+    (|c| c.initialised, "nodes ready and parameters given", "not initialised"),
+    (|c| c.teaching, "teaching on", "teaching off"),
+    (|c| c.teachable, "held at rest", "not held at rest"),
+    (|c| c.execute, "execute", "execution over"),
+];
+
+fn all_conditions() -> impl Iterator<Item = Conditions> {
+    (0..64u8).map(|bits| {
+        let bit = |n: u8| bits >> n & 1 == 1;
+        Conditions {
+            error: bit(0),
+            clearing: bit(1),
+            initialised: bit(2),
+            teaching: bit(3),
+            teachable: bit(4),
+            execute: bit(5),
+        }
+    })
+}
+
+/// What becomes of teaching and of a loaded trajectory when the host sends this in a state that HoldPos has changed into.
+fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditions {
+    let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+    controller.state = ControllerState::HoldPos;
+    let points = [0, 1, 0, 0, 0, 1, 0, 10].into_iter().chain([0; 4 * 36]).collect::<Vec<u8>>();
+    let segment = Segment::parse(&points).expect("four points at standstill");
+    controller.store.begin(&segment);
+    controller.store.copy(&segment, 0, 4);
+    controller.store.commit(&segment, *controller.store.speeds());
+    controller.set_trajectory(TrajectoryState::Stop);
+    controller.enter(state);
+    let bytes = [&[0; 4], &body[..], &[0; 2]].concat();
+    let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
+    controller.serve_host(&Inputs {
+        bus: &[],
+        bus_state: BusState { acknowledged: true, bus_off: false },
+        safety_input: true,
+        missed_ticks: 0,
+        urgent: [UrgentCommands::NONE; HOST_LINES],
+        host: &[HostEvent { line: 0, overtaken: false, event }],
+        status_free: true,
+    });
+    let (teaching, execute) = (controller.teaching, controller.trajectory == TrajectoryState::Execute);
+    Conditions { teaching, execute, ..Conditions::default() }
+}
+
+/// The conditions that a state can find: some only come about where the host's command is accepted.
+fn possible(state: ControllerState) -> Vec<Conditions> {
+    // The host is not served in Start, so that every parameter is missing.
+    let start = state == ControllerState::Start;
+    let teaching = !start
+        && (state == ControllerState::Teaching
+            || sent(state, FrameType::TeachingModeEnable, [0; 4]).teaching);
+    let execute = [ExecCommand::Execute as u8, 0, 0, 0];
+    let execute = !start && sent(state, FrameType::TrajSetExecStatus, execute).execute;
+    all_conditions()
+        .filter(|c| (teaching || !c.teaching) && (execute || !c.execute))
+        .filter(|c| !(c.initialised && (start || c.clearing)))
+        .collect()
+}
+
+/// The conditions that an arrow needs: those that hold whenever it is taken, but for what only keeps a state away that comes
+/// before it in any case.
+fn label(from: ControllerState, to: ControllerState) -> Option<String> {
+    let all = possible(from);
+    let taken: Vec<_> = all.iter().filter(|c| next_state(from, c) == to).collect();
+    let first = taken.first()?;
+    let mut needed: Vec<_> = NAMES
+        .iter()
+        .filter(|(holds, ..)| taken.iter().all(|c| holds(c) == holds(first)))
+        .filter(|(holds, ..)| all.iter().any(|c| holds(c) != holds(first)))
+        .collect();
+    let comes_before = |state: ControllerState| match to {
+        ControllerState::Error => false,
+        ControllerState::Init => state == ControllerState::Error,
+        ControllerState::Operate if state == ControllerState::Teaching => true,
+        _ => matches!(state, ControllerState::Error | ControllerState::Init),
+    };
+    for n in (0..needed.len()).rev() {
+        let without: Vec<_> = needed.iter().enumerate().filter(|(k, _)| *k != n).map(|(_, c)| *c).collect();
+        let only = |c: &&Conditions| without.iter().all(|(holds, ..)| holds(c) == holds(first));
+        let reached = all.iter().filter(only).map(|c| next_state(from, c));
+        if reached.into_iter().all(|state| state == to || state != from && comes_before(state)) {
+            needed.remove(n);
+        }
+    }
+    let words = needed.iter().map(|(holds, yes, no)| if holds(first) { *yes } else { *no });
+    Some(words.collect::<Vec<_>>().join(", "))
+}
+
+fn diagram() -> String {
+    let mut lines = String::from("```mermaid\nstateDiagram-v2\n    [*] --> Start\n");
+    for (from, to) in STATES.iter().flat_map(|from| STATES.map(|to| (*from, to))) {
+        match label(from, to) {
+            Some(label) if from != to && label.is_empty() => lines += &format!("    {from:?} --> {to:?}\n"),
+            Some(label) if from != to => lines += &format!("    {from:?} --> {to:?}: {label}\n"),
+            _ => {}
+        }
+    }
+    lines + "```\n"
+}
+
+#[test]
+fn j20_the_diagram_is_what_the_code_does() {
+    let drawn = diagram();
+    std::println!("{drawn}");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/protocol-jtc.md");
+    let text = std::fs::read_to_string(&path).expect("docs/protocol-jtc.md is there");
+    let mark = |mark: &str| text.find(mark).unwrap_or_else(|| panic!("protocol-jtc.md has no mark {mark}"));
+    let begin = mark("<!-- states begin -->\n") + "<!-- states begin -->\n".len();
+    let end = mark("<!-- states end -->");
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        let new = format!("{}{drawn}{}", &text[..begin], &text[end..]);
+        std::fs::write(&path, new).expect("docs/protocol-jtc.md can be written");
+    } else {
+        assert!(
+            text[begin..end] == drawn,
+            "docs/protocol-jtc.md differs from the code: look, then `cargo xtask docs`"
+        );
+    }
+}
+
+/// Under every condition, possible or not.
+#[test]
+fn j20_j21_torque_is_on_with_no_error_and_all_initialised_only() {
+    for (state, conditions) in STATES.iter().flat_map(|state| all_conditions().map(move |c| (*state, c))) {
+        let next = next_state(state, &conditions);
+        if conditions.error {
+            assert_eq!(next, ControllerState::Error, "{state:?} {conditions:?}");
+        }
+        if !conditions.initialised || conditions.error {
+            assert!(!next.has_torque(), "{state:?} {conditions:?}");
+        }
+        if state == ControllerState::Error && conditions.clearing {
+            assert_eq!(next, ControllerState::Error, "{conditions:?}");
+        }
+        assert_ne!(next, ControllerState::Start, "{state:?} {conditions:?}");
+    }
+}
+
+/// The arm moves, or goes soft, out of HoldPos only, and from there by an order of the host.
+#[test]
+fn j24_j25_no_state_but_holdpos_leads_to_motion_or_teaching() {
+    for (from, conditions) in STATES.iter().flat_map(|from| possible(*from).into_iter().map(|c| (*from, c))) {
+        let next = next_state(from, &conditions);
+        for (to, ordered) in [
+            (ControllerState::Operate, conditions.execute),
+            (ControllerState::Teaching, conditions.teaching && conditions.teachable),
+        ] {
+            if next == to && from != to {
+                assert!(from == ControllerState::HoldPos && ordered, "{from:?} {conditions:?} {next:?}");
+            }
+        }
+    }
+}

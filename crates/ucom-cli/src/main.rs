@@ -2,18 +2,13 @@
 #![forbid(unsafe_code)]
 
 mod args;
-mod bus_off;
 mod cache;
-mod cleanup;
 mod commands;
-mod driver;
 mod failure;
-mod link;
-mod pump;
+mod interrupt;
+mod session;
 mod shape;
-mod values;
 mod words;
-mod written;
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -38,7 +33,7 @@ fn main() -> ExitCode {
             Some(why) => {
                 let exit = if acts { failure::FAULT } else { failure::USAGE };
                 let text = format!("ucom: the result could not be printed: {why}");
-                cleanup::print_within(PRINT_TIMEOUT, move || out.note(text));
+                interrupt::print_within(PRINT_TIMEOUT, move || out.note(text));
                 ExitCode::from(exit)
             }
         },
@@ -47,7 +42,7 @@ fn main() -> ExitCode {
                 // Nobody reads what stands in stdout already.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 let exit = failure.exit;
-                cleanup::print_within(PRINT_TIMEOUT, move || {
+                interrupt::print_within(PRINT_TIMEOUT, move || {
                     out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
                 });
                 return ExitCode::from(exit);

@@ -4,5 +4,6 @@
 pub mod files;
 pub mod master;
 mod profile_file;
+pub mod session;
 
 pub use profile_file::{ProfileFile, ProfileFileError, profile_help};

@@ -1,53 +1,6 @@
-//! Boards and values as words of the command line.
+//! Boards, bits and spans as words of the command line.
 
-use std::str::FromStr;
-
-use ucom_host::files::SignalValue;
-
-/// Which boards are meant: numbers, a list, ranges, or all.
-#[derive(Clone, Debug, Eq, PartialEq)]
-pub enum Boards {
-    /// Every board that answers.
-    All,
-    /// None at all.
-    None,
-    /// These, ascending, each once.
-    Some(Vec<u8>),
-}
-
-impl FromStr for Boards {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "all" => return Ok(Self::All),
-            "none" => return Ok(Self::None),
-            _ => {}
-        }
-        let number = |word: &str| {
-            let number = word.trim().parse().ok().filter(|n| *n <= 31);
-            number.ok_or_else(|| {
-                format!("\"{word}\" is no board: a number 0..31, a list 1,3, a range 1-4, or all")
-            })
-        };
-        let mut boards: Vec<u8> = Vec::new();
-        for word in text.split(',') {
-            match word.split_once('-') {
-                Some((first, last)) => {
-                    let (first, last) = (number(first)?, number(last)?);
-                    if first > last {
-                        return Err(format!("{word} is backwards: {last}-{first}"));
-                    }
-                    boards.extend(first..=last);
-                }
-                None => boards.push(number(word)?),
-            }
-        }
-        boards.sort_unstable();
-        boards.dedup();
-        if boards.is_empty() { Err(format!("\"{text}\" names no board")) } else { Ok(Self::Some(boards)) }
-    }
-}
+pub use ucom_host::session::{Assignment, Boards};
 
 /// The number of one board.
 pub fn one_board(text: &str) -> Result<u8, String> {
@@ -57,35 +10,6 @@ pub fn one_board(text: &str) -> Result<u8, String> {
             Err("inputs are set on one board at a time; ucom run sets those of several".into())
         }
         _ => Err(format!("\"{text}\" is no board: a number 0..31")),
-    }
-}
-
-/// `NAME=VALUE` or `BOARD.NAME=VALUE`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Assignment {
-    /// The board, when it is named.
-    pub board: Option<u8>,
-    /// Name or index.
-    pub name: String,
-    /// The value; what word it becomes is the signal's matter.
-    pub value: SignalValue,
-}
-
-impl FromStr for Assignment {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let form = "the form is NAME=VALUE or BOARD.NAME=VALUE";
-        let (left, right) = text.split_once('=').ok_or_else(|| format!("\"{text}\" has no value; {form}"))?;
-        let value = right.parse().map_err(|e| format!("{}: {e}", left.trim()))?;
-        let (board, name) = match left.split_once('.') {
-            Some((board, name)) if board.trim().parse::<u8>().is_ok() => (board.trim().parse().ok(), name),
-            _ => (None, left),
-        };
-        if name.trim().is_empty() {
-            return Err(format!("\"{text}\" names nothing; {form}"));
-        }
-        Ok(Self { board, name: name.trim().to_owned(), value })
     }
 }
 
@@ -132,33 +56,6 @@ pub fn seconds(text: &str) -> Result<std::time::Duration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn boards_are_numbers_lists_ranges_or_all() {
-        assert_eq!("3".parse(), Ok(Boards::Some(vec![3])));
-        assert_eq!("4-6,1,5".parse(), Ok(Boards::Some(vec![1, 4, 5, 6])));
-        assert_eq!("all".parse(), Ok(Boards::All));
-        for wrong in ["32", "", "1,,2", "3-1", "-1", "x", "0x1"] {
-            assert!(wrong.parse::<Boards>().is_err(), "{wrong}");
-        }
-        assert_eq!("1,4-2".parse::<Boards>(), Err("4-2 is backwards: 2-4".into()));
-    }
-
-    #[test]
-    fn assignments_are_names_with_values() {
-        let parsed = |text: &str| text.parse::<Assignment>().unwrap();
-        let number = |value: f64, unit: &str| SignalValue::Number { value, unit: unit.into() };
-        assert_eq!(parsed("kp=120"), Assignment { board: None, name: "kp".into(), value: number(120.0, "") });
-        assert_eq!(
-            parsed("2.set_position=-20.5deg"),
-            Assignment { board: Some(2), name: "set_position".into(), value: number(-20.5, "deg") }
-        );
-        assert_eq!(parsed("0=0xFFFF").value, SignalValue::Raw(65535));
-        assert_eq!(parsed("brake=off").value, SignalValue::Switch(false));
-        for wrong in ["kp", "kp=", "kp=x", "kp=0x12345", "=3", "1.=3", "kp=1,5"] {
-            assert!(wrong.parse::<Assignment>().is_err(), "{wrong}");
-        }
-    }
 
     #[test]
     fn flash_ids_bits_and_seconds() {

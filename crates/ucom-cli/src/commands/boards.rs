@@ -3,22 +3,23 @@
 use cli_kit::Output;
 use serde_json::json;
 use ucom::{BoardInfo, Profile, Status};
-use ucom_host::master::{BoardSeen, Outcome, RawStatus, Reports, Request, StopLevel, counted};
+use ucom_host::master::{Outcome, RawStatus, Reports, Request, StopLevel, counted};
+use ucom_host::session::{Driver, SessionError};
 
 use crate::args::{ActArgs, Boards, BoardsArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
-use crate::driver::{Driver, shared_numbers, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
+use crate::session::shared_numbers;
 use crate::shape::{bits, board_table, board_value, info_value, state};
 
 /// What boards report about themselves.
 pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let profile = driver.master.profile();
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
         match driver.run(Request::Info { board })? {
             Outcome::Info(seen) => boards.push(seen),
-            other => return Err(unexpected(&other)),
+            other => return Err(SessionError::from(other).into()),
         }
     }
     let value = json!({ "boards": boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>() });
@@ -40,7 +41,7 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     if let Some(bytes) = args.raw {
         return raw_status(args, bytes, link, out);
     }
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let profile = driver.master.profile();
     let boards = driver.numbers(&args.boards)?;
     let all = match set | clear {
@@ -64,7 +65,7 @@ fn raw_status(
     link: &LinkArgs,
     out: &Output,
 ) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let numbers = driver.numbers(&args.boards)?;
     all_there(&mut driver, &numbers)?;
     let targets: Vec<(Option<u8>, Vec<u8>)> = match args.boards {
@@ -75,9 +76,9 @@ fn raw_status(
     for (board, seen) in targets {
         let request = Request::RawStatus { board, seen, mask, value, force: args.force.force };
         let done: Vec<u8> = all.iter().map(|b: &RawStatus| b.board).collect();
-        match driver.run(request).map_err(|e| after(e, &done))? {
+        match driver.run(request).map_err(|e| after(e.into(), &done))? {
             Outcome::RawStatus(boards) => all.extend(boards),
-            other => return Err(unexpected(&other)),
+            other => return Err(SessionError::from(other).into()),
         }
     }
     let row = |b: &RawStatus| {
@@ -123,7 +124,7 @@ fn numbers(outcome: Outcome) -> Result<(u8, BoardInfo), Failure> {
     match outcome {
         Outcome::Status { board, info } => Ok((board, info)),
         Outcome::Info(seen) | Outcome::Started(seen) => Ok((seen.number, seen.info)),
-        other => Err(unexpected(&other)),
+        other => Err(SessionError::from(other).into()),
     }
 }
 
@@ -146,7 +147,7 @@ fn lines_of(all: &[(u8, BoardInfo)]) -> String {
 
 /// PC_RESET, to all at once or one by one.
 pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let force = args.force.force;
     let boards: Vec<Option<u8>> = match &args.boards {
         Boards::All => vec![None],
@@ -157,7 +158,7 @@ pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     for board in boards {
         match driver.run(Request::Reset { board, force })? {
             Outcome::Reset(some) => reports.ids.extend(some.ids),
-            other => return Err(unexpected(&other)),
+            other => return Err(SessionError::from(other).into()),
         }
     }
     if reports.ids.is_empty() {
@@ -189,7 +190,7 @@ fn act(
     out: &Output,
     request: fn(u8, bool) -> Request,
 ) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let profile = driver.master.profile();
     let boards = driver.numbers(&args.boards)?;
     let all = change_each(&mut driver, &boards, |board| request(board, args.force.force))?;
@@ -206,7 +207,7 @@ fn change_each(
     all_there(driver, boards)?;
     let mut all = Vec::new();
     for board in boards {
-        match driver.run(request(*board)).and_then(numbers) {
+        match driver.run(request(*board)).map_err(Failure::from).and_then(numbers) {
             Ok(changed) => all.push(changed),
             Err(e) => return Err(after(e, &all.iter().map(|(n, _)| *n).collect::<Vec<_>>())),
         }
@@ -217,7 +218,7 @@ fn change_each(
 /// Of several boards each must answer before the first one is changed.
 fn all_there(driver: &mut Driver, boards: &[u8]) -> Result<(), Failure> {
     let mut several = boards.iter().filter(|_| boards.len() > 1);
-    several.try_for_each(|board| seen(driver, *board).map(drop))
+    several.try_for_each(|board| Ok(driver.seen(*board).map(drop)?))
 }
 
 /// What has been done already when one of several boards fails.
@@ -234,7 +235,7 @@ fn after(failure: Failure, done: &[u8]) -> Failure {
 
 /// Outputs, control and application, as far as asked. Stopping is always allowed: no other PC can forbid it.
 pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
     // Before anything is asked: no board goes on because another one does not answer.
@@ -245,7 +246,8 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     }
     let (mut all, mut failures) = (Vec::new(), Vec::new());
     for board in driver.numbers_to_stop(&args.boards)? {
-        match driver.run(Request::Stop { board, level, force: true }).and_then(numbers) {
+        match driver.run(Request::Stop { board, level, force: true }).map_err(Failure::from).and_then(numbers)
+        {
             Ok(stopped) => all.push(stopped),
             Err(failure) => {
                 driver.note(format!("board {board}: {}", failure.message));
@@ -287,12 +289,4 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         lines_of(&all) + &format!("not stopped for certain: {}\n", numbers.join(", "))
     });
     Err(Failure::printed(worst))
-}
-
-/// The boards of `info` for other commands.
-pub fn seen(driver: &mut Driver, board: u8) -> Result<BoardSeen, Failure> {
-    match driver.run(Request::Info { board })? {
-        Outcome::Info(seen) => Ok(seen),
-        other => Err(unexpected(&other)),
-    }
 }

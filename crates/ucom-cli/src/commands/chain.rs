@@ -4,26 +4,26 @@ use cli_kit::{Output, OutputFile};
 use serde_json::json;
 use ucom_host::files::{Inventory, InventoryBoard};
 use ucom_host::master::{InitOptions, InitReport, Outcome, Request, ScanFinding, counted};
+use ucom_host::session::{SessionError, nothing_shared};
 
 use crate::args::{InitArgs, LinkArgs};
-use crate::driver::{Driver, nothing_shared, unexpected};
 use crate::failure::{Failure, NO_LINK, exit};
 use crate::shape::{board_table, board_value};
 
 /// Who is there; changes nothing.
 pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let profile = driver.master.profile();
     let report = match driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
-        other => return Err(unexpected(&other)),
+        other => return Err(SessionError::from(other).into()),
     };
     let mut value = json!({
         "reports": report.reports.ids,
         "boards": report.boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>(),
         "findings": texts(&report.findings),
     });
-    let shared = nothing_shared(&driver.master).err();
+    let shared = nothing_shared(&driver.master).err().map(Failure::from);
     if let Some(f) = &shared {
         value["error"] = json!({ "code": f.code, "message": f.message, "hint": f.hint, "exit": f.exit });
     }
@@ -89,12 +89,12 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
         compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
     // It can be written: that is found out before the chain is numbered anew.
     let file = OutputFile::open(&args.inventory, true, &[]).map_err(Failure::nothing_sent)?;
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let profile = driver.master.profile();
     let options = InitOptions { expected, force: args.force.force };
     let report = match driver.run(Request::Init(options))? {
         Outcome::Init(report) => report,
-        other => return Err(unexpected(&other)),
+        other => return Err(SessionError::from(other).into()),
     };
     let written = report.is_ok();
     if written {

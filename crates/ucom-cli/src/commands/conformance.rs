@@ -10,10 +10,10 @@ use ucom_host::files::{Image, ImageOptions, Inventory};
 use ucom_host::master::conformance::{
     ConformanceOptions, ConformanceProgram, ConformanceReport, ConformanceTest, Verdict, test_names,
 };
-use ucom_host::master::{Outcome, Request};
+use ucom_host::master::{Error, Outcome, Request};
+use ucom_host::session::SessionError;
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
-use crate::driver::{Driver, unexpected};
 use crate::failure::{Failure, REFUSED, exit};
 
 /// 2026-01-01: what a test programs has a date of its own, and none of the boards' own time.
@@ -36,7 +36,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
         Some(path) => Some(program(args, path, date(&profile), out)?),
         None => None,
     };
-    let mut driver = Driver::with_profile(link, profile)?;
+    let mut driver = link.session_with(profile)?;
     let boards = driver.numbers(&args.boards)?;
     let options = ConformanceOptions {
         boards,
@@ -46,13 +46,15 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
         only: args.only.clone(),
         force: args.force,
     };
-    let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e.code.as_str() {
-        "running" => e.hint("`ucom stop all` first; --force does not cover this"),
-        _ => e,
+    let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e {
+        SessionError::Procedure(Error::Running { .. }) => {
+            Failure::from(e).hint("`ucom stop all` first; --force does not cover this")
+        }
+        e => e.into(),
     });
     let report = match outcome? {
         Outcome::Conformance(report) => report,
-        other => return Err(unexpected(&other)),
+        other => return Err(SessionError::from(other).into()),
     };
     driver.master.end_session();
     print(&report, out);
@@ -143,16 +145,6 @@ fn not_allowed(report: &ConformanceReport) -> String {
 
 fn who(test: &ConformanceTest) -> String {
     test.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
-}
-
-/// One short line while the tests go on.
-pub fn progress_line(test: &ConformanceTest) -> String {
-    let how = match &test.verdict {
-        Verdict::Pass => "passed",
-        Verdict::Fail(_) => "failed",
-        Verdict::Skipped(_) => "skipped",
-    };
-    format!("{} {}: {how}", test.id, who(test))
 }
 
 fn line(test: &ConformanceTest) -> String {

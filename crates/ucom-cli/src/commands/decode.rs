@@ -8,12 +8,12 @@ use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom_host::ProfileFile;
 use ucom_host::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
+use ucom_host::session::{CleanupList, protocol_frame, recorded};
 
 use super::record::report_broken_off;
 use crate::args::{DecodeArgs, LinkArgs};
-use crate::cleanup::CleanupList;
 use crate::failure::Failure;
-use crate::link::{protocol_frame, recorded};
+use crate::interrupt::listen;
 use crate::words::Decoder;
 
 /// Lines that are read before they are decoded, at most.
@@ -29,7 +29,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     let stdin = args.file.as_os_str() == "-";
     let mut profile = link.profile()?;
-    let stop = CleanupList::default().listen()?;
+    let stop = listen(&CleanupList::default())?;
     let records: Box<dyn Iterator<Item = Result<Record, Failure>>> = if stdin {
         Box::new(received(&stop)?)
     } else {
@@ -62,7 +62,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
 }
 
 fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = CleanupList::default().listen()?;
+    let stop = listen(&CleanupList::default())?;
     let mut decoder = Decoder::new(link.profile()?);
     let mut bus = link.open()?;
     while left > 0 && !stop.asked() && !Output::gone() {

@@ -10,10 +10,10 @@ use ucom_host::files::{Image, ImageOptions};
 use ucom_host::master::doctor::{Controller, Finding, Observation, Severity, findings};
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::{Event, Outcome, Request};
+use ucom_host::session::{Driver, SessionError};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};
-use crate::driver::{Driver, unexpected};
 use crate::failure::{DEVICE, Failure, NO_LINK};
 use crate::shape::board_value;
 
@@ -22,7 +22,7 @@ const LISTEN: Duration = Duration::from_millis(1500);
 
 /// Looks at everything; ends with 0 when nothing is a problem, 3 without any frame, else 1.
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     out.note(format!("listening on {}", link.url()?));
     let start = Instant::now();
     let mut competing_master = None;
@@ -39,7 +39,7 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         Some(_) => None,
         None => match driver.run(Request::Scan)? {
             Outcome::Scan(report) => Some(report),
-            other => return Err(unexpected(&other)),
+            other => return Err(SessionError::from(other).into()),
         },
     };
     let controller = controller(&mut driver);
@@ -100,11 +100,11 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         }
         None => None,
     };
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let options = ProbeOptions { init: args.init, alive: args.alive, image, force: args.force.force };
     let report = match driver.run(Request::Probe(options))? {
         Outcome::Probe(report) => report,
-        other => return Err(unexpected(&other)),
+        other => return Err(SessionError::from(other).into()),
     };
     if report.boards.is_empty() && report.reports == 0 {
         // Nothing was measured: a profile of defaults would pass for what these boards are.

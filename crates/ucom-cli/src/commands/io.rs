@@ -7,30 +7,31 @@ use serde_json::{Value, json};
 use ucom_host::files::{DbcBoard, Signal, SignalTable, SignalType, dbc as dbc_text};
 use ucom_host::master::io::{IoDescription, Kind};
 use ucom_host::master::{Event, Outcome, Request, RunBoard, RunOptions, StopLevel, counted};
+use ucom_host::session::{
+    Driver, Followed, Known, Prepared, SessionError, Word, arrived, become_master, note_rounded,
+    nothing_shared, only, with_names, words,
+};
 
-use super::followed::Followed;
 use super::outputs::{named, units};
-use super::params::{arrived, become_master, deliver, file_or_stdout, open_output};
+use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
-use crate::cache::{Known, of_several};
-use crate::driver::{Driver, nothing_shared, unexpected};
+use crate::cache::of_several;
 use crate::failure::{FAULT, Failure};
-use crate::values::{Prepared, Word, only, print_rounded, with_names, words};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let signals = link.signal_table()?;
+    let (signals, cache) = (link.signal_table()?, args.cache.cache());
     let file = args.template.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose();
     // What is there is a table that somebody has filled in.
     let file = file.map_err(|e| match e.code == "exists" {
         true => e.hint("--template - shows the table, to be added by hand; --force writes over it"),
         false => e,
     })?;
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
-        let known = args.cache.known(&mut driver, &signals, board);
-        let known = known.map_err(|e| of_several(e, &args.boards))?;
+        let known = cache.known(&mut driver, &signals, board);
+        let known = known.map_err(|e| of_several(e.into(), &args.boards))?;
         // Without a started application there is nobody to ask for them.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
@@ -133,30 +134,30 @@ fn io_text((known, initial): &Described) -> String {
 fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
     match driver.run(Request::InitialInputs { board })? {
         Outcome::InitialInputs { values, .. } => Ok(values),
-        other => Err(unexpected(&other)),
+        other => Err(SessionError::from(other).into()),
     }
 }
 
 /// Shows initial inputs, or sets some; with `--for` the board moves under supervision.
 pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let board = args.board;
     only(&[board], &args.values, "set")?;
     if let Some(duration) = args.duration {
         return move_for(&mut driver, args, duration, &signals, out);
     }
-    let known = args.cache.described(&mut driver, &signals, board)?;
+    let known = args.cache.cache().described(&mut driver, &signals, board)?;
     if args.values.is_empty() {
         let words = initial(&mut driver, board)?;
         print_words("initial_ci", &known, Kind::Ci, &words, out);
         return Ok(());
     }
     let words = words(&known, Kind::Ci, &args.values)?;
-    print_rounded(&driver, board, Kind::Ci, &words);
+    note_rounded(&driver, board, Kind::Ci, &words);
     let running = become_master(&mut driver, board, args.force.force)?;
     for word in &words {
-        let (now, setting) = (driver.now_us(), word.setting(&known, Kind::Ci));
+        let (now, setting) = (driver.now_us(), known.setting(Kind::Ci, word));
         driver.master.set_input(now, board, &setting.name, setting.value)?;
     }
     arrived(&mut driver, board)?;
@@ -186,13 +187,13 @@ fn move_for(
     out: &Output,
 ) -> Result<(), Failure> {
     let (board, force) = (args.board, args.force.force);
-    let prepared = with_names(&args.cache, |cache| {
+    let prepared = with_names(&args.cache.cache(), |cache| {
         let mut prepared = Prepared::default();
         prepared.add(driver, cache, signals, board, force)?;
         let Some(known) = prepared.known.get(&board) else { return Ok(prepared) };
         let words = words(known, Kind::Ci, &args.values).inspect_err(|_| prepared.undo(driver))?;
-        print_rounded(driver, board, Kind::Ci, &words);
-        let ci = words.iter().map(|w| w.setting(known, Kind::Ci)).collect();
+        note_rounded(driver, board, Kind::Ci, &words);
+        let ci = words.iter().map(|w| known.setting(Kind::Ci, w)).collect();
         let plan = RunBoard { board, ci, par: Vec::new() };
         let options = RunOptions { boards: vec![plan], active: true, force };
         driver.master.watch(board, None, true);
@@ -210,12 +211,12 @@ fn move_for(
             followed.see(&event, driver.now_us());
             match event {
                 Event::Snapshot { board: from, snapshot } if from == board => last = Some(snapshot),
-                other => driver.print_event(&other, None),
+                other => driver.note_event(&other, None),
             }
         }
         let now_us = driver.now_us();
         for notice in followed.look(&mut driver.master, now_us) {
-            driver.note(notice.text);
+            notice.text().into_iter().for_each(|text| driver.note(text));
         }
     }
     followed.ask_no_more(&mut driver.master);
@@ -225,7 +226,7 @@ fn move_for(
     driver.nothing_is_left();
     driver.nobody_lost(&[board])?;
     followed.nobody_left()?;
-    nothing_shared(&driver.master).map_err(|failure| Failure { exit: FAULT, ..failure })?;
+    nothing_shared(&driver.master).map_err(|e| Failure { exit: FAULT, ..e.into() })?;
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
         return Err(Failure::new(
@@ -261,9 +262,9 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let (profile, signals) = (link.profile()?, link.signal_table()?);
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {
-        let mut driver = Driver::open(link)?;
+        let mut driver = link.session()?;
         for number in driver.numbers(&args.boards)? {
-            let known = args.cache.known(&mut driver, &signals, number)?;
+            let known = args.cache.cache().known(&mut driver, &signals, number)?;
             boards.push(DbcBoard::new(number, &known.names, &known.signals));
         }
     }

@@ -6,7 +6,6 @@ pub mod conformance;
 mod decode;
 mod doctor;
 mod explain;
-mod followed;
 mod help;
 mod io;
 mod monitor;
@@ -14,7 +13,6 @@ mod monitor_boards;
 mod monitor_view;
 mod outputs;
 mod params;
-mod plans;
 mod record;
 mod repair;
 mod run;
@@ -25,8 +23,6 @@ mod update;
 mod update_bar;
 mod update_files;
 mod update_report;
-
-pub use boards::seen;
 
 use cli_kit::{Output, pages};
 

@@ -8,12 +8,13 @@ use cli_kit::{Key, Lines, Output, Screen};
 use serde_json::{Value, json};
 use ucom::Profile;
 use ucom_host::master::{Board, Event, Life, Request};
+use ucom_host::session::{Driver, event_text, nothing_shared};
 
 use super::doctor::controller;
 use super::monitor_view::{self as view, CompetingMaster};
 use crate::args::{LinkArgs, MonitorArgs};
-use crate::driver::{Driver, nothing_shared, shared_numbers, words};
 use crate::failure::Failure;
+use crate::session::shared_numbers;
 use crate::shape::{bits, info_value, state};
 
 /// Seconds of bus load that the curve shows.
@@ -79,7 +80,7 @@ impl Watch {
                 }
                 Event::Note { .. } | Event::Done { .. } => {}
                 other => {
-                    if let Some(text) = words(other, None) {
+                    if let Some(text) = event_text(other, None) {
                         self.note(time_s, text);
                     }
                 }
@@ -133,7 +134,7 @@ impl Watch {
 
 /// Shows the bus until `q`, Ctrl-C, or so many views.
 pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only, driver.master.profile());
     let left = args.count.unwrap_or(u64::MAX);
     let screen = if out.is_json() { None } else { Screen::take()? };
@@ -141,7 +142,7 @@ pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), 
         Some(screen) => live(&mut driver, &mut watch, left, screen)?,
         None => lines(&mut driver, &mut watch, left, out)?,
     }
-    nothing_shared(&driver.master)
+    Ok(nothing_shared(&driver.master)?)
 }
 
 fn lines(driver: &mut Driver, watch: &mut Watch, mut left: u64, out: &Output) -> Result<(), Failure> {

@@ -8,10 +8,9 @@ use serde_json::{Map, Value, json};
 use ucom_host::files::Signal;
 use ucom_host::master::Event;
 use ucom_host::master::io::{Kind, Snapshot, short};
+use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
-use crate::cache::Known;
-use crate::driver::{Driver, nothing_shared};
 use crate::failure::{Failure, NO_LINK};
 
 /// Keys for so many values: the short names; the whole text where another signal has the same one, with its place where
@@ -52,12 +51,12 @@ pub fn finish(stdout: &mut Lines, driver: &Driver) {
 
 /// Outputs of boards as they come; only listens once their names are known.
 pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
     let signals = link.signal_table()?;
     let mut all = BTreeMap::new();
     for board in boards {
-        let known = args.cache.known(&mut driver, &signals, board)?;
+        let known = args.cache.cache().known(&mut driver, &signals, board)?;
         driver.master.watch(board, Some(known.names.dimensions().so), true);
         all.insert(board, known);
     }
@@ -79,7 +78,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                     received = Instant::now();
                     stdout.push(row(args, &all, board, &snapshot, start, out));
                 }
-                other => driver.print_event(&other, None),
+                other => driver.note_event(&other, None),
             }
         }
         nothing_shared(&driver.master)?;

@@ -4,22 +4,18 @@ use std::path::Path;
 
 use cli_kit::{Output, OutputFile, table};
 use serde_json::{Value, json};
-use ucom::Status;
-use ucom_host::files::params::{
-    ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, ParamsWord, SavedBoard,
-    SavedSignal, check_board, check_identity, params_text,
-};
-use ucom_host::files::{Inventory, SignalTable};
+use ucom_host::files::SignalTable;
+use ucom_host::files::params::{SavedBoard, SavedSignal, params_text};
+use ucom_host::master::counted;
 use ucom_host::master::io::{Kind, ParValue};
-use ucom_host::master::{AdminChange, Outcome, Request, counted};
+use ucom_host::session::{
+    Driver, History, Known, ParameterFile, Parameters, Word, for_board, inventory, name_of, note_rounded,
+    only, words, write,
+};
 
-use super::seen;
 use crate::args::{Boards, LinkArgs, ParArgs};
-use crate::cache::{Known, of_several};
-use crate::driver::{Driver, unexpected};
-use crate::failure::{FAULT, Failure, REFUSED};
-use crate::values::{Word, for_board, only, print_rounded, words};
-use crate::written::History;
+use crate::cache::of_several;
+use crate::failure::Failure;
 
 /// Shows parameters, writes some, saves or applies a file.
 pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -31,20 +27,20 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     }
     let signals = link.signal_table()?;
     let file = args.save.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose()?;
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.values, "set")?;
     let mut all = Vec::new();
     for board in &boards {
         let values = for_board(&args.values, *board);
         let known = match values.is_empty() {
-            true => args.cache.known(&mut driver, &signals, *board),
-            false => args.cache.described(&mut driver, &signals, *board),
+            true => args.cache.cache().known(&mut driver, &signals, *board),
+            false => args.cache.cache().described(&mut driver, &signals, *board),
         };
-        let known = known.map_err(|e| of_several(e, &args.boards))?;
+        let known = known.map_err(|e| of_several(e.into(), &args.boards))?;
         let words = words(&known, Kind::Par, &values)?;
-        print_rounded(&driver, *board, Kind::Par, &words);
-        let history = History::of(&args.cache, &known.info);
+        note_rounded(&driver, *board, Kind::Par, &words);
+        let history = History::of(&args.cache.cache(), &known.info);
         all.push(Parameters { known, words, history });
     }
     write(&mut driver, &mut all, args.force.force)?;
@@ -53,61 +49,6 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     }
     print(&driver, &all, matches!(args.boards, Boards::Some(ref n) if n.len() == 1), out);
     Ok(())
-}
-
-/// A board, the words that it is to get, and what it got before.
-struct Parameters {
-    known: Known,
-    words: Vec<Word>,
-    history: History,
-}
-
-/// Writes all words of all boards; nothing before every board is ready for it.
-fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(), Failure> {
-    for board in all.iter().filter(|p| !p.words.is_empty()) {
-        become_master(driver, board.known.board, force)?;
-    }
-    let mut before: Vec<String> = Vec::new();
-    for board in all.iter_mut().filter(|p| !p.words.is_empty()) {
-        for word in &board.words {
-            let (now, setting) = (driver.now_us(), word.setting(&board.known, Kind::Par));
-            driver.master.set_parameter(now, board.known.board, &setting.name, setting.value)?;
-        }
-        arrived(driver, board.known.board).map_err(|failure| {
-            let written = match before.is_empty() {
-                true => "no board was written to before".into(),
-                false => format!("written before: board {}", before.join(", ")),
-            };
-            Failure { message: format!("{}; {written}", failure.message), ..failure }
-        })?;
-        before.push(board.known.board.to_string());
-        board.history.wrote(board.words.iter().map(|w| (w.index, w.word)));
-    }
-    Ok(())
-}
-
-/// Listens for another PC before anything is sent (D-08), and reads whether the loop runs.
-pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, Failure> {
-    let change = AdminChange::default();
-    match driver.run(Request::Admin { board, change, force })? {
-        Outcome::Admin { admin, .. } => Ok(admin.run),
-        other => Err(unexpected(&other)),
-    }
-}
-
-/// Lets what is queued leave, and sees that the application is still there to have taken it: nothing answers to inputs and
-/// parameters themselves (D-35). Frames leave in their order, so the answer to a question comes after all of them.
-pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), Failure> {
-    let unknown = |why: &str| {
-        let message = format!("board {board}: values were sent, but {why}: what it has now is unknown");
-        Failure::new(FAULT, "unknown", message)
-            .hint(format!("ucom status {board} shows its state; ucom start {board}, and write them again"))
-    };
-    match seen(driver, board) {
-        Ok(found) if found.info.status.has(Status::MSTART) => Ok(()),
-        Ok(_) => Err(unknown("its application does not run any more")),
-        Err(e) => Err(unknown(&format!("it does not answer since ({})", e.message))),
-    }
 }
 
 /// The file to write, opened before anything is sent and not written over unless that was asked for.
@@ -170,7 +111,7 @@ fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, 
 
 /// Writes a parameter file: what was written last as values, all other names as comments.
 fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Output) -> Result<(), Failure> {
-    let names = inventory(&args.inventory)?;
+    let names = inventory(&args.inventory).map_err(Failure::usage)?;
     let board = |p: &Parameters| {
         let par = p.known.signals.all(Kind::Par).iter().enumerate().map(|(i, signal)| {
             let last = p.history.last(i);
@@ -225,100 +166,6 @@ pub fn deliver(
     Ok(())
 }
 
-/// The inventory, where there is one.
-pub fn inventory(path: &Path) -> Result<Option<Inventory>, Failure> {
-    match path.exists() {
-        true => Inventory::read(path).map(Some).map_err(Failure::usage),
-        false => Ok(None),
-    }
-}
-
-fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str> {
-    let board = inventory?.boards().find(|b| b.flash_number == flash_number)?;
-    Some(board.name.as_str()).filter(|name| !name.is_empty())
-}
-
-/// A parameter file that was read, against the boards that are there.
-pub struct Applied {
-    file: String,
-    boards: Vec<ParamsBoard>,
-    inventory: Option<Inventory>,
-}
-
-/// A board's words of a parameter file: first inputs, and parameters.
-pub type FileWords = (Vec<Word>, Vec<Word>);
-
-impl Applied {
-    /// Reads a file and takes from it the boards that are meant.
-    pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, Failure> {
-        let file =
-            ParamsFile::read(path).map_err(|e| Failure::usage(e).hint("ucom help params shows the form"))?;
-        if file.boards.iter().all(|b| b.par.is_empty() && b.ci.is_empty()) {
-            return Err(Failure::usage(format!("{}: there is no value in it", path.display())).hint(
-                "a name without # before it and with a value behind it is one, as `kp: 120`; by number \"#0\": 120",
-            ));
-        }
-        let boards = file.boards.into_iter().filter(|b| meant(b.number)).collect();
-        Ok(Self { file: path.display().to_string(), boards, inventory: inventory(inventory_file)? })
-    }
-
-    /// The boards of the file.
-    pub fn numbers(&self) -> Vec<u8> {
-        self.boards.iter().map(|b| b.number).collect()
-    }
-
-    /// Whether the boards are those that the file means. Only asks.
-    pub fn identities(&self, driver: &mut Driver) -> Result<(), Failure> {
-        let mut problems = Vec::new();
-        for board in &self.boards {
-            match seen(driver, board.number) {
-                Ok(found) => {
-                    let name = name_of(self.inventory.as_ref(), found.info.flash_number);
-                    problems.extend(check_identity(board, &ParamsTarget { info: &found.info, name }));
-                }
-                Err(e) if e.code == "no-answer" => {
-                    let kind = ParamsProblemKind::Absent;
-                    problems.push(ParamsProblem { place: board.place, board: board.number, kind });
-                }
-                Err(e) => return Err(e),
-            }
-        }
-        self.verdict(problems)
-    }
-
-    /// The words of all boards, or every mistake.
-    pub fn words<'a>(
-        &self,
-        known: impl Fn(u8) -> Option<&'a Known>,
-    ) -> Result<Vec<(u8, FileWords)>, Failure> {
-        let (mut all, mut problems) = (Vec::new(), Vec::new());
-        for board in &self.boards {
-            let Some(known) = known(board.number) else { continue };
-            match check_board(board, &known.names, &known.signals) {
-                Ok((ci, par)) => {
-                    let words = |list: Vec<ParamsWord>| list.into_iter().map(word).collect();
-                    all.push((board.number, (words(ci), words(par))));
-                }
-                Err(more) => problems.extend(more),
-            }
-        }
-        self.verdict(problems).map(|()| all)
-    }
-
-    fn verdict(&self, problems: Vec<ParamsProblem>) -> Result<(), Failure> {
-        if problems.is_empty() {
-            return Ok(());
-        }
-        let lines: Vec<String> = problems.iter().map(|p| format!("{}: {p}", self.file)).collect();
-        Err(Failure::new(REFUSED, "params", lines.join("\n"))
-            .hint("nothing was written; ucom io shows names and ranges, ucom info the boards"))
-    }
-}
-
-fn word(w: ParamsWord) -> Word {
-    Word { index: w.index, name: w.name, word: w.word, text: w.text, rounded: w.rounded }
-}
-
 /// Checks a whole file, then writes its parameters.
 fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
@@ -327,7 +174,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
         Boards::None => false,
         Boards::Some(numbers) => numbers.contains(&n),
     };
-    let file = Applied::read(path, &args.inventory, meant)?;
+    let file = ParameterFile::read(path, &args.inventory, meant)?;
     if let Boards::Some(numbers) = &args.boards
         && let Some(missing) = numbers.iter().find(|n| !file.numbers().contains(n))
     {
@@ -336,7 +183,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
             path.display()
         )));
     }
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     file.identities(&mut driver)?;
     let known = file.numbers().into_iter().map(|board| described(args, &mut driver, &signals, board));
     let known = known.collect::<Result<Vec<Known>, Failure>>()?;
@@ -345,8 +192,8 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     let mut inputs = 0;
     for (known, (_, (ci, words))) in known.into_iter().zip(checked) {
         inputs += ci.len();
-        print_rounded(&driver, known.board, Kind::Par, &words);
-        let history = History::of(&args.cache, &known.info);
+        note_rounded(&driver, known.board, Kind::Par, &words);
+        let history = History::of(&args.cache.cache(), &known.info);
         all.push(Parameters { known, words, history });
     }
     if !args.dry_run {
@@ -363,10 +210,10 @@ fn described(
     signals: &SignalTable,
     board: u8,
 ) -> Result<Known, Failure> {
-    if args.dry_run {
-        args.cache.known(driver, signals, board)
-    } else {
-        args.cache.described(driver, signals, board)
+    let cache = args.cache.cache();
+    match args.dry_run {
+        true => Ok(cache.known(driver, signals, board)?),
+        false => Ok(cache.described(driver, signals, board)?),
     }
 }
 

@@ -11,13 +11,13 @@ use ucom_host::files::recording::{
     profile_path,
 };
 use ucom_host::master::{Master, counted};
+use ucom_host::session::{CleanupList, Link, protocol_frame, recorded, replayed};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
-use crate::cleanup::CleanupList;
-use crate::driver::shared_numbers;
 use crate::failure::{FAULT, Failure};
-use crate::link::{Link, protocol_frame, recorded, replayed};
+use crate::interrupt::listen;
+use crate::session::shared_numbers;
 use crate::words::Decoder;
 
 /// So often what was recorded reaches the file: a recorder that is killed loses no more.
@@ -61,7 +61,7 @@ pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
 
 /// Records until Ctrl-C, so long, or so many frames.
 pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = CleanupList::default().listen()?;
+    let stop = listen(&CleanupList::default())?;
     let profile = link.profile()?;
     let stdout = args.file.as_os_str() == "-";
     let format = RecordingFormat::of_path(&args.file);
@@ -156,7 +156,7 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let (guarded, due): (Vec<&Record>, Vec<&Record>) =
         recording.records.iter().partition(|record| !args.intrusive && intrusive(record));
     let cleanup = CleanupList::default();
-    let stop = cleanup.listen()?;
+    let stop = listen(&cleanup)?;
     let mut bus = link.open()?;
     if args.intrusive {
         cleanup.begin_other("what the boards took of the recording is not known", "ucom scan");

@@ -5,9 +5,9 @@ use ucom_host::files::Inventory;
 use ucom_host::master::{Outcome, Request};
 
 use cli_kit::Output;
+use ucom_host::session::SessionError;
 
 use crate::args::{LinkArgs, RepairArgs};
-use crate::driver::{Driver, unexpected};
 use crate::failure::Failure;
 use crate::shape::{board_table, board_value};
 
@@ -18,11 +18,11 @@ pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         Some(flash) => flash,
         None => known(args)?,
     };
-    let mut driver = Driver::open(link)?;
+    let mut driver = link.session()?;
     let profile = driver.master.profile();
     let seen = match driver.run(Request::Repair { board, flash_number, force: args.force.force })? {
         Outcome::Repaired(seen) => seen,
-        other => return Err(unexpected(&other)),
+        other => return Err(SessionError::from(other).into()),
     };
     let value = json!({ "repaired": true, "board": board_value(&seen, &profile) });
     out.result(&value, || {

@@ -4,20 +4,19 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use cli_kit::{Lines, Output};
-use serde_json::json;
+use serde_json::{Value, json};
 use ucom_host::files::SignalTable;
 use ucom_host::master::io::Kind;
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel, counted};
+use ucom_host::session::{
+    Cache, Driver, Followed, Notice, ParameterFile, Prepared, SessionError, nothing_shared, only, plans,
+    remember, with_names,
+};
 
-use super::followed::{Followed, Notice};
 use super::outputs::{finish, named, units};
-use super::params::Applied;
-use super::plans::{plans, remember};
 use super::typed::{obey, typed};
-use crate::args::{Boards, CacheArgs, LinkArgs, OnLost, RunArgs};
-use crate::driver::{Driver, nothing_shared, unexpected};
+use crate::args::{Boards, LinkArgs, OnLost, RunArgs};
 use crate::failure::{FAULT, Failure};
-use crate::values::{Prepared, only, with_names};
 
 /// How often `run` shows how things are.
 const REPORT_PERIOD: Duration = Duration::from_secs(1);
@@ -32,15 +31,15 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
             OnLost::StopAll => ucom::profile::OnLost::StopAll,
         };
     }
-    let mut driver = Driver::with_profile(link, profile)?;
+    let mut driver = link.session_with(profile)?;
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.ci, "run")?;
     only(&boards, &args.par, "run")?;
     let file = match &args.params {
         // Of all boards none may be missing that the file has something for.
-        Some(path) => {
-            Some(Applied::read(path, &args.inventory, |n| args.boards == Boards::All || boards.contains(&n))?)
-        }
+        Some(path) => Some(ParameterFile::read(path, &args.inventory, |n| {
+            args.boards == Boards::All || boards.contains(&n)
+        })?),
         None => None,
     };
     // Who is there comes first: it needs no started application.
@@ -49,7 +48,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     }
     let signals = link.signal_table()?;
     let mut stdout = Lines::stdout()?;
-    let (report, prepared) = with_names(&args.cache, |cache| {
+    let (report, prepared) = with_names(&args.cache.cache(), |cache| {
         let mut prepared = Prepared::default();
         let report = start(&mut driver, args, cache, &boards, &signals, file.as_ref(), &mut prepared);
         // What the procedure began it has taken back itself.
@@ -90,30 +89,30 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         return Err(Failure::new(FAULT, "not-stopped", what).hint(next));
     }
     driver.nobody_lost(&boards)?;
-    followed.nobody_left()
+    Ok(followed.nobody_left()?)
 }
 
 /// Names, plans, and the start of all boards.
 fn start(
     driver: &mut Driver,
     args: &RunArgs,
-    cache: &CacheArgs,
+    cache: &Cache,
     boards: &[u8],
     signals: &SignalTable,
-    file: Option<&Applied>,
+    file: Option<&ParameterFile>,
     prepared: &mut Prepared,
-) -> Result<RunReport, Failure> {
+) -> Result<RunReport, SessionError> {
     for board in boards {
         prepared.add(driver, cache, signals, *board, args.force.force)?;
     }
-    let plans = plans(driver, args, prepared, file)?;
+    let plans = plans(driver, prepared, file, &args.ci, &args.par)?;
     let options = RunOptions { boards: plans.clone(), active: args.active, force: args.force.force };
     match driver.run(Request::Run(options))? {
         Outcome::Running(report) => {
-            remember(args, prepared, &plans);
+            remember(cache, prepared, &plans);
             Ok(report)
         }
-        other => Err(unexpected(&other)),
+        other => Err(other.into()),
     }
 }
 
@@ -141,11 +140,11 @@ fn supervise(
     prepared.known.keys().for_each(|board| driver.master.watch(*board, None, true));
     let (start, mut reported) = (Instant::now(), Instant::now());
     let print = |driver: &Driver, notice: Notice| {
-        if !notice.text.is_empty() {
-            driver.note(notice.text);
+        if let Some(text) = notice.text() {
+            driver.note(text);
         }
         if out.is_json() {
-            stdout.push_always(notice.value.to_string());
+            stdout.push_always(notice_value(&notice).to_string());
         }
     };
     loop {
@@ -154,14 +153,14 @@ fn supervise(
             if let Some(notice) = followed.see(&event, driver.now_us()) {
                 print(driver, notice);
             }
-            driver.print_event(&event, None);
+            driver.note_event(&event, None);
         }
         let now_us = driver.now_us();
         for notice in followed.look(&mut driver.master, now_us) {
             print(driver, notice);
         }
         // What was found while it runs: a fault, not a refusal.
-        nothing_shared(&driver.master).map_err(|failure| Failure { exit: FAULT, ..failure })?;
+        nothing_shared(&driver.master).map_err(|e| Failure { exit: FAULT, ..e.into() })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {
                 return Ok(());
@@ -195,6 +194,15 @@ fn supervise(
     }
 }
 
+/// A notice as an event of `--json`.
+fn notice_value(notice: &Notice) -> Value {
+    let Notice { board, change, time_s, age_s } = *notice;
+    match notice.is_of_loop() {
+        true => json!({ "event": change.name(), "board": board, "time_s": time_s, "age_s": age_s }),
+        false => json!({ "event": change.name(), "board": board, "time_s": time_s }),
+    }
+}
+
 /// Control loops and applications end: all loops at once, then each board in turn. Returns those whose end is not certain;
 /// why is reported.
 fn halt(driver: &mut Driver, boards: &[u8], why: Option<&Failure>) -> Vec<u8> {
@@ -205,8 +213,8 @@ fn halt(driver: &mut Driver, boards: &[u8], why: Option<&Failure>) -> Vec<u8> {
     for level in [StopLevel::Loop, StopLevel::Application] {
         for board in boards.iter().rev() {
             if let Err(e) = driver.stop_board(*board, level) {
-                if printed.insert(e.message.clone()) {
-                    driver.note(format!("board {board}: {}", e.message));
+                if printed.insert(e.to_string()) {
+                    driver.note(format!("board {board}: {e}"));
                 }
                 running.insert(*board);
             } else if level == StopLevel::Application {

@@ -13,12 +13,12 @@ use cli_kit::{Output, Stop};
 use serde_json::json;
 use ucom::{Format, Frame, Profile};
 use ucom_host::master::counted;
+use ucom_host::session::{CleanupList, to_wire};
 use ucom_sim::{ChainConfig, ChainSim, Fault};
 
 use crate::args::{LinkArgs, SimArgs};
-use crate::cleanup::CleanupList;
 use crate::failure::Failure;
-use crate::link::to_wire;
+use crate::interrupt::listen;
 
 /// The name of the bus.
 const CHANNEL: &str = "can0";
@@ -29,7 +29,7 @@ const CATCH_UP_US: u64 = 200_000;
 
 /// Serves a simulated chain until SIGINT or SIGTERM.
 pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    let stop = CleanupList::default().listen()?;
+    let stop = listen(&CleanupList::default())?;
     let profile = link.profile()?;
     let config = config(args, &profile)?;
     let faults = match &args.faults {

@@ -5,12 +5,10 @@ use std::sync::mpsc::{Receiver, channel};
 
 use ucom_host::master::io::Kind;
 use ucom_host::master::{AdminChange, Request, Setting};
+use ucom_host::session::{Driver, History, Prepared, note_rounded, only, words};
 
 use crate::args::{Assignment, RunArgs};
-use crate::driver::Driver;
 use crate::failure::Failure;
-use crate::values::{Prepared, only, print_rounded, words};
-use crate::written::History;
 
 /// Lines on stdin, read beside the bus.
 pub fn typed() -> Receiver<String> {
@@ -79,9 +77,9 @@ pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared
             only(&[board], &values, "set")?;
             let kind = if kind == "ci" { Kind::Ci } else { Kind::Par };
             let words = words(known, kind, &values)?;
-            print_rounded(driver, board, kind, &words);
+            note_rounded(driver, board, kind, &words);
             for word in &words {
-                let (now, Setting { name, value }) = (driver.now_us(), word.setting(known, kind));
+                let (now, Setting { name, value }) = (driver.now_us(), known.setting(kind, word));
                 match kind {
                     Kind::Ci => driver.master.set_input(now, board, &name, value)?,
                     _ => driver.master.set_parameter(now, board, &name, value)?,
@@ -89,7 +87,7 @@ pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared
             }
             if kind == Kind::Par {
                 let words = words.iter().map(|w| (w.index, w.word));
-                History::of(&args.cache, &known.info).wrote(words);
+                History::of(&args.cache.cache(), &known.info).wrote(words);
             }
             Ok(())
         }

@@ -7,12 +7,12 @@ use ucom_host::master::update::{
     UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult, UpdateTarget,
 };
 use ucom_host::master::{Outcome, Request};
+use ucom_host::session::{Driver, SessionError};
 
 use super::update_bar::Bar;
 use super::update_files::{Files, day};
 use super::update_report::print;
 use crate::args::{Boards, LinkArgs, UpdateArgs};
-use crate::driver::{Driver, unexpected};
 use crate::failure::{Failure, REFUSED, exit};
 
 /// Programs the boards that are meant.
@@ -20,7 +20,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let profile = link.profile()?;
     let files = Files::read(args, &profile, out)?;
     let day = day(args.date.as_deref(), &profile)?;
-    let mut driver = Driver::with_profile(link, profile)?;
+    let mut driver = link.session_with(profile)?;
     let numbers = match numbers(&mut driver, args) {
         Err(failure) if driver.stop_asked() => return Err(cancelled(failure, args, &profile, out)),
         numbers => numbers?,
@@ -48,7 +48,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     bar.end();
     let report = match outcome? {
         Outcome::Update(report) => report,
-        other => return Err(unexpected(&other)),
+        other => return Err(SessionError::from(other).into()),
     };
     print(&report, &files.names, &profile, out);
     match report.failure() {

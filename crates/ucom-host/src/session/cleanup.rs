@@ -1,22 +1,14 @@
-//! The cleanup list, for Ctrl-C: the first one cancels, and what is begun is brought to an end; the second one ends the process
-//! at once, and prints what is left undone and the command that does it.
+//! The cleanup list: what would be left undone if the process ended now, and the command that does it.
 
 use std::collections::BTreeSet;
-use std::io::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
-use cli_kit::Stop;
-use cli_kit::exit::FAULT;
-use ucom_host::master::{Request, StopLevel};
+use crate::master::{Request, StopLevel};
 
 /// What is left undone if the process ends now, and the next command.
 type Cleanup = (String, String);
 
-/// A reader that does not take what is printed is not waited for longer.
-const PRINT_TIMEOUT: Duration = Duration::from_millis(300);
-
-/// What a command has begun and would leave undone, as the thread that receives Ctrl-C sees it.
+/// What has been begun and would be left undone; a clone sees the same list, also from the thread that receives Ctrl-C.
 #[derive(Clone, Debug, Default)]
 pub struct CleanupList(Arc<Mutex<State>>);
 
@@ -55,18 +47,9 @@ impl State {
 }
 
 impl CleanupList {
-    /// Handles Ctrl-C from now on.
-    pub fn listen(&self) -> std::io::Result<Stop> {
-        let cleanup = self.clone();
-        Stop::listen_with(move || {
-            let words = cleanup.lock().words();
-            // Files that were made and not written.
-            cli_kit::output_file::abandon();
-            print_within(PRINT_TIMEOUT, move || {
-                let _ = std::io::stderr().write_all(words.as_bytes());
-            });
-            FAULT
-        })
+    /// What would be left undone if the process ended now, and the command that does it: lines for the operator.
+    pub fn words(&self) -> String {
+        self.lock().words()
     }
 
     /// Something begins that is no request; what it leaves undone, and the next command.
@@ -109,19 +92,6 @@ impl CleanupList {
 
     fn lock(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Prints in a thread of its own, and waits for that no longer than `timeout`: a pipe that nobody reads (`2>&1 | less`)
-/// does not keep the process from ending.
-pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
-    let (done, printed) = std::sync::mpsc::channel();
-    let spawned = std::thread::Builder::new().name("last words".into()).spawn(move || {
-        print();
-        let _ = done.send(());
-    });
-    if spawned.is_ok() {
-        let _ = printed.recv_timeout(timeout);
     }
 }
 
@@ -179,8 +149,6 @@ fn cleanup_of(request: &Request) -> Option<Cleanup> {
         Request::Probe(_) | Request::Conformance(_) => {
             ("what the boards do is not known".into(), "ucom scan".into())
         }
-        // The list of requests may grow: until one is named above, nothing is claimed for it.
-        _ => ("what the boards do is not known".into(), "ucom scan".into()),
     };
     Some((what, next))
 }
@@ -188,8 +156,8 @@ fn cleanup_of(request: &Request) -> Option<Cleanup> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ucom_host::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
-    use ucom_host::master::{RunBoard, RunOptions};
+    use crate::master::update::{UpdateImage, UpdateOptions, UpdateTarget};
+    use crate::master::{RunBoard, RunOptions};
 
     fn stop(board: u8) -> Request {
         Request::Stop { board, level: StopLevel::Application, force: true }
@@ -199,20 +167,20 @@ mod tests {
     #[test]
     fn what_is_left_undone() {
         let cleanup = CleanupList::default();
-        assert!(cleanup.lock().words().contains("nothing was changed"));
+        assert!(cleanup.words().contains("nothing was changed"));
         let board = |board| RunBoard { board, ..Default::default() };
         let run = Request::Run(RunOptions { boards: vec![board(1), board(3)], ..Default::default() });
         cleanup.begin(&run);
         cleanup.end(&run, true);
         cleanup.begin(&stop(1));
-        let words = cleanup.lock().words();
+        let words = cleanup.words();
         assert!(words.contains("boards 1, 3 may run") && words.contains("ucom stop 1,3"), "{words}");
         cleanup.end(&stop(1), true);
-        let words = cleanup.lock().words();
+        let words = cleanup.words();
         assert!(words.contains("board 3 may run") && words.contains("ucom stop 3\n"), "{words}");
         cleanup.forget();
         cleanup.begin(&Request::Scan);
-        let words = cleanup.lock().words();
+        let words = cleanup.words();
         assert!(words.contains("what was begun is complete"), "{words}");
     }
 
@@ -226,12 +194,12 @@ mod tests {
             cleanup.end(&start, true);
         }
         cleanup.begin(&Request::Info { board: 3 });
-        let words = cleanup.lock().words();
+        let words = cleanup.words();
         assert!(words.contains(": 1, 2\n") && words.contains("ucom stop 1,2"), "{words}");
         cleanup.end(&Request::Info { board: 3 }, false);
         cleanup.begin(&stop(1));
         cleanup.end(&stop(1), true);
-        assert!(cleanup.lock().words().contains("ucom stop 2\n"));
+        assert!(cleanup.words().contains("ucom stop 2\n"));
     }
 
     /// A dry run changes nothing, which the message states.
@@ -243,21 +211,9 @@ mod tests {
             let targets = vec![UpdateTarget { board: 4, flash_number: None }];
             let options = UpdateOptions { dry_run, ..UpdateOptions::new(targets, image, 0) };
             cleanup.begin(&Request::Update(options));
-            let words = cleanup.lock().words();
+            let words = cleanup.words();
             assert_eq!(words.contains("nothing was changed"), dry_run, "{words}");
             assert_eq!(words.contains("board 4 may be without a valid application"), !dry_run, "{words}");
         }
-    }
-
-    /// Words without a reader do not keep the process.
-    #[test]
-    fn words_without_a_reader_are_not_waited_for() {
-        let (never, reader) = std::sync::mpsc::channel::<()>();
-        let since = std::time::Instant::now();
-        print_within(Duration::from_millis(20), move || {
-            let _ = reader.recv();
-        });
-        assert!(since.elapsed() < Duration::from_secs(5));
-        drop(never);
     }
 }

@@ -1,22 +1,28 @@
-//! Runs the PC side over a bus in wall-clock time: one loop; what it prints waits for no reader.
+//! Runs procedures over a bus in wall-clock time, in one loop.
 
 use std::cell::RefCell;
 use std::time::Duration;
 
-use cli_kit::{Lines, Stop};
-use serde_json::{Value, json};
+use host_kit::ErrorKind;
 use ucom::Profile;
-use ucom_host::master::{
-    Error, Event, Master, Outcome, ProcedureId, Request, ScanFinding, StopLevel, Supervision,
+
+use super::cleanup::CleanupList;
+use super::error::SessionError;
+use super::link::Link;
+use super::pump::{LOOK, Pump};
+use super::selection::Boards;
+use crate::master::conformance::{ConformanceTest, Verdict};
+use crate::master::{
+    BoardSeen, Error, Event, Master, Outcome, ProcedureId, Request, ScanFinding, StopLevel, Supervision,
 };
 
-use crate::args::{Boards, LinkArgs};
-use crate::bus_off;
-use crate::cleanup::CleanupList;
-use crate::commands::conformance::progress_line;
-use crate::failure::{FAULT, Failure, NO_LINK, exit};
-use crate::link::Link;
-use crate::pump::{LOOK, Pump};
+/// Whoever runs the session: may end it, and reads what is noted beside results.
+pub trait Operator {
+    /// An end was asked for (Ctrl-C).
+    fn stop_asked(&self) -> bool;
+    /// Takes a line; waits for no reader.
+    fn note(&self, text: String);
+}
 
 /// The PC side on an open bus.
 pub struct Driver {
@@ -24,9 +30,8 @@ pub struct Driver {
     pub master: Master,
     link: Link,
     pump: Pump,
-    stop: Stop,
+    operator: Box<dyn Operator>,
     cleanup: CleanupList,
-    notes: Lines,
     lost: RefCell<Vec<Loss>>,
 }
 
@@ -37,17 +42,10 @@ struct Loss {
 }
 
 impl Driver {
-    /// Opens the bus of the command line.
-    pub fn open(args: &LinkArgs) -> Result<Self, Failure> {
-        Self::with_profile(args, args.profile()?)
-    }
-
-    /// The same with another profile than the command line's.
-    pub fn with_profile(args: &LinkArgs, profile: Profile) -> Result<Self, Failure> {
-        let cleanup = CleanupList::default();
-        let (stop, notes) = (cleanup.listen()?, Lines::stderr()?);
-        let (master, link, pump) = (Master::new(profile), args.open()?, Pump::default());
-        Ok(Self { master, link, pump, stop, cleanup, notes, lost: RefCell::default() })
+    /// The PC side on a bus. What its requests would leave undone stands in `cleanup`.
+    pub fn new(profile: Profile, link: Link, operator: Box<dyn Operator>, cleanup: CleanupList) -> Self {
+        let (master, pump) = (Master::new(profile), Pump::default());
+        Self { master, link, pump, operator, cleanup, lost: RefCell::default() }
     }
 
     /// µs since the bus was opened.
@@ -60,13 +58,13 @@ impl Driver {
         &mut self.link
     }
 
-    /// Ctrl-C was pressed.
+    /// The operator asked for an end.
     pub fn stop_asked(&self) -> bool {
-        self.stop.asked()
+        self.operator.stop_asked()
     }
 
     /// Hands over what has come and sends what is due, waiting for either no longer than `patience`.
-    pub fn turn(&mut self, patience: Duration) -> Result<(), Failure> {
+    pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
         if let Some(news) = self.link.news() {
             self.note(news);
@@ -75,13 +73,25 @@ impl Driver {
     }
 
     /// Runs a procedure to its end. Ctrl-C cancels it: what it has to undo on the boards it still does.
-    pub fn run(&mut self, request: Request) -> Result<Outcome, Failure> {
+    pub fn run(&mut self, request: Request) -> Result<Outcome, SessionError> {
         self.run_with(request, &mut |_| {})
     }
 
     /// The same; every event goes to `see`.
-    pub fn run_with(&mut self, request: Request, see: &mut dyn FnMut(&Event)) -> Result<Outcome, Failure> {
+    pub fn run_with(
+        &mut self,
+        request: Request,
+        see: &mut dyn FnMut(&Event),
+    ) -> Result<Outcome, SessionError> {
         self.drive(request, true, see)
+    }
+
+    /// What a board reports of itself.
+    pub fn seen(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
+        match self.run(Request::Info { board })? {
+            Outcome::Info(seen) => Ok(seen),
+            other => Err(other.into()),
+        }
     }
 
     /// Ends control loops before anything else is sent or asked: of these boards, or by broadcast of all.
@@ -90,7 +100,7 @@ impl Driver {
     }
 
     /// Stops a board, also after Ctrl-C: what was started is not left alone.
-    pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), Failure> {
+    pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), SessionError> {
         let request = Request::Stop { board, level, force: true };
         self.drive(request, false, &mut |_| {}).map(drop)
     }
@@ -100,7 +110,7 @@ impl Driver {
         request: Request,
         can_be_cancelled: bool,
         see: &mut dyn FnMut(&Event),
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Outcome, SessionError> {
         self.cleanup.begin(&request);
         let times_off = self.link.times_bus_off();
         let result = match self.master.start(self.link.now_us(), request.clone()) {
@@ -109,12 +119,9 @@ impl Driver {
         };
         self.cleanup.end(&request, result.is_ok());
         // Who does not answer may never have been asked.
-        result.map_err(|failure| match self.link.times_bus_off() > times_off && failure.exit == NO_LINK {
-            true => {
-                let message =
-                    format!("{}; the CAN controller of this computer was bus-off meanwhile", failure.message);
-                Failure { message, ..failure }.hint(bus_off::next(self.link.url()))
-            }
+        let was_off = self.link.times_bus_off() > times_off;
+        result.map_err(|failure| match was_off && failure.kind() == ErrorKind::NoLink {
+            true => SessionError::BusOff { failure: Box::new(failure), url: self.link.url().into() },
             false => failure,
         })
     }
@@ -124,13 +131,13 @@ impl Driver {
         id: ProcedureId,
         can_be_cancelled: bool,
         see: &mut dyn FnMut(&Event),
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Outcome, SessionError> {
         let mut waits_for_cancel = can_be_cancelled;
         loop {
             let broken = self.turn(LOOK).err();
             if let Some(failure) = &broken {
                 // Its end follows at once, with what is known.
-                self.master.abandon(id, &failure.message);
+                self.master.abandon(id, &failure.to_string());
             }
             while let Some(event) = self.master.take_event() {
                 see(&event);
@@ -142,17 +149,17 @@ impl Driver {
                             (result, Some(_)) | (result @ Ok(Outcome::Update(_)), None) => Ok(result?),
                             (result, None) => {
                                 let sent = self.pump.flush(&mut self.master, &mut self.link);
-                                sent.and(result.map_err(Failure::from))
+                                sent.and(result.map_err(SessionError::from))
                             }
                         };
                     }
-                    other => self.print_event(&other, Some(id)),
+                    other => self.note_event(&other, Some(id)),
                 }
             }
             if let Some(failure) = broken {
                 return Err(failure);
             }
-            if waits_for_cancel && self.stop.asked() {
+            if waits_for_cancel && self.stop_asked() {
                 waits_for_cancel = false;
                 self.note("cancelling; a second Ctrl-C ends at once".into());
                 self.master.cancel(id);
@@ -165,32 +172,21 @@ impl Driver {
         self.cleanup.forget();
     }
 
-    /// A line on stderr.
+    /// A line for the operator.
     pub fn note(&self, text: String) {
-        self.notes.push(text);
+        self.operator.note(text);
     }
 
-    /// How often a board was lost or one of these has rebooted, by what was reported; a failure if that was so.
-    pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), Failure> {
-        let lost = self.lost.borrow();
-        let rebooted = lost.iter().filter(|l| l.rebooted && boards.contains(&l.board)).count();
-        let times = |n: usize| if n == 1 { "once".to_owned() } else { format!("{n} times") };
-        let mut what = Vec::new();
-        match lost.iter().filter(|l| !l.rebooted).count() {
-            0 => {}
-            n => what.push(format!("{} a board was lost", times(n))),
-        }
-        if rebooted > 0 {
-            what.push(format!("{} a board has rebooted", times(rebooted)));
-        }
-        if what.is_empty() {
-            return Ok(());
-        }
-        Err(Failure::new(FAULT, "lost", what.join(", ")).hint("ucom doctor looks at bus and boards"))
+    /// A failure if a board was lost, or one of these has rebooted, by what was reported.
+    pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), SessionError> {
+        let losses = self.lost.borrow();
+        let lost = losses.iter().filter(|l| !l.rebooted).count();
+        let rebooted = losses.iter().filter(|l| l.rebooted && boards.contains(&l.board)).count();
+        if lost + rebooted == 0 { Ok(()) } else { Err(SessionError::Lost { lost, rebooted }) }
     }
 
-    /// Words for what happens beside a procedure.
-    pub fn print_event(&self, event: &Event, during: Option<ProcedureId>) {
+    /// Notes what happens beside a procedure.
+    pub fn note_event(&self, event: &Event, during: Option<ProcedureId>) {
         if let Event::Supervision {
             board,
             change: change @ (Supervision::Lost | Supervision::Rebooted { .. }),
@@ -199,13 +195,13 @@ impl Driver {
             let rebooted = *change != Supervision::Lost;
             self.lost.borrow_mut().push(Loss { board: *board, rebooted });
         }
-        if let Some(text) = words(event, during) {
+        if let Some(text) = event_text(event, during) {
             self.note(text);
         }
     }
 
     /// The numbers of the boards that are meant; `all` asks who is there, and refuses a number that two boards have.
-    pub fn numbers(&mut self, boards: &Boards) -> Result<Vec<u8>, Failure> {
+    pub fn numbers(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         let numbers = self.numbers_to_stop(boards)?;
         match self.master.shared_numbers().into_iter().next() {
             Some(error) if *boards == Boards::All => Err(error.into()),
@@ -214,7 +210,7 @@ impl Driver {
     }
 
     /// The same with the numbers that two boards have: a stop stops both.
-    pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, Failure> {
+    pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         match boards {
             Boards::Some(numbers) => Ok(numbers.clone()),
             Boards::None => Ok(Vec::new()),
@@ -232,19 +228,9 @@ impl Driver {
                     more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);
                 }
-                let found = report.reports.ids.len();
-                Err(match found {
-                    0 => Failure::new(NO_LINK, "no-boards", "no board answers")
-                        .hint("ucom doctor looks for the reason"),
-                    n => Failure::new(
-                        NO_LINK,
-                        "no-numbers",
-                        match n {
-                            1 => "1 board is there, without a number".to_owned(),
-                            n => format!("{n} boards are there, none has a number"),
-                        },
-                    )
-                    .hint("ucom init numbers them"),
+                Err(match report.reports.ids.len() {
+                    0 => SessionError::NoBoards,
+                    boards => SessionError::NoNumbers { boards },
                 })
             }
         }
@@ -252,10 +238,10 @@ impl Driver {
 }
 
 /// Words for an event; `None` where they would only repeat what a procedure reports itself.
-pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
+pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     Some(match event {
         Event::Note { text, .. } => text.clone(),
-        Event::Tested { test, .. } => progress_line(test),
+        Event::Tested { test, .. } => test_text(test),
         Event::BoardError { board, code, during: at } if *at != during || during.is_none() => {
             format!("board {board} reports {code}: {} {}", code.meaning(), code.reaction())
         }
@@ -285,28 +271,18 @@ pub fn words(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     })
 }
 
-/// Numbers that two boards have, as `--json` lists them.
-pub fn shared_numbers(master: &Master) -> Vec<Value> {
-    let value = |e: &Error| {
-        let Error::NumberShared { board, found, .. } = e else { return Value::Null };
-        json!({ "board": board, "flash_numbers": found, "code": e.code(), "message": e.to_string(), "hint": e.hint() })
-    };
-    master.shared_numbers().iter().map(value).collect()
-}
-
 /// Refuses to go on with a bus on which two boards have one number.
-pub fn nothing_shared(master: &Master) -> Result<(), Failure> {
+pub fn nothing_shared(master: &Master) -> Result<(), SessionError> {
     master.shared_numbers().into_iter().next().map_or(Ok(()), |error| Err(error.into()))
 }
 
-impl From<Error> for Failure {
-    fn from(e: Error) -> Self {
-        Self::new(exit(e.kind()), e.code(), &e).hint(e.hint())
-    }
-}
-
-/// An outcome that does not fit its request: a mistake in this program.
-pub fn unexpected(outcome: &Outcome) -> Failure {
-    Failure::new(crate::failure::FAULT, "internal", format!("unexpected outcome {outcome:?}"))
-        .hint("this is a mistake in ucom; please report it")
+/// One short line while the tests go on.
+fn test_text(test: &ConformanceTest) -> String {
+    let how = match &test.verdict {
+        Verdict::Pass => "passed",
+        Verdict::Fail(_) => "failed",
+        Verdict::Skipped(_) => "skipped",
+    };
+    let of = test.board.map_or_else(|| "chain".into(), |n| format!("board {n}"));
+    format!("{} {of}: {how}", test.id)
 }

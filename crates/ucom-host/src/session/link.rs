@@ -1,16 +1,14 @@
-//! The way to the boards: bus and profile of the command line, and frames of the bus as the protocol's.
+//! An open bus, and its frames as the protocol's.
 
 use std::time::{Duration, Instant};
 
-use can_link::{CanBus, CanFrame, ControllerState, Id};
-use ucom::{Foreign, Format, Frame, Profile};
-use ucom_host::ProfileFile;
-use ucom_host::files::recording::{FrameKind, RecordedFrame};
+use can_link::{CanBus, CanError, CanFrame, ControllerState, Id};
+use ucom::{Foreign, Format, Frame};
 
-use crate::args::LinkArgs;
-use crate::bus_off::BusOff;
-use crate::failure::{FAULT, Failure, NO_LINK};
-use crate::pump::Line;
+use super::bus_off::BusOff;
+use super::error::SessionError;
+use super::pump::Line;
+use crate::files::recording::{FrameKind, RecordedFrame};
 
 /// Waits that are no longer than this are kept exactly.
 const COARSE: Duration = Duration::from_millis(12);
@@ -18,32 +16,6 @@ const COARSE: Duration = Duration::from_millis(12);
 const LOOK: Duration = Duration::from_micros(100);
 /// Sleeping takes up to so much longer than it was asked to: the end of such a wait is not slept.
 const OVERSLEPT: Duration = Duration::from_micros(150);
-
-impl LinkArgs {
-    /// The profile; without a file the defaults.
-    pub fn profile(&self) -> Result<Profile, Failure> {
-        let Some(path) = &self.profile else { return Ok(Profile::default()) };
-        let text =
-            std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-        Profile::from_toml(&text).map_err(|e| {
-            Failure::usage(format!("{}: {e}", path.display())).hint("ucom help profile lists every key")
-        })
-    }
-
-    /// The URL of the bus.
-    pub fn url(&self) -> Result<&str, Failure> {
-        self.bus.as_deref().ok_or_else(|| {
-            Failure::usage("which bus? there is neither --bus URL nor UCOM_BUS")
-                .hint("as --bus socketcan:can0; ucom sim makes a simulated one and prints its URL")
-        })
-    }
-
-    /// Opens the bus.
-    pub fn open(&self) -> Result<Link, Failure> {
-        let url = self.url()?.to_owned();
-        Ok(Link { bus: can_link::open(&url)?, url, start: Instant::now(), bus_off: BusOff::default() })
-    }
-}
 
 /// An open bus with its clock.
 pub struct Link {
@@ -54,6 +26,15 @@ pub struct Link {
 }
 
 impl Link {
+    /// Opens a bus.
+    ///
+    /// # Errors
+    /// The URL is none, or the bus cannot be opened.
+    pub fn open(url: &str) -> Result<Self, CanError> {
+        let bus = can_link::open(url)?;
+        Ok(Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() })
+    }
+
     /// The URL it was opened with.
     pub fn url(&self) -> &str {
         &self.url
@@ -65,19 +46,19 @@ impl Link {
     }
 
     /// Puts a frame of any protocol on the bus.
-    pub fn send_wire(&mut self, frame: &CanFrame) -> Result<(), Failure> {
-        self.bus.send(frame).map_err(lost)
+    pub fn send_wire(&mut self, frame: &CanFrame) -> Result<(), SessionError> {
+        self.bus.send(frame).map_err(SessionError::Bus)
     }
 
     /// The next frame, of any protocol; waits at most so long.
-    pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, Failure> {
+    pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, SessionError> {
         if timeout > COARSE {
-            return self.bus.receive(timeout - COARSE).map_err(lost);
+            return self.bus.receive(timeout - COARSE).map_err(SessionError::Bus);
         }
         // Sockets round their timeouts up to the system's tick, up to 10 ms; gaps between frames are shorter.
         let end = Instant::now() + timeout;
         loop {
-            if let Some(frame) = self.bus.receive(Duration::ZERO).map_err(lost)? {
+            if let Some(frame) = self.bus.receive(Duration::ZERO).map_err(SessionError::Bus)? {
                 return Ok(Some(frame));
             }
             let left = end.saturating_duration_since(Instant::now());
@@ -114,25 +95,20 @@ impl Line for Link {
         Link::now_us(self)
     }
 
-    fn send(&mut self, frame: &Frame) -> Result<(), Failure> {
+    fn send(&mut self, frame: &Frame) -> Result<(), SessionError> {
         self.send_wire(&to_wire(frame)?)
     }
 
-    fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, Failure> {
+    fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError> {
         Ok(Link::receive(self, timeout)?.map(|frame| from_wire(&frame)))
     }
 }
 
-/// A bus that was open and fails is a fault of the run, not of the command line.
-fn lost(e: can_link::CanError) -> Failure {
-    Failure::new(NO_LINK, "bus", e).hint("is the bus still there? ucom doctor looks at it")
-}
-
 /// A frame of the protocol as one of the bus.
-pub fn to_wire(frame: &Frame) -> Result<CanFrame, Failure> {
+pub fn to_wire(frame: &Frame) -> Result<CanFrame, SessionError> {
     let id = Id::standard(frame.id().into());
     let made = id.and_then(|id| CanFrame::classic(id, frame.data()));
-    made.map_err(|e| Failure::new(FAULT, "frame", e))
+    made.map_err(SessionError::Frame)
 }
 
 /// A frame of the bus as one of the protocol, or why it is foreign (D-02).

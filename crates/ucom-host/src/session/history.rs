@@ -8,7 +8,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 use ucom::{BoardInfo, DateForm};
 
-use crate::args::CacheArgs;
+use super::known::Cache;
 
 /// One parameter.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
@@ -32,8 +32,9 @@ pub struct History {
 
 impl History {
     /// What is remembered of a board; nothing when it has another program by now.
-    pub fn of(cache: &CacheArgs, info: &BoardInfo) -> Self {
-        let file = cache.directory().map(|dir| dir.join(format!("written-{:04X}.json", info.flash_number)));
+    pub fn of(cache: &Cache, info: &BoardInfo) -> Self {
+        let file =
+            cache.directory.as_ref().map(|dir| dir.join(format!("written-{:04X}.json", info.flash_number)));
         let text = file.as_ref().and_then(|file| std::fs::read_to_string(file).ok());
         let kept = text.and_then(|text| serde_json::from_str::<Self>(&text).ok()).unwrap_or_default();
         let same = (kept.program_id, kept.date) == (info.program_id, info.date);
@@ -83,7 +84,7 @@ mod tests {
     #[test]
     fn d35_another_program_remembers_nothing() {
         let dir = tempfile::tempdir().unwrap();
-        let cache = CacheArgs { fresh: false, cache: Some(dir.path().into()) };
+        let cache = Cache { directory: Some(dir.path().into()), fresh: false };
         let info =
             BoardInfo { flash_number: 0x21, sequence: 1, status: Status(0x8B), program_id: 7, date: 8 };
         History::of(&cache, &info).wrote([(2, 0xFFEC)].into_iter());

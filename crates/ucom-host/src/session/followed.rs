@@ -5,13 +5,12 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Value, json};
 use ucom::Status;
 use ucom::profile::OnLost;
-use ucom_host::master::io::Snapshot;
-use ucom_host::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
 
-use crate::failure::{FAULT, Failure};
+use super::error::SessionError;
+use crate::master::io::Snapshot;
+use crate::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
 
 /// Outputs come every few milliseconds: after so long a silence the last ones are old, µs.
 const OLD_US: u64 = 500_000;
@@ -20,12 +19,75 @@ const ASK_US: u64 = 1_000_000;
 /// A run of which no board has been in its loop for so long has nothing left to supervise, µs.
 const OVER_US: u64 = 3_000_000;
 
-/// A notice to print at once, for programs and for people.
+/// What has become of a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Its heartbeat is late.
+    Late,
+    /// Its heartbeats have ended.
+    Lost,
+    /// Its heartbeats come again.
+    Back,
+    /// It has started anew.
+    Rebooted,
+    /// It has left its control loop by itself.
+    LeftLoop,
+    /// It was stopped because another board was lost.
+    StoppedByPolicy,
+    /// It is in its control loop again.
+    InLoop,
+}
+
+impl Change {
+    /// Short name for programs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Late => "late",
+            Self::Lost => "lost",
+            Self::Back => "back",
+            Self::Rebooted => "rebooted",
+            Self::LeftLoop => "left-loop",
+            Self::StoppedByPolicy => "stopped-by-policy",
+            Self::InLoop => "in-loop",
+        }
+    }
+}
+
+/// A change of a board, to be printed at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Notice {
-    /// An event of `--json`.
-    pub value: Value,
-    /// The same in words; empty where the driver prints it.
-    pub text: String,
+    /// The board.
+    pub board: u8,
+    /// What has become of it.
+    pub change: Change,
+    /// When, s.
+    pub time_s: f64,
+    /// The age of its last outputs, s; `None` when none came, and where heartbeats are what has changed.
+    pub age_s: Option<f64>,
+}
+
+impl Notice {
+    /// It is about the control loop, not about heartbeats.
+    pub fn is_of_loop(&self) -> bool {
+        matches!(self.change, Change::LeftLoop | Change::StoppedByPolicy | Change::InLoop)
+    }
+
+    /// In words; `None` where the driver notes the event itself.
+    pub fn text(&self) -> Option<String> {
+        let board = self.board;
+        let age = self.age_s.map_or_else(|| "none came".to_owned(), |s| format!("{s:.1} s old"));
+        let what = match self.change {
+            Change::LeftLoop => {
+                format!("has left its control loop by itself; its last outputs: {age}, stale")
+            }
+            Change::StoppedByPolicy => {
+                format!("was stopped, as a board was lost; its last outputs: {age}, stale")
+            }
+            Change::InLoop => "is in its control loop again".into(),
+            _ => return None,
+        };
+        Some(format!("board {board} {what}"))
+    }
 }
 
 /// The boards of a run.
@@ -74,16 +136,15 @@ impl Followed {
                 }
             }
             Event::Supervision { board, change } => {
-                let event = match change {
-                    Supervision::Late => "late",
-                    Supervision::Lost => "lost",
-                    Supervision::Back => "back",
-                    Supervision::Rebooted { .. } | Supervision::UnknownRebooted { .. } => "rebooted",
+                let change = match change {
+                    Supervision::Late => Change::Late,
+                    Supervision::Lost => Change::Lost,
+                    Supervision::Back => Change::Back,
+                    Supervision::Rebooted { .. } | Supervision::UnknownRebooted { .. } => Change::Rebooted,
                 };
                 let followed = self.boards.contains_key(board);
-                self.lost |= matches!(event, "lost") || (event == "rebooted" && followed);
-                let value = json!({ "event": event, "board": board, "time_s": seconds(now_us) });
-                return Some(Notice { value, text: String::new() });
+                self.lost |= change == Change::Lost || (change == Change::Rebooted && followed);
+                return Some(Notice { board: *board, change, time_s: seconds(now_us), age_s: None });
             }
             _ => {}
         }
@@ -101,7 +162,12 @@ impl Followed {
                 one.out = out;
                 one.left |= out && !self.lost;
                 let age_s = one.last.as_ref().map(|last| age_s(last, now_us));
-                notices.push(changed(*number, out, self.lost, age_s, now_us));
+                let change = match (out, self.lost) {
+                    (true, false) => Change::LeftLoop,
+                    (true, true) => Change::StoppedByPolicy,
+                    (false, _) => Change::InLoop,
+                };
+                notices.push(Notice { board: *number, change, time_s: seconds(now_us), age_s });
             }
             let quiet = board.so_at.is_some_and(|at| now_us.saturating_sub(at) > OLD_US);
             if quiet && !out && board.life == Life::Alive && now_us.saturating_sub(one.asked_us) > ASK_US {
@@ -151,17 +217,9 @@ impl Followed {
     }
 
     /// A failure if a board has left its loop by itself.
-    pub fn nobody_left(&self) -> Result<(), Failure> {
-        let left: Vec<String> =
-            self.boards.iter().filter(|(_, one)| one.left).map(|(n, _)| n.to_string()).collect();
-        let what = match left.as_slice() {
-            [] => return Ok(()),
-            [one] => format!("board {one} left its control loop by itself"),
-            many => format!("boards {} left their control loops by themselves", many.join(", ")),
-        };
-        Err(Failure::new(FAULT, "left-loop", what).hint(
-            "ucom doctor: another PC on the bus, heartbeats that did not arrive, an application that stops",
-        ))
+    pub fn nobody_left(&self) -> Result<(), SessionError> {
+        let boards: Vec<u8> = self.boards.iter().filter(|(_, one)| one.left).map(|(n, _)| *n).collect();
+        if boards.is_empty() { Ok(()) } else { Err(SessionError::LeftLoop { boards }) }
     }
 }
 
@@ -176,28 +234,6 @@ fn seconds(us: u64) -> f64 {
 
 fn age_s(last: &Snapshot, now_us: u64) -> f64 {
     seconds(now_us.saturating_sub(last.time_us))
-}
-
-fn changed(board: u8, out: bool, lost: bool, age_s: Option<f64>, now_us: u64) -> Notice {
-    let event = match (out, lost) {
-        (true, false) => "left-loop",
-        (true, true) => "stopped-by-policy",
-        (false, _) => "in-loop",
-    };
-    let age = age_s.map_or_else(|| "none came".to_owned(), |s| format!("{s:.1} s old"));
-    let text = match (out, lost) {
-        (true, false) => {
-            format!("board {board} has left its control loop by itself; its last outputs: {age}, stale")
-        }
-        (true, true) => {
-            format!("board {board} was stopped, as a board was lost; its last outputs: {age}, stale")
-        }
-        (false, _) => format!("board {board} is in its control loop again"),
-    };
-    Notice {
-        value: json!({ "event": event, "board": board, "time_s": seconds(now_us), "age_s": age_s }),
-        text,
-    }
 }
 
 #[cfg(test)]
@@ -218,7 +254,7 @@ mod tests {
             notices.extend(followed.see(&event, at_us));
         }
         notices.extend(followed.look(master, at_us));
-        let event = |s: Notice| s.value["event"].as_str().unwrap_or_default().to_owned();
+        let event = |notice: Notice| notice.change.name().to_owned();
         sent.into_iter().filter(|f| f != "680#").chain(notices.into_iter().map(event)).collect()
     }
 
@@ -252,7 +288,7 @@ mod tests {
         let again = ["601#01000000", "381#0000640065006600"];
         assert_eq!(receive(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
         assert_eq!(stale(&master, &followed, 40_000), [false]);
-        assert_eq!(followed.nobody_left().unwrap_err().exit, FAULT);
+        assert_eq!(followed.nobody_left().unwrap_err().kind(), host_kit::ErrorKind::Fault);
     }
 
     #[test]

@@ -4,9 +4,9 @@
 use std::time::Duration;
 
 use ucom::{Foreign, Frame};
-use ucom_host::master::Master;
 
-use crate::failure::Failure;
+use super::error::SessionError;
+use crate::master::Master;
 
 /// Longest wait: so often Ctrl-C is looked at.
 pub const LOOK: Duration = Duration::from_millis(50);
@@ -24,9 +24,9 @@ pub trait Line {
     /// µs from any start.
     fn now_us(&self) -> u64;
     /// Puts a frame on the bus.
-    fn send(&mut self, frame: &Frame) -> Result<(), Failure>;
+    fn send(&mut self, frame: &Frame) -> Result<(), SessionError>;
     /// The next frame; waits at most so long, and not at all for zero.
-    fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, Failure>;
+    fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError>;
 }
 
 /// What the loop remembers.
@@ -44,14 +44,14 @@ impl Pump {
         master: &mut Master,
         line: &mut impl Line,
         patience: Duration,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SessionError> {
         let due = master.next_deadline().map_or(u64::MAX, |at| at.saturating_sub(line.now_us()));
         self.receive(master, line, patience.min(LOOK).min(Duration::from_micros(due)))?;
         self.send(master, line).map(drop)
     }
 
     /// Lets what is queued leave.
-    pub fn flush(&mut self, master: &mut Master, line: &mut impl Line) -> Result<(), Failure> {
+    pub fn flush(&mut self, master: &mut Master, line: &mut impl Line) -> Result<(), SessionError> {
         let end = line.now_us() + BEHIND_US;
         while self.send(master, line)? && line.now_us() < end {}
         Ok(())
@@ -62,7 +62,7 @@ impl Pump {
         master: &mut Master,
         line: &mut impl Line,
         mut wait: Duration,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SessionError> {
         let mut first = None;
         for _ in 0..MOST_RECEIVED {
             let asked = line.now_us();
@@ -88,7 +88,7 @@ impl Pump {
     }
 
     /// Sends what is due; `true`: there may be more.
-    fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, Failure> {
+    fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, SessionError> {
         for _ in 0..MOST_SENT {
             let Some(frame) = master.poll_behind(line.now_us(), self.received_us) else { return Ok(false) };
             line.send(&frame)?;
@@ -101,8 +101,8 @@ impl Pump {
 mod tests {
     use std::collections::VecDeque;
 
+    use crate::master::{Event, Outcome, Request};
     use ucom::Profile;
-    use ucom_host::master::{Event, Outcome, Request};
 
     use super::*;
 
@@ -143,11 +143,7 @@ mod tests {
         }
 
         /// Runs a request to its end.
-        fn run(
-            &mut self,
-            master: &mut Master,
-            request: Request,
-        ) -> Result<Outcome, ucom_host::master::Error> {
+        fn run(&mut self, master: &mut Master, request: Request) -> Result<Outcome, crate::master::Error> {
             let mut pump = Pump::default();
             let id = master.start(self.now, request).unwrap();
             while self.now < 100_000_000 {
@@ -169,7 +165,7 @@ mod tests {
             self.now
         }
 
-        fn send(&mut self, sent: &Frame) -> Result<(), Failure> {
+        fn send(&mut self, sent: &Frame) -> Result<(), SessionError> {
             self.lose();
             self.now += 20;
             self.sent.push((self.now, *sent));
@@ -181,7 +177,7 @@ mod tests {
             Ok(())
         }
 
-        fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, Failure> {
+        fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError> {
             self.lose();
             let end = self.now + timeout.as_micros() as u64;
             let next = self.next_at().filter(|at| *at <= end);
@@ -233,7 +229,7 @@ mod tests {
         let mut master = Master::new(Profile::default());
         master.begin_session(0);
         let result = bench.run(&mut master, Request::Info { board: 9 });
-        assert!(matches!(result, Err(ucom_host::master::Error::NoAnswer { board: 9, .. })), "{result:?}");
+        assert!(matches!(result, Err(crate::master::Error::NoAnswer { board: 9, .. })), "{result:?}");
         let alive = bench.times_of("680#");
         assert!(bench.now < 10_000_000, "{} µs", bench.now);
         assert!(alive.len() as u64 >= bench.now / 500_000, "{alive:?} up to {}", bench.now);

@@ -1,23 +1,23 @@
-//! With which inputs and parameters `ucom run` starts each board.
+//! With which inputs and parameters a run starts each board.
 
-use ucom_host::master::io::Kind;
-use ucom_host::master::{RunBoard, Setting};
+use super::driver::Driver;
+use super::error::SessionError;
+use super::history::History;
+use super::known::{Cache, Known};
+use super::parameters::ParameterFile;
+use super::selection::{Assignment, for_board};
+use super::values::{Prepared, Word, note_rounded, words};
+use crate::master::io::Kind;
+use crate::master::{RunBoard, Setting};
 
-use super::params::Applied;
-use crate::args::{Assignment, RunArgs};
-use crate::cache::Known;
-use crate::driver::Driver;
-use crate::failure::Failure;
-use crate::values::{Prepared, Word, for_board, print_rounded, words};
-use crate::written::History;
-
-/// What each board is to get: the file's values, then those of the command line.
+/// What each board is to get: the file's values, then those that are given beside it.
 pub fn plans(
     driver: &Driver,
-    args: &RunArgs,
     prepared: &Prepared,
-    file: Option<&Applied>,
-) -> Result<Vec<RunBoard>, Failure> {
+    file: Option<&ParameterFile>,
+    ci: &[Assignment],
+    par: &[Assignment],
+) -> Result<Vec<RunBoard>, SessionError> {
     let from_file = file.map(|f| f.words(|n| prepared.known.get(&n))).transpose()?.unwrap_or_default();
     let plan = |known: &Known| {
         let board = known.board;
@@ -28,22 +28,22 @@ pub fn plans(
                 all.retain(|w| w.index != word.index);
                 all.push(word);
             }
-            print_rounded(driver, board, kind, &all);
-            Ok::<_, Failure>(all.iter().map(|w| w.setting(known, kind)).collect())
+            note_rounded(driver, board, kind, &all);
+            Ok::<_, SessionError>(all.iter().map(|w| known.setting(kind, w)).collect())
         };
-        let ci = settings(Kind::Ci, of_file.map(|(ci, _)| ci), &args.ci)?;
-        let par = settings(Kind::Par, of_file.map(|(_, par)| par), &args.par)?;
+        let ci = settings(Kind::Ci, of_file.map(|(ci, _)| ci), ci)?;
+        let par = settings(Kind::Par, of_file.map(|(_, par)| par), par)?;
         Ok(RunBoard { board, ci, par })
     };
     prepared.known.values().map(plan).collect()
 }
 
-/// The parameters that were written, for `ucom par`.
-pub fn remember(args: &RunArgs, prepared: &Prepared, plans: &[RunBoard]) {
+/// The parameters that a run has written, into the history.
+pub fn remember(cache: &Cache, prepared: &Prepared, plans: &[RunBoard]) {
     for plan in plans.iter().filter(|plan| !plan.par.is_empty()) {
         let Some(known) = prepared.known.get(&plan.board) else { continue };
         let index = |s: &Setting| known.names.find(plan.board, Kind::Par, &s.name).ok();
         let words = plan.par.iter().filter_map(|s| Some((index(s)?, s.value)));
-        History::of(&args.cache, &known.info).wrote(words);
+        History::of(cache, &known.info).wrote(words);
     }
 }

@@ -1,0 +1,91 @@
+//! A session as the command line opens it: its bus and profile, Ctrl-C, and notes on stderr.
+
+use cli_kit::{Lines, Stop};
+use serde_json::{Value, json};
+use ucom::Profile;
+use ucom_host::ProfileFile;
+use ucom_host::master::{Error, Master};
+use ucom_host::session::{CleanupList, Driver, Link, Operator, SessionError, ValuesError};
+
+use crate::args::LinkArgs;
+use crate::failure::{Failure, exit};
+use crate::interrupt::listen;
+
+struct Console {
+    stop: Stop,
+    notes: Lines,
+}
+
+impl Operator for Console {
+    fn stop_asked(&self) -> bool {
+        self.stop.asked()
+    }
+
+    fn note(&self, text: String) {
+        self.notes.push(text);
+    }
+}
+
+impl LinkArgs {
+    /// The profile; without a file the defaults.
+    pub fn profile(&self) -> Result<Profile, Failure> {
+        let Some(path) = &self.profile else { return Ok(Profile::default()) };
+        let text =
+            std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
+        Profile::from_toml(&text).map_err(|e| {
+            Failure::usage(format!("{}: {e}", path.display())).hint("ucom help profile lists every key")
+        })
+    }
+
+    /// The URL of the bus.
+    pub fn url(&self) -> Result<&str, Failure> {
+        self.bus.as_deref().ok_or_else(|| {
+            Failure::usage("which bus? there is neither --bus URL nor UCOM_BUS")
+                .hint("as --bus socketcan:can0; ucom sim makes a simulated one and prints its URL")
+        })
+    }
+
+    /// Opens the bus.
+    pub fn open(&self) -> Result<Link, Failure> {
+        Ok(Link::open(self.url()?)?)
+    }
+
+    /// A session on the bus.
+    pub fn session(&self) -> Result<Driver, Failure> {
+        self.session_with(self.profile()?)
+    }
+
+    /// The same with another profile than the command line's.
+    pub fn session_with(&self, profile: Profile) -> Result<Driver, Failure> {
+        let cleanup = CleanupList::default();
+        let console = Console { stop: listen(&cleanup)?, notes: Lines::stderr()? };
+        Ok(Driver::new(profile, self.open()?, Box::new(console), cleanup))
+    }
+}
+
+/// Numbers that two boards have, as `--json` lists them.
+pub fn shared_numbers(master: &Master) -> Vec<Value> {
+    let value = |e: &Error| {
+        let Error::NumberShared { board, found, .. } = e else { return Value::Null };
+        json!({ "board": board, "flash_numbers": found, "code": e.code(), "message": e.to_string(), "hint": e.hint() })
+    };
+    master.shared_numbers().iter().map(value).collect()
+}
+
+impl From<SessionError> for Failure {
+    fn from(e: SessionError) -> Self {
+        Self::new(exit(e.kind()), e.code(), &e).hint(e.hint())
+    }
+}
+
+impl From<ValuesError> for Failure {
+    fn from(e: ValuesError) -> Self {
+        SessionError::from(e).into()
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(e: Error) -> Self {
+        SessionError::from(e).into()
+    }
+}

@@ -1,0 +1,265 @@
+//! Why a session did not do what was asked: a procedure failed, or what is around it did.
+use can_link::{CanError, InvalidFrame};
+use host_kit::ErrorKind;
+
+use super::bus_off;
+use crate::files::signals::ValueError;
+use crate::master::io::Kind;
+use crate::master::{Error, Outcome};
+
+/// Why a session did not do what was asked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// A procedure failed.
+    #[error(transparent)]
+    Procedure(#[from] Error),
+    /// Values do not fit the boards, or what became of them is not known.
+    #[error(transparent)]
+    Values(#[from] ValuesError),
+    /// The open bus failed.
+    #[error("{0}")]
+    Bus(CanError),
+    /// The bus has no such frame.
+    #[error("{0}")]
+    Frame(InvalidFrame),
+    /// Nothing answered while the controller of this computer was off the bus: it may never have been asked.
+    #[error("{failure}; the CAN controller of this computer was bus-off meanwhile")]
+    BusOff {
+        /// What failed.
+        failure: Box<SessionError>,
+        /// The URL of the bus.
+        url: String,
+    },
+    /// No board is there.
+    #[error("no board answers")]
+    NoBoards,
+    /// No board has a number.
+    #[error("{}", if *boards == 1 { "1 board is there, without a number".to_owned() } else { format!("{boards} boards are there, none has a number") })]
+    NoNumbers {
+        /// How many are there.
+        boards: usize,
+    },
+    /// Boards were lost, or have rebooted, in the course of the session.
+    #[error("{}", losses(*lost, *rebooted))]
+    Lost {
+        /// How often one was lost.
+        lost: usize,
+        /// How often one has rebooted.
+        rebooted: usize,
+    },
+    /// Boards have left their control loops by themselves.
+    #[error("{}", left(boards))]
+    LeftLoop {
+        /// Their numbers.
+        boards: Vec<u8>,
+    },
+    /// An outcome that does not fit its request: a mistake in this library.
+    #[error("unexpected outcome {0:?}")]
+    Unexpected(Box<Outcome>),
+}
+
+/// Why values cannot be sent to boards, or what became of them is not known.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ValuesError {
+    /// The board has no signal at this place.
+    #[error("board {board} has no {} {index}", kind.name())]
+    NoSignal {
+        /// Its number.
+        board: u8,
+        /// Which buffer.
+        kind: Kind,
+        /// The place.
+        index: u16,
+    },
+    /// The value is none of the signal's.
+    #[error("board {board}: {} `{name}`: {error}", kind.name())]
+    Value {
+        /// The board.
+        board: u8,
+        /// Which buffer.
+        kind: Kind,
+        /// As it was given.
+        name: String,
+        /// The program that the board has.
+        program_id: u16,
+        /// What is wrong with it.
+        error: Box<ValueError>,
+    },
+    /// One signal has two values.
+    #[error("board {board}: {} `{name}` is given twice", kind.name())]
+    Twice {
+        /// The board.
+        board: u8,
+        /// Which buffer.
+        kind: Kind,
+        /// Its name.
+        name: String,
+    },
+    /// A value for a board that is not meant.
+    #[error("{board}.{name}: board {board} is not among those to {to}")]
+    NotMeant {
+        /// The board.
+        board: u8,
+        /// The signal.
+        name: String,
+        /// What is to be done with the others.
+        to: &'static str,
+    },
+    /// Values were sent, and the application is not there to have taken them.
+    #[error("board {board}: values were sent, but {why}: what it has now is unknown{}", before(written))]
+    Unknown {
+        /// The board.
+        board: u8,
+        /// Why.
+        why: String,
+        /// Boards that were written to before it; `None` where that is no matter.
+        written: Option<Vec<u8>>,
+    },
+    /// A parameter file cannot be read, or has nothing to write.
+    #[error("{message}")]
+    File {
+        /// With the file's name.
+        message: String,
+        /// What helps.
+        hint: &'static str,
+    },
+    /// A parameter file does not fit the boards: one line for each mistake.
+    #[error("{}", lines.join("\n"))]
+    Misfit {
+        /// Each with the file's name and the line.
+        lines: Vec<String>,
+    },
+}
+
+impl SessionError {
+    /// What kind of failure it is.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Procedure(e) => e.kind(),
+            Self::Values(e) => e.kind(),
+            Self::BusOff { failure, .. } => failure.kind(),
+            Self::Bus(_) | Self::NoBoards | Self::NoNumbers { .. } => ErrorKind::NoLink,
+            Self::Frame(_) | Self::Lost { .. } | Self::LeftLoop { .. } | Self::Unexpected(_) => {
+                ErrorKind::Fault
+            }
+        }
+    }
+
+    /// A short name for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Procedure(e) => e.code(),
+            Self::Values(e) => e.code(),
+            Self::BusOff { failure, .. } => failure.code(),
+            Self::Bus(_) => "bus",
+            Self::Frame(_) => "frame",
+            Self::NoBoards => "no-boards",
+            Self::NoNumbers { .. } => "no-numbers",
+            Self::Lost { .. } => "lost",
+            Self::LeftLoop { .. } => "left-loop",
+            Self::Unexpected(_) => "internal",
+        }
+    }
+
+    /// The next command or act; empty when there is none.
+    pub fn hint(&self) -> String {
+        let hint = match self {
+            Self::Procedure(e) => return e.hint(),
+            Self::Values(e) => return e.hint(),
+            Self::BusOff { url, .. } => return bus_off::next(url),
+            Self::Bus(_) => "is the bus still there? ucom doctor looks at it",
+            Self::Frame(_) => "",
+            Self::NoBoards => "ucom doctor looks for the reason",
+            Self::NoNumbers { .. } => "ucom init numbers them",
+            Self::Lost { .. } => "ucom doctor looks at bus and boards",
+            Self::LeftLoop { .. } => {
+                "ucom doctor: another PC on the bus, heartbeats that did not arrive, an application that stops"
+            }
+            Self::Unexpected(_) => "this is a mistake in ucom; please report it",
+        };
+        hint.into()
+    }
+}
+
+impl From<Outcome> for SessionError {
+    fn from(outcome: Outcome) -> Self {
+        Self::Unexpected(Box::new(outcome))
+    }
+}
+
+impl ValuesError {
+    /// What kind of failure it is.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::NoSignal { .. } | Self::Twice { .. } | Self::NotMeant { .. } | Self::File { .. } => {
+                ErrorKind::Usage
+            }
+            Self::Value { .. } | Self::Misfit { .. } => ErrorKind::Refused,
+            Self::Unknown { .. } => ErrorKind::Fault,
+        }
+    }
+
+    /// A short name for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoSignal { .. } | Self::Twice { .. } | Self::NotMeant { .. } | Self::File { .. } => "usage",
+            Self::Value { .. } => "value",
+            Self::Unknown { .. } => "unknown",
+            Self::Misfit { .. } => "params",
+        }
+    }
+
+    /// The next command or act; empty when there is none.
+    pub fn hint(&self) -> String {
+        match self {
+            Self::NoSignal { .. } | Self::NotMeant { .. } => String::new(),
+            Self::Twice { .. } => "give each name once: nothing was sent".into(),
+            Self::Value { error, program_id, .. } if matches!(**error, ValueError::Meaning { .. }) => {
+                format!(
+                    "add program 0x{program_id:04X} to the signal table (ucom help edges), or give the word as 0x0000"
+                )
+            }
+            Self::Value { board, .. } => {
+                format!("ucom io {board} shows types, scales and units; a word as 0x05DC is sent as it is")
+            }
+            Self::Unknown { board, .. } => {
+                format!("ucom status {board} shows its state; ucom start {board}, and write them again")
+            }
+            Self::File { hint, .. } => (*hint).into(),
+            Self::Misfit { .. } => {
+                "nothing was written; ucom io shows names and ranges, ucom info the boards".into()
+            }
+        }
+    }
+}
+
+fn losses(lost: usize, rebooted: usize) -> String {
+    let times = |n: usize, what: &str| match n {
+        0 => None,
+        1 => Some(format!("once a board {what}")),
+        n => Some(format!("{n} times a board {what}")),
+    };
+    let what = [times(lost, "was lost"), times(rebooted, "has rebooted")];
+    what.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+fn list(boards: &[u8]) -> String {
+    boards.iter().map(u8::to_string).collect::<Vec<_>>().join(", ")
+}
+
+fn left(boards: &[u8]) -> String {
+    match boards {
+        [one] => format!("board {one} left its control loop by itself"),
+        many => format!("boards {} left their control loops by themselves", list(many)),
+    }
+}
+
+fn before(written: &Option<Vec<u8>>) -> String {
+    match written.as_deref() {
+        None => String::new(),
+        Some([]) => "; no board was written to before".into(),
+        Some(boards) => format!("; written before: board {}", list(boards)),
+    }
+}

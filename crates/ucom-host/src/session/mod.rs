@@ -1,0 +1,35 @@
+//! A session on a bus: a master with the frames that carry it, in wall-clock time, and what commands make of it.
+//!
+//! - [`Link`]: an open bus with its clock; [`pump`]: frames between it and the master, in the order that keeps times honest.
+//! - [`Driver`]: procedures from start to end, with an [`Operator`] who may stop them and reads notes.
+//! - [`CleanupList`]: what would be left undone if the process ended now.
+//! - [`Cache`], [`History`]: what is remembered of boards from session to session.
+//! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: values by name as words of boards, checked before anything is sent.
+//! - [`Followed`]: the boards of a run under supervision.
+pub mod bus_off;
+mod cleanup;
+mod driver;
+mod error;
+mod followed;
+mod history;
+mod known;
+mod link;
+mod parameters;
+mod plans;
+pub mod pump;
+mod selection;
+mod values;
+
+pub use cleanup::CleanupList;
+pub use driver::{Driver, Operator, event_text, nothing_shared};
+pub use error::{SessionError, ValuesError};
+pub use followed::{Change, Followed, Notice};
+pub use history::{History, Written};
+pub use known::{Cache, Known};
+pub use link::{Link, from_wire, protocol_frame, recorded, replayed, to_wire};
+pub use parameters::{
+    FileWords, ParameterFile, Parameters, arrived, become_master, inventory, name_of, write,
+};
+pub use plans::{plans, remember};
+pub use selection::{Assignment, Boards, for_board, only};
+pub use values::{Prepared, Word, note_rounded, with_names, words};

@@ -1,0 +1,163 @@
+//! Parameters of boards: written so that it is known whether they arrived, and from parameter files.
+
+use std::path::Path;
+
+use ucom::Status;
+
+use super::driver::Driver;
+use super::error::{SessionError, ValuesError};
+use super::history::History;
+use super::known::Known;
+use super::values::Word;
+use crate::files::Inventory;
+use crate::files::inventory::InventoryError;
+use crate::files::params::{
+    ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, check_board, check_identity,
+};
+use crate::master::io::Kind;
+use crate::master::{AdminChange, Error, Outcome, Request};
+
+/// A board, the words that it is to get, and what it got before.
+#[derive(Debug)]
+pub struct Parameters {
+    /// The board with its names.
+    pub known: Known,
+    /// What is to be written.
+    pub words: Vec<Word>,
+    /// What was written before.
+    pub history: History,
+}
+
+/// Writes all words of all boards; nothing before every board is ready for it.
+pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(), SessionError> {
+    for board in all.iter().filter(|p| !p.words.is_empty()) {
+        become_master(driver, board.known.board, force)?;
+    }
+    let mut written: Vec<u8> = Vec::new();
+    for Parameters { known, words, history } in all.iter_mut().filter(|p| !p.words.is_empty()) {
+        for word in words.iter() {
+            let (now, setting) = (driver.now_us(), known.setting(Kind::Par, word));
+            driver.master.set_parameter(now, known.board, &setting.name, setting.value)?;
+        }
+        arrived(driver, known.board).map_err(|failure| match failure {
+            ValuesError::Unknown { board, why, .. } => {
+                ValuesError::Unknown { board, why, written: Some(written.clone()) }
+            }
+            other => other,
+        })?;
+        written.push(known.board);
+        history.wrote(words.iter().map(|w| (w.index, w.word)));
+    }
+    Ok(())
+}
+
+/// Listens for another PC before anything is sent (D-08), and reads whether the loop runs.
+pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, SessionError> {
+    let change = AdminChange::default();
+    match driver.run(Request::Admin { board, change, force })? {
+        Outcome::Admin { admin, .. } => Ok(admin.run),
+        other => Err(other.into()),
+    }
+}
+
+/// Lets what is queued leave, and sees that the application is still there to have taken it: nothing answers to inputs and
+/// parameters themselves (D-35). Frames leave in their order, so the answer to a question comes after all of them.
+pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
+    let unknown = |why: String| Err(ValuesError::Unknown { board, why, written: None });
+    match driver.seen(board) {
+        Ok(found) if found.info.status.has(Status::MSTART) => Ok(()),
+        Ok(_) => unknown("its application does not run any more".into()),
+        Err(e) => unknown(format!("it does not answer since ({e})")),
+    }
+}
+
+/// The inventory, where there is one.
+pub fn inventory(path: &Path) -> Result<Option<Inventory>, InventoryError> {
+    match path.exists() {
+        true => Inventory::read(path).map(Some),
+        false => Ok(None),
+    }
+}
+
+/// The name of a board by an inventory.
+pub fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str> {
+    let board = inventory?.boards().find(|b| b.flash_number == flash_number)?;
+    Some(board.name.as_str()).filter(|name| !name.is_empty())
+}
+
+/// A parameter file that was read, against the boards that are there.
+#[derive(Debug)]
+pub struct ParameterFile {
+    file: String,
+    boards: Vec<ParamsBoard>,
+    inventory: Option<Inventory>,
+}
+
+/// A board's words of a parameter file: first inputs, and parameters.
+pub type FileWords = (Vec<Word>, Vec<Word>);
+
+impl ParameterFile {
+    /// Reads a file and takes from it the boards that are meant.
+    pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, ValuesError> {
+        let wrong = |message: String, hint| ValuesError::File { message, hint };
+        let file =
+            ParamsFile::read(path).map_err(|e| wrong(e.to_string(), "ucom help params shows the form"))?;
+        if file.boards.iter().all(|b| b.par.is_empty() && b.ci.is_empty()) {
+            return Err(wrong(
+                format!("{}: there is no value in it", path.display()),
+                "a name without # before it and with a value behind it is one, as `kp: 120`; by number \"#0\": 120",
+            ));
+        }
+        let inventory = inventory(inventory_file).map_err(|e| wrong(e.to_string(), ""))?;
+        let boards = file.boards.into_iter().filter(|b| meant(b.number)).collect();
+        Ok(Self { file: path.display().to_string(), boards, inventory })
+    }
+
+    /// The boards of the file.
+    pub fn numbers(&self) -> Vec<u8> {
+        self.boards.iter().map(|b| b.number).collect()
+    }
+
+    /// Whether the boards are those that the file means. Only asks.
+    pub fn identities(&self, driver: &mut Driver) -> Result<(), SessionError> {
+        let mut problems = Vec::new();
+        for board in &self.boards {
+            match driver.seen(board.number) {
+                Ok(found) => {
+                    let name = name_of(self.inventory.as_ref(), found.info.flash_number);
+                    problems.extend(check_identity(board, &ParamsTarget { info: &found.info, name }));
+                }
+                Err(SessionError::Procedure(Error::NoAnswer { .. })) => {
+                    let kind = ParamsProblemKind::Absent;
+                    problems.push(ParamsProblem { place: board.place, board: board.number, kind });
+                }
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(self.verdict(problems)?)
+    }
+
+    /// The words of all boards, or every mistake.
+    pub fn words<'a>(
+        &self,
+        known: impl Fn(u8) -> Option<&'a Known>,
+    ) -> Result<Vec<(u8, FileWords)>, ValuesError> {
+        let (mut all, mut problems) = (Vec::new(), Vec::new());
+        for board in &self.boards {
+            let Some(known) = known(board.number) else { continue };
+            match check_board(board, &known.names, &known.signals) {
+                Ok(words) => all.push((board.number, words)),
+                Err(more) => problems.extend(more),
+            }
+        }
+        self.verdict(problems).map(|()| all)
+    }
+
+    fn verdict(&self, problems: Vec<ParamsProblem>) -> Result<(), ValuesError> {
+        if problems.is_empty() {
+            return Ok(());
+        }
+        let lines: Vec<String> = problems.iter().map(|p| format!("{}: {p}", self.file)).collect();
+        Err(ValuesError::Misfit { lines })
+    }
+}

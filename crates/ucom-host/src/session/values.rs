@@ -1,0 +1,113 @@
+//! Values as words of the boards: names and ranges are checked before anything is sent.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use host_kit::ErrorKind;
+
+use super::driver::Driver;
+use super::error::{SessionError, ValuesError};
+use super::known::{Cache, Known};
+use super::selection::Assignment;
+use crate::files::SignalTable;
+use crate::files::params::ParamsWord;
+use crate::master::io::Kind;
+use crate::master::{Error, Outcome, Request, StopLevel};
+
+/// A word for a signal.
+pub type Word = ParamsWord;
+
+/// The words of assignments for a board.
+pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Word>, SessionError> {
+    let board = known.board;
+    let word = |a: &Assignment| {
+        let index = known.names.find(board, kind, &a.name)?;
+        let name = known.names.names(kind).get(usize::from(index)).cloned().unwrap_or_default();
+        let Some(signal) = known.signals.get(kind, index.into()) else {
+            return Err(SessionError::from(ValuesError::NoSignal { board, kind, index }));
+        };
+        let word = signal.word(&a.value).map_err(|error| {
+            let (name, program_id, error) = (a.name.clone(), known.info.program_id, Box::new(error));
+            ValuesError::Value { board, kind, name, program_id, error }
+        })?;
+        let rounded = signal.rounded(&a.value, word).map(|sent| format!("{} → {sent}", a.value));
+        Ok(Word { index, name, word, text: signal.text_with_unit(word), rounded })
+    };
+    let all = values.iter().map(word).collect::<Result<Vec<_>, _>>()?;
+    let earlier = |(i, word): &(usize, &Word)| all.iter().take(*i).any(|other| other.index == word.index);
+    if let Some((_, word)) = all.iter().enumerate().find(earlier) {
+        return Err(ValuesError::Twice { board, kind, name: word.name.clone() }.into());
+    }
+    Ok(all)
+}
+
+/// Notes which values lie between two words and go as the nearer one.
+pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
+    for word in words {
+        if let Some(rounded) = &word.rounded {
+            driver.note(format!("board {board}: {} `{}`: {rounded}", kind.name(), word.name));
+        }
+    }
+}
+
+/// Does something by names that may be kept from before; when a board turns out to have others, once more by those that it sends.
+pub fn with_names<T>(
+    cache: &Cache,
+    mut act: impl FnMut(&Cache) -> Result<T, SessionError>,
+) -> Result<T, SessionError> {
+    match act(cache) {
+        Err(SessionError::Procedure(Error::StaleNames { .. } | Error::NoSignal { .. })) if !cache.fresh => {
+            act(&Cache { fresh: true, ..cache.clone() })
+        }
+        other => other,
+    }
+}
+
+/// Boards with their names, whose applications were started where only they could send the names.
+#[derive(Default)]
+pub struct Prepared {
+    /// By number.
+    pub known: BTreeMap<u8, Known>,
+    started: RefCell<Vec<u8>>,
+}
+
+impl Prepared {
+    /// Asks for the names of a board; starts its application where nothing else helps. Nothing moves by that.
+    pub fn add(
+        &mut self,
+        driver: &mut Driver,
+        cache: &Cache,
+        table: &SignalTable,
+        board: u8,
+        force: bool,
+    ) -> Result<(), SessionError> {
+        let known = match cache.known(driver, table, board) {
+            Err(SessionError::Procedure(Error::NoApplication { .. })) => {
+                // Before the command leaves: a start that is cancelled may have reached it.
+                self.started.borrow_mut().push(board);
+                let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
+                    // Refused means that nothing was sent; taking that back would speak on another PC's bus.
+                    if e.kind() == ErrorKind::Refused {
+                        self.started.borrow_mut().pop();
+                    }
+                });
+                started.and_then(|outcome| match outcome {
+                    Outcome::Started(_) => cache.described(driver, table, board),
+                    other => Err(other.into()),
+                })
+            }
+            other => other,
+        };
+        self.known.insert(board, known.inspect_err(|_| self.undo(driver))?);
+        Ok(())
+    }
+
+    /// Stops what was started only to be asked, once: a refusal leaves the boards as they were. What cannot be stopped is reported.
+    pub fn undo(&self, driver: &mut Driver) {
+        for board in self.started.take().into_iter().rev() {
+            if let Err(e) = driver.stop_board(board, StopLevel::Application) {
+                driver.note(format!("board {board} may still be started: {e}"));
+            }
+        }
+    }
+}

@@ -87,8 +87,7 @@ fn program(
     for note in image.notes() {
         out.note(format!("note: {}: {note}", path.display()));
     }
-    let (address, image) = (image.address_words(), image.bytes().to_vec());
-    Ok(ConformanceProgram { board, flash_number, image, address, date })
+    Ok(ConformanceProgram { board, flash_number, image: image.into(), date })
 }
 
 /// The board's flash number by the inventory.

@@ -96,7 +96,8 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     let output = args.out.as_deref().map(|file| open_output(file, args.force.force)).transpose()?;
     let image = match &args.image {
         Some(path) => {
-            Some(Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?.bytes().to_vec())
+            let image = Image::read(path, &ImageOptions::default()).map_err(Failure::usage)?;
+            Some(image.into_bytes().into())
         }
         None => None,
     };

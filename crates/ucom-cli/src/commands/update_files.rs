@@ -73,7 +73,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
         image.bytes().len(),
         image.address_words()
     );
-    Ok((UpdateImage { bytes: image.bytes().to_vec(), address_words: image.address_words() }, note))
+    Ok((image.into(), note))
 }
 
 /// The file beside the image that the plan takes.

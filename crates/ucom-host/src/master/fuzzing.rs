@@ -30,9 +30,9 @@ fn request(choice: u8) -> Request {
             let boards = vec![RunBoard { board, ..Default::default() }];
             Request::Run(RunOptions { boards, active: true, force })
         }
-        13 => Request::Probe(ProbeOptions { init: force, alive: force, image: Some(vec![1; 64]), force }),
+        13 => Request::Probe(ProbeOptions { init: force, alive: force, image: Some([1; 64].into()), force }),
         _ => {
-            let image = UpdateImage { bytes: vec![choice; 64], address_words: 0 };
+            let image = UpdateImage { bytes: [choice; 64].into(), address_words: 0 };
             let targets = vec![UpdateTarget { board, flash_number: None }];
             Request::Update(UpdateOptions { force, ..UpdateOptions::new(targets, image, 0x3AC1) })
         }

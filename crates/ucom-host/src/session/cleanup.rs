@@ -207,7 +207,7 @@ mod tests {
     fn a_dry_run_leaves_nothing_undone() {
         for dry_run in [true, false] {
             let cleanup = CleanupList::default();
-            let image = UpdateImage { bytes: vec![7; 64], address_words: 0 };
+            let image = UpdateImage { bytes: [7; 64].into(), address_words: 0 };
             let targets = vec![UpdateTarget { board: 4, flash_number: None }];
             let options = UpdateOptions { dry_run, ..UpdateOptions::new(targets, image, 0) };
             cleanup.begin(&Request::Update(options));

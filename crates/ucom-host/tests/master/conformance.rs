@@ -8,6 +8,7 @@ use ucom::{Frame, Function, Profile};
 use ucom_host::master::conformance::{
     ConformanceOptions, ConformanceProgram, ConformanceReport, Verdict, test_names,
 };
+use ucom_host::master::update::UpdateImage;
 use ucom_host::master::{Event, InitOptions, Outcome, Request};
 use ucom_sim::memory::WirePins;
 
@@ -15,8 +16,12 @@ use crate::bench::{Bench, From, Member, TestNode, frame, image, node};
 
 /// Everything that is allowed.
 fn all() -> ConformanceOptions {
-    let program =
-        ConformanceProgram { board: 1, flash_number: 0x21, image: image(1000), address: 0, date: 0x5C21 };
+    let program = ConformanceProgram {
+        board: 1,
+        flash_number: 0x21,
+        image: UpdateImage { bytes: image(1000).into(), address_words: 0 },
+        date: 0x5C21,
+    };
     ConformanceOptions { init: true, run: true, program: Some(program), ..Default::default() }
 }
 

@@ -4,6 +4,7 @@
 use crate::bench::Exit;
 use ucom::{Function, Status};
 use ucom_host::master::conformance::{ConformanceOptions, ConformanceProgram, ConformanceReport, Verdict};
+use ucom_host::master::update::UpdateImage;
 use ucom_host::master::{
     BoardSeen, Error, Event, InitOptions, Outcome, ProcedureId, Request, RunBoard, RunOptions,
 };
@@ -13,8 +14,12 @@ use crate::bench::{Bench, From, image};
 const FLASH: [u16; 3] = [0x21, 0x42, 0x63];
 
 fn all() -> ConformanceOptions {
-    let program =
-        ConformanceProgram { board: 1, flash_number: 0x21, image: image(1000), address: 0, date: 0x5C21 };
+    let program = ConformanceProgram {
+        board: 1,
+        flash_number: 0x21,
+        image: UpdateImage { bytes: image(1000).into(), address_words: 0 },
+        date: 0x5C21,
+    };
     ConformanceOptions { init: true, run: true, program: Some(program), ..Default::default() }
 }
 
@@ -159,8 +164,7 @@ fn programs_the_board_that_is_named_alone() {
     let program = ConformanceProgram {
         board: 1,
         flash_number: 0x21,
-        image: image(1000),
-        address: 0x0001_0040,
+        image: UpdateImage { bytes: image(1000).into(), address_words: 0x0001_0040 },
         date: 0x5C21,
     };
     let only = vec!["D-T17".to_owned()];

@@ -117,7 +117,7 @@ fn probe_of_checksum_and_heartbeats() {
     bench.go(Request::Init(InitOptions::default()), 20).unwrap();
     bench.go(Request::Update(options(&[1], 1000)), 60).unwrap();
     bench.master = ucom_host::master::Master::new(Profile::default());
-    let asked = ProbeOptions { image: Some(image(1000)), alive: true, ..Default::default() };
+    let asked = ProbeOptions { image: Some(image(1000).into()), alive: true, ..Default::default() };
     let Ok(Outcome::Probe(report)) = bench.go(Request::Probe(asked), 120) else { panic!() };
     assert_eq!(report.profile.prog_checksum, Checksum::Sum16, "{}", report.table());
     assert_eq!(report.profile.alive_mode, AliveMode::Broadcast);

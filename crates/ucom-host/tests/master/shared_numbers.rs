@@ -41,7 +41,7 @@ fn is_shared(error: &Error, flash: [u16; 2]) -> bool {
 fn requests() -> Vec<Request> {
     let (board, force) = (1, false);
     let target = UpdateTarget { board, flash_number: Some(0x21) };
-    let image = UpdateImage { bytes: image(200), address_words: 0 };
+    let image = UpdateImage { bytes: image(200).into(), address_words: 0 };
     vec![
         Request::Info { board },
         Request::SetStatus { board, mask: Status::ASTART, value: Status::ASTART, force },
@@ -159,7 +159,7 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
 fn d24_it_is_named_when_it_shows_in_an_update() {
     let strap = |flash| node(flash, WirePins::chain(1).remove(0), Profile::default());
     let target = UpdateTarget { board: 1, flash_number: Some(0x21) };
-    let image = UpdateImage { bytes: image(500), address_words: 0 };
+    let image = UpdateImage { bytes: image(500).into(), address_words: 0 };
     let options = || UpdateOptions::new(vec![target], image.clone(), 0x3AC1);
     let frames = {
         let mut bench = crate::chain::initialised(&[0x21]);

@@ -15,7 +15,7 @@ const DATE: u16 = 0x3AC1;
 
 pub fn options(boards: &[u8], len: usize) -> UpdateOptions {
     let targets = boards.iter().map(|b| UpdateTarget { board: *b, flash_number: None }).collect();
-    UpdateOptions::new(targets, UpdateImage { bytes: image(len), address_words: 0 }, DATE)
+    UpdateOptions::new(targets, UpdateImage { bytes: image(len).into(), address_words: 0 }, DATE)
 }
 
 pub fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport {

@@ -19,7 +19,7 @@ fn with_plan(prog_plan: Plan) -> Profile {
 
 /// 16 data blocks as the image, and 64 bytes beside it where the plan takes them.
 fn two(plan: Plan) -> UpdateOptions {
-    let second = UpdateImage { bytes: vec![9; 64], address_words: 0x20 };
+    let second = UpdateImage { bytes: [9; 64].into(), address_words: 0x20 };
     let second = (plan != Plan::VerifyWrite).then_some(second);
     UpdateOptions { second, ..options(&[1], 1000) }
 }

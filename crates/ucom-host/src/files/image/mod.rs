@@ -257,6 +257,11 @@ impl Image {
         &self.bytes
     }
 
+    /// The same without a copy.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
     /// Load address, words.
     pub fn address_words(&self) -> u32 {
         self.address_words

@@ -1,5 +1,6 @@
 //! What the conformance tests may do, and how each ended.
 use crate::master::error::Error;
+use crate::master::reports::update::UpdateImage;
 use host_kit::ErrorKind;
 use serde::Serialize;
 
@@ -28,16 +29,14 @@ impl ConformanceOptions {
 }
 
 /// What one board is programmed with.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConformanceProgram {
     /// Its number.
     pub board: u8,
     /// The flash number that it must have; the header of the image names it, so that no other board takes it.
     pub flash_number: u16,
     /// The program.
-    pub image: Vec<u8>,
-    /// Where it is loaded to, in words.
-    pub address: u32,
+    pub image: UpdateImage,
     /// Flash date, in the form of the profile's `prog.date`.
     pub date: u16,
 }

@@ -1,4 +1,6 @@
 //! What a probe may do, and what it measured.
+use std::sync::Arc;
+
 use serde::Serialize;
 use ucom::Profile;
 
@@ -10,7 +12,7 @@ pub struct ProbeOptions {
     /// Start a control loop, outputs inactive: shows which heartbeats count.
     pub alive: bool,
     /// An image that some board has, as sent: shows how the Program ID is computed.
-    pub image: Option<Vec<u8>>,
+    pub image: Option<Arc<[u8]>>,
     /// Also when another PC is on the bus.
     pub force: bool,
 }

@@ -19,9 +19,9 @@ fn header(bench: &Bench<'_>, program: &ConformanceProgram, cycle: u16) -> Header
     Header {
         cycle,
         memory: 0,
-        address: program.address,
-        length: (program.image.len() / 2) as u32,
-        program_id: checksum(profile.prog_checksum, profile.prog_endian, &program.image),
+        address: program.image.address_words,
+        length: (program.image.bytes.len() / 2) as u32,
+        program_id: checksum(profile.prog_checksum, profile.prog_endian, &program.image.bytes),
         date: program.date,
         target: program.flash_number,
     }
@@ -61,7 +61,7 @@ pub(super) async fn update(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
     enter_exloader(bench.link, board, flash).await?;
     let times = bench.link.times();
     let endian = bench.profile().prog_endian;
-    let data: Vec<[u8; BLOCK_LEN]> = (0..).map_while(|i| data_block(&program.image, i)).collect();
+    let data: Vec<[u8; BLOCK_LEN]> = (0..).map_while(|i| data_block(&program.image.bytes, i)).collect();
     for cycle in 1..=2 {
         let head = header(bench, program, cycle).build(endian);
         for (i, next) in core::iter::once(&head).chain(&data).enumerate() {
@@ -133,7 +133,8 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
             }
             Case::Block(bytes) => block(bench, board, &bytes).await,
             Case::Cycle => {
-                let data: Vec<[u8; BLOCK_LEN]> = (0..).map_while(|i| data_block(&program.image, i)).collect();
+                let data: Vec<[u8; BLOCK_LEN]> =
+                    (0..).map_while(|i| data_block(&program.image.bytes, i)).collect();
                 for next in core::iter::once(&good.build(endian)).chain(&data) {
                     block(bench, board, next).await;
                     answer(bench, bench.link.times().ready).await;

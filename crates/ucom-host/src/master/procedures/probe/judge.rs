@@ -3,6 +3,7 @@
 use crate::master::counted::counted;
 use crate::master::reports::{ProbeReport, ProbeRow};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use ucom::profile::{AliveMode, Broadcast, Endian, KEYS, ReportMode};
 use ucom::{Checksum, Payload, Profile, Report, Sequence, Status, checksum};
 
@@ -13,7 +14,7 @@ pub(super) type Answers = Vec<Vec<Payload>>;
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     pub before: Profile,
-    pub image: Option<Vec<u8>>,
+    pub image: Option<Arc<[u8]>>,
     pub reports: Vec<Report>,
     pub raised: Option<bool>,
     /// Boards that answered PC_INFO to 0 and to 31.

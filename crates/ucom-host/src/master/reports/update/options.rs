@@ -1,12 +1,21 @@
 //! Which boards are updated with what, and how.
+use std::sync::Arc;
+
+use crate::files::Image;
 
 /// An image with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateImage {
-    /// Bytes in wire order.
-    pub bytes: Vec<u8>,
+    /// Bytes in wire order; every plan and cycle shares them.
+    pub bytes: Arc<[u8]>,
     /// Load address, words.
     pub address_words: u32,
+}
+
+impl From<Image> for UpdateImage {
+    fn from(image: Image) -> Self {
+        Self { address_words: image.address_words(), bytes: image.into_bytes().into() }
+    }
 }
 
 /// A board to be updated.

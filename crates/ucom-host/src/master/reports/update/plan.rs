@@ -1,5 +1,6 @@
 //! What goes over the wire: the blocks of both cycles (D-40, D-41).
 use core::fmt;
+use std::sync::Arc;
 
 use crate::master::error::PlanError;
 use crate::master::reports::update::options::{UpdateImage, UpdateOptions};
@@ -10,7 +11,7 @@ use ucom::{BLOCK_LEN, BoardInfo, Checksum, Header, Memory, Profile, block_count,
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Cycle {
     pub header: Option<[u8; BLOCK_LEN]>,
-    pub bytes: Vec<u8>,
+    pub bytes: Arc<[u8]>,
 }
 
 impl Cycle {
@@ -205,7 +206,7 @@ mod tests {
     use crate::master::reports::update::options::UpdateTarget;
 
     fn options(bytes: Vec<u8>) -> UpdateOptions {
-        let image = UpdateImage { bytes, address_words: 0 };
+        let image = UpdateImage { bytes: bytes.into(), address_words: 0 };
         UpdateOptions::new(vec![UpdateTarget { board: 1, flash_number: None }], image, 0x3AC1)
     }
 
@@ -227,7 +228,7 @@ mod tests {
     #[test]
     fn d40_other_plans_need_their_images() {
         let two = UpdateOptions {
-            second: Some(UpdateImage { bytes: vec![9; 64], address_words: 5 }),
+            second: Some(UpdateImage { bytes: vec![9; 64].into(), address_words: 5 }),
             ..options(vec![1; 128])
         };
         let planned = |options: &UpdateOptions, prog_plan| {

@@ -184,7 +184,7 @@ def not_asked_for(bench: Bench) -> None:
     with five(bench) as chain, chain.peer() as peer:
         give_numbers(bench, peer, 1)
         bench.same("PC_PROG", "with PROG = 0:", peer.ask("2C1#0000000000000000", 0.2), ["081#02"])
-        bench.same("PC_PROG", "to everybody:", peer.ask("2C0#0000000000000000", 0.2), [])
+        bench.same("PC_PROG", "broadcast:", peer.ask("2C0#0000000000000000", 0.2), [])
         start(bench, peer)
         answers = [f for f in peer.ask("2C1#0000000000000000", 0.2) if f.startswith("081")]
         bench.same("PC_PROG", "with an application:", answers, ["081#02"])

@@ -146,7 +146,7 @@ def life_signs_missing(bench: Bench) -> None:
         late = bench.jitter.worst(began, peer.stamp)
         bench.within("D-T13", "safe", lost, 1.5 / rows.BENCH - late, 1.5 * rows.BENCH + late)
         outputs = [f for f in peer.all(0.2) + peer.ask("680#", 0.3) if f.startswith("381")]
-        bench.same("D-T13", "stopped, and life signs alone start nothing:", outputs, [])
+        bench.same("D-T13", "stopped, and heartbeats alone start nothing:", outputs, [])
         bench.same("D-T13", "a start does:", peer.answer("541#", "601#"), "601#01000000")
         bench.ok("D-T13", f"safe after {lost:.2f} s")
 
@@ -171,12 +171,12 @@ def life_signs(bench: Bench) -> None:
         gaps = sorted(after - before for before, after in zip(sent, sent[1:]))
         # This peer was too late itself when a pause is near the limit; nothing is known then about the board.
         if gaps[-1] < 1.4:
-            bench.same("D-T14", "stops in a minute, and with one life sign missing:", stops, [])
+            bench.same("D-T14", "stops in a minute, and with one heartbeat missing:", stops, [])
         bench.expect(outputs > 60 * 100, "D-T14", "two packages of outputs every 10 ms", f"{outputs} in a minute")
         bench.same("D-T14", "three missing: flags", peer.wait("601#00000000", seconds=4.0), "601#00000000")
         safe, late = peer.stamp - sent[-1], bench.jitter.worst(sent[-1], peer.stamp)
         bench.within("D-T14", "three missing: safe", safe, 0.0, 1.5 * rows.BENCH + late)
-        bench.ok("D-T14", f"{len(sent)} life signs, longest pause {gaps[-1]:.2f} s, safe after {safe:.2f} s")
+        bench.ok("D-T14", f"{len(sent)} heartbeats, longest pause {gaps[-1]:.2f} s, safe after {safe:.2f} s")
 
 
 def autostart(bench: Bench) -> None:

@@ -159,7 +159,7 @@ def second_master(bench: Bench) -> None:
             # What the other one says is heard here, too.
             odd = [f for f in intrusive(played.frames()) if f != frame]
             bench.same("P-17", f"{words[0]}: frames that do something", odd, [])
-        # A running board's own life signs and flags are none.
+        # A running board's own heartbeats and flags are none.
         command = chain.start("start", "1")
         while command.process.poll() is None:
             other.send("682#")

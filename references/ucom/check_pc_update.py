@@ -216,9 +216,9 @@ def life_signs(bench: Bench) -> None:
 
 
 def punctual(bench: Bench, what: str, signs: list[float], first: float, last: float) -> None:
-    """Life signs of a PC between two times are 500 ms apart, to 50 ms in the mean and to the bench's fifth each."""
+    """Heartbeats of a PC between two times are 500 ms apart, to 50 ms in the mean and to the bench's fifth each."""
     gaps = [after - before for before, after in zip(signs, signs[1:])]
-    bench.expect(len(gaps) >= 4 and signs[0] <= first + 0.6, "P-14", f"life signs all the time of the {what}", signs)
+    bench.expect(len(gaps) >= 4 and signs[0] <= first + 0.6, "P-14", f"heartbeats all the time of the {what}", signs)
     late = bench.jitter.worst(signs[0], last)
     mean = sum(gaps) / len(gaps)
     bench.expect(0.45 <= mean <= 0.55, "P-14", f"500 ms in the mean while the {what} goes on", f"{mean * 1e3:.0f} ms")
@@ -227,7 +227,7 @@ def punctual(bench: Bench, what: str, signs: list[float], first: float, last: fl
         all(span[0] <= gap <= span[1] for gap in gaps) and last - signs[-1] <= span[1],
         "P-14", f"{span[0] * 1e3:.0f} to {span[1] * 1e3:.0f} ms while the {what} goes on", [round(g, 3) for g in gaps],
     )
-    bench.ok("P-14", f"{what}: {len(signs)} life signs, {min(gaps) * 1e3:.0f} to {max(gaps) * 1e3:.0f} ms apart")
+    bench.ok("P-14", f"{what}: {len(signs)} heartbeats, {min(gaps) * 1e3:.0f} to {max(gaps) * 1e3:.0f} ms apart")
 
 
 if __name__ == "__main__":

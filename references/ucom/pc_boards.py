@@ -194,7 +194,7 @@ class Boards(threading.Thread, Programming):
         self.say(20, board.number)
 
     def alive(self, board: Board) -> None:
-        """A life sign, and so on every second while the application is up."""
+        """A heartbeat, and so on every second while the application is up."""
         if board.status & MSTART and board.number is not None:
             if not board.silent:
                 self.say(26, board.number)

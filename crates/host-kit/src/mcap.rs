@@ -3,7 +3,7 @@ use mcap::McapError;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// Longest record that is read, bytes: memory is taken for what a damaged file says before it is missed.
+/// Longest record that is read, bytes: memory is allocated for the length that a damaged file states, before the bytes are found missing.
 const MAX_RECORD: usize = 1 << 26;
 
 /// Shows channels, messages and metadata of a file, those in chunks too, and returns whether the file was completed.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 ///
-/// What the system says; nothing is left beside the file then.
+/// The system's error; nothing is left beside the file then.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
     let path = end_of_links(path);
     let before = metadata(&path).ok();

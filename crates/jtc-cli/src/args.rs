@@ -88,7 +88,7 @@ pub enum Command {
                             jtc sim --serial /tmp/jtc --faults faults.toml\n  \
                             jtc sim --serial /tmp/jtc --record sim.mcap\n\n\
                             --record takes up to 40 MB a minute as .mcap, 50 MB as .csv, and is opened before anything runs. The file can be\n\
-                            read while it grows, and after a killed simulator up to its last 0.2 s. If the disk is full, that is said at\n\
+                            read while it grows, and after a killed simulator up to its last 0.2 s. If the disk is full, that is reported at\n\
                             once, the simulation goes on, and ends with exit code 5.\n\nLines on the standard input are \
                             events:\n  push 3 12 0.5    joint 3 (counted from 1) is pushed by 12 N·m for 0.5 s\n  \
                             hand lead.csv    a hand leads the arm along the positions of a trajectory file while it is taught"
@@ -136,7 +136,7 @@ pub enum Command {
     /// The whole way back to HoldPos, saying each step and whose numbers it uses; resumes no motion
     #[command(
         after_help = "--arm FILE gives friction, gains and arm model of that file to a controller that does not hold the arm, also\n\
-                            in place of others that it was given before; where the arm is held, those given before stay, and it is said.\n\
+                            in place of others that it was given before; where the arm is held, those given before stay, and it is reported.\n\
                             --defaults gives those of the arm that is built into the controller, only where some are missing. Without\n\
                             either, a controller that has all three keeps them, and one that has not is refused.\n\nExamples:\n  \
                             jtc recover\n  jtc recover --arm my-arm.toml\n  jtc recover --defaults"
@@ -162,7 +162,7 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  jtc help files      trajectories, arms, friction, recordings, with an example each\n  \
                             jtc help faults     what can go wrong in the simulator\n  \
-                            jtc help events     what a command tells programs while it works\n  jtc help traj run"
+                            jtc help events     what a command reports to programs while it works\n  jtc help traj run"
     )]
     Help(HelpArgs),
     /// Decode frames: hex or a raw serial capture on stdin

@@ -21,7 +21,7 @@ pub struct Failure {
     pub message: String,
     /// The next command or act; empty when there is none.
     pub hint: String,
-    /// The result was printed already: only the exit code is left to say.
+    /// The result was printed already: only the exit code is left to return.
     pub printed: bool,
 }
 
@@ -37,7 +37,7 @@ impl Failure {
         }
     }
 
-    /// What the library says.
+    /// An error of the library.
     pub fn of(e: &jtc_host::Error) -> Self {
         Self {
             exit: cli_kit::exit::of(e.kind()),

@@ -17,16 +17,16 @@ use cli_kit::output_file;
 /// How long the last words may take: a reader that takes nothing holds no command.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
-/// At the second signal: leaves no empty file, says why it ended, and returns the exit code.
+/// At the second signal: leaves no empty file, reports why it ended, and returns the exit code.
 pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> u8 {
     output_file::abandon();
-    let (done, said) = mpsc::channel();
+    let (done, written) = mpsc::channel();
     std::thread::spawn(move || {
         out.failure(FAULT, "ended-at-once", message, hint);
         Output::finish();
         let _ = done.send(());
     });
-    let _ = said.recv_timeout(LAST_WORDS);
+    let _ = written.recv_timeout(LAST_WORDS);
     FAULT
 }
 
@@ -34,7 +34,7 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
 pub struct Operator<'a> {
     /// Where words go.
     pub out: &'a Output,
-    /// What programs are told.
+    /// What programs receive.
     pub progress: Progress,
     stop: Stop,
     /// Only while the arm moves: otherwise the terminal is as it was.

@@ -60,7 +60,7 @@ impl Progress {
         session.observe(move |_, status| own.see(status));
     }
 
-    /// A status that came: the first one is the connection, changes of the state are told at once, and measured values at a modest
+    /// A status that came: the first one is the connection, changes of the state are reported at once, and measured values at a modest
     /// rate while the arm moves or may be moved.
     pub fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);

@@ -16,8 +16,8 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// Begins a recording in `output`, in the form that the ending of its name says; what it began before is gone. Writing that fails
-    /// later is said at once, and `goes_on` what happens then.
+    /// Begins a recording in `output`, in the form of the ending of its name; what it began before is gone. Writing that fails
+    /// later is reported at once, and `goes_on` what happens then.
     pub fn begin(
         output: &mut OutputFile,
         info: &RecordingInfo,

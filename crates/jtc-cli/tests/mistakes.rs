@@ -20,35 +20,35 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let header = "t,q1,q2,q3,q4,q5,q6\n";
 
     std::fs::write(&path, header.to_owned() + &rows(45.0, 0.01)).unwrap();
-    let said = jtc(&["traj", "check", file]).ends(4);
+    let output = jtc(&["traj", "check", file]).ends(4);
     assert!(
-        said.out.contains("look like degrees: joint 1 is at 45.0") && said.out.contains("--deg"),
+        output.out.contains("look like degrees: joint 1 is at 45.0") && output.out.contains("--deg"),
         "{}",
-        said.out
+        output.out
     );
-    assert!(said.out.lines().count() < 30, "{}", said.out);
+    assert!(output.out.lines().count() < 30, "{}", output.out);
     assert_eq!(jtc(&["--json", "traj", "check", file]).ends(4).json()["suspicion"], "degrees");
-    let said = jtc(&["--json", "traj", "check", file, "--deg"]).ends(0).json();
-    let top = said["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
+    let output = jtc(&["--json", "traj", "check", file, "--deg"]).ends(0).json();
+    let top = output["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((top - 45f64.to_radians()).abs() < 1e-3, "{top}");
     // A header that names its units is not taken otherwise.
     std::fs::write(&path, header.replace("q1,", "q1_deg,") + &rows(45.0, 0.01)).unwrap();
-    let said = jtc(&["traj", "info", file, "--deg"]).ends(2);
-    assert!(said.err.contains("units of this file are known"), "{}", said.err);
+    let output = jtc(&["traj", "info", file, "--deg"]).ends(2);
+    assert!(output.err.contains("units of this file are known"), "{}", output.err);
 
     std::fs::write(&path, rows(0.7, 0.01)).unwrap();
-    let said = jtc(&["traj", "check", file]).ends(2);
+    let output = jtc(&["traj", "check", file]).ends(2);
     assert!(
-        said.err.contains("header is missing: write the line t,q1,q2,q3,q4,q5,q6 before"),
+        output.err.contains("header is missing: write the line t,q1,q2,q3,q4,q5,q6 before"),
         "{}",
-        said.err
+        output.err
     );
 
     std::fs::write(&path, header.to_owned() + &rows(0.7, 0.002)).unwrap();
-    let said = jtc(&["--json", "traj", "check", file]).ends(4).json();
-    assert_eq!(said["suspicion"], "too_fast");
-    let percent = said["passing_speed_percent"].as_f64().unwrap();
-    let hint = said["hint"].as_str().unwrap();
+    let output = jtc(&["--json", "traj", "check", file]).ends(4).json();
+    assert_eq!(output["suspicion"], "too_fast");
+    let percent = output["passing_speed_percent"].as_f64().unwrap();
+    let hint = output["hint"].as_str().unwrap();
     assert!(hint.contains(&format!("--speed {percent}`")), "{hint}");
     jtc(&["traj", "check", file, "--speed", &percent.to_string()]).ends(0);
     jtc(&["traj", "check", file, "--speed", &(percent + 5.0).to_string()]).ends(4);
@@ -57,9 +57,9 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let waypoints = "0,0,0,0,0,0,0\n1,0.1,0,0,0,0,0\n2,0.2,0,0,0,0,0\n3,0.3,0,0,0,0,0\n3.4,1.5,0,0,0,0,0\n4.4,1.6,0,0,0,0,0\n\
                      5.4,1.7,0,0,0,0,0\n6.4,1.8,0,0,0,0,0\n";
     std::fs::write(&path, header.to_owned() + waypoints).unwrap();
-    let said = jtc(&["--json", "traj", "check", file]).ends(4).json();
-    assert_eq!(said["suspicion"], "too_fast", "{said}");
-    assert!(said["overshoot"][0]["beyond_rad"].as_f64().unwrap() > 0.05, "{said}");
-    let said = jtc(&["traj", "info", file]).ends(0);
-    assert!(said.err.contains("the curve goes beyond them: joint 1 by"), "{}", said.err);
+    let output = jtc(&["--json", "traj", "check", file]).ends(4).json();
+    assert_eq!(output["suspicion"], "too_fast", "{output}");
+    assert!(output["overshoot"][0]["beyond_rad"].as_f64().unwrap() > 0.05, "{output}");
+    let output = jtc(&["traj", "info", file]).ends(0);
+    assert!(output.err.contains("the curve goes beyond them: joint 1 by"), "{}", output.err);
 }

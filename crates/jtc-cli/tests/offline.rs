@@ -9,14 +9,14 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["traj", "rum", "x"]).ends(2);
     // Which nodes must be named, and a bit mask is none: nothing is even opened.
     jtc(&["reset", "--port", "/nowhere/tty"]).ends(2);
-    let said = jtc(&["reset", "3", "--port", "/nowhere/tty"]).ends(2);
-    assert!(said.err.contains("--joints 3") && said.err.contains("--joints 1,2"), "{}", said.err);
+    let output = jtc(&["reset", "3", "--port", "/nowhere/tty"]).ends(2);
+    assert!(output.err.contains("--joints 3") && output.err.contains("--joints 1,2"), "{}", output.err);
     jtc(&["reset", "--joints", "0", "--port", "/nowhere/tty"]).ends(2);
     jtc(&["reset", "--joints", "1,7", "--port", "/nowhere/tty"]).ends(2);
-    let said = jtc(&["traj", "check", "/nowhere/motion.csv"]).ends(2);
-    assert!(said.err.contains("/nowhere/motion.csv"), "{}", said.err);
-    let said = jtc(&["--json", "traj", "check", "/nowhere/motion.csv"]).ends(2);
-    assert_eq!(said.json()["error"]["exit"], 2);
+    let output = jtc(&["traj", "check", "/nowhere/motion.csv"]).ends(2);
+    assert!(output.err.contains("/nowhere/motion.csv"), "{}", output.err);
+    let output = jtc(&["--json", "traj", "check", "/nowhere/motion.csv"]).ends(2);
+    assert_eq!(output.json()["error"]["exit"], 2);
     jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
 }
 
@@ -43,28 +43,32 @@ fn the_port_may_stand_before_the_command() {
         &["traj", "--port", "/nowhere/tty", "stop"],
         &["--baud", "9600", "--port", "/nowhere/tty", "params", "use-defaults"],
     ] {
-        let said = jtc(words).ends(3);
-        assert!(said.err.contains("/nowhere/tty"), "{}", said.err);
+        let output = jtc(words).ends(3);
+        assert!(output.err.contains("/nowhere/tty"), "{}", output.err);
     }
     // The nearer one counts.
-    let said = jtc(&["--port", "/far/tty", "status", "--port", "/near/tty"]).ends(3);
-    assert!(said.err.contains("/near/tty"), "{}", said.err);
+    let output = jtc(&["--port", "/far/tty", "status", "--port", "/near/tty"]).ends(3);
+    assert!(output.err.contains("/near/tty"), "{}", output.err);
 }
 
 /// The joint bus is CAN FD: a transport that cannot carry it is refused with one that can.
 #[cfg(unix)]
 #[test]
 fn a_bus_that_cannot_carry_the_joints_is_refused() {
-    let said = jtc(&["sim", "--bus", "socketcand:localhost/can0"]).ends(2);
-    assert!(said.err.contains("CAN FD") && said.err.contains("multicast:239.74.163.2:43113"), "{}", said.err);
-    let said = jtc(&["sim", "--bus", "can0"]).ends(2);
-    assert!(said.err.contains("is no CAN URL"), "{}", said.err);
+    let output = jtc(&["sim", "--bus", "socketcand:localhost/can0"]).ends(2);
+    assert!(
+        output.err.contains("CAN FD") && output.err.contains("multicast:239.74.163.2:43113"),
+        "{}",
+        output.err
+    );
+    let output = jtc(&["sim", "--bus", "can0"]).ends(2);
+    assert!(output.err.contains("is no CAN URL"), "{}", output.err);
 }
 
 #[test]
 fn a_port_that_is_not_there_ends_with_3() {
-    let said = jtc(&["--json", "status", "--port", "/nowhere/tty"]).ends(3);
-    let error = &said.json()["error"];
+    let output = jtc(&["--json", "status", "--port", "/nowhere/tty"]).ends(3);
+    let error = &output.json()["error"];
     assert_eq!(error["code"], "port");
     assert!(error["hint"].as_str().unwrap().contains("jtc ports"));
 }
@@ -75,26 +79,26 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     let path = dir.path().join("motion.csv");
     let file = path.to_str().unwrap();
     std::fs::write(&path, motion(0.3)).unwrap();
-    let said = jtc(&["--json", "traj", "check", file]).ends(0);
-    assert_eq!(said.json()["ok"], true);
-    assert_eq!(said.json()["verdict"]["points"], 121);
+    let output = jtc(&["--json", "traj", "check", file]).ends(0);
+    assert_eq!(output.json()["ok"], true);
+    assert_eq!(output.json()["verdict"]["points"], 121);
     std::fs::write(&path, motion(1.4)).unwrap();
-    let said = jtc(&["--json", "traj", "check", file]).ends(4);
-    let problems = said.json()["verdict"]["problems"].clone();
+    let output = jtc(&["--json", "traj", "check", file]).ends(4);
+    let problems = output.json()["verdict"]["problems"].clone();
     assert!(problems[0]["joint"].is_u64() && problems[0]["limit"].is_f64(), "{problems}");
     // The next command is one that can be typed.
     let spaced = dir.path().join("my motion.csv");
     std::fs::write(&spaced, motion(0.3)).unwrap();
     let spaced = spaced.to_str().unwrap();
-    let said = jtc(&["traj", "check", spaced, "--speed", "50"]).ends(0);
-    assert!(said.out.contains(&format!("next: jtc traj run '{spaced}' --speed 50")), "{}", said.out);
-    let said = jtc(&["traj", "check", file]).ends(4);
-    assert!(said.out.contains(&format!("jtc traj check {file} --speed ")), "{}", said.out);
+    let output = jtc(&["traj", "check", spaced, "--speed", "50"]).ends(0);
+    assert!(output.out.contains(&format!("next: jtc traj run '{spaced}' --speed 50")), "{}", output.out);
+    let output = jtc(&["traj", "check", file]).ends(4);
+    assert!(output.out.contains(&format!("jtc traj check {file} --speed ")), "{}", output.out);
     // Refused before anything is opened: the port is not even there.
-    let said = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
-    assert_eq!(said.json()["outcome"], "refused");
-    let said = jtc(&["--json", "traj", "info", file]).ends(0);
-    assert_eq!(said.json()["duration_s"], 1.2);
+    let output = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
+    assert_eq!(output.json()["outcome"], "refused");
+    let output = jtc(&["--json", "traj", "info", file]).ends(0);
+    assert_eq!(output.json()["duration_s"], 1.2);
 }
 
 #[test]
@@ -102,20 +106,20 @@ fn dynamics_gives_back_what_it_was_given() {
     let q = "0.3 -0.4 0.5 0.1 -0.2 0.7";
     let qd = "0.5 0.2 -0.3 0.4 0.1 -0.6";
     let qdd = "1 -2 0.5 0.25 -0.125 3";
-    let said = jtc_with(&["dynamics", "inverse"], &format!("{q} {qd} {qdd}\n")).ends(0);
-    let torque = said.out.trim().to_owned();
+    let output = jtc_with(&["dynamics", "inverse"], &format!("{q} {qd} {qdd}\n")).ends(0);
+    let torque = output.out.trim().to_owned();
     assert_eq!(torque.split(' ').count(), 6);
     for word in torque.split(' ') {
         let mantissa = word.trim_start_matches('-').split('e').next().unwrap();
         assert_eq!(mantissa.len(), 18, "17 significant digits and a point: {word}");
     }
-    let said = jtc_with(&["dynamics", "forward"], &format!("{q} {qd} {torque}\n")).ends(0);
-    for (got, want) in said.out.split_whitespace().zip(qdd.split(' ')) {
+    let output = jtc_with(&["dynamics", "forward"], &format!("{q} {qd} {torque}\n")).ends(0);
+    for (got, want) in output.out.split_whitespace().zip(qdd.split(' ')) {
         let (got, want): (f64, f64) = (got.parse().unwrap(), want.parse().unwrap());
         assert!((got - want).abs() < 1e-9, "{got} is not {want}");
     }
-    let said = jtc_with(&["dynamics", "mass"], &format!("{q}\n")).ends(0);
-    let mass: Vec<f64> = said.out.split_whitespace().map(|w| w.parse().unwrap()).collect();
+    let output = jtc_with(&["dynamics", "mass"], &format!("{q}\n")).ends(0);
+    let mass: Vec<f64> = output.out.split_whitespace().map(|w| w.parse().unwrap()).collect();
     assert_eq!(mass.len(), 36);
     for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
         assert!((mass[6 * i + j] - mass[6 * j + i]).abs() < 1e-12, "not symmetric at {i}, {j}");
@@ -123,28 +127,28 @@ fn dynamics_gives_back_what_it_was_given() {
     let weightless =
         jtc_with(&["dynamics", "inverse", "--gravity", "0,0,0"], &format!("{q} 0 0 0 0 0 0 0 0 0 0 0 0\n"));
     assert!(weightless.ends(0).out.split_whitespace().all(|w| w.parse::<f64>().unwrap() == 0.0));
-    let said = jtc_with(&["dynamics", "inverse"], "1 2 3\n").ends(2);
-    assert!(said.err.contains("line 1") && said.err.contains("3 numbers"), "{}", said.err);
+    let output = jtc_with(&["dynamics", "inverse"], "1 2 3\n").ends(2);
+    assert!(output.err.contains("line 1") && output.err.contains("3 numbers"), "{}", output.err);
 }
 
 #[test]
 fn decode_knows_frames_of_both_directions() {
-    let said = jtc_with(&["decode"], "9B 0E 00 06 A3 47\n").ends(0);
-    assert!(said.out.contains("FrictionPolynomial"), "{}", said.out);
-    let said = jtc_with(&["--json", "decode"], "9B0B0007 03 7D9E").ends(0);
-    assert_eq!(said.json()["frame"], "TrajSetExecStatus");
-    assert_eq!(said.json()["type"], 0x0B);
+    let output = jtc_with(&["decode"], "9B 0E 00 06 A3 47\n").ends(0);
+    assert!(output.out.contains("FrictionPolynomial"), "{}", output.out);
+    let output = jtc_with(&["--json", "decode"], "9B0B0007 03 7D9E").ends(0);
+    assert_eq!(output.json()["frame"], "TrajSetExecStatus");
+    assert_eq!(output.json()["type"], 0x0B);
     // Noise before and after costs no frame.
-    let said = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
-    assert!(said.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", said.out);
+    let output = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
+    assert!(output.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", output.out);
     // Bit 2 of the mask is joint 3.
-    let said = jtc_with(&["decode"], "9B 10 00 0A 04 00 00 00 AD BE").ends(0);
-    assert!(said.out.contains("ResetCanDevices: node 2 (joint 3)"), "{}", said.out);
+    let output = jtc_with(&["decode"], "9B 10 00 0A 04 00 00 00 AD BE").ends(0);
+    assert!(output.out.contains("ResetCanDevices: node 2 (joint 3)"), "{}", output.out);
     jtc_with(&["decode"], "hello").ends(2);
     jtc_with(&["decode"], "").ends(2);
     let capture = "0.001250 > 9B 0B 00 07\n0.001300 > 03 7D 9E\n0.016400 < 9B 03\n";
-    let said = jtc_with(&["decode"], capture).ends(0);
-    assert!(said.out.contains("to device") && said.out.contains("execute"), "{}", said.out);
+    let output = jtc_with(&["decode"], capture).ends(0);
+    assert!(output.out.contains("to device") && output.out.contains("execute"), "{}", output.out);
 }
 
 /// An arm file whose first two joints may not turn as fast as the controller lets them.
@@ -172,8 +176,8 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
         vec!["traj", "run", file, "--arm", &arm],
         vec!["recover", "--arm", &arm],
     ] {
-        let said = jtc(&[&["--json"], &words[..], &port].concat()).ends(4);
-        let value = said.json();
+        let output = jtc(&[&["--json"], &words[..], &port].concat()).ends(4);
+        let value = output.json();
         let differences = value["differences"].as_array().unwrap();
         assert_eq!(differences.len(), 2, "{words:?}: {value}");
         assert_eq!(differences[1]["joint"], 2);
@@ -182,16 +186,16 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
             (Some(1.2), Some(1.5))
         );
         assert!(
-            said.err.contains("joint 2, velocity_max_rad_s: 1.2 rad/s in the file, 1.5 rad/s"),
+            output.err.contains("joint 2, velocity_max_rad_s: 1.2 rad/s in the file, 1.5 rad/s"),
             "{}",
-            said.err
+            output.err
         );
         // Accepted, it fails only at the port that is not there.
         jtc(&[&words[..], &port, &["--accept-device-limits"]].concat()).ends(3);
     }
 }
 
-/// What a URDF cannot say is not zero: no difference to the controller, and a check that leaves it out says so.
+/// What a URDF cannot give is not zero: no difference to the controller, and a check that leaves it out reports it.
 #[test]
 fn j55_what_a_urdf_cannot_say_is_not_given() {
     let dir = tempfile::tempdir().unwrap();
@@ -201,11 +205,11 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let (urdf, file) = (urdf.to_str().unwrap(), motion_file.to_str().unwrap());
     // Its limits are the controller's own: it goes on to the port, which is not there.
-    let said = jtc(&["params", "push", urdf, "--port", "/nowhere/tty"]).ends(3);
-    assert!(!said.err.contains("rotor_inertia"), "{}", said.err);
+    let output = jtc(&["params", "push", urdf, "--port", "/nowhere/tty"]).ends(3);
+    assert!(!output.err.contains("rotor_inertia"), "{}", output.err);
 
-    let said = jtc(&["traj", "check", file, "--arm", urdf]).ends(0);
-    let line = said.out.lines().find(|line| line.contains("friction and rotor inertia")).expect("named");
+    let output = jtc(&["traj", "check", file, "--arm", urdf]).ends(0);
+    let line = output.out.lines().find(|line| line.contains("friction and rotor inertia")).expect("named");
     assert!(line.contains("arms/avena.toml") && line.contains("--arm"), "{line}");
     let left_out =
         |arm: &str| jtc(&["--json", "traj", "check", file, "--arm", arm]).ends(0).json()["left_out"].clone();
@@ -213,8 +217,8 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
     assert_eq!(left_out(whole), serde_json::json!([]));
     // A run counts the rotors that the controller computes with.
-    let said = jtc(&["traj", "run", file, "--arm", urdf, "--port", "/nowhere/tty"]).ends(3);
-    assert!(said.err.contains("without friction, which"), "{}", said.err);
+    let output = jtc(&["traj", "run", file, "--arm", urdf, "--port", "/nowhere/tty"]).ends(3);
+    assert!(output.err.contains("without friction, which"), "{}", output.err);
 }
 
 /// J-55: a URDF has neither friction nor gains, and those of another arm are not filled in.
@@ -228,8 +232,8 @@ fn j55_recover_refuses_an_arm_that_is_not_whole() {
         .map(|line| format!("{line}\n"))
         .collect();
     std::fs::write(&path, text).unwrap();
-    let said = jtc(&["recover", "--arm", path.to_str().unwrap(), "--port", "/nowhere/tty"]).ends(4);
-    assert!(said.err.contains("PID gains missing") && said.err.contains("avena.toml"), "{}", said.err);
+    let output = jtc(&["recover", "--arm", path.to_str().unwrap(), "--port", "/nowhere/tty"]).ends(4);
+    assert!(output.err.contains("PID gains missing") && output.err.contains("avena.toml"), "{}", output.err);
     jtc(&["recover", "--arm", path.to_str().unwrap(), "--defaults", "--port", "/nowhere/tty"]).ends(2);
 }
 
@@ -241,10 +245,10 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
     std::fs::write(&file, motion(0.3)).unwrap();
     std::fs::write(&old, "precious").unwrap();
     let run = |more: &[&str]| jtc(&[&["traj", "run", &file, "--port", "/nowhere/tty"], more].concat());
-    let said = run(&["--record", &old]).ends(4);
-    assert!(said.err.contains("there already") && said.err.contains("--force"), "{}", said.err);
-    let said = run(&["--record", &file, "--force"]).ends(4);
-    assert!(said.err.contains("uses itself"), "{}", said.err);
+    let output = run(&["--record", &old]).ends(4);
+    assert!(output.err.contains("there already") && output.err.contains("--force"), "{}", output.err);
+    let output = run(&["--record", &file, "--force"]).ends(4);
+    assert!(output.err.contains("uses itself"), "{}", output.err);
     run(&["--record", &path("no/where.mcap")]).ends(2);
     run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--force"]).ends(4);
     // Allowed, and then there is no port: the old file is as it was, and no empty one is left behind.
@@ -256,12 +260,12 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
 
 #[test]
 fn explain_has_a_page_for_codes_and_refuses_others() {
-    let said = jtc(&["--json", "explain"]).ends(0);
-    let pages = said.json()["pages"].clone();
+    let output = jtc(&["--json", "explain"]).ends(0);
+    let pages = output.json()["pages"].clone();
     assert!(pages.as_array().unwrap().len() > 40);
     for page in pages.as_array().unwrap() {
-        let said = jtc(&["explain", page["name"].as_str().unwrap()]).ends(0);
-        assert!(said.out.contains("meaning:") && said.out.contains("next:"));
+        let output = jtc(&["explain", page["name"].as_str().unwrap()]).ends(0);
+        assert!(output.out.contains("meaning:") && output.out.contains("next:"));
     }
     assert!(jtc(&["explain", "data:8"]).ends(0).out.contains("start"));
     jtc(&["explain", "no-such-code"]).ends(2);
@@ -281,8 +285,8 @@ fn completions_and_manual_pages_are_made() {
 fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("demo");
-    let said = jtc(&["--json", "demo", "--out", out.to_str().unwrap()]).ends(0);
-    let value = said.json();
+    let output = jtc(&["--json", "demo", "--out", out.to_str().unwrap()]).ends(0);
+    let value = output.json();
     for joint in value["joints"].as_array().unwrap() {
         assert!(joint["rms_error_mrad"].as_f64().unwrap() < 2.0, "{joint}");
         assert!(joint["torque_share"].as_f64().unwrap() < 1.0, "{joint}");
@@ -290,15 +294,15 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
     }
-    // Neither a second demo nor a report takes the place of what is there, unless told to; refused, nothing is run.
+    // Neither a second demo nor a report takes the place of what is there, unless asked to; refused, nothing is run.
     std::fs::write(out.join("picture.svg"), "precious").unwrap();
-    let said = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
+    let output = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
     assert!(
-        said.err.contains("report.html is there already") && said.err.contains("--force"),
+        output.err.contains("report.html is there already") && output.err.contains("--force"),
         "{}",
-        said.err
+        output.err
     );
-    assert!(!said.err.contains("parameters:"), "{}", said.err);
+    assert!(!output.err.contains("parameters:"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(out.join("picture.svg")).unwrap(), "precious");
     jtc(&["demo", "--force", "--out", out.to_str().unwrap()]).ends(0);
     assert!(out.join("picture.svg").metadata().unwrap().len() > 10_000);
@@ -327,9 +331,9 @@ fn a_result_that_cannot_be_printed_is_an_error() {
             .stderr(std::process::Stdio::piped());
         let mut child = child.spawn().unwrap();
         std::io::Write::write_all(&mut child.stdin.take().unwrap(), b"0 0 0 0 0 0\n").ok();
-        let said = cli_kit::trial::ended(child);
-        assert_eq!(said.code, 2, "{words:?}");
-        assert!(said.err.contains("No space left"), "{words:?}: {}", said.err);
+        let output = cli_kit::trial::ended(child);
+        assert_eq!(output.code, 2, "{words:?}");
+        assert!(output.err.contains("No space left"), "{words:?}: {}", output.err);
     }
 }
 
@@ -344,24 +348,24 @@ fn an_arm_file_is_made_from_a_robot_description() {
     std::fs::write(&urdf, arm.to_urdf().replace("</robot>", gripper)).unwrap();
     let (urdf, toml) = (urdf.to_str().unwrap(), toml.to_str().unwrap());
 
-    let said = jtc(&["params", "show", urdf]).ends(2);
+    let output = jtc(&["params", "show", urdf]).ends(2);
     let joints = arm.joint_names.join(",");
     assert!(
-        said.err.contains(&format!("jtc arm import {urdf} --joints {joints} -o arm.toml")),
+        output.err.contains(&format!("jtc arm import {urdf} --joints {joints} -o arm.toml")),
         "{}",
-        said.err
+        output.err
     );
     jtc(&["arm", "import", urdf, "-o", toml]).ends(2);
     assert!(!std::path::Path::new(toml).exists());
 
-    let said = jtc(&["--json", "arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(0);
-    assert_eq!(said.json()["missing"], serde_json::json!(["friction", "PID gains"]));
-    assert_eq!(said.json()["warnings"][0]["place"], "joint grip");
+    let output = jtc(&["--json", "arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(0);
+    assert_eq!(output.json()["missing"], serde_json::json!(["friction", "PID gains"]));
+    assert_eq!(output.json()["warnings"][0]["place"], "joint grip");
     let read = jtc_host::arm::Arm::load(std::path::Path::new(toml)).unwrap();
     assert_eq!((read.model, read.joint_names), (arm.model, arm.joint_names));
     jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(4);
-    let said = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
-    assert!(said.err.contains("is no robot description"), "{}", said.err);
+    let output = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
+    assert!(output.err.contains("is no robot description"), "{}", output.err);
 }
 
 /// Each example is written, and the command that it names takes it.
@@ -376,8 +380,8 @@ fn examples_are_files_that_the_named_commands_take() {
         assert!(names.contains(&name), "{names:?}");
     }
     for name in names {
-        let said = jtc(&["--json", "example", name, "-o", to]).ends(0).json();
-        let file = said["file"].as_str().unwrap();
+        let output = jtc(&["--json", "example", name, "-o", to]).ends(0).json();
+        let file = output["file"].as_str().unwrap();
         match file.rsplit_once('.').unwrap().1 {
             "toml" if name == "arm" => drop(jtc(&["params", "show", file]).ends(0)),
             "toml" => {}
@@ -387,19 +391,23 @@ fn examples_are_files_that_the_named_commands_take() {
         jtc(&["example", name, "-o", to]).ends(4);
         jtc(&["example", name, "-o", to, "--force"]).ends(0);
     }
-    let said = jtc(&["example", "nothing"]).ends(2);
-    assert!(said.err.contains("motion, waypoints"), "{}", said.err);
+    let output = jtc(&["example", "nothing"]).ends(2);
+    assert!(output.err.contains("motion, waypoints"), "{}", output.err);
 }
 
 #[test]
 fn help_knows_pages_and_commands() {
     assert!(jtc(&["help", "files"]).ends(0).out.contains("q1_deg"));
     assert!(jtc(&["help", "faults"]).ends(0).out.contains("node-silent"));
-    let said = jtc(&["help", "traj", "run"]).ends(0);
-    assert!(said.out.contains("--approach") && said.out.contains("Usage: jtc traj run"), "{}", said.out);
+    let output = jtc(&["help", "traj", "run"]).ends(0);
+    assert!(
+        output.out.contains("--approach") && output.out.contains("Usage: jtc traj run"),
+        "{}",
+        output.out
+    );
     assert!(jtc(&["help"]).ends(0).out.contains("Commands:"));
-    let said = jtc(&["help", "trajectory"]).ends(2);
-    assert!(said.err.contains("traj") && said.err.contains("files"), "{}", said.err);
+    let output = jtc(&["help", "trajectory"]).ends(2);
+    assert!(output.err.contains("traj") && output.err.contains("files"), "{}", output.err);
 }
 
 /// A German spreadsheet, and degrees.
@@ -409,9 +417,9 @@ fn decimal_commas_are_named_and_degrees_are_read() {
     let path = dir.path().join("motion.csv");
     let file = path.to_str().unwrap();
     std::fs::write(&path, "t;q1;q2;q3;q4;q5;q6\n0;0;0;0;0;0;0\n1;0,1;0;0;0;0;0\n").unwrap();
-    let said = jtc(&["traj", "info", file]).ends(2);
-    assert!(said.err.contains("line 3, column 2, q1: \"0,1\" has a decimal comma"), "{}", said.err);
+    let output = jtc(&["traj", "info", file]).ends(2);
+    assert!(output.err.contains("line 3, column 2, q1: \"0,1\" has a decimal comma"), "{}", output.err);
     std::fs::write(&path, "t;q1_deg;q2;q3;q4;q5;q6\n0;0;0;0;0;0;0\n1;18;0;0;0;0;0\n").unwrap();
-    let said = jtc(&["--json", "traj", "info", file]).ends(0).json().to_string();
-    assert!(said.contains("0.3141592"), "{said}");
+    let output = jtc(&["--json", "traj", "info", file]).ends(0).json().to_string();
+    assert!(output.contains("0.3141592"), "{output}");
 }

@@ -43,7 +43,7 @@ struct Session {
 }
 
 impl Session {
-    /// Starts `jtc --json` with these words, and waits until it has said `ready`.
+    /// Starts `jtc --json` with these words, and waits until it has printed `ready`.
     fn start(sim: Sim, words: &[&str], ready: &str) -> Self {
         let (person, slave) = terminal();
         let mut child = command()
@@ -82,7 +82,7 @@ impl Session {
         cli_kit::trial::signal(&self.child, signal);
     }
 
-    /// Waits until it has said `words`.
+    /// Waits until it has printed `words`.
     fn until(&mut self, words: &str) {
         let mut line = String::new();
         while !line.contains(words) {
@@ -132,7 +132,7 @@ fn j33_every_signal_stops_on_the_path_and_then_ends() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let mut run = Session::run();
         if signal == "-HUP" {
-            // The terminal has gone: nothing that is said reaches anybody.
+            // The terminal has gone: nothing that is printed is read.
             run.err = None;
         }
         run.signal(signal);
@@ -163,7 +163,7 @@ fn j33_keys_pause_resume_and_stop() {
     stands(&sim);
 }
 
-/// A second Ctrl-C ends the command at once, says what may be, and leaves the terminal as it was.
+/// A second Ctrl-C ends the command at once, reports what may be, and leaves the terminal as it was.
 #[test]
 fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     let mut run = Session::run();
@@ -232,7 +232,7 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     (code, serde_json::from_str(out.trim()).unwrap_or_else(|e| panic!("{e}: {out:?}")))
 }
 
-/// Ctrl-C in each wait before the motion: nothing moves, and that is said, with exit code 5.
+/// Ctrl-C in each wait before the motion: nothing moves, and that is reported, with exit code 5.
 #[test]
 fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     let sim = Sim::start(&[]);
@@ -280,8 +280,8 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
         assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it moved");
     }
     cli_kit::trial::signal(&child, "-INT");
-    let said = cli_kit::trial::ended(child).ends(5);
-    let value = said.json();
+    let output = cli_kit::trial::ended(child).ends(5);
+    let value = output.json();
     assert_eq!(
         (value["outcome"].as_str(), value["phase"].as_str()),
         (Some("stopped"), Some("approach")),

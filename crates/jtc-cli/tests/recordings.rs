@@ -31,8 +31,8 @@ fn the_simulator_records_each_millisecond() {
         std::fs::write(&file, motion(0.2)).unwrap();
         sim.jtc(&["traj", "run", &file]).ends(0);
         // It was ready before, so the file is there, and not written over.
-        let said = jtc(&["sim", "--record", &record]).ends(4);
-        assert!(said.err.contains("is there already"), "{}", said.err);
+        let output = jtc(&["sim", "--record", &record]).ends(4);
+        assert!(output.err.contains("is there already"), "{}", output.err);
         // What is younger than 0.2 s may be missing.
         assert!((0..400).any(|_| {
             std::thread::sleep(std::time::Duration::from_millis(50));
@@ -107,16 +107,16 @@ fn a_run_that_is_killed_leaves_its_recording() {
         assert!((1.0..30.0).contains(&seen), "{info}");
         let notes = info["notes"].to_string();
         assert!(notes.contains("breaks off") || notes.contains("not completed"), "{notes}");
-        let said = jtc(&["report", &record]).ends(0);
-        assert!(said.err.contains("breaks off") || said.err.contains("not completed"), "{}", said.err);
-        assert!(said.out.starts_with("FAILED "), "{}", said.out);
+        let output = jtc(&["report", &record]).ends(0);
+        assert!(output.err.contains("breaks off") || output.err.contains("not completed"), "{}", output.err);
+        assert!(output.out.starts_with("FAILED "), "{}", output.out);
     }
 }
 
 /// Milliseconds of the path in a recording that somebody is writing.
 fn recorded_ms(record: &str) -> u64 {
-    let said = jtc(&["--json", "traj", "info", record]);
-    let value: serde_json::Value = serde_json::from_str(said.out.trim()).unwrap_or_default();
+    let output = jtc(&["--json", "traj", "info", record]);
+    let value: serde_json::Value = serde_json::from_str(output.out.trim()).unwrap_or_default();
     (value["duration_s"].as_f64().unwrap_or(0.0) * 1e3) as u64
 }
 
@@ -128,20 +128,20 @@ fn a_full_disk_is_found_before_anything_moves() {
     let (file, full, page) = (sim.path("motion.csv"), sim.path("full.mcap"), sim.path("page.html"));
     std::fs::write(&file, motion(0.2)).unwrap();
     std::os::unix::fs::symlink("/dev/full", &full).unwrap();
-    let said = sim.jtc(&["traj", "run", &file, "--record", &full, "--report", &page]).ends(2);
+    let output = sim.jtc(&["traj", "run", &file, "--record", &full, "--report", &page]).ends(2);
     assert!(
-        said.err.contains("No space left") && said.err.contains("the motion was not started"),
+        output.err.contains("No space left") && output.err.contains("the motion was not started"),
         "{}",
-        said.err
+        output.err
     );
     assert!(!std::path::Path::new(&page).exists());
     let status = sim.jtc(&["--json", "status"]).ends(0).json();
     assert_eq!((status["state"].as_str(), status["point"].as_u64()), (Some("HoldPos"), Some(0)), "{status}");
-    let said = jtc(&["sim", "--record", &full]).ends(2);
-    assert!(said.err.contains("No space left") && said.out.is_empty(), "{}", said.err);
+    let output = jtc(&["sim", "--record", &full]).ends(2);
+    assert!(output.err.contains("No space left") && output.out.is_empty(), "{}", output.err);
 }
 
-/// The disk is full on the way: said at once, the motion goes on to its end, and the exit code says that something is lost.
+/// The disk is full on the way: reported at once, the motion goes on to its end, and the exit code shows that something is lost.
 #[test]
 fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good() {
     let sim = ready(&["--speed", "max", "--no-throttle"]);
@@ -158,14 +158,14 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
             line
         }
     });
-    let said = sim.jtc(&["--json", "traj", "run", &file, "--record", &pipe, "--report", &page]).ends(5);
+    let output = sim.jtc(&["--json", "traj", "run", &file, "--record", &pipe, "--report", &page]).ends(5);
     assert!(reader.join().unwrap().starts_with("time_s,"));
-    let value = said.json();
+    let value = output.json();
     assert_eq!(
         (value["outcome"].as_str(), value["error"]["code"].as_str()),
         (Some("finished"), Some("output-lost"))
     );
-    assert!(said.err.contains("nothing more is recorded, the motion goes on"), "{}", said.err);
+    assert!(output.err.contains("nothing more is recorded, the motion goes on"), "{}", output.err);
     // The other output is not lost with it.
     assert_eq!(value["files"], serde_json::json!([page]));
 }

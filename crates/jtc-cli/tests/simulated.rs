@@ -18,8 +18,8 @@ fn a_stale_link_is_replaced_and_a_file_is_not() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("jtc");
     std::fs::write(&path, "precious").unwrap();
-    let said = jtc(&["sim", "--serial", path.to_str().unwrap()]).ends(2);
-    assert!(said.err.contains("a file is there"), "{}", said.err);
+    let output = jtc(&["sim", "--serial", path.to_str().unwrap()]).ends(2);
+    assert!(output.err.contains("a file is there"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
     std::fs::remove_file(&path).unwrap();
     std::os::unix::fs::symlink("/dev/pts/99999", &path).unwrap();
@@ -31,8 +31,12 @@ fn a_stale_link_is_replaced_and_a_file_is_not() {
 fn a_port_that_is_served_is_not_taken_over() {
     let sim = Sim::start(&["--speed", "max"]);
     let to = std::fs::read_link(&sim.port).unwrap();
-    let said = jtc(&["sim", "--serial", sim.port.to_str().unwrap()]).ends(2);
-    assert!(said.err.contains("another simulator") && said.err.contains("another path"), "{}", said.err);
+    let output = jtc(&["sim", "--serial", sim.port.to_str().unwrap()]).ends(2);
+    assert!(
+        output.err.contains("another simulator") && output.err.contains("another path"),
+        "{}",
+        output.err
+    );
     assert_eq!(std::fs::read_link(&sim.port).unwrap(), to);
     sim.jtc(&["status"]).ends(0);
     // A terminal that is none of a simulator's got the number of one that was killed.
@@ -53,11 +57,11 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(status["joints"].as_array().unwrap().len(), 6);
     assert!(status["missing_parameters"].as_array().unwrap().len() == 3, "{status}");
 
-    // Nothing can run yet, and it says what to do.
+    // Nothing can run yet, and the output names what to do.
     let file = sim.path("motion.csv");
     std::fs::write(&file, motion(0.25)).unwrap();
-    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(1);
-    assert!(said.json()["error"]["hint"].as_str().unwrap().contains("params"), "{}", said.out);
+    let output = sim.jtc(&["--json", "traj", "run", &file]).ends(1);
+    assert!(output.json()["error"]["hint"].as_str().unwrap().contains("params"), "{}", output.out);
 
     let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
     let pushed = sim.jtc(&["--json", "params", "push", arm]).ends(0).json();
@@ -89,15 +93,19 @@ fn from_power_up_to_a_recorded_motion() {
     let status = sim.jtc(&["--json", "status"]).ends(0).json();
     assert_eq!((status["state"].as_str(), status["trajectory"].as_str()), (Some("HoldPos"), Some("Finish")));
     // J-34: nothing is paused, so there is nothing to go on with.
-    let said = sim.jtc(&["traj", "resume"]).ends(4);
-    assert!(said.err.contains("nothing is paused") && said.err.contains("trajectory Finish"), "{}", said.err);
+    let output = sim.jtc(&["traj", "resume"]).ends(4);
+    assert!(
+        output.err.contains("nothing is paused") && output.err.contains("trajectory Finish"),
+        "{}",
+        output.err
+    );
     sim.jtc(&["traj", "stop"]).ends(0);
-    let said = sim.jtc(&["traj", "resume"]).ends(4);
-    assert!(said.err.contains("trajectory Stop") && said.err.contains("jtc traj run"), "{}", said.err);
+    let output = sim.jtc(&["traj", "resume"]).ends(4);
+    assert!(output.err.contains("trajectory Stop") && output.err.contains("jtc traj run"), "{}", output.err);
     sim.jtc(&["traj", "pause"]).ends(1);
     // Held: a reset is not assumed to be meant, and in teaching no joint is reset at all.
-    let said = sim.jtc(&["reset", "--joints", "2"]).ends(4);
-    assert!(said.err.contains("joint 2") && said.err.contains("--yes"), "{}", said.err);
+    let output = sim.jtc(&["reset", "--joints", "2"]).ends(4);
+    assert!(output.err.contains("joint 2") && output.err.contains("--yes"), "{}", output.err);
     sim.jtc(&["gripper", "on"]).ends(0);
     sim.jtc(&["teach", "on"]).ends(0);
     sim.jtc(&["reset", "--joints", "2", "--yes"]).ends(4);
@@ -106,8 +114,8 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(doctor["healthy"], true, "{doctor}");
     let lines = sim.jtc(&["--json", "monitor", "--count", "5"]).ends(0);
     assert_eq!(lines.out.lines().count(), 5);
-    let said = sim.jtc(&["--json", "reset", "--joints", "2", "--yes"]).ends(0);
-    assert_eq!(said.json()["reset"], serde_json::json!(["joint 2"]));
+    let output = sim.jtc(&["--json", "reset", "--joints", "2", "--yes"]).ends(0);
+    assert_eq!(output.json()["reset"], serde_json::json!(["joint 2"]));
 }
 
 /// A stream whose reader has gone ends, and that is no error.
@@ -130,15 +138,15 @@ fn monitor_ends_with_its_reader() {
 #[test]
 fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
-    let said = sim.jtc(&["--json", "recover"]).ends(4);
-    assert_eq!(said.json()["error"]["code"], "no-parameters");
+    let output = sim.jtc(&["--json", "recover"]).ends(4);
+    assert_eq!(output.json()["error"]["code"], "no-parameters");
     let status = sim.jtc(&["--json", "status"]).ends(0).json();
     assert_eq!(status["missing_parameters"].as_array().unwrap().len(), 3, "{status}");
-    let said = sim.jtc(&["--json", "recover", "--defaults"]).ends(0);
-    assert!(said.err.contains("the controller's own defaults"), "{}", said.err);
-    assert_eq!(said.json()["status"]["state"], "HoldPos");
-    let said = sim.jtc(&["recover"]).ends(0);
-    assert!(said.err.contains("given before"), "{}", said.err);
+    let output = sim.jtc(&["--json", "recover", "--defaults"]).ends(0);
+    assert!(output.err.contains("the controller's own defaults"), "{}", output.err);
+    assert_eq!(output.json()["status"]["state"], "HoldPos");
+    let output = sim.jtc(&["recover"]).ends(0);
+    assert!(output.err.contains("given before"), "{}", output.err);
 }
 
 #[test]
@@ -158,10 +166,10 @@ fn a_start_elsewhere_is_refused_until_it_is_approached() {
         })
         .collect();
     std::fs::write(&file, shifted).unwrap();
-    let said = sim.jtc(&["--json", "traj", "run", &file]).ends(4);
-    assert!(said.out.contains("start_pose"), "{}", said.out);
-    let said = sim.jtc(&["--json", "traj", "run", &file, "--approach", "--speed", "50"]).ends(0);
-    assert_eq!(said.json()["outcome"], "finished");
+    let output = sim.jtc(&["--json", "traj", "run", &file]).ends(4);
+    assert!(output.out.contains("start_pose"), "{}", output.out);
+    let output = sim.jtc(&["--json", "traj", "run", &file, "--approach", "--speed", "50"]).ends(0);
+    assert_eq!(output.json()["outcome"], "finished");
 }
 
 #[test]
@@ -174,8 +182,8 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     let file = sim.path("motion.csv");
     std::fs::write(&file, motion(0.25)).unwrap();
     let (record, page) = (sim.path("run.mcap"), sim.path("run.html"));
-    let said = sim.jtc(&["--json", "traj", "run", &file, "--record", &record, "--report", &page]).ends(5);
-    let value = said.json();
+    let output = sim.jtc(&["--json", "traj", "run", &file, "--record", &record, "--report", &page]).ends(5);
+    let value = output.json();
     assert_eq!(value["outcome"], "fault");
     // What broke first leads, with its joint and the values around it.
     assert_eq!(value["failure"]["joint"], 3, "{}", value["failure"]);
@@ -187,15 +195,15 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     assert!(text.contains("<title>FAILED: ") && text.contains("ms into the run: joint 3: "));
     // From the recording, too.
     let again = sim.path("again.html");
-    let said = jtc(&["report", &record, "--out", &again]).ends(0);
+    let output = jtc(&["report", &record, "--out", &again]).ends(0);
     assert!(
-        said.out.starts_with("FAILED ") && said.out.contains("figures up to the failure"),
+        output.out.starts_with("FAILED ") && output.out.contains("figures up to the failure"),
         "{}",
-        said.out
+        output.out
     );
     assert!(std::fs::read_to_string(&again).unwrap().contains("<title>FAILED: "));
-    let said = sim.jtc(&["--json", "recover"]).ends(0);
-    assert_eq!(said.json()["status"]["state"], "HoldPos", "{}", said.out);
+    let output = sim.jtc(&["--json", "recover"]).ends(0);
+    assert_eq!(output.json()["status"]["state"], "HoldPos", "{}", output.out);
 }
 
 /// A fault on the way to the first point is recorded and reported like any other, and named.
@@ -254,10 +262,10 @@ fn typed_events_happen_and_mistakes_are_named() {
         ("hand /no/such/file.csv", "/no/such/file.csv".to_owned()),
     ];
     assert!(sim.error_line().contains("holding brakes"), "announced at the start");
-    for (line, said) in lines {
-        sim.say(line);
+    for (line, expected) in lines {
+        sim.write_line(line);
         let answer = sim.error_line();
-        assert!(answer.contains(&said), "{line}\n→ {answer}");
+        assert!(answer.contains(&expected), "{line}\n→ {answer}");
     }
     sim.jtc(&["status"]).ends(0);
 }
@@ -273,7 +281,7 @@ fn the_arm_can_be_taught_by_hand() {
     });
     let lead = sim.path("lead.csv");
     std::fs::write(&lead, "t,q1,q2,q3,q4,q5,q6\n".to_owned() + &rows.collect::<String>()).unwrap();
-    sim.say(&format!("hand {lead}"));
+    sim.write_line(&format!("hand {lead}"));
     sim.jtc(&["teach", "on"]).ends(0);
     let position = |sim: &Sim| {
         sim.jtc(&["--json", "status"]).ends(0).json()["joints"][0]["position_rad"].as_f64().unwrap()
@@ -288,8 +296,12 @@ fn a_fault_file_that_counted_from_0_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let faults = dir.path().join("faults.toml");
     std::fs::write(&faults, FAULT.replace("format = 2", "")).unwrap();
-    let said = jtc(&["sim", "--faults", faults.to_str().unwrap()]).ends(2);
-    assert!(said.err.contains("format = 2") && said.err.contains("add 1 to every `joint`"), "{}", said.err);
+    let output = jtc(&["sim", "--faults", faults.to_str().unwrap()]).ends(2);
+    assert!(
+        output.err.contains("format = 2") && output.err.contains("add 1 to every `joint`"),
+        "{}",
+        output.err
+    );
 }
 
 /// A drive faults half a second into the motion.
@@ -319,11 +331,11 @@ fn the_examples_run_in_the_simulator() {
     sim.jtc(&["traj", "run", motion]).ends(0);
     let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]);
     sim.jtc(&["params", "use-defaults"]).ends(0);
-    let said = sim.jtc(&["traj", "run", motion]).ends(5);
-    assert!(said.err.contains("joint 2"), "{}", said.err);
-    let point = said.err.split("point ").nth(1).and_then(|t| t.split(|c: char| !c.is_ascii_digit()).next());
+    let output = sim.jtc(&["traj", "run", motion]).ends(5);
+    assert!(output.err.contains("joint 2"), "{}", output.err);
+    let point = output.err.split("point ").nth(1).and_then(|t| t.split(|c: char| !c.is_ascii_digit()).next());
     // The last status is from up to 40 ms before.
-    assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", said.err);
+    assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", output.err);
 }
 
 /// What was recorded runs again, and is the same motion.

@@ -12,12 +12,12 @@ use common::{Sim, command, jtc, motion};
 use serde_json::Value;
 
 /// The events of a command, and its result.
-fn stream(said: &CommandOutput) -> (Vec<Value>, Value) {
-    let events = said.events();
+fn stream(output: &CommandOutput) -> (Vec<Value>, Value) {
+    let events = output.events();
     for event in &events {
         assert!(event["time_s"].is_f64() && event["event"].is_string(), "{event}");
     }
-    let result = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {:?}", said.out));
+    let result = serde_json::from_str(&output.out).unwrap_or_else(|e| panic!("{e}: {:?}", output.out));
     (events, result)
 }
 
@@ -46,11 +46,11 @@ fn a_command_reports_what_happens_and_then_its_result() {
 
     let file = sim.path("motion.csv");
     std::fs::write(&file, motion(0.2)).unwrap();
-    let said = sim.jtc(&["--json", "traj", "run", &file, "--speed", "50"]).ends(0);
-    let (events, report) = stream(&said);
+    let output = sim.jtc(&["--json", "traj", "run", &file, "--speed", "50"]).ends(0);
+    let (events, report) = stream(&output);
     let order = ["connected", "checked", "uploading", "uploaded", "executing", "sample"];
     let places = order.map(|wanted| first(&events, wanted).0);
-    assert!(places.is_sorted(), "{places:?} {}", said.err);
+    assert!(places.is_sorted(), "{places:?} {}", output.err);
     let full = events.iter().rfind(|e| name(e) == "uploading").unwrap();
     assert_eq!((full["fraction"].as_f64(), &full["phase"]), (Some(1.0), &Value::from("motion")));
     // 2.4 s of motion: more than one sample, and not one a status.
@@ -111,8 +111,8 @@ fn what_breaks_in_motion_is_reported_at_once() {
 fn the_demo_has_events_and_all_events_are_documented() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("demo");
-    let said = jtc(&["--json", "demo", "--out", out.to_str().unwrap()]).ends(0);
-    let (events, result) = stream(&said);
+    let output = jtc(&["--json", "demo", "--out", out.to_str().unwrap()]).ends(0);
+    let (events, result) = stream(&output);
     for wanted in ["connected", "parameter", "uploading", "uploaded", "executing", "sample"] {
         first(&events, wanted);
     }
@@ -148,9 +148,9 @@ fn j33_a_reader_that_does_not_read_holds_no_run() {
     cli_kit::trial::signal(&run, "-INT");
     wait(&mut || run.try_wait().unwrap().is_some());
     drop(reader);
-    let ended = run.wait_with_output().unwrap();
-    assert_eq!(ended.status.code(), Some(5));
-    let result: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    let output = run.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(5));
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(result["outcome"], "stopped", "{result}");
     let status = sim.jtc(&["--json", "status"]).ends(0).json();
     assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()), "{status}");

@@ -65,7 +65,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         // The screen from before the view is shown again.
         assert!(String::from_utf8_lossy(&terminal.bytes).contains("\u{1B}[?1049l"), "{name}");
     }
-    // The window is closed, for a session of its own and for one that is told nothing of it.
+    // The window is closed, for a session of its own and for one that receives nothing of it.
     for nohup in [false, true] {
         let mut terminal = Terminal::new(60, 20);
         let mut monitor = at(&sim, &["monitor"]);
@@ -93,7 +93,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
-/// On a terminal below 40 columns the keys work, and it is said what is missing.
+/// On a terminal below 40 columns the keys work, and what is missing is printed.
 #[test]
 fn a_small_terminal_says_so_and_its_keys_work() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -106,7 +106,7 @@ fn a_small_terminal_says_so_and_its_keys_work() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// What is said while a bar is drawn stands above it, and no piece of the bar is left; keys that cannot do anything say so.
+/// What is printed while a bar is drawn stands above it, and no piece of the bar is left; keys that cannot do anything report it.
 #[test]
 fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let sim = Sim::start(&["--no-throttle"]);

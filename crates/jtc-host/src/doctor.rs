@@ -13,7 +13,7 @@ use crate::{Error, Session, words};
 /// Rates that are tried when bytes come and no frame is in them.
 pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
 
-/// What was heard on the link.
+/// What was received on the link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     /// Rate of the port, Bd.

@@ -35,7 +35,7 @@ pub enum FileError {
         /// What is wrong there, with the value.
         problem: String,
     },
-    /// A robot description of which it has to be said which six joints are the arm.
+    /// A robot description of which six joints have to be selected as the arm.
     #[error("{}: {problem}", path.display())]
     Joints {
         /// The file.
@@ -125,7 +125,7 @@ impl FileError {
             FileError::Io { .. } => "check the name and the rights of the file".into(),
             FileError::TooLarge { .. } => "is it the right file?".into(),
             FileError::Joints { path, six, .. } => format!(
-                "say which six are the arm, the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
+                "name the six that are the arm, the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
                 path.display()
             ),
             FileError::Choice { .. } => {
@@ -216,7 +216,7 @@ pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
 }
 
 fn cells(line: &str) -> Vec<&str> {
-    // Where semicolons separate, a comma is in a number, and said to be wrong there.
+    // Where semicolons separate, a comma is in a number, and wrong there.
     match [';', ','].into_iter().find(|c| line.contains(*c)) {
         Some(c) => line.split(c).map(str::trim).collect(),
         None => line.split_whitespace().collect(),

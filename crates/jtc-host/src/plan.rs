@@ -117,7 +117,7 @@ fn quintic(from: &[f64; JOINTS], to: &[f64; JOINTS], seconds: f64) -> Trajectory
     Trajectory { step_ms, points: points.collect() }
 }
 
-/// A move from where the arm is to the first point of a trajectory, slowed down until the arm model says that the torque suffices.
+/// A move from where the arm is to the first point of a trajectory, slowed down until the torque suffices by the arm model.
 ///
 /// # Errors
 ///

@@ -58,7 +58,7 @@ impl JointSample {
         internal: 0,
     };
 
-    /// Without what a joint that does not answer cannot have said: a gap, not a joint at 0 rad.
+    /// Without what a joint that does not answer cannot have sent: a gap, not a joint at 0 rad.
     fn not_measured(self) -> Self {
         let nan = f64::NAN;
         Self { position: nan, velocity: nan, torque: nan, temperature: nan, ..self }
@@ -148,7 +148,7 @@ pub fn is_measured(status: &Status, j: usize) -> bool {
 }
 
 impl Sample {
-    /// What a status says, received at `time_s`. Commanded values and the torque split are unknown.
+    /// The values of a status, received at `time_s`. Commanded values and the torque split are unknown.
     pub fn from_status(time_s: f64, status: &Status) -> Self {
         Self {
             time_s,
@@ -178,7 +178,7 @@ impl Sample {
         self.state == ControllerState::Operate && self.trajectory == TrajectoryState::Execute
     }
 
-    /// What a status says while `trajectory` is executed: the commanded values are those of the reported point, as the
+    /// The values of a status while `trajectory` is executed: the commanded values are those of the reported point, as the
     /// controller computes them.
     pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory) -> Self {
         let mut sample = Self::from_status(time_s, status);

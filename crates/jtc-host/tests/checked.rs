@@ -80,7 +80,7 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     assert_eq!((diagnosis.code, diagnosis.kind), ("device-limits", ErrorKind::Refused));
     assert!(error.to_string().contains("joint 1, acceleration_max_rad_s2: "), "{error}");
     assert!(check(&arm, &motion(0.5), true).is_ok());
-    // The gravity that the controller computes with, whatever the file says: an arm without weight would pass.
+    // The gravity that the controller computes with, whatever the file gives: an arm without weight would pass.
     let weightless = Arm { gravity: Some([0.0; 3]), ..Arm::avena() };
     let mut weak = weightless.clone();
     weak.joints[1].torque_max = 60.0;
@@ -149,7 +149,7 @@ fn a_run_has_an_outcome_and_its_figures() {
     let error = summary.joints[0].max_error_mrad.unwrap();
     assert!(error > 0.0 && error < 20.0, "{error} mrad");
     assert_eq!(summary.joints[0].torque_limit_nm, Some(Arm::avena().joints[0].torque_max));
-    // A second run from the end of the first: the controller refuses it (J-34), and the run says so.
+    // A second run from the end of the first: the controller refuses it (J-34), and the run reports it.
     let run = s.run(&checked, |_| Flow::Continue);
     assert!(matches!(run.outcome, Err(Error::Link(LinkError::Refused { .. }))), "{:?}", run.outcome);
 }

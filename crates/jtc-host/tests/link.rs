@@ -269,7 +269,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// What the session wrote, while a controller behind a scripted port says nothing or the same status again and again.
+/// What the session wrote, while a controller behind a scripted port sends nothing or the same status again and again.
 mod scripted {
     use std::cell::RefCell;
     use std::rc::Rc;
@@ -346,7 +346,7 @@ fn j34_resume_only_after_a_pause() {
     assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Execute));
 }
 
-/// A link that is lost in motion: the error says that the arm may be moving, and a stop goes out that may still arrive.
+/// A link that is lost in motion: the error states that the arm may be moving, and a stop goes out that may still arrive.
 #[test]
 fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     let moving = jtc_wire::Status {
@@ -414,7 +414,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // Held: nothing is sent under the arm's weight, and that is said.
+    // Held: nothing is sent under the arm's weight, and that is reported.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
@@ -439,7 +439,7 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
     let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
     assert!(give < clear, "{steps:?}");
-    // Without one the controller keeps what it has, and says so.
+    // Without one the controller keeps what it has, and the step reports it.
     s.port_mut().world_mut().inject(Fault {
         kind: FaultKind::SafetyInput,
         trigger: Trigger::At(0),
@@ -475,28 +475,28 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     assert_eq!(s.fresh_status().unwrap().state, ControllerState::HoldPos, "it is held");
 }
 
-/// The controller says "incorrect value" only: joint, value and bounds are found on this side.
+/// The controller answers "incorrect value" only: joint, value and bounds are found on this side.
 #[test]
 fn j06_a_refused_parameter_is_named() {
     let mut s = ready(Some(921_600));
     let good = Arm::avena().parameter_set();
-    let said = |s: &mut Sim, set: &ParameterSet| {
+    let refusal = |s: &mut Sim, set: &ParameterSet| {
         let error = s.push(set, |_| ()).expect_err("it is refused");
         assert_eq!((error.kind(), error.code()), (ErrorKind::Device, "beyond-bounds"), "{error}");
         error.to_string()
     };
     let mut set = ParameterSet { pid: good.pid, ..ParameterSet::default() };
     set.pid.as_mut().unwrap()[2].kp = 60_000.0;
-    let text = said(&mut s, &set);
+    let text = refusal(&mut s, &set);
     assert!(text.contains("joint 3: Kp (N·m/rad) 60000 is outside 0..50000"), "{text}");
     let Some(Friction::Polynomial(mut c)) = good.friction.clone() else { panic!("a polynomial") };
     c[4][1] *= -1.0;
     let set = ParameterSet { friction: Some(Friction::Polynomial(c)), ..ParameterSet::default() };
-    let text = said(&mut s, &set);
+    let text = refusal(&mut s, &set);
     assert!(text.contains("joint 5: friction torque (N·m) at ") && text.contains("is outside"), "{text}");
     let mut set = ParameterSet { model: good.model, ..ParameterSet::default() };
     set.model.as_mut().unwrap().links[0].mass = 51.0;
-    let text = said(&mut s, &set);
+    let text = refusal(&mut s, &set);
     assert!(text.contains("mass of a link (kg) 51 is outside 0..50"), "{text}");
     // What the arm was given before is still what it uses.
     assert_eq!(s.fresh_status().unwrap().jtc_init, 0);

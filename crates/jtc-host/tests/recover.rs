@@ -1,4 +1,4 @@
-//! The way back to HoldPos: what is said on it from each state, and how a person ends it.
+//! The way back to HoldPos: what it reports from each state, and how a person ends it.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;

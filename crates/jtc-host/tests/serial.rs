@@ -1,4 +1,4 @@
-//! Serial ports on a pseudo-terminal: both directions, timeouts, rates, and what is said when a port cannot be used.
+//! Serial ports on a pseudo-terminal: both directions, timeouts, rates, and the errors of a port that cannot be used.
 #![cfg(unix)]
 
 use std::io::{Read, Write};

@@ -176,7 +176,7 @@ fn bus_off_ends_129_times_11_bits_after_init_is_cleared() {
 }
 
 #[test]
-fn a_wrong_bit_rate_is_an_error_to_everybody() {
+fn a_wrong_bit_rate_is_an_error_to_every_node() {
     let mut machine = with_prescaler(10, Some(Listener::default()));
     assert_eq!(machine.chip().fdcan.state().rates, (500_000, 5_000_000));
     machine.write_register(TXBAR, 1);

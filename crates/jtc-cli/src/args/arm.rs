@@ -12,7 +12,7 @@ pub enum ArmCommand {
     /// Make an arm file from a robot description (URDF); what had to be turned or guessed is listed
     #[command(
         after_help = "The arm is six revolute or continuous joints in a chain. Where more joints move (a gripper,\n\
-                      a seventh axis, a second arm), --joints or --tip says which six are meant; the others are\n\
+                      a seventh axis, a second arm), --joints or --tip selects the six; the others are\n\
                       held at 0. Gains and friction are in no URDF: they are to be added to the file.\n\nExamples:\n  \
                       jtc arm import ur5.urdf -o ur5.toml\n  \
                       jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \

@@ -16,7 +16,7 @@ pub struct CheckArgs {
     /// Speed in percent of the file's own, 1 to 200: 50 takes twice the time, with the same path
     #[arg(long, env = "JTC_SPEED_PERCENT", value_name = "PCT", default_value_t = 100.0)]
     pub speed: f64,
-    /// The numbers of the file are degrees, for files that do not say; a CSV header does with q1_deg..q6_deg
+    /// The numbers of the file are degrees, for files that do not name their unit; a CSV header does with q1_deg..q6_deg
     #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
     pub deg: bool,
 }
@@ -39,17 +39,17 @@ pub enum TrajCommand {
     Info {
         /// CSV, JSON or trajectory_msgs/JointTrajectory as YAML or JSON
         file: PathBuf,
-        /// The numbers of the file are degrees, for files that do not say
+        /// The numbers of the file are degrees, for files that do not name their unit
         #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
         deg: bool,
     },
     /// Check, upload, execute, follow, report
     #[command(
-        after_help = "On a terminal space pauses and resumes, s stops; + and - say how to run it at another speed.\n\
+        after_help = "On a terminal space pauses and resumes, s stops; + and - show how to run it at another speed.\n\
                             Ctrl-C stops on the path, then ends; a second one ends at once.\n\
                             Output files are opened before anything moves. A recording is written while the arm moves, and after a killed\n\
                             program it can be read up to its last 0.2 s. If it cannot be written to before the motion begins, nothing\n\
-                            moves; if that happens on the way (full disk), it is said at once, the motion goes on as it was checked, and\n\
+                            moves; if that happens on the way (full disk), it is reported at once, the motion goes on as it was checked, and\n\
                             the command ends with exit code 5.\n\nExamples:\n  jtc traj run motion.csv --approach\n  \
                             jtc traj run motion.csv --speed 10 --record run.mcap"
     )]

@@ -70,7 +70,7 @@ pub struct ReportArgs {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub force: ForceArgs,
-    /// Arm whose limits count, for recordings that do not say (CSV)
+    /// Arm whose limits count, for recordings that do not hold them (CSV)
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
 }

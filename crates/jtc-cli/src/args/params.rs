@@ -30,7 +30,7 @@ pub enum ParamsCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Tell the controller to use its defaults
+    /// Let the controller use its defaults
     #[command(after_help = "Examples:\n  jtc params use-defaults")]
     UseDefaults(LinkArgs),
     /// What a file holds (default: the built-in arm), and what the controller still misses when one is connected
@@ -60,7 +60,7 @@ pub enum FrictionKind {
 /// What of an arm file a controller cannot be given.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct AcceptArgs {
-    /// Go on although the controller uses other limits, gravity or rotor inertia than the arm file says
+    /// Go on although the controller uses other limits, gravity or rotor inertia than the arm file gives
     #[arg(long, env = "JTC_ACCEPT_DEVICE_LIMITS", value_parser = FalseyValueParser::new())]
     pub accept_device_limits: bool,
 }

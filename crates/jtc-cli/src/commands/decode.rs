@@ -73,7 +73,7 @@ fn hex(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
-/// The byte streams of an input with their names; one without a name, unless the input tells directions apart.
+/// The byte streams of an input with their names; one without a name, unless the input marks directions.
 fn streams(input: &[u8]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let Some(text) =
         std::str::from_utf8(input).ok().filter(|t| t.chars().all(|c| !c.is_control() || c.is_whitespace()))

@@ -22,7 +22,7 @@ pub fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
             "there is no example \"{name}\"; there are {}",
             names.join(", ")
         ))
-        .hint("`jtc example` says what they are"));
+        .hint("`jtc example` shows what they are"));
     };
     let dir = args.dir.as_deref().unwrap_or(".".as_ref());
     std::fs::create_dir_all(dir).map_err(|e| Failure::usage(format!("{}: {e}", dir.display())))?;

@@ -45,7 +45,7 @@ fn list(out: &Output) {
         };
         let rows: Vec<Vec<String>> = pages().map(row).collect();
         format!(
-            "{}\njtc explain CODE tells what a code means, what causes it and what to do",
+            "{}\njtc explain CODE shows what a code means, what causes it and what to do",
             table(&["name", ">code"], &rows)
         )
     });

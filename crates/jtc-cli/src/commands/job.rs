@@ -161,8 +161,8 @@ impl Job {
         })
     }
 
-    /// Says what the torques leave out, as a note.
-    pub fn say_what_is_left_out(&self, out: &Output) {
+    /// Prints what the torques leave out, as a note.
+    pub fn note_what_is_left_out(&self, out: &Output) {
         if let Some(words) = self.without() {
             out.note(format!("note: {words}"));
         }

@@ -20,7 +20,7 @@ const ALL_NODES: u8 = 0x7F;
 /// A clear takes effect within some statuses.
 const EFFECT: Duration = Duration::from_millis(300);
 
-/// Clears errors, and says what is left of them.
+/// Clears errors, and reports what is left of them.
 pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     if args.occurred {
@@ -113,6 +113,6 @@ fn not_itself(e: Error) -> Failure {
     }
     failure.hint(
         "what causes the error is still there: release the emergency stop, look at power, cable and drive of what is named, then \
-         `jtc doctor`; `jtc explain CODE` tells about each error",
+         `jtc doctor`; `jtc explain CODE` explains each error",
     )
 }

@@ -78,12 +78,12 @@ fn live(
             match key {
                 Key::Char('q') | Key::Escape => return Ok(()),
                 Key::Char('s') => {
-                    view.said = "stopping".into();
+                    view.reply = "stopping".into();
                     screen.draw(|frame| view.draw(frame));
-                    view.said = stop_motion(session);
+                    view.reply = stop_motion(session);
                 }
                 key => {
-                    view.said.clear();
+                    view.reply.clear();
                     view.scroll.key(key);
                 }
             }

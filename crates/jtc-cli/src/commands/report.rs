@@ -13,7 +13,7 @@ use crate::args::ReportArgs;
 use crate::failure::Failure;
 use cli_kit::OutputFile;
 
-/// Writes the page and says the figures.
+/// Writes the page and prints the figures.
 pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let page = args.out.clone().unwrap_or_else(|| args.file.with_extension("html"));
     let picture = page.with_extension("svg");
@@ -31,7 +31,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let info = match (arm, recording.info) {
         (Some(arm), _) => run_report::info(&arm, &args.file.display().to_string(), &name, 0),
         (None, Some(info)) => info,
-        // A CSV file says nothing about limits.
+        // A CSV file holds no limits.
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
     let failure = RunFailure::of_recording(&info, &recording.samples, &recording.ending);

@@ -58,8 +58,7 @@ fn of_mask(text: &str) -> Failure {
         Some(hex) => u8::from_str_radix(hex, 16).ok(),
         None => text.parse().ok(),
     };
-    let failure =
-        Failure::usage(format!("\"{text}\" does not say which joints: nodes are named, nothing was sent"));
+    let failure = Failure::usage(format!("\"{text}\" names no joints: nodes have names, nothing was sent"));
     let Some(mask) = value.filter(|mask| *mask != 0 && mask & !ALL == 0) else {
         return failure.hint("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`");
     };

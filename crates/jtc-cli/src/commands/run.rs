@@ -34,13 +34,13 @@ const BRING_UP: Duration = Duration::from_secs(15);
 pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     if let Some(path) = &args.record {
-        Format::of(path)?; // a wrong ending is said before anything moves
+        Format::of(path)?; // a wrong ending is reported before anything moves
     }
     let mut job = Job::load(&args.file, &args.check, out)?;
     limits::accept(&job.arm, args.accept.accept_device_limits, out)?;
     // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
     job.config = job.arm.config_on_device();
-    job.say_what_is_left_out(out);
+    job.note_what_is_left_out(out);
     perform(args, &job, &progress, out).map_err(|failure| job.named(failure))
 }
 
@@ -127,7 +127,7 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
     let input = ReportInput { info: &info, samples: &samples, facts: &facts, failure: broken.as_ref() };
     let (files, lost) = outputs.write(tape, &input);
     let summary = Summary::of(&info, &samples);
-    // A file that is lost is said even when the run failed, but the run comes first.
+    // A file that is lost is reported even when the run failed, but the run comes first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }

@@ -1,4 +1,4 @@
-//! What a run says at its end: figures per joint as a table and as JSON, and the files made of it.
+//! What a run reports at its end: figures per joint as a table and as JSON, and the files made of it.
 
 use cli_kit::table;
 use jtc_host::arm::Arm;
@@ -7,7 +7,7 @@ use jtc_host::report::{Facts, RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 use jtc_wire::{Joint, Status, TrajectoryState};
 
-/// What a recording of this arm says about itself.
+/// The description that a recording of this arm carries.
 pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
     RecordingInfo {
         source: source.to_owned(),
@@ -101,7 +101,7 @@ pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
     )
 }
 
-/// In percent; none behind a pseudo-terminal that is faster than the rate says.
+/// In percent; none behind a pseudo-terminal that is faster than its rate.
 fn line_share(upload: &UploadReport) -> Option<f64> {
     upload.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
 }

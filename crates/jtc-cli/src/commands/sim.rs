@@ -30,7 +30,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use cli_kit::Stop;
 
     if let Some(path) = &args.record {
-        Format::of(path)?; // a wrong ending is said before anything runs
+        Format::of(path)?; // a wrong ending is reported before anything runs
     }
     let stop = Stop::listen()?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?.unwrap_or_else(Arm::avena);

@@ -74,7 +74,7 @@ pub fn as_json(s: &Status) -> Value {
     })
 }
 
-/// State of joint `j` (from 0): what it said last, unless it says nothing any more.
+/// State of joint `j` (from 0): what it sent last, unless it sends nothing any more.
 pub fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
     // A joint that is not ready may answer; one that is enabled and not measured does not.
@@ -82,7 +82,7 @@ pub fn joint_state(s: &Status, j: usize) -> &'static str {
     if silent { "does not answer" } else { state.name() }
 }
 
-/// What the status says of pump and vacuum is what the gripper sent.
+/// Pump and vacuum of the status are what the gripper sent.
 pub fn gripper_answers(s: &Status) -> bool {
     !words::is_silent(s, GRIPPER)
 }

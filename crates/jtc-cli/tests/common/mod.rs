@@ -53,7 +53,7 @@ impl Sim {
         if line != format!("ready: {}\n", port.display()) {
             let mut err = String::new();
             stderr.read_to_string(&mut err).ok();
-            panic!("jtc sim says {line:?}, {err}");
+            panic!("jtc sim prints {line:?}, {err}");
         }
         Self { child, stderr, port, dir }
     }
@@ -66,7 +66,7 @@ impl Sim {
     }
 
     /// Types a line on its standard input.
-    pub fn say(&mut self, line: &str) {
+    pub fn write_line(&mut self, line: &str) {
         writeln!(self.child.stdin.as_mut().expect("stdin"), "{line}").expect("it reads");
     }
 

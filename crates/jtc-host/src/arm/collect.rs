@@ -243,10 +243,10 @@ impl<T> PerJoint<T> {
         self.found.iter().flatten().count()
     }
 
-    /// Takes the table of a joint; the name of the file says which.
+    /// Takes the table of a joint; the name of the file gives its number.
     fn add(&mut self, path: &Path, table: T) -> Result<(), FileError> {
         let Some((_, joint, _)) = split_name(path) else {
-            let problem = "holds the numbers of one joint, and its name does not say of which: such files are named ...Joint0.csv \
+            let problem = "holds the numbers of one joint, and its name gives no joint: such files are named ...Joint0.csv \
                            (joint 1) to ...Joint5.csv (joint 6), and all six are needed";
             return Err(FileError::form(problem).in_file(path));
         };

@@ -23,7 +23,7 @@ pub(super) enum Table {
     Model(Box<ArmModel>),
 }
 
-/// Tells by the shape what it is.
+/// Recognises the parameter by the shape of the table.
 pub(super) fn read(text: &str) -> Result<Table, FileError> {
     let first = rows(text).next();
     if first.as_ref().is_some_and(|(_, cells)| cells.contains(&"vel_index")) {

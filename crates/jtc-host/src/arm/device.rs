@@ -1,7 +1,7 @@
 //! What of an arm a controller cannot be given: friction, gains and arm model go over the wire; limits, gravity and rotor inertia
 //! are built into the controller.
 //!
-//! A controller that runs with other limits or another gravity than the arm file says moves another arm than the one that was
+//! A controller that runs with other limits or another gravity than the arm file gives moves another arm than the one that was
 //! checked (J-55). It is known to use the built-in arm's settings, [`Config::avena`].
 
 use jtc_core::{Config, JointConfig};
@@ -20,7 +20,7 @@ pub struct Difference {
     pub name: &'static str,
     /// None for what concerns the whole arm.
     pub joint: Option<Joint>,
-    /// As the arm file says.
+    /// The value of the arm file.
     pub file: f64,
     /// As the controller has it built in.
     pub device: f64,
@@ -158,13 +158,13 @@ mod tests {
         assert_eq!(urdf.settings_not_given(), ["gravity", "rotor inertia"]);
         // What is checked for a controller counts the rotors that it computes with.
         assert_eq!(urdf.config_on_device().joints[3].rotor_inertia, Config::avena().joints[3].rotor_inertia);
-        // An arm file that is made of it gives none either; one that says 0 does.
+        // An arm file that is made of it gives none either; one with 0 does.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);
-        let said =
+        let given =
             Arm::avena().to_toml().replacen("rotor_inertia_kg_m2 = 0.7", "rotor_inertia_kg_m2 = 0.0", 1);
-        assert_eq!(Arm::parse(&said).unwrap().device_differences().len(), 1);
+        assert_eq!(Arm::parse(&given).unwrap().device_differences().len(), 1);
     }
 
     #[test]

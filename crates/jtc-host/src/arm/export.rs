@@ -9,7 +9,7 @@ use super::Arm;
 use super::toml_form::FORMAT;
 
 fn list(values: &[f64]) -> String {
-    // `{:?}` keeps a fraction, which TOML needs to tell floats from integers.
+    // `{:?}` keeps a fraction, which makes a float of it in TOML.
     let cells: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();
     format!("[{}]", cells.join(", "))
 }

@@ -28,7 +28,7 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
 impl Frame {
     pub const IDENTITY: Self = Self { rotation: UNIT, position: [0.0; 3] };
 
-    /// Rz(yaw)·Ry(pitch)·Rx(roll), as URDF says.
+    /// Rz(yaw)·Ry(pitch)·Rx(roll), as URDF defines.
     pub fn of(origin: &Origin) -> Self {
         let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.map(f64::sin_cos);
         Self {

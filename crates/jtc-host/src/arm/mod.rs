@@ -52,7 +52,7 @@ pub struct Arm {
     pub model: ArmModel,
     /// Limits and rotor inertia, base to wrist.
     pub joints: [JointConfig; JOINTS],
-    /// Joints, base to wrist, whose rotor inertia the file gives. That of the others is 0 in `joints`: nobody said it.
+    /// Joints, base to wrist, whose rotor inertia the file gives. That of the others is 0 in `joints`: it is not known.
     pub rotors_given: [bool; JOINTS],
     /// Acceleration of gravity in the base frame, m/s²; `None`: the device's setting.
     pub gravity: Option<[f64; 3]>,
@@ -72,7 +72,7 @@ impl Arm {
         Self::from_toml(AVENA_TOML).expect("the delivered arm file is good: tests read it")
     }
 
-    /// From a TOML or URDF file, told apart by their content.
+    /// From a TOML or URDF file, recognised by its content.
     ///
     /// # Errors
     ///
@@ -92,7 +92,7 @@ impl Arm {
         arm.checked()
     }
 
-    /// From a URDF file, of which `choice` says what is the arm.
+    /// From a URDF file, of which `choice` selects the arm.
     ///
     /// # Errors
     ///
@@ -127,7 +127,7 @@ impl Arm {
         })
     }
 
-    /// Settings of a controller for this arm; what the file does not say is as for the default arm, but a rotor inertia that is
+    /// Settings of a controller for this arm; what the file does not give is as for the default arm, but a rotor inertia that is
     /// not given is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
@@ -145,7 +145,7 @@ impl Arm {
         ParameterSet { friction: self.friction(), pid: self.pid, model: Some(self.model) }
     }
 
-    /// Parameters of a controller for this arm; what the file does not say is as for the default arm.
+    /// Parameters of a controller for this arm; what the file does not give is as for the default arm.
     pub fn parameters(&self) -> Parameters {
         let default = Parameters::avena();
         Parameters {

@@ -1,4 +1,4 @@
-//! Files of arms and parameters, and what is said about broken ones.
+//! Files of arms and parameters, and the errors of broken ones.
 
 use std::path::PathBuf;
 
@@ -128,25 +128,26 @@ fn fixed_bodies_become_part_of_their_link() {
 
 #[test]
 fn what_no_arm_of_ours_can_be_is_refused_by_name() {
-    let say = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
-    assert!(say(&urdf("0 0 0", "revolute")).contains("no direction"));
-    assert!(say("<robot name=\"x\"></robot>").contains("0 rotary joints"));
+    let error_of = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
+    assert!(error_of(&urdf("0 0 0", "revolute")).contains("no direction"));
+    assert!(error_of("<robot name=\"x\"></robot>").contains("0 rotary joints"));
     // No form of file and no option helps there.
     let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
     assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
-    assert!(say(&"<a>".repeat(100_000)).contains("nested"));
+    assert!(error_of(&"<a>".repeat(100_000)).contains("nested"));
     assert!(
-        say(&urdf("0 0 1", "revolute").replace("<mass value=\"7.5\"/>", "<mass value=\"-7.5\"/>"))
+        error_of(&urdf("0 0 1", "revolute").replace("<mass value=\"7.5\"/>", "<mass value=\"-7.5\"/>"))
             .contains("arm model")
     );
     let toml = AVENA_TOML;
-    assert!(say(&toml.replacen("mass_kg = 7.5", "mass_kg = -7.5", 1)).contains("arm model"));
-    assert!(say(&toml.replacen("kp = ", "kq = ", 1)).contains("line"));
+    assert!(error_of(&toml.replacen("mass_kg = 7.5", "mass_kg = -7.5", 1)).contains("arm model"));
+    assert!(error_of(&toml.replacen("kp = ", "kq = ", 1)).contains("line"));
     assert!(
-        say(&toml.replacen("torque_max_nm = 80.0", "torque_max_nm = -80.0", 1)).contains("torque_max_nm")
+        error_of(&toml.replacen("torque_max_nm = 80.0", "torque_max_nm = -80.0", 1))
+            .contains("torque_max_nm")
     );
     assert!(
-        say(&toml.replacen("position_min_rad = -2.97", "position_min_rad = 4", 1))
+        error_of(&toml.replacen("position_min_rad = -2.97", "position_min_rad = 4", 1))
             .contains("position_min_rad")
     );
 }
@@ -169,12 +170,12 @@ fn a_continuous_joint_has_the_working_area_of_its_drive() {
     assert!(arm.warnings.iter().any(|w| w.place == "joint j2" && w.problem.contains("no position limits")));
 }
 
-/// Z1, UR with a gripper, a redundant arm: what is too much is named, and the command that says which six are meant.
+/// Z1, UR with a gripper, a redundant arm: what is too much is named, and the command that selects six.
 #[test]
 fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     let plain = urdf("0 0 1", "revolute");
     let with = |end: String| plain.replace("</robot>", &end);
-    let say = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
+    let error_of = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
 
     let seven = with(more("gripper", "revolute", "flange"));
     let error = Arm::parse(&seven).expect_err("accepted").in_file(Path::new("z1.urdf"));
@@ -184,13 +185,14 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     assert!(error.hint().contains(command), "{}", error.hint());
     let finger = with(more("finger", "prismatic", "flange"));
     assert!(
-        say(&finger).contains("6 rotary joints") && say(&finger).contains("finger (prismatic) moves as well")
+        error_of(&finger).contains("6 rotary joints")
+            && error_of(&finger).contains("finger (prismatic) moves as well")
     );
     let branch = with(more("head", "revolute", "l0"));
-    assert!(say(&branch).contains("head (revolute) moves as well"), "{}", say(&branch));
+    assert!(error_of(&branch).contains("head (revolute) moves as well"), "{}", error_of(&branch));
     let five = plain.replacen("type=\"revolute\"", "type=\"fixed\"", 1);
     assert!(
-        say(&five)
+        error_of(&five)
             .contains("5 rotary joints carry each other (j2, j3, j4, j5, j6), the controller drives six")
     );
 
@@ -250,12 +252,12 @@ fn a_joint_that_is_held_keeps_its_place() {
 
 #[test]
 fn j35_j43_limits_that_the_drives_cannot_keep_are_refused_and_those_of_a_description_narrowed() {
-    let say = |from: &str, to: &str| {
+    let error_of = |from: &str, to: &str| {
         Arm::parse(&AVENA_TOML.replacen(from, to, 1)).expect_err("accepted").to_string()
     };
-    let text = say("position_max_rad = 2.9\n", "position_max_rad = 3.05\n");
+    let text = error_of("position_max_rad = 2.9\n", "position_max_rad = 3.05\n");
     assert!(text.contains("joint_3") && text.contains("3.05") && text.contains("2.9905"), "{text}");
-    let text = say("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 3.15");
+    let text = error_of("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 3.15");
     assert!(text.contains("joint_1") && text.contains("3.780"), "{text}");
     let wide = urdf("0 0 1", "revolute").replace("\"1.5\"", "\"6.28\"").replace("\"1.2\"", "\"3.15\"");
     let arm = Arm::parse(&wide).unwrap();
@@ -379,16 +381,16 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert_eq!(kp(ParameterFile::load(dir.path()).unwrap()), expected);
 
     // One is named although all are there: which is meant is not guessed.
-    let say = |paths: &[PathBuf]| ParameterFile::load_all(paths).unwrap_err().to_string();
-    let text = say(&all[2..3]);
+    let error_of = |paths: &[PathBuf]| ParameterFile::load_all(paths).unwrap_err().to_string();
+    let text = error_of(&all[2..3]);
     assert!(
         text.contains("PidParamJoint0.csv (joint 1)") && text.contains("PidParamJoint5.csv (joint 6)"),
         "{text}"
     );
     assert!(!text.contains("(joint 3)"), "{text}");
-    let text = say(&[&all[..3], &all[4..]].concat());
+    let text = error_of(&[&all[..3], &all[4..]].concat());
     assert!(text.contains("not named: ") && text.contains("PidParamJoint3.csv (joint 4). "), "{text}");
-    assert!(say(&[&all[..], &all[..1]].concat()).contains("joint 1"));
+    assert!(error_of(&[&all[..], &all[..1]].concat()).contains("joint 1"));
 
     // One is missing in the directory.
     std::fs::remove_file(&all[3]).unwrap();
@@ -397,5 +399,5 @@ fn gains_of_one_joint_are_never_those_of_six() {
 
     let nameless = dir.path().join("gains.csv");
     std::fs::write(&nameless, "1000,10,5,-1,1\n").unwrap();
-    assert!(say(&[nameless]).contains("does not say of which"));
+    assert!(error_of(&[nameless]).contains("gives no joint"));
 }

@@ -10,7 +10,7 @@ use crate::file::{FileError, Place, short};
 /// Format of the arm files that are read. Files without it are older and mean the same.
 pub(super) const FORMAT: i64 = 2;
 
-/// What says how the rest is to be read.
+/// The keys that decide how the rest is read.
 #[derive(Deserialize)]
 struct Head {
     format: Option<toml::Value>,

@@ -37,7 +37,7 @@ impl Arm {
         Self::from_urdf_with(text, &ArmChoice::default())
     }
 
-    /// From the text of a URDF file, of which `choice` says what is the arm.
+    /// From the text of a URDF file, of which `choice` selects the arm.
     ///
     /// # Errors
     ///
@@ -110,7 +110,7 @@ impl<'a> Chain<'a> {
     }
 
     /// What leads from the last link to the flange: the way to `tip`, or else the fixed joint behind it; of several the one whose
-    /// name says so, else the first.
+    /// name is one, else the first.
     fn find_flange(&mut self, tip: Option<&str>) {
         let last = &self.rotary[JOINTS - 1].child.link;
         if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
@@ -275,7 +275,7 @@ impl<'a> Chain<'a> {
                 || !limit.upper.is_finite()
             {
                 if joint.joint_type == JointType::Continuous {
-                    // As far as the drives go; that the mechanism has a stop is not said.
+                    // As far as the drives go; whether the mechanism has a stop is not given.
                     (to.position_min, to.position_max) = (-jtc_core::WORKING_AREA, jtc_core::WORKING_AREA);
                 }
                 let problem =
@@ -316,7 +316,7 @@ impl<'a> Chain<'a> {
         Ok(all)
     }
 
-    /// A description says what the mechanism can do. Its drives may do less, and the controller refuses limits beyond that
+    /// A description gives the limits of the mechanism. Its drives may do less, and the controller refuses limits beyond that
     /// (J-35, J-43).
     fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) {
         let drives = Config::avena();

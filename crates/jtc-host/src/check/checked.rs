@@ -146,7 +146,7 @@ impl CheckedTrajectory {
         Arc::clone(&self.trajectory)
     }
 
-    /// Tells this check from all others of the program.
+    /// The number of this check; no other of the program has it.
     pub(crate) fn number(&self) -> u64 {
         self.number
     }

@@ -7,7 +7,7 @@ use super::verdict::{Suspicion, Verdict};
 
 impl Verdict {
     /// The speed (% of the file's own) at which nothing would be too fast any more; `None` where speed is not what is wrong.
-    /// It is estimated from the worst values; [`plan::at_speed`](crate::plan::at_speed) and another check tell.
+    /// It is estimated from the worst values; [`plan::at_speed`](crate::plan::at_speed) and another check give the exact one.
     pub fn slower(&self, now_pct: f64) -> Option<f64> {
         use ProblemKind::*;
         let mut speed = 1.0f64;

@@ -41,15 +41,15 @@ pub enum ProblemKind {
     FrictionVelocity,
     /// A place from which Pause or Stop cannot bring the arm to rest in time with the torque that there is (J-33).
     NoStop,
-    /// Positions move faster than the velocity limit, whatever the velocities say.
+    /// Positions move faster than the velocity limit, whatever the given velocities are.
     PositionSpeed,
-    /// Positions move at another speed than the velocities say; a warning at single places.
+    /// Positions move at another speed than the given velocities; a warning at single places.
     VelocityMismatch,
     /// The first or last point is not at rest.
     NotAtRest,
     /// The arm is not at the first point (J-34).
     StartPose,
-    /// Velocities change otherwise than the accelerations say.
+    /// Velocities change otherwise than by the given accelerations.
     AccelerationMismatch,
 }
 

@@ -58,7 +58,7 @@ impl<'a> Checker<'a> {
         Self { config, model: None, friction: None, temperature: 30.0, start: None, upload }
     }
 
-    /// Looks at all of it and says all that is wrong.
+    /// Checks all of it and returns all that is wrong.
     pub fn check(&self, trajectory: &Trajectory) -> Verdict {
         let mut verdict = Verdict::new(trajectory);
         self.counts(trajectory, &mut verdict);
@@ -94,7 +94,7 @@ impl<'a> Checker<'a> {
         verdict.done()
     }
 
-    /// What the controller itself will say when it is loaded (J-36); what is known already stays as it is.
+    /// What the controller's own check will find during the upload (J-36); what is known already stays as it is.
     fn controller(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
         let tables = match self.friction {
             Some(Friction::Table(tables)) => Some(tables),

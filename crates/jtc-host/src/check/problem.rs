@@ -20,7 +20,7 @@ pub struct Seen {
     pub time_s: f64,
     /// In the unit of its kind.
     pub value: f64,
-    /// Its limit, or what the other channel says.
+    /// Its limit, or the value of the other channel.
     pub limit: f64,
 }
 
@@ -41,7 +41,7 @@ pub struct Problem {
     pub time_s: f64,
     /// Worst value, in the unit of its kind.
     pub value: f64,
-    /// Its limit, or what the other channel says.
+    /// Its limit, or the value of the other channel.
     pub limit: f64,
     /// Milliseconds (or points, or steps) in which it is.
     pub count: usize,
@@ -114,7 +114,7 @@ impl Seen {
             }
             NotAtRest => format!("{words}: {value:+.4} {unit} {place}"),
             VelocityMismatch | AccelerationMismatch => format!(
-                "{words}: {value:+.4} {unit} between points {point} and {next} ({time_s:.3} s) where {limit:+.4} {unit} is said"
+                "{words}: {value:+.4} {unit} between points {point} and {next} ({time_s:.3} s) where {limit:+.4} {unit} is given"
             ),
             _ => format!("{words}: {value:+.4} {unit} (limit {limit}) {place}"),
         };

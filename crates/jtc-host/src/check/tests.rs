@@ -95,7 +95,7 @@ fn all_problems_are_reported_with_their_worst_place() {
     );
 }
 
-/// A file whose velocities say nothing would stop and go at every point.
+/// A file whose velocities are all 0 would stop and go at every point.
 #[test]
 fn channels_that_contradict_each_other_all_along_are_refused() {
     let mut t = smooth();

@@ -154,7 +154,7 @@ impl Verdict {
 
     /// Pieces that do not meet make single jumps from one sample to the next. Where every fifth step or more is one, the path is too
     /// fast all along, or not in radians; a long way in a long step between waypoints, or in many steps in a row, is a move that is too
-    /// fast. One line per joint says so.
+    /// fast. It is one line per joint.
     fn part_haste_from_seams(&mut self) {
         let is_jump = |p: &Problem| p.kind == ProblemKind::Jump;
         let mut places: Vec<usize> = self.problems.iter().filter(|p| is_jump(p)).map(|p| p.point).collect();

@@ -15,7 +15,7 @@ pub enum LinkError {
     #[error(transparent)]
     Port(#[from] PortError),
     /// No status came.
-    #[error("{port}: no status within {waited_s:.1} s ({})", heard(*bytes))]
+    #[error("{port}: no status within {waited_s:.1} s ({})", received(*bytes))]
     NoLink {
         /// Name of the port.
         port: String,
@@ -50,7 +50,7 @@ pub enum LinkError {
     },
 }
 
-fn heard(bytes: u64) -> String {
+fn received(bytes: u64) -> String {
     match bytes {
         0 => "no byte came".into(),
         n => format!("{n} bytes came, but no frame in them"),
@@ -130,11 +130,11 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> &
         (DataStatus::StartPositionMismatch, _) => {
             "the arm is not at the first point: `jtc traj run FILE --approach` moves it there first"
         }
-        _ => "`jtc explain` tells about each code",
+        _ => "`jtc explain` explains each code",
     }
 }
 
-/// A record says that its frame was taken.
+/// The record confirms its frame.
 pub(crate) fn accepted(r: &Response) -> bool {
     r.status == FrameStatus::NoError && r.data == DataStatus::NoError
 }

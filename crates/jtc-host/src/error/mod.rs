@@ -98,7 +98,7 @@ impl Error {
             Self::Frame(_) => Diagnosis::new(
                 ErrorKind::Usage,
                 "frame",
-                "`jtc traj check` and `jtc params show` tell what the file holds",
+                "`jtc traj check` and `jtc params show` show what the file holds",
             ),
             Self::Cancelled => {
                 Diagnosis::new(ErrorKind::Fault, "cancelled", "`jtc status` shows where the arm is")

@@ -29,7 +29,7 @@ pub enum MotionError {
     RunFault {
         /// Index of the 1 ms point where it ended.
         point: u32,
-        /// The status that says so.
+        /// The status with the errors.
         status: Box<Status>,
     },
     /// The controller paused the motion because of an error that it could still act upon (J-66).
@@ -39,7 +39,7 @@ pub enum MotionError {
         point: u32,
         /// Errors of each joint that had occurred before the motion.
         before: [u16; 6],
-        /// The status that says so.
+        /// The status with the errors.
         status: Box<Status>,
     },
     /// The link was lost while the arm moves, or may move.

@@ -22,7 +22,7 @@ pub enum ParametersError {
         /// Joint, value and bounds.
         beyond: Beyond,
     },
-    /// The controller needs parameters, and nobody said whose.
+    /// The controller needs parameters, and no source of them was named.
     #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
     NoSource {
         /// What it misses.

@@ -13,7 +13,7 @@ pub enum StateError {
     /// The controller reports errors.
     #[error("the controller reports an error: {}", words::errors_line(status))]
     Device {
-        /// The status that says so.
+        /// The status with the errors.
         status: Box<Status>,
     },
     /// A state was not reached.
@@ -35,7 +35,7 @@ impl StateError {
             Self::Device { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "device-error",
-                "`jtc recover` leads back to HoldPos, `jtc explain CODE` tells about each error",
+                "`jtc recover` leads back to HoldPos, `jtc explain CODE` explains each error",
             ),
             Self::Timeout { status, .. } => {
                 Diagnosis::new(ErrorKind::Device, "state-timeout", words::next_step(status))

@@ -12,7 +12,7 @@ const fn missing(bit: u32, name: &'static str, meaning: &'static str) -> Page {
     let texts = [
         meaning,
         "It was switched on or reset since, or this parameter was not among those that were sent.",
-        "Send the arm's own, or say that those of the built-in arm are meant.",
+        "Send the arm's own, or name those of the built-in arm.",
         "jtc params push FILE",
     ];
     page(Family::Missing, bit, name, texts)
@@ -174,7 +174,7 @@ pub(super) const PAGES: &[Page] = &[
         Kind::PositionSpeed,
         "check-position-speed",
         [
-            "Positions move faster than the velocity limit, whatever the velocities say.",
+            "Positions move faster than the velocity limit, whatever the given velocities are.",
             "Times that are too short, or degrees instead of radians.",
             "Slow it down: --speed PCT.",
         ],
@@ -183,7 +183,7 @@ pub(super) const PAGES: &[Page] = &[
         Kind::VelocityMismatch,
         "check-velocity-mismatch",
         [
-            "Positions move at another speed than the velocities say.",
+            "Positions move at another speed than the given velocities.",
             "Pieces put together, or velocities in another unit.",
             "Leave the velocities out: they are derived from the positions.",
         ],
@@ -212,7 +212,7 @@ pub(super) const PAGES: &[Page] = &[
         Kind::AccelerationMismatch,
         "check-acceleration-mismatch",
         [
-            "Velocities change otherwise than the accelerations say.",
+            "Velocities change otherwise than by the given accelerations.",
             "Pieces put together, or accelerations in another unit.",
             "Leave the accelerations out: they are derived from the velocities.",
         ],

@@ -32,7 +32,7 @@ pub(super) const PAGES: &[Page] = &[
         [
             "The controller found an error by itself.",
             "One of: joint over a limit, CAN timeout. With neither of these bits beside it: the device itself failed \
-             (watchdog, hard fault, panic) and was reset; its log says where.",
+             (watchdog, hard fault, panic) and was reset; its log holds the place.",
             "Look at the more specific bits beside it; after a reset clear the errors and send the parameters again.",
             "jtc status",
         ],

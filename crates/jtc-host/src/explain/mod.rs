@@ -200,7 +200,7 @@ fn letters(text: &str) -> String {
 /// Pages for a name (`joint-position-error`), the words that a screen shows (`HoldPos`, `over-current`), a number of one family
 /// (`can:0x100`, `data:7`), a bare number (looked up in every family), or words of a name. Empty: nothing fits.
 pub fn find(query: &str) -> Vec<&'static Page> {
-    // A line of errors says of which joint each is.
+    // A line of errors names the joint of each.
     let query = match query.split_once(": ") {
         Some((node, rest)) if node.starts_with("joint ") || node == "gripper" => rest,
         _ => query,

@@ -95,7 +95,7 @@ impl PortError {
                     .into()
             }
             PortError::Several { .. } => "name one with `--port PATH` (or JTC_PORT)".into(),
-            PortError::Io { path, .. } => format!("`jtc ports` tells how {path} is"),
+            PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is"),
         }
     }
 

@@ -23,7 +23,7 @@ pub enum PortKind {
     Pci,
     /// A paired radio link.
     Bluetooth,
-    /// The system does not say.
+    /// The system does not report it.
     Unknown,
 }
 
@@ -74,7 +74,7 @@ pub fn only_one() -> Result<String, PortError> {
     let mut usable: Vec<String> = ports.iter().filter(|p| p.usable()).map(|p| p.path.clone()).collect();
     match usable.len() {
         1 => Ok(usable.remove(0)),
-        // A board that is there but cannot be opened is the more helpful thing to say.
+        // A board that is there but cannot be opened is the more helpful error.
         0 => Err(ports
             .into_iter()
             .filter(|p| matches!(p.kind, PortKind::Usb { .. }))

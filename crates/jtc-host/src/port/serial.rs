@@ -34,7 +34,7 @@ impl SerialPort {
     ///
     /// The port is not there, is used by another program, may not be opened by this user, or does not take the rate.
     pub fn open(path: &str, baud: u32) -> Result<Self, PortError> {
-        // The builder says "not found" in several words; ask the file system first.
+        // The builder reports a missing port in several ways; ask the file system first.
         if cfg!(unix) && !std::path::Path::new(path).exists() {
             return Err(PortError::NotFound { path: path.to_owned() });
         }

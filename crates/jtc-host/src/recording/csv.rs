@@ -1,4 +1,4 @@
-//! CSV files: a header with units, then one row a sample; an unknown value is an empty field. A run that was not finished says so in
+//! CSV files: a header with units, then one row a sample; an unknown value is an empty field. The end of a run that was not finished stands in
 //! lines that begin with `#`, behind all rows: readers that know no comments have the whole table before them.
 
 use std::io::Write;

@@ -20,7 +20,7 @@ pub enum RecordingError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// Its error.
         source: std::io::Error,
     },
     /// A CSV line that cannot be understood.

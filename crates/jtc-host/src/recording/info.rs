@@ -1,4 +1,4 @@
-//! What a recording says about itself: the arm, its limits, where the samples come from.
+//! The description that a recording carries: the arm, its limits, where the samples come from.
 
 use std::collections::BTreeMap;
 

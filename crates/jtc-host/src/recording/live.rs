@@ -168,8 +168,8 @@ mod tests {
             LiveRecorder::begin(file, Path::new("run.csv"), &RecordingInfo::default(), on_error).unwrap();
         drop(read);
         live.sink().write(&sample(0));
-        let said = errors.recv_timeout(Duration::from_secs(20)).unwrap();
-        assert!(said.starts_with("run.csv: ") && said.contains("pipe"), "{said}");
+        let error = errors.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert!(error.starts_with("run.csv: ") && error.contains("pipe"), "{error}");
         assert!(live.finish(&Ending::default()).is_err());
     }
 }

@@ -2,10 +2,10 @@
 //!
 //! An MCAP file holds `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so that
 //! Foxglove, PlotJuggler and Rerun plot it at once, the torque split on `/jtc/control` and states on `/jtc/state`. A CSV file
-//! has one row a sample and a header that names the units; lines that begin with `#` at its end say how a run ended that was not
+//! has one row a sample and a header that names the units; lines that begin with `#` at its end hold how a run ended that was not
 //! finished.
 //!
-//! A file that breaks off (a program that was killed, a full disk) is read as far as it is whole, and [`Recording::cut`] says what
+//! A file that breaks off (a program that was killed, a full disk) is read as far as it is whole, and [`Recording::cut`] gives what
 //! is missing.
 
 mod cdr;
@@ -136,7 +136,7 @@ impl Recorder {
         self.finish()
     }
 
-    /// Completes the file (index and summary of an MCAP file) and says how many samples it holds.
+    /// Completes the file (index and summary of an MCAP file) and returns how many samples it holds.
     ///
     /// # Errors
     ///

@@ -92,7 +92,7 @@ fn what_is_no_recording_is_refused_by_name() {
     assert!(mcap::read(b"not an mcap file").is_err());
 }
 
-/// Cut at any byte, a file gives all samples of the blocks that are whole, in the order in which they were written, and says that it
+/// Cut at any byte, a file gives all samples of the blocks that are whole, in the order in which they were written, and reports that it
 /// breaks off.
 #[test]
 fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
@@ -142,7 +142,7 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     }
 }
 
-/// A record inside a compressed chunk that says it is of a terabyte.
+/// A record inside a compressed chunk whose length is a terabyte.
 #[test]
 fn a_damaged_length_takes_no_memory() {
     let mut file = b"\x89MCAP0\r\n".to_vec();

@@ -74,7 +74,7 @@ impl RunFailure {
         Some(Self::at(info, samples, at, causes, joint))
     }
 
-    /// What a recording shows and says of its run: an error in its samples; or what ended it, as was written down; or that its end
+    /// What a recording shows of its run: an error in its samples; or what ended it, as was written down; or that its end
     /// was not seen.
     pub fn of_recording(info: &RecordingInfo, samples: &[Sample], ending: &Ending) -> Option<Self> {
         if let Some(found) = Self::find(info, samples) {
@@ -245,7 +245,7 @@ fn begin(samples: &[Sample]) -> usize {
     samples.iter().position(Sample::is_executing).unwrap_or(0)
 }
 
-/// When the run began, s: the controller's own count of milliseconds at the last sample of the motion says it best.
+/// When the run began, s: the controller's own count of milliseconds at the last sample of the motion is the most exact.
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];
     match known.iter().rfind(|s| s.state == ControllerState::Operate) {

@@ -142,7 +142,7 @@ fn a_failed_run_leads_with_what_broke_first() {
     let page = html(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });
     let headline = page.find("FAILED 600 ms into the run: joint 3: does not answer").expect("the headline");
     assert!(headline < page.find("class=\"hero\"").unwrap(), "it leads the page");
-    assert!(page.contains("<title>FAILED: "), "the title says so");
+    assert!(page.contains("<title>FAILED: "), "the title reports it");
     assert!(page.contains("<td>–</td>"), "what is not measured is no number");
     let picture =
         picture_svg(&ReportInput { info: &info, samples: &samples, facts: &[], failure: Some(&failure) });

@@ -101,7 +101,7 @@ impl<P: Port> Session<P> {
         self.command(&fixed::gripper_control(pump))
     }
 
-    /// Tells the controller to use its default of one parameter.
+    /// Commands the controller to use its default of one parameter.
     ///
     /// # Errors
     ///
@@ -110,7 +110,7 @@ impl<P: Port> Session<P> {
         self.command(&fixed::empty(parameter.use_default()))
     }
 
-    /// Tells the controller to use its defaults: friction polynomial, gains and arm model.
+    /// Commands the controller to use its defaults: friction polynomial, gains and arm model.
     ///
     /// # Errors
     ///
@@ -174,7 +174,7 @@ impl<P: Port> Session<P> {
         self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
 
-    /// Without a confirmation nobody knows whether the arm moves: such errors say so.
+    /// Without a confirmation it is not known whether the arm moves: [`MotionError::LinkLost`] states it.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let retries = self.statistics.retries;
         let record = self

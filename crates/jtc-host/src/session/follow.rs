@@ -39,7 +39,7 @@ const SETTLE: Duration = Duration::from_millis(300);
 impl<P: Port> Session<P> {
     /// Follows the execution that was just started. `each` sees every status.
     ///
-    /// When the link is lost on the way, a stop is sent that may still arrive, and the error says that the arm may be moving.
+    /// When the link is lost on the way, a stop is sent that may still arrive, and the error states that the arm may be moving.
     ///
     /// # Errors
     ///

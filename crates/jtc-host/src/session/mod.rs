@@ -287,7 +287,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Waits until `reached` says yes; `what` names it in the error.
+    /// Waits until `reached` returns true; `what` names it in the error.
     ///
     /// # Errors
     ///
@@ -338,7 +338,7 @@ fn frame_type(kind: u8) -> FrameType {
     ALL.into_iter().find(|t| *t as u8 == kind).unwrap_or(JtcStatus)
 }
 
-/// The record says that the state forbids it.
+/// The record refuses the request because of the state.
 fn not_allowed(record: &Response) -> bool {
     record.status == FrameStatus::NoError && record.data == DataStatus::NotAllowed
 }

@@ -1,4 +1,4 @@
-//! The whole way back to HoldPos, whatever the state is, with each step said.
+//! The whole way back to HoldPos, whatever the state is, with each step reported.
 
 use std::time::Duration;
 
@@ -110,7 +110,7 @@ const LOOK: Duration = Duration::from_millis(100);
 const PERSON_TIME: Duration = Duration::from_secs(60);
 
 impl<P: Port> Session<P> {
-    /// Leads the controller to HoldPos without errors. Where it misses friction, gains or arm model, `parameters` says whose it is
+    /// Leads the controller to HoldPos without errors. Where it misses friction, gains or arm model, `parameters` decides whose it is
     /// given; no source, or one that lacks a part, is an error before anything is sent. No trajectory is resumed.
     ///
     /// # Errors
@@ -120,31 +120,31 @@ impl<P: Port> Session<P> {
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,
-        say: impl FnMut(&RecoverStep),
+        report: impl FnMut(&RecoverStep),
     ) -> Result<Status, Error> {
-        self.recover_until(parameters, || false, say)
+        self.recover_until(parameters, || false, report)
     }
 
-    /// The same, until `ended` says that a person wants it to end: nothing more is sent then and the error is
+    /// The same, until `ended` returns true because a person wants it to end: nothing more is sent then and the error is
     /// [`Error::Cancelled`], but a motion is stopped and followed to its standstill first.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::recover`], and [`Error::Cancelled`] once `ended` says so.
+    /// Those of [`Session::recover`], and [`Error::Cancelled`] once `ended` returns true.
     pub fn recover_until(
         &mut self,
         parameters: ParameterSource<'_>,
         ended: impl Fn() -> bool,
-        mut say: impl FnMut(&RecoverStep),
+        mut report: impl FnMut(&RecoverStep),
     ) -> Result<Status, Error> {
         parameters.check()?;
         let status = self.fresh_status()?;
         parameters.enough_for(&status)?;
-        say(&RecoverStep::Found(words::waiting_for(&status)));
+        report(&RecoverStep::Found(words::waiting_for(&status)));
         if let Some(step) = parameters.kept(&status) {
-            say(&step);
+            report(&step);
         }
-        Recovery::new(self, parameters, ended, say).from(status)
+        Recovery::new(self, parameters, ended, report).from(status)
     }
 
     fn give(&mut self, parameters: ParameterSource<'_>) -> Result<(), Error> {
@@ -169,11 +169,11 @@ impl<P: Port> Session<P> {
 }
 
 /// A recovery on its way, with what it has done so far.
-struct Recovery<'a, P, Ended, Say> {
+struct Recovery<'a, P, Ended, Report> {
     session: &'a mut Session<P>,
     parameters: ParameterSource<'a>,
     ended: Ended,
-    say: Say,
+    report: Report,
     /// Parameters were given.
     given: bool,
     /// Nodes that were reset because they were silent.
@@ -188,14 +188,19 @@ struct Recovery<'a, P, Ended, Say> {
     acts_left: u8,
 }
 
-impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P, Ended, Say> {
-    fn new(session: &'a mut Session<P>, parameters: ParameterSource<'a>, ended: Ended, say: Say) -> Self {
+impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a, P, Ended, Report> {
+    fn new(
+        session: &'a mut Session<P>,
+        parameters: ParameterSource<'a>,
+        ended: Ended,
+        report: Report,
+    ) -> Self {
         let (given, reset_slow) = (false, false);
         Self {
             session,
             parameters,
             ended,
-            say,
+            report,
             given,
             reset: 0,
             clears: 0,
@@ -222,7 +227,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
                 }
                 Some(ControllerState::Init) => self.bring_up(&status)?,
                 Some(ControllerState::HoldPos) if status.errors == 0 => {
-                    (self.say)(&RecoverStep::HoldPos);
+                    (self.report)(&RecoverStep::HoldPos);
                     return Ok(status);
                 }
                 Some(ControllerState::HoldPos) => self.clear(0)?,
@@ -243,14 +248,14 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
     }
 
     fn give(&mut self) -> Result<(), Error> {
-        (self.say)(&RecoverStep::Give(self.parameters.arm_name()));
+        (self.report)(&RecoverStep::Give(self.parameters.arm_name()));
         self.session.give(self.parameters)?;
         self.given = true;
         self.session.pause_for(TAKEN_IN, &self.ended)
     }
 
     fn bring_up(&mut self, status: &Status) -> Result<(), Error> {
-        (self.say)(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
+        (self.report)(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
         let up = |s: &Status| !s.is_coming_up() || (self.ended)();
         match self.session.wait_for("nodes ready", NODE_TIME, up) {
             Err(Error::State(StateError::Timeout { status, .. })) if !self.reset_slow => {
@@ -262,7 +267,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
     }
 
     fn end_motion(&mut self) -> Result<(), Error> {
-        (self.say)(&RecoverStep::Stop);
+        (self.report)(&RecoverStep::Stop);
         match self.session.stop() {
             Ok(()) | Err(Error::Link(LinkError::Refused { .. })) => {}
             Err(e) => return Err(e),
@@ -272,7 +277,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
     }
 
     fn end_teaching(&mut self) -> Result<(), Error> {
-        (self.say)(&RecoverStep::TeachOff);
+        (self.report)(&RecoverStep::TeachOff);
         self.session.teach(false)?;
         let off = |s: &Status| s.state != ControllerState::Teaching || (self.ended)();
         self.session.wait_for("teaching off", START_TIME, off).map(drop)
@@ -280,7 +285,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
 
     fn leave_error(&mut self, status: &Status) -> Result<(), Error> {
         let nodes = faulty(status);
-        // Errors latch: only clearing tells whether the safety input is high again.
+        // Errors latch: only clearing shows whether the safety input is high again.
         let safety_input = status.errors & error::EMERGENCY_INPUT != 0;
         if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
             return self.wait_for_a_person(status);
@@ -291,7 +296,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
             self.reset |= silent;
             self.reset_nodes(silent)?;
         }
-        (self.say)(&RecoverStep::Clear(names(nodes)));
+        (self.report)(&RecoverStep::Clear(names(nodes)));
         self.clear(nodes)?;
         self.clears += 1;
         if self.clears > CLEARS_MAX {
@@ -303,7 +308,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
     /// Clears until the safety input is high again, for as long as a person may take.
     fn wait_for_a_person(&mut self, status: &Status) -> Result<(), Error> {
         let since = *self.asked.get_or_insert_with(|| {
-            (self.say)(&RecoverStep::SafetyInput);
+            (self.report)(&RecoverStep::SafetyInput);
             self.session.port.now()
         });
         if self.session.port.now() - since > PERSON_TIME {
@@ -319,7 +324,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Say: FnMut(&RecoverStep)> Recovery<'a, P,
     }
 
     fn reset_nodes(&mut self, nodes: u8) -> Result<(), Error> {
-        (self.say)(&RecoverStep::Reset(names(nodes)));
+        (self.report)(&RecoverStep::Reset(names(nodes)));
         self.session.reset(nodes)?;
         self.session.pause_for(BOOT, &self.ended)
     }

@@ -37,7 +37,7 @@ impl Run {
 impl<P: Port> Session<P> {
     /// Executes the trajectory that was just uploaded and follows it to its end. **The arm moves.**
     ///
-    /// `each` is called with each status and says what to do: go on, pause, resume, stop. An observer that was set before is replaced.
+    /// `each` is called with each status and returns what to do: go on, pause, resume, stop. An observer that was set before is replaced.
     pub fn run(&mut self, checked: &CheckedTrajectory, each: impl FnMut(&Status) -> Flow) -> Run {
         self.run_observed(checked, |_| {}, each)
     }

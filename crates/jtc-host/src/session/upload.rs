@@ -171,7 +171,7 @@ impl Upload {
 }
 
 impl<P: Port> Session<P> {
-    /// Uploads a trajectory that passed the check; done when the controller says that it is complete (TES Stop). Nothing moves.
+    /// Uploads a trajectory that passed the check; done when the controller reports it complete (TES Stop). Nothing moves.
     /// `progress` is called after each confirmed segment and may end it with [`Flow::Cancel`].
     ///
     /// What the controller held before is lost with the first segment.

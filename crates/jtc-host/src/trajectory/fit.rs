@@ -22,7 +22,7 @@
 //! # Overshoot
 //!
 //! A spline passes through every sample, and between samples it may leave the interval of its two neighbours: after a step it swings
-//! over, by some 10 % of the step where the samples are equally far apart. Nothing is limited here; [`Fitted::overshoot`] says how far
+//! over, by some 10 % of the step where the samples are equally far apart. Nothing is limited here; [`Fitted::overshoot`] gives how far
 //! each joint goes. What the fit made of the samples,
 //! between the points too, is what [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) looks at. Samples closer to each
 //! other where the direction changes keep it small.

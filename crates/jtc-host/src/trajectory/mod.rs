@@ -68,7 +68,7 @@ pub struct Loaded {
     pub notes: Vec<String>,
     /// How far the curve goes beyond the waypoints of a file that has positions alone.
     pub overshoot: Vec<Overshoot>,
-    /// The file says in which units its numbers are.
+    /// The file names the units of its numbers.
     pub units_named: bool,
 }
 
@@ -115,7 +115,7 @@ impl Loaded {
         Ok(self)
     }
 
-    /// From a text, told by its content.
+    /// From a text whose form is recognised by its content.
     ///
     /// # Errors
     ///

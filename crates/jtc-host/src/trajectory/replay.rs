@@ -1,6 +1,6 @@
 //! The trajectory that a recording is of.
 //!
-//! A sample of an execution says at which millisecond of its path the controller was, so the path is found whatever the line
+//! A sample of an execution holds the millisecond of its path at which the controller was, so the path is found whatever the line
 //! and the host did to the times of the samples, and also where it was paused.
 
 use std::path::Path;

@@ -225,7 +225,7 @@ fn joint_order(
     if let Some(exact) = exact {
         order.copy_from_slice(&exact);
     } else {
-        // Prefixes differ between files of the same arm: the number at the end tells the joint.
+        // Prefixes differ between files of the same arm: the number at the end is that of the joint.
         let mut ends: Vec<(u32, usize)> =
             found.iter().enumerate().filter_map(|(i, n)| Some((last_number(n)?, i))).collect();
         ends.sort_unstable();

@@ -1,4 +1,4 @@
-//! Every form of file, and what is said about broken ones.
+//! Every form of file, and the errors of broken ones.
 
 use proptest::prelude::*;
 

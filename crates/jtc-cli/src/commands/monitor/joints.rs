@@ -59,7 +59,7 @@ fn fitting(words: &[&str], width: usize) -> String {
     if words.is_empty() { String::new() } else { format!("{} above", words.len()) }
 }
 
-/// All rows, those of which nothing is known first, then those with an error: what a joint that does not answer had said last is no news of it. Where no status
+/// All rows, those of which nothing is known first, then those with an error: the last values of a joint that does not answer are no news of it. Where no status
 /// comes any more, nothing is known of any of them.
 fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     let room = usize::from(width.saturating_sub(WITH_WORDS));

@@ -41,7 +41,7 @@ pub struct View {
     /// Bytes that were in no frame.
     pub bad_bytes: u64,
     /// What became of the last key, until the next one.
-    pub said: String,
+    pub reply: String,
     /// How far causes and joints are scrolled.
     pub scroll: Scroll,
     /// NaN where a joint was not measured.
@@ -58,7 +58,7 @@ impl View {
             silent: None,
             rate: 0.0,
             bad_bytes: 0,
-            said: String::new(),
+            reply: String::new(),
             scroll: Scroll::default(),
             position: Default::default(),
             torque: Default::default(),
@@ -137,7 +137,7 @@ impl View {
             Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(area);
         frame.render_widget(Paragraph::new(above), causes);
         let (inner, skip) = (area.width.saturating_sub(2 * edge), first.saturating_sub(rest.len()));
-        // A head without a row below it says nothing.
+        // A head without a row below it is of no use.
         if table.height > heads + edge {
             frame.render_widget(joints::table(s, self.silent.is_some(), inner, framed, skip), table);
         }
@@ -165,7 +165,7 @@ impl View {
 
     /// What is wrong, and what to do.
     fn trouble(&self) -> Trouble {
-        let said = self.said.clone();
+        let reply = self.reply.clone();
         let (causes, warnings, next) = match (&self.last, self.silent) {
             (None, None) => (Vec::new(), vec!["waiting for a status".into()], String::new()),
             (None, Some(time)) => (vec![silence(time)], Vec::new(), "jtc doctor".into()),
@@ -183,7 +183,7 @@ impl View {
                 (causes, warnings, words::next_step(s).to_owned())
             }
         };
-        Trouble { causes, warnings, next, message: said }
+        Trouble { causes, warnings, next, message: reply }
     }
 
     fn curves(&self, frame: &mut Frame<'_>, area: Rect) {

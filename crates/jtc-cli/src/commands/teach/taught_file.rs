@@ -9,7 +9,7 @@ use cli_kit::OutputFile;
 
 /// Movement below this is standing still, rad.
 const STILL: f64 = 0.002;
-/// The controller's own grid, s: the host's clock only says which status was lost.
+/// The controller's own grid, s: the host's clock only shows which status was lost.
 const GRID_S: f64 = 0.04;
 /// Fewer rows are no motion.
 const LEAST: usize = 3;

@@ -10,7 +10,7 @@ use urdf_rs::{Joint, JointType, Robot};
 
 use crate::file::{FileError, Place};
 
-/// What a user says of the arm in a robot description that has more than one in it.
+/// The part of a robot description that is the arm, where it holds more than one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ArmChoice {
     /// Names of the six joints that move, base to wrist; `None`: there are no others.
@@ -139,7 +139,7 @@ fn kind(joint: &Joint) -> String {
     format!("{:?}", joint.joint_type).to_lowercase()
 }
 
-/// Why these are no six-axis arm, and how to say which joints are meant.
+/// Why these are no six-axis arm, and how to select the joints.
 fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileError {
     // The longest chain of rotary joints.
     let chain_to = |end: &Joint| -> Vec<&Joint> {

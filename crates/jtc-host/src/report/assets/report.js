@@ -51,7 +51,7 @@
   const [rms, rmsJoint] = best("rms_error_mrad");
   const [max, maxJoint] = best("max_error_mrad");
   const [share, shareJoint] = best("torque_share");
-  // Figures of a run that failed say nothing about how well it went: they are only in the table below.
+  // Figures of a run that failed are no measure of how well it went: they are only in the table below.
   const failed = known(data.failure_s);
   if (!failed && known(rms)) tile(round(rms, 2), "mrad", `worst RMS error, ${names[rmsJoint].toLowerCase()}`);
   if (!failed && known(max)) tile(round(max, 2), "mrad", `largest error, ${names[maxJoint].toLowerCase()}`);

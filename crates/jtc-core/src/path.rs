@@ -6,6 +6,8 @@
 //! with all the torque there is. Then the slope is what the arm achieves at its torque limits, which are computed with the
 //! feedback torque in it: set values never run away from an arm that cannot follow (time scaling under torque limits, Dahl and
 //! Nielsen 1990).
+use jtc_dynamics::sqrt;
+
 use crate::DT;
 
 /// Path time and how fast it goes.
@@ -59,7 +61,7 @@ impl Ramp {
 
     /// The slope from which the rest of the way just suffices to flatten out.
     fn flatten(&self, distance: f64) -> f64 {
-        self.round * (root(0.25 + 2.0 * distance / (self.round * DT)) - 0.5)
+        self.round * (sqrt(0.25 + 2.0 * distance / (self.round * DT)) - 0.5)
     }
 
     /// The slope after `now` on the way to a rate that is `distance` away; both in the direction of travel.
@@ -160,15 +162,6 @@ impl PathClock {
             self.slope = if self.rate < 1.0 { -slope } else { 0.0 };
         }
     }
-}
-
-/// Square root by Newton's method from above, which needs no library: enough for a slope, not for more.
-fn root(x: f64) -> f64 {
-    let mut y = 0.5 * (x + 1.0);
-    for _ in 0..24 {
-        y = 0.5 * (y + x / y);
-    }
-    y
 }
 
 #[cfg(test)]

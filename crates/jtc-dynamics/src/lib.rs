@@ -18,7 +18,7 @@ use inverse::JointSinesCosines;
 
 pub use kinematics::Pose;
 pub use model::{ArmModel, Field, JOINTS, JointVec, Link, ModelError, Origin};
-pub use trig::{SIN_COS_MAX, sin_cos};
+pub use trig::{SIN_COS_MAX, sin_cos, sqrt};
 
 /// An arm prepared for kinematics and dynamics: what does not depend on the joint positions is precomputed.
 ///

@@ -1,4 +1,4 @@
-//! Sine and cosine of f64 without the standard library and without branches on the argument.
+//! Sine, cosine and square root of f64 without the standard library; sine and cosine without branches on the argument.
 
 use core::f64::consts::FRAC_2_PI;
 
@@ -57,9 +57,9 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     (f64::from_bits((s ^ mixed) ^ sign_s), f64::from_bits((c ^ mixed) ^ sign_c))
 }
 
-/// Square root of a finite `x` ≥ 0 by Newton's method; 0 for anything below the normal numbers. For set-up,
-/// not for the tick.
-pub(crate) fn sqrt(x: f64) -> f64 {
+/// Square root of a finite `x` ≥ 0 by Newton's method, within 2^-52 of its value; 0 for a NaN and for anything below the
+/// normal numbers, negative ones among them. It takes five divisions.
+pub fn sqrt(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return 0.0;
     }

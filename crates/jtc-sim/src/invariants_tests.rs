@@ -1,5 +1,8 @@
 //! The checker finds what it is there to find.
+use jtc_core::{Config, Telemetry};
+
 use super::*;
+use crate::plant::Truth;
 
 /// A controller that behaves, one tick after the other; each test lets it misbehave in one way.
 struct Script {

@@ -10,13 +10,27 @@ use crate::drive::{Drive, DriveFault};
 use crate::faults::FaultKind;
 use crate::gripper::Gripper;
 use crate::request::NodeRequest;
-use crate::world::Truth;
 
 /// Length of a drive's tick and of a step of the arm, s.
 const TICK: f64 = 1e-3;
 
 /// An answer of a node and how long after the end of the request it is ready, µs.
 pub type ReadyAnswer = (u32, Frame);
+
+/// How the arm really is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Truth {
+    /// Position, rad.
+    pub q: JointVec,
+    /// Velocity, rad/s.
+    pub qd: JointVec,
+    /// Torque of the drives, N·m.
+    pub torque: JointVec,
+    /// Torque of pushes and of a hand, N·m.
+    pub outside: JointVec,
+    /// Bearing temperature, °C.
+    pub temperature: JointVec,
+}
 
 /// Drives, gripper and arm.
 ///

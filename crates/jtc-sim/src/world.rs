@@ -14,7 +14,7 @@ use crate::serial::{Line, LineFault};
 
 mod access;
 
-pub use access::{Statistics, Truth};
+pub use access::Statistics;
 
 /// Length of a tick, µs.
 const TICK_US: u64 = 1000;

@@ -3,7 +3,8 @@ use jtc_bus::NodeState;
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
 
-use super::{Broken, Moment};
+use super::broken::Broken;
+use super::moment::Moment;
 use crate::board::Worked;
 
 /// Ticks from a pause or stop until the arm stands: the time of J-33, and some in which what was commanded comes to rest.

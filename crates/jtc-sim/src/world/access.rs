@@ -1,7 +1,7 @@
 //! What users of the world see and do.
 use jtc_bus::{Frame, NODES, NodeState};
 use jtc_core::{BusState, Telemetry};
-use jtc_dynamics::{ArmModel, JointVec};
+use jtc_dynamics::ArmModel;
 
 use super::{TICK_US, World};
 use crate::board::Worked;
@@ -11,21 +11,7 @@ use crate::event::Log;
 use crate::faults::{Fault, FaultKind, Trigger};
 use crate::hand::HandPath;
 use crate::invariants::Moment;
-
-/// How the arm really is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Truth {
-    /// Position, rad.
-    pub q: JointVec,
-    /// Velocity, rad/s.
-    pub qd: JointVec,
-    /// Torque of the drives, N·m.
-    pub torque: JointVec,
-    /// Torque of pushes and of a hand, N·m.
-    pub outside: JointVec,
-    /// Bearing temperature, °C.
-    pub temperature: JointVec,
-}
+use crate::plant::Truth;
 
 /// Counted since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,0 +1,124 @@
+//! What the checker finds.
+use core::fmt;
+
+use jtc_core::{ControllerState, TrajectoryState};
+
+/// An invariant that was broken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Broken {
+    /// A torque went out in a state without torque.
+    Torque {
+        /// State.
+        state: ControllerState,
+        /// Joint.
+        joint: usize,
+        /// N·m.
+        torque: f64,
+    },
+    /// A torque is larger than the joint's limit.
+    TorqueLimit {
+        /// Joint.
+        joint: usize,
+        /// N·m.
+        torque: f64,
+        /// N·m.
+        limit: f64,
+    },
+    /// A number is NaN or infinite.
+    NotFinite {
+        /// What.
+        what: &'static str,
+        /// Joint.
+        joint: usize,
+    },
+    /// The error state was left, though the host had not cleared anything.
+    LeftErrorAlone {
+        /// State that was entered.
+        to: ControllerState,
+    },
+    /// Operate was entered without Execute from the host.
+    MovedAlone,
+    /// Teaching was entered without a command from the host.
+    TaughtAlone,
+    /// An execution state that only the host can bring about.
+    ExecutionAlone {
+        /// State that was entered.
+        to: TrajectoryState,
+    },
+    /// The point index went back within a run.
+    IndexFell {
+        /// Before.
+        from: u32,
+        /// Now.
+        to: u32,
+    },
+    /// No frame went out though the controller ticked and is not in Start.
+    Silent {
+        /// State.
+        state: ControllerState,
+    },
+    /// Frames that take the place of Move are too close together.
+    NoMove {
+        /// Ticks since the last such frame.
+        ticks: u32,
+    },
+    /// The first frame after an error is not Move with zero torque.
+    ErrorWithoutZero,
+    /// A node is asked to be enabled in a state that does not want it.
+    Enabled {
+        /// State.
+        state: ControllerState,
+        /// Node.
+        node: usize,
+    },
+    /// What went out is no frame of the protocol.
+    UnknownFrame {
+        /// Its id.
+        id: u16,
+    },
+    /// A pause or stop took too long, though no error intervened (J-33).
+    NoStop {
+        /// Ticks since it was commanded.
+        ticks: u32,
+    },
+    /// A joint with torque was too fast for too long (J-35).
+    Speed {
+        /// Joint.
+        joint: usize,
+        /// Measured velocity, rad/s.
+        velocity: f64,
+        /// Consecutive measurements above the limit.
+        ticks: u16,
+    },
+    /// A torque was at its limit too often, though the arm did not brake and no load was caught (J-43).
+    Saturated {
+        /// Joint.
+        joint: usize,
+        /// So many of the last 100 ticks.
+        ticks: u32,
+    },
+    /// The safety output does not follow from the errors.
+    SafetyOutput {
+        /// Its level.
+        level: bool,
+        /// Error word.
+        errors: u16,
+    },
+}
+
+/// A broken invariant and its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Violation {
+    /// µs since the start.
+    pub time_us: u64,
+    /// What.
+    pub broken: Broken,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {:.3} s: {:?}", self.time_us as f64 * 1e-6, self.broken)
+    }
+}
+
+impl std::error::Error for Violation {}

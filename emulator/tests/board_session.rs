@@ -182,7 +182,7 @@ fn j40_torques_have_the_same_bits_as_on_a_pc() {
     }
     assert!(moved.len() > 1_000, "{} different torques", moved.len());
     // A joint that is stuck: the position error grows over its limit.
-    rig.inject(jtc_sim::FaultKind::Friction { joint: 1, factor: 30.0 });
+    rig.inject(jtc_sim::FaultKind::Friction { joint: jtc_bus::Joint::ALL[1], factor: 30.0 });
     rig.wait("an error", 2_000, |rig| rig.state() == ControllerState::Error);
     rig.run(200);
     assert_ne!(rig.status(HOST).joints[1].internal_occurred, 0, "of that joint");

@@ -3,6 +3,7 @@
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
 
+use jtc_bus::Joint;
 use jtc_core::{Config, Friction};
 use jtc_host::arm::{Arm, FrictionChoice, ParameterFile, ParameterSet};
 use jtc_host::port::sim::SimPort;
@@ -211,7 +212,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
     let (t, _) = upload(&mut s, &t).unwrap();
     s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::MotorFault { joint: 2, bits: 2 },
+        kind: FaultKind::MotorFault { joint: Joint::ALL[2], bits: 2 },
         trigger: Trigger::AtPoint(500),
         duration_ms: Some(300),
     });
@@ -462,7 +463,7 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     s.wait_hold(Duration::from_secs(15)).unwrap();
     let (t, _) = upload(&mut s, &trajectory(2_000)).unwrap();
     s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::Push { joint: 4, torque: 38.0 },
+        kind: FaultKind::Push { joint: Joint::ALL[4], torque: 38.0 },
         trigger: Trigger::AtPoint(500),
         duration_ms: Some(400),
     });

@@ -3,6 +3,7 @@
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
 
+use jtc_bus::Joint;
 use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, ParameterSource};
@@ -80,7 +81,7 @@ fn recover_says_each_step_of_each_state() {
     assert_eq!(stopped.iter().filter(|s| *s == waiting).count(), 1, "{stopped:?}");
     assert_eq!(stopped.last().unwrap(), done);
     s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::MotorFault { joint: 2, bits: 2 },
+        kind: FaultKind::MotorFault { joint: Joint::ALL[2], bits: 2 },
         trigger: Trigger::At(0),
         duration_ms: Some(300),
     });

@@ -1,5 +1,5 @@
 #![doc = include_str!("fault_file.md")]
-use jtc_bus::GRIPPER;
+use jtc_bus::{GRIPPER, Joint};
 use jtc_core::{ControllerState, JOINTS};
 use serde::Deserialize;
 
@@ -212,15 +212,15 @@ impl Reader<'_> {
     /// The node of a joint or of the gripper.
     fn node(&mut self) -> Result<u8, FaultFileError> {
         match (self.entry.joint, self.entry.gripper.take()) {
-            (Some(_), None | Some(false)) => self.joint(),
+            (Some(_), None | Some(false)) => Ok(self.joint()?.index() as u8),
             (None, Some(true)) => Ok(GRIPPER as u8),
             _ => Err(FaultFileError::Device { fault: self.number, kind: self.entry.kind.clone() }),
         }
     }
 
-    /// The node of a joint, which the file counts from 1.
-    fn joint(&mut self) -> Result<u8, FaultFileError> {
-        Ok(self.whole("joint", |e| &mut e.joint, 1.0, JOINTS as f64)? - 1)
+    fn joint(&mut self) -> Result<Joint, FaultFileError> {
+        let number = self.whole("joint", |e| &mut e.joint, 1.0, JOINTS as f64)?;
+        Joint::from_number(number.into()).ok_or_else(|| self.missing("joint"))
     }
 
     fn bits(&mut self) -> Result<u8, FaultFileError> {

@@ -11,7 +11,7 @@ fn the_documented_example_is_read() {
     let expected = [
         Fault { kind: FaultKind::NodeSilent { node: 2 }, trigger: Trigger::At(3500), duration_ms: Some(50) },
         Fault {
-            kind: FaultKind::EncoderJump { joint: 1, rad: 0.3 },
+            kind: FaultKind::EncoderJump { joint: Joint::ALL[1], rad: 0.3 },
             trigger: Trigger::InState(ControllerState::Operate, 1000),
             duration_ms: None,
         },
@@ -21,7 +21,7 @@ fn the_documented_example_is_read() {
             duration_ms: Some(2000),
         },
         Fault {
-            kind: FaultKind::Push { joint: 2, torque: 12.0 },
+            kind: FaultKind::Push { joint: Joint::ALL[2], torque: 12.0 },
             trigger: Trigger::InState(ControllerState::HoldPos, 2000),
             duration_ms: Some(500),
         },

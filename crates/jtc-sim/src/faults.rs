@@ -1,7 +1,7 @@
 //! What can go wrong in the simulated world, and when.
 use core::fmt;
 
-use jtc_bus::GRIPPER;
+use jtc_bus::{GRIPPER, Joint};
 use jtc_core::ControllerState;
 
 use crate::hand::HandPath;
@@ -21,49 +21,49 @@ pub enum FaultKind {
     },
     /// The motor control reports faults.
     MotorFault {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
         /// Bits of the fault byte.
         bits: u8,
     },
     /// The gate driver reports a fault.
     HardwareFault {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
     },
     /// A drive goes to its fault state with no error bit set, once.
     FaultState {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
     },
     /// A drive answers requests for another state, and stays in the one that it is in.
     IgnoresState {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
     },
     /// The encoder reads something else.
     EncoderJump {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
         /// Added to the position, rad.
         rad: f64,
     },
     /// A drive reports that its position is not accurate.
     NotAccurate {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
     },
     /// Friction is multiplied.
     Friction {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
         /// Times the true one.
         factor: f64,
     },
     /// A bearing is at this temperature.
     Temperature {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
         /// °C.
         celsius: f64,
     },
@@ -109,8 +109,8 @@ pub enum FaultKind {
     TickOverrun,
     /// Someone pushes a joint.
     Push {
-        /// 0..5.
-        joint: u8,
+        /// Which.
+        joint: Joint,
         /// N·m.
         torque: f64,
     },
@@ -162,17 +162,17 @@ impl fmt::Display for FaultKind {
                     joint => write!(f, " joint {}", joint + 1),
                 }
             }
-            Self::MotorFault { joint, bits } => write!(f, " joint {} bits 0x{bits:02X}", joint + 1),
+            Self::MotorFault { joint, bits } => write!(f, " {joint} bits 0x{bits:02X}"),
             Self::HardwareFault { joint }
             | Self::FaultState { joint }
             | Self::IgnoresState { joint }
             | Self::NotAccurate { joint } => {
-                write!(f, " joint {}", joint + 1)
+                write!(f, " {joint}")
             }
-            Self::EncoderJump { joint, rad } => write!(f, " joint {} by {rad} rad", joint + 1),
-            Self::Friction { joint, factor } => write!(f, " joint {} times {factor}", joint + 1),
-            Self::Temperature { joint, celsius } => write!(f, " joint {} at {celsius} °C", joint + 1),
-            Self::Push { joint, torque } => write!(f, " joint {} by {torque} N·m", joint + 1),
+            Self::EncoderJump { joint, rad } => write!(f, " {joint} by {rad} rad"),
+            Self::Friction { joint, factor } => write!(f, " {joint} times {factor}"),
+            Self::Temperature { joint, celsius } => write!(f, " {joint} at {celsius} °C"),
+            Self::Push { joint, torque } => write!(f, " {joint} by {torque} N·m"),
             Self::FramesLost { probability }
             | Self::FramesCorrupted { probability }
             | Self::FramesGarbled { probability }

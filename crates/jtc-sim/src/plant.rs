@@ -162,7 +162,7 @@ impl Plant {
                     }
                 }
             },
-            FaultKind::FaultState { joint } => self.nodes.drives[usize::from(joint)].force_fault(),
+            FaultKind::FaultState { joint } => self.nodes.drives[joint.index()].force_fault(),
             _ => {}
         }
     }
@@ -183,15 +183,15 @@ impl Plant {
                     Some(drive) => drive.safety_line = true,
                     None => gripper_line = true,
                 },
-                FaultKind::MotorFault { joint, bits } => drives[usize::from(joint)].motor_control |= bits,
-                FaultKind::HardwareFault { joint } => drives[usize::from(joint)].hardware = true,
-                FaultKind::EncoderJump { joint, rad } => drives[usize::from(joint)].encoder_offset += rad,
-                FaultKind::Push { joint, torque } => self.push[usize::from(joint)] += torque,
-                FaultKind::IgnoresState { joint } => drives[usize::from(joint)].ignores_state = true,
-                FaultKind::NotAccurate { joint } => drives[usize::from(joint)].not_accurate = true,
-                FaultKind::Friction { joint, factor } => friction[usize::from(joint)] *= factor,
+                FaultKind::MotorFault { joint, bits } => drives[joint.index()].motor_control |= bits,
+                FaultKind::HardwareFault { joint } => drives[joint.index()].hardware = true,
+                FaultKind::EncoderJump { joint, rad } => drives[joint.index()].encoder_offset += rad,
+                FaultKind::Push { joint, torque } => self.push[joint.index()] += torque,
+                FaultKind::IgnoresState { joint } => drives[joint.index()].ignores_state = true,
+                FaultKind::NotAccurate { joint } => drives[joint.index()].not_accurate = true,
+                FaultKind::Friction { joint, factor } => friction[joint.index()] *= factor,
                 FaultKind::Temperature { joint, celsius } => {
-                    self.arm.temperature[usize::from(joint)] = celsius;
+                    self.arm.temperature[joint.index()] = celsius;
                 }
                 _ => {}
             }

@@ -1,4 +1,5 @@
 //! Hours of virtual time with random commands and faults, every millisecond checked: the soak run.
+use jtc_bus::Joint;
 use jtc_core::{ControllerState, JOINTS, JointConfig, JointTelemetry, TrajectoryState};
 use jtc_dynamics::JointVec;
 use jtc_wire::{ExecCommand, FrameType, RawPoint};
@@ -255,7 +256,7 @@ impl Soak {
     fn throw(&mut self) {
         let rng = &mut self.rng;
         self.next_fault = self.now + rng.u64(500..25_000);
-        let joint = rng.u8(0..6);
+        let joint = Joint::ALL[usize::from(rng.u8(0..6))];
         let node = rng.u8(0..7);
         let small = rng.f64() * 0.05;
         let kind = match rng.u8(0..24) {

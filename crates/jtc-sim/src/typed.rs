@@ -1,7 +1,7 @@
 //! Events that a person types while a simulation runs: `push 3 12 0.5`, `hand FILE`.
 use core::fmt;
 
-use jtc_dynamics::JOINTS;
+use jtc_bus::{JOINTS, Joint};
 
 /// The events, for people.
 pub const TYPED_EVENTS_HELP: &str =
@@ -17,8 +17,8 @@ const PUSH_MAX_S: f64 = 60.0;
 pub enum TypedEvent {
     /// Someone pushes.
     Push {
-        /// 0..5: people count from 1.
-        joint: u8,
+        /// Which joint.
+        joint: Joint,
         /// N·m in the joint's positive direction.
         torque: f64,
         /// s.
@@ -35,7 +35,7 @@ impl fmt::Display for TypedEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Push { joint, torque, seconds } => {
-                write!(f, "push: joint {} by {torque} N·m for {seconds} s", joint + 1)
+                write!(f, "push: {joint} by {torque} N·m for {seconds} s")
             }
             Self::Hand { file } => write!(f, "hand: leads along {file} while the arm is taught"),
         }
@@ -105,13 +105,13 @@ fn push(words: &[&str]) -> Result<TypedEvent, TypedEventError> {
         let number = word.parse().ok().filter(|x: &f64| *x >= low && *x <= high);
         number.ok_or_else(|| TypedEventError::Value { what, word: word.into(), allowed: (low, high) })
     };
-    let number = value("joint", joint, 1.0, JOINTS as f64)?;
-    if number.fract() != 0.0 {
-        let word = (*joint).into();
-        return Err(TypedEventError::Value { what: "joint", word, allowed: (1.0, JOINTS as f64) });
-    }
+    let allowed = (1.0, JOINTS as f64);
+    let number = value("joint", joint, allowed.0, allowed.1)?;
+    let whole = Some(number as usize).filter(|_| number.fract() == 0.0).and_then(Joint::from_number);
+    let joint =
+        whole.ok_or_else(|| TypedEventError::Value { what: "joint", word: (*joint).into(), allowed })?;
     Ok(TypedEvent::Push {
-        joint: number as u8 - 1,
+        joint,
         torque: value("torque (N·m)", torque, -PUSH_MAX, PUSH_MAX)?,
         seconds: value("time (s)", seconds, 0.001, PUSH_MAX_S)?,
     })
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn events_are_read_and_joints_count_from_1() {
-        let push = TypedEvent::Push { joint: 2, torque: 12.0, seconds: 0.5 };
+        let push = TypedEvent::Push { joint: Joint::ALL[2], torque: 12.0, seconds: 0.5 };
         assert_eq!(TypedEvent::parse("  push 3 12  0.5 \n"), Ok(Some(push.clone())));
         assert_eq!(push.to_string(), "push: joint 3 by 12 N·m for 0.5 s");
         let hand = TypedEvent::Hand { file: "my lead.csv".into() };

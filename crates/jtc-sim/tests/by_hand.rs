@@ -1,4 +1,5 @@
 //! Someone pushes the arm and leads it by the hand.
+use jtc_bus::Joint;
 use jtc_core::ControllerState;
 use jtc_sim::{FaultPlan, HandPath, Operator, SimConfig, host};
 use jtc_wire::FrameType;
@@ -32,7 +33,7 @@ fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
 fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     let mut operator = held(FaultPlan::default());
     operator.run(500);
-    operator.world.push(2, 40.0, 200);
+    operator.world.push(Joint::ALL[2], 40.0, 200);
     let far = farthest(&mut operator, 2, 300);
     assert!((1e-3..0.05).contains(&far), "{far} rad");
     operator.run(1500);

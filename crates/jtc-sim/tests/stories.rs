@@ -1,4 +1,5 @@
 //! Short stories of an operator and an arm.
+use jtc_bus::Joint;
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::invariants::Invariants;
 use jtc_sim::{BusTap, DriveConfig, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
@@ -218,7 +219,7 @@ fn j12_the_first_frame_after_an_error_is_zero_torque_also_during_bring_up() {
     for at in 245..285 {
         let mut world = jtc_sim::World::new(SimConfig::default());
         world.host_write(&host::use_defaults());
-        let kind = FaultKind::MotorFault { joint: 4, bits: 4 };
+        let kind = FaultKind::MotorFault { joint: Joint::ALL[4], bits: 4 };
         world.inject(Fault { kind, trigger: Trigger::At(at), duration_ms: Some(50) });
         let mut invariants = Invariants::default();
         for _ in 0..400 {

@@ -1,5 +1,5 @@
 //! What goes wrong in a row of the tables, and why nothing happens where nothing happens.
-use jtc_bus::GRIPPER;
+use jtc_bus::{GRIPPER, Joint};
 use jtc_core::ControllerState;
 use jtc_wire::{FrameType, fixed};
 
@@ -116,9 +116,11 @@ const fn fault(kind: FaultKind) -> Act {
     Act::Fault(kind, LASTING_MS)
 }
 
-const SILENT: FaultKind = FaultKind::NodeSilent { node: 1 };
-const GLITCH: FaultKind = FaultKind::EncoderJump { joint: 1, rad: 0.3 };
-const IGNORES: FaultKind = FaultKind::IgnoresState { joint: 1 };
+/// The joint that faults of one joint concern.
+const MEANT: Joint = Joint::ALL[1];
+const SILENT: FaultKind = FaultKind::NodeSilent { node: MEANT.index() as u8 };
+const GLITCH: FaultKind = FaultKind::EncoderJump { joint: MEANT, rad: 0.3 };
+const IGNORES: FaultKind = FaultKind::IgnoresState { joint: MEANT };
 const ALL_LOST: FaultKind = FaultKind::FramesLost { probability: 1.0 };
 
 pub(super) const ROWS: [Row; 39] = [
@@ -132,22 +134,26 @@ pub(super) const ROWS: [Row; 39] = [
     seen("joint silent", fault(SILENT)),
     borne("joint silent for 4 ms", Act::Fault(SILENT, 4), "bridged"),
     seen("joint reboots", Act::Fault(FaultKind::NodeReboot { node: 1 }, 1)),
-    seen("joint: motor-control fault", fault(FaultKind::MotorFault { joint: 1, bits: 0x04 })),
-    seen("joint: gate driver fault", fault(FaultKind::HardwareFault { joint: 1 })),
-    seen("joint in fault state, no error bit", Act::Fault(FaultKind::FaultState { joint: 1 }, 1)),
+    seen("joint: motor-control fault", fault(FaultKind::MotorFault { joint: MEANT, bits: 0x04 })),
+    seen("joint: gate driver fault", fault(FaultKind::HardwareFault { joint: MEANT })),
+    seen("joint in fault state, no error bit", Act::Fault(FaultKind::FaultState { joint: MEANT }, 1)),
     seen(
         "the same, cleared in the tick that finds it",
-        Act::Cleared(FaultKind::FaultState { joint: 1 }, 1, 2),
+        Act::Cleared(FaultKind::FaultState { joint: MEANT }, 1, 2),
     ),
     seen("joint: safety line", fault(FaultKind::SafetyLine { node: 1 })),
     seen("joint: encoder jumps by 0.3 rad", fault(GLITCH)),
     borne("joint: encoder jumps by 0.3 rad for 1 ms", Act::Fault(GLITCH, 1), "bridged"),
     borne("joint: encoder jumps by 0.3 rad for 3 ms", Act::Fault(GLITCH, 3), "bridged"),
     seen("joint: encoder jumps by 0.3 rad for 10 ms", Act::Fault(GLITCH, 10)),
-    seen("joint: encoder jumps by 0.05 rad", fault(FaultKind::EncoderJump { joint: 1, rad: 0.05 })),
-    powered("joint: position not accurate", fault(FaultKind::NotAccurate { joint: 1 })),
-    borne("joint: friction times 3", fault(FaultKind::Friction { joint: 1, factor: 3.0 }), "controlled"),
-    borne("joint: bearing at 60 °C", fault(FaultKind::Temperature { joint: 1, celsius: 60.0 }), "controlled"),
+    seen("joint: encoder jumps by 0.05 rad", fault(FaultKind::EncoderJump { joint: MEANT, rad: 0.05 })),
+    powered("joint: position not accurate", fault(FaultKind::NotAccurate { joint: MEANT })),
+    borne("joint: friction times 3", fault(FaultKind::Friction { joint: MEANT, factor: 3.0 }), "controlled"),
+    borne(
+        "joint: bearing at 60 °C",
+        fault(FaultKind::Temperature { joint: MEANT, celsius: 60.0 }),
+        "controlled",
+    ),
     borne("gripper silent", fault(FaultKind::NodeSilent { node: 6 }), "shown"),
     borne("gripper reboots", Act::Fault(FaultKind::NodeReboot { node: 6 }, 1), "shown"),
     borne("gripper reset by the host", Act::ResetGripper, "shown"),

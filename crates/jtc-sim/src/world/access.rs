@@ -1,5 +1,5 @@
 //! What users of the world see and do.
-use jtc_bus::{Frame, NODES, NodeState};
+use jtc_bus::{Frame, Joint, NODES, NodeState};
 use jtc_core::{BusState, Telemetry};
 use jtc_dynamics::ArmModel;
 
@@ -143,8 +143,8 @@ impl World {
         self.faults.add(fault);
     }
 
-    /// Someone pushes a joint (0..5) with a torque (N·m) for some milliseconds, from now on.
-    pub fn push(&mut self, joint: u8, torque: f64, ms: u64) {
+    /// Someone pushes a joint with a torque (N·m) for some milliseconds, from now on.
+    pub fn push(&mut self, joint: Joint, torque: f64, ms: u64) {
         let trigger = Trigger::At(self.now_us() / TICK_US);
         self.inject(Fault { kind: FaultKind::Push { joint, torque }, trigger, duration_ms: Some(ms) });
     }

@@ -8,7 +8,6 @@ mod failure;
 mod interrupt;
 mod session;
 mod shape;
-mod words;
 
 use std::process::ExitCode;
 use std::time::Duration;

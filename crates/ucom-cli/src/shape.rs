@@ -3,15 +3,8 @@
 use cli_kit::table;
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Profile, Status};
+use ucom_host::date_text;
 use ucom_host::master::BoardSeen;
-
-/// A flash date as text, `2026-05-04`; the bare number where the profile's form does not fit.
-pub fn date(profile: &Profile, date: u16) -> String {
-    match profile.prog_date.decode(date) {
-        Some((year, month, day)) => format!("{year:04}-{month:02}-{day:02}"),
-        None => format!("0x{date:04X}"),
-    }
-}
 
 /// The names of the bits that are set.
 pub fn bits(status: Status) -> Vec<&'static str> {
@@ -42,7 +35,7 @@ pub fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
         "state": state(info.status),
         "application": application,
         "program_id": application.then_some(info.program_id),
-        "flash_date": application.then(|| date(profile, info.date)),
+        "flash_date": application.then(|| date_text(profile, info.date)),
     })
 }
 
@@ -57,7 +50,7 @@ pub fn board_value(board: &BoardSeen, profile: &Profile) -> Value {
 pub fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
     let row = |b: &BoardSeen| {
         let (program, day) = match b.info.has_application() {
-            true => (format!("0x{:04X}", b.info.program_id), date(profile, b.info.date)),
+            true => (format!("0x{:04X}", b.info.program_id), date_text(profile, b.info.date)),
             false => ("none".into(), "-".into()),
         };
         vec![

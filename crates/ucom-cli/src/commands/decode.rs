@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use cli_kit::{Output, Stop};
 use serde_json::json;
+use ucom_host::Decoder;
 use ucom_host::ProfileFile;
 use ucom_host::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 use ucom_host::session::{CleanupList, protocol_frame, recorded};
@@ -14,7 +15,6 @@ use super::record::report_broken_off;
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::failure::Failure;
 use crate::interrupt::listen;
-use crate::words::Decoder;
 
 /// Lines that are read before they are decoded, at most.
 const READ_AHEAD: usize = 64;

@@ -5,13 +5,12 @@ use std::time::{Duration, Instant};
 use cli_kit::Output;
 use serde_json::json;
 use ucom_host::files::recording::RecordedFrame;
-use ucom_host::session::replayed;
+use ucom_host::session::bus_off::{WHY, next};
+use ucom_host::session::{is_intrusive, replayed};
 
 use super::decode::parsed;
-use super::record::is_intrusive;
 use crate::args::{LinkArgs, SendArgs};
 use crate::failure::{Failure, NO_LINK, REFUSED};
-use ucom_host::session::bus_off::{WHY, next};
 
 /// How long the adapter is listened to afterwards: a controller that leaves the bus does so within some 32 tries of a frame.
 const SENT: Duration = Duration::from_millis(50);

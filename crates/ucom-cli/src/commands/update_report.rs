@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use cli_kit::{Output, table};
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Memory, Profile};
+use ucom_host::date_text;
 use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult};
 
 use super::update_files::has_header;
 use crate::failure::exit;
-use crate::shape::date;
 
 /// Prints the report; `names` are the files of its images.
 pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {
@@ -17,7 +17,7 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
     let value = json!({
         "dry_run": report.dry_run,
         "program_id": report.program_id,
-        "flash_date": has_header(profile).then(|| date(profile, report.date)),
+        "flash_date": has_header(profile).then(|| date_text(profile, report.date)),
         "bytes": report.bytes,
         "images": images.clone().map(|(image, name)| image_value(image, name)).collect::<Vec<_>>(),
         "unverifiable": report.unverifiable.map(|why| json!({ "reason": why.to_string(), "hint": why.hint() })),
@@ -36,8 +36,11 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
         }
         text += &images.map(|(image, name)| image_line(image, name)).collect::<String>();
         if let Some(id) = report.program_id.filter(|_| !report.dry_run) {
-            let day =
-                if has_header(profile) { format!(", {}", date(profile, report.date)) } else { String::new() };
+            let day = if has_header(profile) {
+                format!(", {}", date_text(profile, report.date))
+            } else {
+                String::new()
+            };
             text += &format!("program 0x{id:04X}{day}\n");
         }
         text += &boards(report);
@@ -69,7 +72,9 @@ fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     let Some(why) = report.unverifiable else { return String::new() };
     let line = |b: &UpdateResult| {
         let shown = |info: Option<BoardInfo>| match info {
-            Some(i) if i.has_application() => format!("0x{:04X}, {}", i.program_id, date(profile, i.date)),
+            Some(i) if i.has_application() => {
+                format!("0x{:04X}, {}", i.program_id, date_text(profile, i.date))
+            }
             Some(_) => "no application".into(),
             None => "?".into(),
         };
@@ -134,7 +139,7 @@ fn result(b: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value {
             let application = i.has_application();
             json!({
                 "program_id": application.then_some(i.program_id),
-                "flash_date": application.then(|| date(profile, i.date)),
+                "flash_date": application.then(|| date_text(profile, i.date)),
             })
         })
     };

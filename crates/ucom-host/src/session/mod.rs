@@ -5,6 +5,7 @@
 //! - [`CleanupList`]: what would be left undone if the process ended now.
 //! - [`Cache`], [`History`]: what is remembered of boards from session to session.
 //! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: values by name as words of boards, checked before anything is sent.
+//! - [`Recorder`], [`replay()`]: frames of the bus to a recording and back.
 //! - [`Followed`]: the boards of a run under supervision.
 pub mod bus_off;
 mod cleanup;
@@ -17,6 +18,8 @@ mod link;
 mod parameters;
 mod plans;
 pub mod pump;
+mod recorder;
+mod replay;
 mod selection;
 mod values;
 
@@ -31,5 +34,7 @@ pub use parameters::{
     FileWords, ParameterFile, Parameters, arrived, become_master, inventory, name_of, write,
 };
 pub use plans::{plans, remember};
+pub use recorder::Recorder;
+pub use replay::{is_intrusive, replay};
 pub use selection::{Assignment, Boards, for_board, only};
 pub use values::{Prepared, Word, note_rounded, with_names, words};

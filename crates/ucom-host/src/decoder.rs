@@ -8,8 +8,6 @@ use ucom::{
     StringAssembler, ToBoard,
 };
 
-use crate::shape::date;
-
 /// A frame in words.
 pub struct Described {
     /// Function, or why it is foreign.
@@ -206,7 +204,7 @@ fn info_words(info: &BoardInfo, profile: &Profile) -> (String, Value) {
         "status": info.status.0,
         "program_id": info.program_id,
         "date": info.date,
-        "flash_date": info.has_application().then(|| date(profile, info.date)),
+        "flash_date": info.has_application().then(|| date_text(profile, info.date)),
     });
     (text, value)
 }
@@ -226,4 +224,12 @@ fn admin_value(admin: ucom::Admin) -> Value {
 pub fn hex(bytes: &[u8]) -> String {
     let all: Vec<String> = bytes.iter().map(|b| format!("{b:02X}")).collect();
     all.join(" ")
+}
+
+/// A flash date as text, `2026-05-04`; the bare number where the profile's form does not fit.
+pub fn date_text(profile: &Profile, date: u16) -> String {
+    match profile.prog_date.decode(date) {
+        Some((year, month, day)) => format!("{year:04}-{month:02}-{day:02}"),
+        None => format!("0x{date:04X}"),
+    }
 }

@@ -1,0 +1,117 @@
+//! Recording a bus: frames with their time, and with what they are.
+
+use std::io::Write;
+use std::path::Path;
+
+use can_link::CanFrame;
+use ucom::Profile;
+
+use super::link::{protocol_frame, recorded};
+use crate::ProfileFile;
+use crate::decoder::Decoder;
+use crate::files::recording::{CandumpWriter, Record, RecordingError, RecordingFormat, RecordingWriter};
+use crate::master::Master;
+
+enum Sink {
+    File(RecordingWriter),
+    Stream(CandumpWriter<Box<dyn Write>>),
+}
+
+/// A recording that is being written; it listens on the way who answers to which number.
+pub struct Recorder {
+    sink: Sink,
+    /// Frames of other protocols may have no form in it.
+    only_protocol: bool,
+    channel: String,
+    decoder: Decoder,
+    master: Master,
+    frames: u64,
+    left_out: u64,
+}
+
+impl Recorder {
+    /// A recording as a file, with the profile in it or beside it; `channel` is the bus's name in it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn file(
+        path: &Path,
+        format: RecordingFormat,
+        profile: Profile,
+        channel: &str,
+    ) -> Result<Self, RecordingError> {
+        let sink = Sink::File(RecordingWriter::create(path, format, &profile.to_toml())?);
+        let only_protocol = format == RecordingFormat::FziCan;
+        Ok(Self { only_protocol, ..Self::new(sink, profile, channel) })
+    }
+
+    /// A recording as lines in candump's form.
+    pub fn stream(out: impl Write + 'static, profile: Profile, channel: &str) -> Self {
+        Self::new(Sink::Stream(CandumpWriter::new(Box::new(out))), profile, channel)
+    }
+
+    fn new(sink: Sink, profile: Profile, channel: &str) -> Self {
+        let (decoder, master) = (Decoder::new(profile), Master::new(profile));
+        Self { sink, only_protocol: false, channel: channel.into(), decoder, master, frames: 0, left_out: 0 }
+    }
+
+    /// Writes a frame that came at `now_us` of the session and at `time_ns` since 1970.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn take(&mut self, now_us: u64, time_ns: u64, frame: &CanFrame) -> Result<(), RecordingError> {
+        let frame = recorded(frame);
+        self.master.handle(now_us, protocol_frame(&frame));
+        while self.master.take_event().is_some() {}
+        let name = self.decoder.describe(now_us, &protocol_frame(&frame)).name;
+        let record = Record { time_ns, channel: self.channel.clone(), direction: None, frame };
+        let written = match &mut self.sink {
+            Sink::File(writer) => writer.write(&record, Some(&name)),
+            Sink::Stream(writer) => writer.write(&record),
+        };
+        match written {
+            Ok(()) => self.frames += 1,
+            Err(_) if self.only_protocol && protocol_frame(&record.frame).is_err() => self.left_out += 1,
+            Err(e) => return Err(e),
+        }
+        Ok(())
+    }
+
+    /// Lets what was written reach the disk: a recorder that is killed afterwards does not lose it.
+    ///
+    /// # Errors
+    /// The disk does not take it.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        match &mut self.sink {
+            Sink::File(writer) => writer.flush(),
+            // Line by line by itself.
+            Sink::Stream(_) => Ok(()),
+        }
+    }
+
+    /// Frames that were written.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Frames of other protocols that the form has no place for.
+    pub fn left_out(&self) -> u64 {
+        self.left_out
+    }
+
+    /// What was received, as a master that only listens sees it.
+    pub fn master(&self) -> &Master {
+        &self.master
+    }
+
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// Its end cannot be written.
+    pub fn finish(self) -> Result<(), RecordingError> {
+        match self.sink {
+            Sink::File(writer) => writer.finish(),
+            Sink::Stream(_) => Ok(()),
+        }
+    }
+}

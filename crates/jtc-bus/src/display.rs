@@ -2,7 +2,7 @@
 
 use core::fmt::{Display, Formatter, Result};
 
-use crate::{Answer, Bits, Frame, GripperReport, JointReport, Request, Scale, Target};
+use crate::{Answer, Bits, Frame, GRIPPER, GripperReport, Joint, JointReport, Request, Scale, Target};
 use crate::{config, error, id, motor_control, warning};
 
 /// Any frame of the bus, decoded; one that is not understood is shown with the reason and its bytes.
@@ -105,14 +105,16 @@ impl Display for Request {
     }
 }
 
+/// A node by its number on the bus.
 struct Node(u8);
 
 impl Display for Node {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        if usize::from(self.0) == crate::GRIPPER {
-            return f.write_str("gripper");
+        match Joint::from_index(self.0.into()) {
+            Some(joint) => joint.fmt(f),
+            None if usize::from(self.0) == GRIPPER => f.write_str("gripper"),
+            None => write!(f, "node {}", self.0),
         }
-        write!(f, "joint {}", self.0)
     }
 }
 

@@ -216,7 +216,7 @@ fn frames_read_as_words() {
     };
     assert_eq!(
         Answer::Joint { node: 4, report }.emit(SCALE).to_string(),
-        "204 joint 4 0.5000 rad, 0.0000 rad/s, 0.0 N·m, 31 °C, fault, motor control: over-current, \
+        "204 joint 5 0.5000 rad, 0.0000 rad/s, 0.0 N·m, 31 °C, fault, motor control: over-current, \
          motor control before: over-voltage, errors: motor-control fault, warnings: position not accurate"
     );
     assert_eq!(frame(0x3FF, &[1, 0xAB]).to_string(), "3FF no frame of the joint bus has id 0x3FF: 01 AB");

@@ -6,10 +6,10 @@ use can_link::{CanFrame, Id};
 use jtc_sim::{FaultKind, Plant, SimConfig};
 
 use crate::clock::{MICROSECOND, MILLISECOND, Time};
-use crate::cpu::Machine;
 use crate::elf::Elf;
 use crate::fdcan::{CanPeers, WireFault};
 use crate::gpio::Pin;
+use crate::machine::Machine;
 use crate::usart::WireByte;
 
 /// Safety input and output of the Nucleo boards.

@@ -9,12 +9,12 @@ use unicorn_engine::{ArmCpuModel, RegisterARM, Unicorn};
 use crate::chip::Chip;
 use crate::clock::Time;
 use crate::code::{LOWERS_SP, PLAIN, SEV, UNKNOWN, WATCHED, classify};
-use crate::dma::Memory;
 use crate::elf::Elf;
 use crate::exception;
+use crate::machine::{Machine, Sleep};
 use crate::memory;
 use crate::nvic::{self, Masks};
-use crate::observe::{Fault, FaultKind, Reset, ResetCause};
+use crate::observe::{FaultKind, Reset, ResetCause};
 use crate::rcc::flag;
 
 /// Numbers that Unicorn gives to exceptions of the core.
@@ -27,36 +27,6 @@ mod raised {
 
 /// Addresses from here on are exception returns.
 const EXC_RETURN: u32 = 0xFFFF_FFE0;
-
-/// Memory as the peripherals reach it.
-pub(crate) struct Ram<'a>(pub Unicorn<'a, Chip>);
-
-impl Memory for Ram<'_> {
-    fn read(&mut self, address: u32, bytes: &mut [u8]) -> bool {
-        self.0.mem_read(u64::from(address), bytes).is_ok()
-    }
-    fn write(&mut self, address: u32, bytes: &[u8]) -> bool {
-        self.0.mem_write(u64::from(address), bytes).is_ok()
-    }
-}
-
-/// The machine: core, memory and peripherals of the controller board, with a firmware in its flash.
-pub struct Machine {
-    pub(crate) uc: Unicorn<'static, Chip>,
-    elf: Elf,
-    sleep: Sleep,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sleep {
-    Awake,
-    /// In WFI.
-    Interrupt,
-    /// In WFE.
-    Event,
-    /// Locked up: only a reset helps.
-    Lockup,
-}
 
 impl Machine {
     /// A board with this firmware in its flash; power is switched on. `seed` decides what RAM holds before anything was
@@ -81,53 +51,12 @@ impl Machine {
         machine
     }
 
-    /// The chip around the core.
-    pub fn chip(&mut self) -> &mut Chip {
-        self.uc.get_data_mut()
-    }
-
-    /// The firmware's file.
-    pub fn elf(&self) -> &Elf {
-        &self.elf
-    }
-
-    /// Virtual time since power-on.
-    pub fn now(&self) -> Time {
-        self.uc.get_data().now()
-    }
-
-    /// Instructions executed since power-on.
-    pub fn instructions(&self) -> u64 {
-        self.uc.get_data().core.instructions
-    }
-
-    /// A core register.
-    pub fn register(&self, register: RegisterARM) -> u32 {
-        self.uc.reg_read(register).unwrap_or(0) as u32
-    }
-
-    /// The instruction that comes next.
-    pub fn pc(&self) -> u32 {
-        self.register(RegisterARM::PC)
-    }
-
-    /// The core stands still after a fault within a fault.
-    pub fn locked_up(&self) -> bool {
-        self.sleep == Sleep::Lockup
-    }
-
     /// Run until a moment of virtual time.
     pub fn run_until(&mut self, end: Time) {
         while self.now() < end {
             self.slice(end);
         }
         self.catch_up();
-    }
-
-    /// Let peripherals happen up to now.
-    pub(crate) fn catch_up(&mut self) {
-        let mut ram = Ram(self.uc.clone());
-        self.uc.get_data_mut().advance(&mut ram);
     }
 
     /// Pull the reset pin or write SYSRESETREQ: RAM and reset flags stay.
@@ -163,62 +92,6 @@ impl Machine {
         self.set(PC, entry | 1);
         self.sleep = Sleep::Awake;
         self.remap();
-    }
-
-    pub(crate) fn set(&mut self, register: RegisterARM, value: u32) {
-        // Every register named here exists on this core.
-        let _ = self.uc.reg_write(register, u64::from(value));
-    }
-
-    /// A word of memory; `None` where nothing is.
-    pub fn word(&self, address: u32) -> Option<u32> {
-        let mut bytes = [0; 4];
-        self.uc.mem_read(u64::from(address), &mut bytes).ok()?;
-        Some(u32::from_le_bytes(bytes))
-    }
-
-    /// Bytes of memory; `None` where nothing is.
-    pub fn memory(&self, address: u32, length: usize) -> Option<Vec<u8>> {
-        self.uc.mem_read_as_vec(u64::from(address), length).ok()
-    }
-
-    /// Change memory from outside, as a debugger does, code too; false where nothing is.
-    pub fn poke(&mut self, address: u32, bytes: &[u8]) -> bool {
-        let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
-        if written && self.chip().code.forget(address, bytes.len() as u32) {
-            // What was translated from the old code would go on running.
-            let _ = self.uc.ctl_flush_tb();
-        }
-        written
-    }
-
-    /// Read a register of a peripheral from outside, as a debugger does.
-    pub fn read_register(&mut self, address: u32) -> u32 {
-        let mut ram = Ram(self.uc.clone());
-        self.uc.get_data_mut().load(address, 4, &mut ram)
-    }
-
-    /// Write a register of a peripheral from outside, as a debugger does.
-    pub fn write_register(&mut self, address: u32, value: u32) {
-        let mut ram = Ram(self.uc.clone());
-        self.uc.get_data_mut().store(address, 4, value, &mut ram);
-        if self.uc.get_data().remap {
-            self.remap();
-        }
-    }
-
-    pub(crate) fn masks(&self) -> Masks {
-        Masks {
-            primask: self.register(RegisterARM::PRIMASK) & 1 == 1,
-            faultmask: self.register(RegisterARM::FAULTMASK) & 1 == 1,
-            basepri: self.register(RegisterARM::BASEPRI) as u8,
-        }
-    }
-
-    /// D2 SRAM can be used as far as its clocks are enabled.
-    fn remap(&mut self) {
-        self.chip().remap = false;
-        memory::protect(&mut self.uc);
     }
 
     /// Up to the next event, but not beyond `end`.
@@ -342,34 +215,6 @@ impl Machine {
                 self.sleep = Sleep::Event;
             }
         }
-    }
-
-    /// A fault at an instruction: HardFault, or lock-up within it.
-    pub(crate) fn fault(&mut self, kind: FaultKind, pc: u32) {
-        let masks = self.masks();
-        let chip = self.chip();
-        let address = chip.core.fault_address;
-        let hard = nvic::exception::HARD_FAULT;
-        let lockup = chip.nvic.is_active(hard) || masks.faultmask;
-        chip.observers.faults.push(Fault { time: chip.now(), kind, pc, address, lockup });
-        chip.scs.hfsr |= 1 << 30;
-        match kind {
-            FaultKind::BadAccess => {
-                chip.scs.cfsr |= 1 << 9 | 1 << 15;
-                chip.scs.bfar = address;
-            }
-            FaultKind::BadJump => chip.scs.cfsr |= 1 << 8,
-            FaultKind::Undefined => chip.scs.cfsr |= 1 << 16,
-            FaultKind::BadReturn => chip.scs.cfsr |= 1 << 18,
-            FaultKind::Breakpoint => {}
-        }
-        self.set(RegisterARM::PC, pc | 1);
-        if lockup {
-            self.sleep = Sleep::Lockup;
-            return;
-        }
-        let now = self.now();
-        self.chip().nvic.pend(hard, now);
     }
 }
 

@@ -2,7 +2,7 @@
 //! registers, which is the larger of the two frames of the hardware.
 use unicorn_engine::RegisterARM::{self, *};
 
-use crate::cpu::Machine;
+use crate::machine::Machine;
 use crate::observe::FaultKind;
 
 const BASIC: [RegisterARM; 6] = [R0, R1, R2, R3, R12, LR];

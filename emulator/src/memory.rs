@@ -3,8 +3,20 @@ use unicorn_engine::Unicorn;
 use unicorn_engine::unicorn_const::Prot;
 
 use crate::chip::Chip;
-use crate::cpu::Ram;
+use crate::dma::Memory;
 use crate::rcc::Gate;
+
+/// Memory as the peripherals reach it.
+pub(crate) struct Ram<'a>(pub Unicorn<'a, Chip>);
+
+impl Memory for Ram<'_> {
+    fn read(&mut self, address: u32, bytes: &mut [u8]) -> bool {
+        self.0.mem_read(u64::from(address), bytes).is_ok()
+    }
+    fn write(&mut self, address: u32, bytes: &[u8]) -> bool {
+        self.0.mem_write(u64::from(address), bytes).is_ok()
+    }
+}
 
 /// Start of flash bank 1; bank 2 follows 1 MiB behind.
 pub const FLASH: u32 = 0x0800_0000;

@@ -1,6 +1,6 @@
 //! Observers by the names of the firmware's symbols, and its log.
-use crate::cpu::Machine;
 use crate::elf::ElfError;
+use crate::machine::Machine;
 use crate::observe::Count;
 
 /// A counter of a function's instructions.

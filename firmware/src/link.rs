@@ -8,12 +8,11 @@ use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use critical_section::Mutex;
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant};
 use jtc_wire::{EventBatch, FRAME_MAX, ReceivedEvent, Receiver};
 use openjtc_firmware::{BAUD, lines};
 
+use crate::summary::{self, Summary};
 use crate::uart;
 
 /// Inter-byte timeout: silence that ends a frame, µs (J-03).
@@ -24,9 +23,6 @@ const CHUNK: usize = 1024;
 const ROUNDS: usize = 64;
 /// Bytes behind which the links may be: DMA overwrites what is older than the ring is long, and goes on while they read.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
-
-/// There may be something to do: a tick has ended, or a line has fallen idle.
-pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Counts up with every round of the links: the tick sees by it that they are alive.
 pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
@@ -182,7 +178,7 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn) -> ! {
     let mut turn = 0;
     let mut report = Report::new();
     loop {
-        WORK.wait().await;
+        uart::WORK.wait().await;
         ROUNDS_DONE.fetch_add(1, Ordering::Relaxed);
         for _ in 0..ROUNDS {
             let mut more = false;
@@ -210,7 +206,7 @@ struct Report {
     next: Instant,
     line_errors: [u32; lines::LINES],
     lost: [u64; lines::LINES],
-    tick: crate::tick::Summary,
+    tick: Summary,
 }
 
 impl Report {
@@ -219,7 +215,7 @@ impl Report {
             next: Instant::now(),
             line_errors: [0; lines::LINES],
             lost: [0; lines::LINES],
-            tick: crate::tick::Summary::new(),
+            tick: Summary::new(),
         }
     }
 
@@ -239,7 +235,7 @@ impl Report {
             self.lost = lost;
             defmt::warn!("bytes lost, more than can be executed: RS422 {=u64}, USB {=u64}", lost[0], lost[1]);
         }
-        let tick = crate::tick::summary();
+        let tick = critical_section::with(|cs| summary::LAST.borrow(cs).get());
         if tick != self.tick {
             self.tick = tick;
             defmt::info!("{}", tick);

@@ -18,9 +18,10 @@ use static_cell::StaticCell;
 
 use crate::board::Pins;
 use crate::fault::Boot;
-use crate::fdcan::{Counters, Fdcan, ReceivedFrames};
+use crate::fdcan::{Fdcan, ReceivedFrames};
 use crate::link::{self, SlotOut};
-use crate::uart::{Lookahead, Transmitter};
+use crate::summary::{self, Summary};
+use crate::uart::{self, Lookahead, Transmitter};
 
 /// The controller with its trajectory elsewhere.
 type Jtc = Controller<&'static mut [RawPoint]>;
@@ -51,26 +52,6 @@ pub struct Parts {
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
     /// How this start came about.
     pub boot: Boot,
-}
-
-/// The tick in the log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-pub struct Summary {
-    /// State of the controller.
-    pub state: u8,
-    /// Current error word.
-    pub errors: u16,
-    /// Joint bus.
-    pub bus: Counters,
-    /// Ticks that were left out because the one before took too long.
-    pub left_out: u32,
-}
-
-impl Summary {
-    /// Before the first tick.
-    pub const fn new() -> Self {
-        Self { state: 0, errors: 0, bus: Counters::new(), left_out: 0 }
-    }
 }
 
 struct Tick {
@@ -109,7 +90,6 @@ impl Links {
 
 /// The tick's own; it takes it out while it runs.
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
-static SUMMARY: Mutex<Cell<Summary>> = Mutex::new(Cell::new(Summary::new()));
 
 /// Starts the ticks. Not inlined: the controller is large, and its way through the stack should not last.
 #[inline(never)]
@@ -151,11 +131,6 @@ pub fn start(parts: Parts) {
     pac::TIM7.cr1().write(|w| w.set_cen(true));
 }
 
-/// What the log should know, as of the last tick.
-pub fn summary() -> Summary {
-    critical_section::with(|cs| SUMMARY.borrow(cs).get())
-}
-
 #[interrupt]
 fn TIM7() {
     if !pac::TIM7.sr().read().uif() {
@@ -166,9 +141,9 @@ fn TIM7() {
     let summary = tick.run();
     critical_section::with(|cs| {
         TICK.borrow(cs).set(Some(tick));
-        SUMMARY.borrow(cs).set(summary);
+        summary::LAST.borrow(cs).set(summary);
     });
-    link::WORK.signal(());
+    uart::WORK.signal(());
 }
 
 impl Tick {

@@ -16,10 +16,15 @@ use embassy_stm32::pac::usart::vals::Over8;
 use embassy_stm32::pac::{DMA1, DMAMUX1};
 use embassy_stm32::peripherals::{USART2, USART3};
 use embassy_stm32::{Peri, interrupt, pac, rcc};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use jtc_wire::STATUS_LEN;
 use openjtc_firmware::clock::Baud;
 
-use crate::{clocks, link};
+use crate::clocks;
+
+/// There may be something to do for the links: a tick has ended, or a line has fallen idle.
+pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Bytes of a ring: 21 ms at 15 MBd.
 pub const RING: usize = 32 * 1024;
@@ -301,5 +306,5 @@ fn USART3() {
 /// The line has been silent for the time of a byte.
 fn idle(usart: Usart) {
     usart.icr().write(|w| w.set_idle(true));
-    link::WORK.signal(());
+    WORK.signal(());
 }

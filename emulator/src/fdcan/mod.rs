@@ -1,6 +1,7 @@
 //! FDCAN1 (RM0399 chapter 56, a Bosch M_CAN) with its message RAM: filters, dedicated buffers, FIFOs, transmission by
 //! identifier, error counters and bus-off.
 mod bus;
+mod pending;
 mod ram;
 mod registers;
 mod transmit;
@@ -12,8 +13,8 @@ pub use ram::{MessageRam, Target};
 
 use crate::clock::{NEVER, Time};
 use bus::NOMINAL_BIT;
+use pending::Pending;
 use ram::ELEMENT_SIZES;
-use transmit::Pending;
 
 /// Bits of CCCR.
 mod cccr {

@@ -1,7 +1,7 @@
 //! The registers from 0x4000_A000.
 use super::{Fdcan, Fifo, INTEGRATION, RECOVERY, cccr, lec};
 use crate::clock::{NEVER, Time};
-use crate::fdcan::transmit::Pending;
+use crate::fdcan::pending::Pending;
 
 impl Fdcan {
     /// Read a word.

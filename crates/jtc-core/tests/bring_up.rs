@@ -1,8 +1,8 @@
 //! Order of the bring-up: what counts when, and who is asked for what (J-16, J-20, J-21).
 mod rig;
 
-use jtc_bus::{Answer, Frame, JointReport, NodeState, Request, Target};
-use jtc_core::{Config, ControllerState};
+use jtc_bus::{Answer, Frame, JointReport, NodeState, Request, Target, warning};
+use jtc_core::{Config, ControllerState, error};
 use jtc_wire::{DataStatus, FrameType};
 use rig::{Rig, SCALE};
 
@@ -206,4 +206,130 @@ fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
     }
     rig.nodes[2].stays_ready = false;
     rig.until(500, |rig| rig.state() == ControllerState::HoldPos);
+}
+
+#[test]
+fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
+    let mut rig = Rig::new(Config::avena());
+    rig.run(500);
+    // Without parameters it stays in Init, with no joint enabled.
+    assert_eq!(rig.state(), ControllerState::Init);
+    assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.state == NodeState::READY && n.configured));
+    let status = rig.status();
+    assert_eq!((status.jtc_init, status.node_init), (0b111, 0));
+    // Each parameter clears its bit; then Init ends.
+    for (t, left) in [
+        (FrameType::PidParamUseDefault, 0b101),
+        (FrameType::FrictionTableUseDefault, 0b100),
+        (FrameType::ArmModelUseDefault, 0b000),
+    ] {
+        assert_eq!(rig.ask(t, &[]), DataStatus::NoError);
+        assert_eq!(rig.status().jtc_init, left);
+    }
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+    rig.run(100);
+    assert!(rig.nodes.iter().all(|n| n.report.state == NodeState::ENABLED && n.resets == 1));
+}
+
+#[test]
+fn j20_no_node_is_enabled_before_the_reset_of_the_boot() {
+    let mut rig = Rig::new(Config::avena());
+    for node in &mut rig.nodes {
+        node.report.state = NodeState::READY;
+        node.configured = true;
+    }
+    rig.defaults();
+    rig.run(40);
+    let reset = rig.sent.iter().position(|r| *r == Request::ResetAll).expect("a reset");
+    for request in &rig.sent[..reset] {
+        assert!(matches!(request, Request::Move { torque, .. } if *torque == [0.0; 6]));
+    }
+    assert_eq!(rig.sent.iter().filter(|r| **r == Request::ResetAll).count(), 1);
+}
+
+#[test]
+fn j20_waits_for_accurate_positions() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.run(30);
+    rig.nodes[3].report.warnings = warning::POSITION_NOT_ACCURATE;
+    rig.run(300);
+    assert_eq!(rig.state(), ControllerState::Init);
+    assert_eq!(rig.status().node_init, 1 << 3);
+    rig.nodes[3].report.warnings = 0;
+    rig.run(5);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+}
+
+#[test]
+fn j20_a_node_that_falls_back_to_init_takes_the_controller_back() {
+    let mut rig = Rig::holding();
+    rig.nodes[2].configured = false;
+    rig.nodes[2].report.state = NodeState::INIT;
+    rig.run(2);
+    assert_eq!(rig.state(), ControllerState::Init);
+    assert_eq!(rig.torque, [0.0; 6]);
+    assert_eq!(rig.errors(), 0);
+    rig.run(200);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+    assert!(rig.nodes.iter().all(|n| n.resets == 1), "later entries reset none");
+}
+
+#[test]
+fn j20_the_gripper_can_be_absent() {
+    let mut rig = Rig::new(Config { gripper: false, ..Config::avena() });
+    rig.nodes[6].silent = true;
+    rig.defaults();
+    rig.run(3000);
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
+}
+
+#[test]
+fn j16_leaving_operation_enable_unasked_is_an_error() {
+    let mut rig = Rig::holding();
+    rig.nodes[3].report.state = NodeState::READY;
+    rig.run(2);
+    assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
+    assert_eq!(rig.torque, [0.0; 6]);
+}
+
+#[test]
+fn j16_enabling_has_a_time_limit() {
+    let mut rig = Rig::new(Config { enable_timeout_ms: 500, ..Config::avena() });
+    rig.nodes[2].slow_enable = true;
+    rig.defaults();
+    rig.until(200, |r| r.state() == ControllerState::HoldPos);
+    rig.run(490);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+    // The arm has to have been still for 50 ms before enabling is asked for.
+    rig.run(80);
+    assert_eq!(
+        (rig.state(), rig.errors()),
+        (ControllerState::Error, error::EXTERNAL | error::EXTERNAL_JOINTS)
+    );
+    // The default leaves time for the four seconds of motor alignment.
+    assert_eq!(Config::avena().enable_timeout_ms, 10_000);
+}
+
+#[test]
+fn j16_only_known_states_are_requested_and_positions_count_after_configuration() {
+    let mut rig = Rig::new(Config::avena());
+    for (j, node) in rig.nodes.iter_mut().enumerate() {
+        node.report.position = 0.1 * j as f64;
+    }
+    rig.follow = false;
+    rig.defaults();
+    for _ in 0..400 {
+        rig.tick();
+        let t = rig.controller.telemetry();
+        for j in 0..6 {
+            let q = t.joints[j].position;
+            assert!(q == 0.0 || (q - 0.1 * j as f64).abs() < 1e-6);
+            // A hold position is never latched from the zero that is reported before configuration.
+            if t.state == ControllerState::HoldPos {
+                assert!((t.joints[j].set_position - 0.1 * j as f64).abs() < 1e-6);
+            }
+        }
+    }
+    assert_eq!(rig.state(), ControllerState::HoldPos);
 }

@@ -1,6 +1,7 @@
 //! Answers that are missing, or that no arm can have given: no torque step when they go, none when they come back (J-35, J-63).
 mod rig;
 
+use jtc_bus::Request;
 use jtc_core::{Config, ControllerState, JointTelemetry, error};
 use jtc_wire::{FrameType, RawPoint};
 use rig::{Rig, pieces};
@@ -212,4 +213,56 @@ fn j35_a_position_that_becomes_accurate_may_jump() {
     rig.run(300);
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     assert!((rig.controller.telemetry().joints[JOINT].position - 0.037).abs() < 1e-6);
+}
+
+#[test]
+fn j14_five_unanswered_moves_are_a_receive_timeout() {
+    for node in 0..6 {
+        let mut rig = Rig::holding();
+        rig.nodes[node].silent = true;
+        let from = rig.sent.len();
+        rig.until(30, |r| r.state() == ControllerState::Error);
+        assert_eq!(rig.status().can_current, 1 << (8 + node));
+        // The answer to the last Move before the silence still arrives; then five are missed.
+        let moves = rig.sent[from..].iter().take_while(|r| matches!(r, Request::Move { .. })).count();
+        assert!(moves >= 5);
+        let mut rig = Rig::holding();
+        rig.nodes[node].silent = true;
+        rig.run(4);
+        rig.nodes[node].silent = false;
+        rig.run(20);
+        assert_eq!(rig.state(), ControllerState::HoldPos, "four missed answers are no error yet");
+    }
+}
+
+#[test]
+fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
+    let mut rig = Rig::holding();
+    rig.acknowledged = false;
+    rig.run(4);
+    assert_eq!(rig.state(), ControllerState::HoldPos);
+    rig.run(2);
+    assert_eq!(rig.state(), ControllerState::Error);
+    assert_eq!(rig.status().can_current, 1);
+}
+
+#[test]
+fn j14_a_bus_on_which_every_node_boots_is_no_error_until_that_takes_too_long() {
+    let mut rig = Rig::new(Config::avena());
+    rig.defaults();
+    rig.acknowledged = false;
+    rig.run(1500);
+    assert_eq!((rig.state(), rig.errors()), (ControllerState::Init, 0));
+    rig.run(600);
+    assert_eq!((rig.state(), rig.status().can_current), (ControllerState::Error, 1));
+}
+
+#[test]
+fn j14_bus_off_is_an_error_at_once() {
+    let mut rig = Rig::holding();
+    rig.bus_off = true;
+    rig.tick();
+    assert_eq!(rig.state(), ControllerState::Error);
+    assert!(matches!(rig.sent.last(), Some(Request::Move { torque, .. }) if *torque == [0.0; 6]));
+    assert_ne!(rig.errors() & error::INTERNAL_CAN, 0);
 }

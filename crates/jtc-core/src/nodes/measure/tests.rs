@@ -1,0 +1,215 @@
+//! What is measured, and what is predicted in its place (J-35, J-63).
+extern crate std;
+
+use super::*;
+
+const VELOCITY_MAX: f64 = 2.0;
+
+fn tick(answer: Option<f64>, velocity: f64) -> Tick {
+    let answer = answer.map(|position| Reading { position, velocity });
+    Tick { answer, expected: true, commanded: velocity, elapsed_ms: 1, velocity_max: VELOCITY_MAX }
+}
+
+/// A joint that has moved at this velocity for a while; it is at 0 now.
+fn moving(velocity: f64) -> Measurement {
+    let mut joint = Measurement::default();
+    for k in -20..=0 {
+        assert!(joint.step(&tick(Some(velocity * f64::from(k) * DT), velocity), &Config::avena()));
+    }
+    joint
+}
+
+#[test]
+fn j63_a_missing_answer_is_predicted_from_the_motion() {
+    for velocity in [0.0, 0.4, -1.5] {
+        let mut joint = moving(velocity);
+        for k in 1..=4 {
+            assert!(!joint.step(&tick(None, velocity), &Config::avena()));
+            assert!((joint.used().position - velocity * f64::from(k) * DT).abs() < 1e-12);
+            assert_eq!(joint.used().velocity, velocity);
+        }
+    }
+    // The change of the commanded velocity is followed.
+    let mut joint = moving(0.4);
+    let slower = Tick { commanded: 0.1, ..tick(None, 0.4) };
+    joint.step(&slower, &Config::avena());
+    assert!((joint.used().position - 0.1 * DT).abs() < 1e-12);
+    assert!((joint.used().velocity - 0.1).abs() < 1e-12);
+}
+
+/// A joint that was thrown is not carried on as fast as it flew.
+#[test]
+fn j63_no_more_is_carried_on_than_a_little_over_the_velocity_limit() {
+    for (velocity, carried) in [(1.7, 1.7), (2.5, 1.2 * VELOCITY_MAX), (-2.5, -1.2 * VELOCITY_MAX)] {
+        let mut joint = moving(velocity);
+        joint.step(&tick(None, velocity), &Config::avena());
+        assert!((joint.used().position - carried * DT).abs() < 1e-12, "{:?}", joint.used());
+    }
+}
+
+#[test]
+fn j35_the_reach_grows_with_the_time_since_the_last_usable_answer() {
+    for silent in 0..4 {
+        let reach = 3.0 * VELOCITY_MAX * f64::from(silent + 1) * DT;
+        for (distance, usable) in [(reach, true), (1.01 * reach, false), (-1.01 * reach, false)] {
+            let mut joint = moving(0.0);
+            for _ in 0..silent {
+                joint.step(&tick(None, 0.0), &Config::avena());
+            }
+            assert_eq!(joint.step(&tick(Some(distance), 0.0), &Config::avena()), usable);
+        }
+    }
+}
+
+#[test]
+fn j35_neither_position_nor_velocity_of_an_unusable_answer_is_used() {
+    let mut joint = moving(0.2);
+    let glitch = Tick { commanded: 0.2, ..tick(Some(0.05), 1.9) };
+    assert!(!joint.step(&glitch, &Config::avena()));
+    assert!((joint.used().position - 0.2 * DT).abs() < 1e-12 && joint.used().velocity == 0.2);
+    joint.forget();
+    assert!(joint.step(&glitch, &Config::avena()), "after the error the next answer is taken as it is");
+    assert_eq!(joint.used(), Reading { position: 0.05, velocity: 1.9 });
+}
+
+#[test]
+fn j63_the_return_of_the_answers_makes_no_step_and_ends_at_the_answer() {
+    let mut joint = moving(0.0);
+    for _ in 0..4 {
+        joint.step(&tick(None, 0.0), &Config::avena());
+    }
+    let mut last = joint.used();
+    let mut after_100_ms = last;
+    for k in 0..1000 {
+        joint.step(&Tick { commanded: 0.0, ..tick(Some(0.01), 0.5) }, &Config::avena());
+        let now = joint.used();
+        assert!((now.position - last.position).abs() < 1.6 * 0.01 / 100.0, "{k}: {last:?} {now:?}");
+        assert!((now.velocity - last.velocity).abs() < 1.6 * 0.5 / 100.0, "{k}: {last:?} {now:?}");
+        last = now;
+        if k == 100 {
+            after_100_ms = now;
+        }
+    }
+    assert_eq!(last, Reading { position: 0.01, velocity: 0.5 });
+    // Most of it within the setting, 100 ms.
+    assert!(
+        (0.01 - after_100_ms.position).abs() < 0.2 * 0.01 && (0.5 - after_100_ms.velocity).abs() < 0.2 * 0.5
+    );
+}
+
+#[test]
+fn j63_a_long_tick_is_predicted_for_its_length() {
+    let mut joint = moving(0.4);
+    joint.step(&Tick { elapsed_ms: 3, ..tick(None, 0.4) }, &Config::avena());
+    assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < 1e-12);
+}
+
+/// A joint at `rate` that reports another velocity, until an answer comes `off` the way, `since` more go on from there, and the
+/// next is missing: how much is carried on.
+fn carried_after(rate: f64, reported: f64, off: f64, since: u8) -> f64 {
+    let mut joint = Measurement::default();
+    let answer = |k: f64, off: f64| Tick {
+        answer: Some(Reading { position: rate * k * DT + off, velocity: reported }),
+        ..tick(None, 0.0)
+    };
+    for k in -20..0 {
+        assert!(joint.step(&answer(f64::from(k), 0.0), &Config::avena()));
+    }
+    for k in 0..=since {
+        assert!(joint.step(&answer(f64::from(k), off), &Config::avena()));
+    }
+    let before = joint.used().position;
+    joint.step(&tick(None, 0.0), &Config::avena());
+    (joint.used().position - before) / DT
+}
+
+#[test]
+fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
+    let unexpected = 0.1 * 3.0 * VELOCITY_MAX * DT;
+    for (rate, reported, off, since, carried) in [
+        (0.4, 0.5, 0.0, 0, 0.4),
+        (0.4, 0.3, 0.0, 0, 0.4),
+        // What was a way of 5 ms is now longer by a tenth of what no joint does in one.
+        (0.0, 0.0, unexpected, 0, unexpected / (5.0 * DT)),
+        (0.0, 0.0, 1.01 * unexpected, 0, 0.0),
+        (0.0, 0.1, -1.01 * unexpected, 0, 0.1),
+        // The reported velocity is carried on until the rate is one of answers behind the jump alone.
+        (0.4, 0.5, 2.0 * unexpected, 0, 0.5),
+        (0.4, 0.5, 2.0 * unexpected, 4, 0.5),
+        (0.4, 0.5, 2.0 * unexpected, 5, 0.4),
+        (0.4, 0.5, 2.0 * unexpected, 6, 0.4),
+    ] {
+        let found = carried_after(rate, reported, off, since);
+        assert!((found - carried).abs() < 1e-9, "{rate} {reported} {off} {since}: {found}");
+    }
+}
+
+/// The velocity that is predicted follows the commands; what it differs by from the answer is what fades.
+#[test]
+fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
+    let mut joint = moving(0.4);
+    joint.step(&Tick { commanded: 0.1, ..tick(None, 0.0) }, &Config::avena());
+    let predicted = joint.used();
+    let back = Reading { position: predicted.position + 0.1 * DT, velocity: 0.1 };
+    joint.step(&Tick { answer: Some(back), commanded: 0.1, ..tick(None, 0.0) }, &Config::avena());
+    assert!((joint.used().velocity - 0.1).abs() < 1e-9, "{:?}", joint.used());
+}
+
+/// An answer that is missing, or unusable, leaves a difference that fades; one that nobody asked for is not missing.
+#[test]
+fn j63_only_what_was_expected_or_came_can_be_missing() {
+    for (lost, jumps) in [
+        (Tick { expected: true, ..tick(None, 0.0) }, false),
+        (Tick { expected: false, ..tick(Some(0.5), 0.0) }, false),
+        (Tick { expected: false, ..tick(None, 0.0) }, true),
+    ] {
+        let mut joint = moving(0.0);
+        assert!(!joint.step(&lost, &Config::avena()));
+        assert!(joint.step(&tick(Some(0.003), 0.0), &Config::avena()));
+        assert_eq!(joint.used().position > 0.002, jumps, "{lost:?}: {:?}", joint.used());
+    }
+}
+
+#[test]
+fn j16_the_speed_is_seen_where_the_reported_velocity_is_wrong() {
+    let mut joint = Measurement::default();
+    for k in 0..20 {
+        let answer = Some(Reading { position: 0.3 * f64::from(k) * DT, velocity: 0.0 });
+        joint.step(&Tick { answer, ..tick(None, 0.0) }, &Config::avena());
+    }
+    assert!((joint.speed() - 0.3).abs() < 1e-9);
+}
+
+/// The double pole's own decay, whatever the ticks are and wherever it is.
+#[test]
+fn j63_an_offset_fades_like_a_critically_damped_filter() {
+    let config = Config::avena();
+    let pole = FADING / f64::from(config.blend_ms);
+    for (left, slope) in [(0.01, 0.0), (0.0, 1e-3), (-0.01, 2e-4), (-1e-3, (1.0 + pole) * 1e-3)] {
+        for ms in [1u32, 2, 5] {
+            let mut fading = Fading { left, slope };
+            fading.step(ms, &config);
+            let (t, both) = (f64::from(ms), slope + pole * left);
+            let decay = (-pole * t).exp();
+            let exact = ((left + both * t) * decay, (slope - pole * both * t) * decay);
+            assert!((fading.left - exact.0).abs() < 1e-4 * 0.01, "{ms} ms: {fading:?} {exact:?}");
+            assert!((fading.slope - exact.1).abs() < 1e-4 * 1e-3, "{ms} ms: {fading:?} {exact:?}");
+        }
+    }
+    // However little is left: none of it is dropped at once.
+    let mut little = Fading { left: 1e-6, slope: 0.0 };
+    little.step(1, &config);
+    assert!(little.left > 0.9e-6, "{little:?}");
+    // In no time nothing fades; what is dropped is less than the bound, of the offset and of its slope.
+    for (left, slope, dropped) in [
+        (FADED, 0.0, false),
+        (0.0, -FADED, false),
+        (0.9 * FADED, 2.0 * FADED, false),
+        (0.9 * FADED, -0.9 * FADED, true),
+    ] {
+        let mut fading = Fading { left, slope };
+        fading.step(0, &config);
+        let kept = if dropped { (0.0, 0.0) } else { (left, slope) };
+        assert_eq!((fading.left, fading.slope), kept);
+    }
+}

@@ -4,7 +4,7 @@ use cli_kit::{Lines, Stop};
 use serde_json::{Value, json};
 use ucom::Profile;
 use ucom_host::ProfileFile;
-use ucom_host::master::{Error, Master};
+use ucom_host::master::{Error, IdentityError, Master, SignalError};
 use ucom_host::session::{CleanupList, Driver, Link, Operator, SessionError, ValuesError};
 
 use crate::args::LinkArgs;
@@ -66,7 +66,7 @@ impl LinkArgs {
 /// Numbers that two boards have, as `--json` lists them.
 pub fn shared_numbers(master: &Master) -> Vec<Value> {
     let value = |e: &Error| {
-        let Error::NumberShared { board, found, .. } = e else { return Value::Null };
+        let Error::Identity(IdentityError::NumberShared { board, found, .. }) = e else { return Value::Null };
         json!({ "board": board, "flash_numbers": found, "code": e.code(), "message": e.to_string(), "hint": e.hint() })
     };
     master.shared_numbers().iter().map(value).collect()
@@ -87,5 +87,11 @@ impl From<ValuesError> for Failure {
 impl From<Error> for Failure {
     fn from(e: Error) -> Self {
         SessionError::from(e).into()
+    }
+}
+
+impl From<SignalError> for Failure {
+    fn from(e: SignalError) -> Self {
+        Error::from(e).into()
     }
 }

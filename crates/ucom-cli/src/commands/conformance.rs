@@ -10,7 +10,7 @@ use ucom_host::files::{Image, ImageOptions, Inventory};
 use ucom_host::master::conformance::{
     ConformanceOptions, ConformanceProgram, ConformanceReport, ConformanceTest, Verdict, test_names,
 };
-use ucom_host::master::{Error, Outcome, Request};
+use ucom_host::master::{Error, Outcome, Request, RunningError};
 use ucom_host::session::SessionError;
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
@@ -47,7 +47,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
         force: args.force,
     };
     let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e {
-        SessionError::Procedure(Error::Running { .. }) => {
+        SessionError::Procedure(Error::Running(RunningError::Running { .. })) => {
             Failure::from(e).hint("`ucom stop all` first; --force does not cover this")
         }
         e => e.into(),

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 
 use crate::master::engine::{Boards, Core, Event, Link, Mailbox, Session, Statistics, lock};
-use crate::master::error::Error;
+use crate::master::error::{Error, MasterError, SignalError};
 use crate::master::io::{DescriptionKey, IoDescription, Kind, ParValue, SnapshotAssembler};
 use crate::master::procedures::work::{Work, work};
 use crate::master::reports::{ProcedureId, Request};
@@ -32,7 +32,7 @@ impl Master {
             if let Some(other) = core.mailboxes.values().find(|mailbox| mailbox.claims & claims != 0) {
                 let shared = other.claims & claims;
                 let boards = (0..32).filter(|b| shared >> b & 1 == 1).collect();
-                return Err(Error::Busy { boards, with: other.name });
+                return Err(Error::Master(MasterError::Busy { boards, with: other.name }));
             }
             let bears_shared_numbers = request.bears_shared_numbers();
             core.mailboxes.insert(id, Mailbox { name, claims, bears_shared_numbers, ..Default::default() });
@@ -53,7 +53,7 @@ impl Master {
     }
 
     /// The bus is gone: ends a procedure without another frame. [`Event::Done`] comes at once: an update's with what
-    /// is known of each board, the conformance tests' with those that were done, any other's with [`Error::Bus`].
+    /// is known of each board, the conformance tests' with those that were done, any other's with [`MasterError::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.bus_gone = Some(reason.into());
@@ -149,7 +149,7 @@ impl Master {
 
     /// Numbers that two boards have, each as the error that procedures end with.
     pub fn shared_numbers(&self) -> Vec<Error> {
-        lock(&self.core).holders.all_shared()
+        lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
 
     /// Counters of the bus.
@@ -158,7 +158,7 @@ impl Master {
     }
 
     /// Sets an input of a described board: sent at once, and repeated while the board runs (D-34).
-    pub fn set_input(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, Error> {
+    pub fn set_input(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Ci, name)?;
         let mut core = lock(&self.core);
         if let Some(data) = core.data.get_mut(&board)
@@ -171,15 +171,15 @@ impl Master {
     }
 
     /// Writes a parameter of a described board; there is no answer, the shadow takes it as assumed (D-35).
-    pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, Error> {
+    pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Par, name)?;
         lock(&self.core).send_parameter(board, index, value);
         Ok(index)
     }
 
-    fn signal(&mut self, now: u64, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
+    fn signal(&mut self, now: u64, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         lock(&self.core).advance(now);
-        let description = self.description(board).ok_or(Error::NoApplication { board, valid: true })?;
+        let description = self.description(board).ok_or(SignalError::NoApplication { board, valid: true })?;
         description.find(board, kind, name)
     }
 

@@ -67,7 +67,10 @@ pub mod update {
 
 pub use counted::counted;
 pub use engine::{Board, Boards, Event, Life, Rate, Statistics, Supervision, WINDOW_US};
-pub use error::{Error, Incomplete, LastReceived, Received};
+pub use error::{
+    AddressError, Error, ExchangeError, IdentityError, Incomplete, LastReceived, MasterError, Received,
+    RunningError, SignalError, StatusError,
+};
 pub use host_kit::ErrorKind;
 pub use interface::Master;
 pub use load::{LoadForecast, frame_bits};

@@ -13,7 +13,8 @@ use super::pump::{LOOK, Pump};
 use super::selection::Boards;
 use crate::master::conformance::{ConformanceTest, Verdict};
 use crate::master::{
-    BoardSeen, Error, Event, Master, Outcome, ProcedureId, Request, ScanFinding, StopLevel, Supervision,
+    BoardSeen, Error, Event, IdentityError, Master, MasterError, Outcome, ProcedureId, Request, ScanFinding,
+    StopLevel, Supervision,
 };
 
 /// Whoever runs the session: may end it, and reads what is noted beside results.
@@ -144,7 +145,7 @@ impl Driver {
                 match event {
                     Event::Done { id: done, result } if done == id => {
                         return match (result, broken) {
-                            (Err(Error::Bus { .. }), Some(failure)) => Err(failure),
+                            (Err(Error::Master(MasterError::Bus { .. })), Some(failure)) => Err(failure),
                             // What became of boards is reported also when the bus fails.
                             (result, Some(_)) | (result @ Ok(Outcome::Update(_)), None) => Ok(result?),
                             (result, None) => {
@@ -263,9 +264,12 @@ pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> 
         Event::CompetingMaster { function, to } => {
             format!("another PC talks on the bus: {} to {to}", function.name())
         }
-        Event::NumberShared { board, found } => {
-            Error::NumberShared { board: *board, found: found.clone(), given_back: false }.to_string()
-        }
+        Event::NumberShared { board, found } => Error::Identity(IdentityError::NumberShared {
+            board: *board,
+            found: found.clone(),
+            given_back: false,
+        })
+        .to_string(),
         Event::Overflow { dropped } => format!("{dropped} events were dropped"),
         _ => return None,
     })

@@ -15,7 +15,7 @@ use crate::files::params::{
     ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, check_board, check_identity,
 };
 use crate::master::io::Kind;
-use crate::master::{AdminChange, Error, Outcome, Request};
+use crate::master::{AdminChange, Error, ExchangeError, Outcome, Request};
 
 /// A board, the words that it is to get, and what it got before.
 #[derive(Debug)]
@@ -37,7 +37,10 @@ pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result
     for Parameters { known, words, history } in all.iter_mut().filter(|p| !p.words.is_empty()) {
         for word in words.iter() {
             let (now, setting) = (driver.now_us(), known.setting(Kind::Par, word));
-            driver.master.set_parameter(now, known.board, &setting.name, setting.value)?;
+            driver
+                .master
+                .set_parameter(now, known.board, &setting.name, setting.value)
+                .map_err(Error::from)?;
         }
         arrived(driver, known.board).map_err(|failure| match failure {
             ValuesError::Unknown { board, why, .. } => {
@@ -127,7 +130,7 @@ impl ParameterFile {
                     let name = name_of(self.inventory.as_ref(), found.info.flash_number);
                     problems.extend(check_identity(board, &ParamsTarget { info: &found.info, name }));
                 }
-                Err(SessionError::Procedure(Error::NoAnswer { .. })) => {
+                Err(SessionError::Procedure(Error::Exchange(ExchangeError::NoAnswer { .. }))) => {
                     let kind = ParamsProblemKind::Absent;
                     problems.push(ParamsProblem { place: board.place, board: board.number, kind });
                 }

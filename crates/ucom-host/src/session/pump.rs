@@ -229,7 +229,13 @@ mod tests {
         let mut master = Master::new(Profile::default());
         master.begin_session(0);
         let result = bench.run(&mut master, Request::Info { board: 9 });
-        assert!(matches!(result, Err(crate::master::Error::NoAnswer { board: 9, .. })), "{result:?}");
+        assert!(
+            matches!(
+                result,
+                Err(crate::master::Error::Exchange(crate::master::ExchangeError::NoAnswer { board: 9, .. }))
+            ),
+            "{result:?}"
+        );
         let alive = bench.times_of("680#");
         assert!(bench.now < 10_000_000, "{} µs", bench.now);
         assert!(alive.len() as u64 >= bench.now / 500_000, "{alive:?} up to {}", bench.now);

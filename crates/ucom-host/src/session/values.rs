@@ -12,7 +12,7 @@ use super::selection::Assignment;
 use crate::files::SignalTable;
 use crate::files::params::ParamsWord;
 use crate::master::io::Kind;
-use crate::master::{Error, Outcome, Request, StopLevel};
+use crate::master::{Error, Outcome, Request, SignalError, StopLevel};
 
 /// A word for a signal.
 pub type Word = ParamsWord;
@@ -21,7 +21,7 @@ pub type Word = ParamsWord;
 pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Word>, SessionError> {
     let board = known.board;
     let word = |a: &Assignment| {
-        let index = known.names.find(board, kind, &a.name)?;
+        let index = known.names.find(board, kind, &a.name).map_err(Error::from)?;
         let name = known.names.names(kind).get(usize::from(index)).cloned().unwrap_or_default();
         let Some(signal) = known.signals.get(kind, index.into()) else {
             return Err(SessionError::from(ValuesError::NoSignal { board, kind, index }));
@@ -56,9 +56,9 @@ pub fn with_names<T>(
     mut act: impl FnMut(&Cache) -> Result<T, SessionError>,
 ) -> Result<T, SessionError> {
     match act(cache) {
-        Err(SessionError::Procedure(Error::StaleNames { .. } | Error::NoSignal { .. })) if !cache.fresh => {
-            act(&Cache { fresh: true, ..cache.clone() })
-        }
+        Err(SessionError::Procedure(
+            Error::Signal(SignalError::StaleNames { .. }) | Error::Signal(SignalError::NoSignal { .. }),
+        )) if !cache.fresh => act(&Cache { fresh: true, ..cache.clone() }),
         other => other,
     }
 }
@@ -82,7 +82,7 @@ impl Prepared {
         force: bool,
     ) -> Result<(), SessionError> {
         let known = match cache.known(driver, table, board) {
-            Err(SessionError::Procedure(Error::NoApplication { .. })) => {
+            Err(SessionError::Procedure(Error::Signal(SignalError::NoApplication { .. }))) => {
                 // Before the command leaves: a start that is cancelled may have reached it.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {

@@ -4,7 +4,9 @@ use crate::bench::Exit;
 use ucom::Profile;
 use ucom::node::Phase;
 use ucom::{Function, Status};
-use ucom_host::master::{Error, Event, InitOptions, Life, Outcome, Request};
+use ucom_host::master::{
+    Error, Event, ExchangeError, InitOptions, Life, MasterError, Outcome, Request, StatusError,
+};
 
 use crate::bench::{Bench, MS, Script, frame};
 use crate::chain::initialised;
@@ -24,8 +26,10 @@ fn d08_whose_heartbeat_is_it() {
         }
         let mut bench = Bench::script(script);
         let result = bench.go(Request::Start { board: 1, force: false }, 30);
-        let is_refused =
-            matches!(result, Err(Error::CompetingMaster { function: Function::Alive, to: 1, .. }));
+        let is_refused = matches!(
+            result,
+            Err(Error::Master(MasterError::CompetingMaster { function: Function::Alive, to: 1, .. }))
+        );
         assert_eq!(is_refused, refused, "status {status:?}: {result:?}");
         let commands = bench.sent().iter().filter(|t| *t != "201#" && *t != "680#").count();
         assert!(!refused || commands == 0, "{:?}", bench.sent());
@@ -78,7 +82,10 @@ fn reset(board: u8) -> Request {
 fn a_single_reset_is_checked() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let error = bench.go(reset(4), 10).unwrap_err();
-    assert!(matches!(error, Error::NoAnswer { board: 4, asked: Function::Info, .. }), "{error:?}");
+    assert!(
+        matches!(error, Error::Exchange(ExchangeError::NoAnswer { board: 4, asked: Function::Info, .. })),
+        "{error:?}"
+    );
     assert_eq!((error.exit(), bench.count("004#")), (3, 0));
     assert!(error.hint().contains("ucom scan"), "{}", error.hint());
 
@@ -95,7 +102,7 @@ fn a_single_reset_is_checked() {
                 assert!(reports.ids.iter().eq(&[0x42]), "{what}: {reports:?}");
                 assert_eq!(bench.board(1).phase(), Phase::Uninitialised, "{what}");
             }
-            Err(Error::NotReached { board: 2, .. }) => {
+            Err(Error::Status(StatusError::NotReached { board: 2, .. })) => {
                 assert_eq!(bench.board(1).phase(), Phase::Idle, "{what}");
             }
             other => panic!("{what}: {other:?}"),
@@ -106,7 +113,10 @@ fn a_single_reset_is_checked() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     bench.lose = vec![("> 482#", 100)];
     let error = bench.go(reset(2), 20).unwrap_err();
-    assert!(matches!(error, Error::NoAnswer { board: 2, asked: Function::Reset, .. }), "{error:?}");
+    assert!(
+        matches!(error, Error::Exchange(ExchangeError::NoAnswer { board: 2, asked: Function::Reset, .. })),
+        "{error:?}"
+    );
 }
 
 /// The driver is behind: what it has not handed over yet is not taken for silence, and heartbeats go out all the same.

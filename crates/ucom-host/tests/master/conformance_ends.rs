@@ -6,7 +6,8 @@ use ucom::{Function, Status};
 use ucom_host::master::conformance::{ConformanceOptions, ConformanceProgram, ConformanceReport, Verdict};
 use ucom_host::master::update::UpdateImage;
 use ucom_host::master::{
-    BoardSeen, Error, Event, InitOptions, Outcome, ProcedureId, Request, RunBoard, RunOptions,
+    AddressError, BoardSeen, Error, Event, IdentityError, InitOptions, MasterError, Outcome, ProcedureId,
+    Request, RunBoard, RunOptions, RunningError,
 };
 
 use crate::bench::{Bench, From, image};
@@ -96,7 +97,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let report = match result {
             Ok(Outcome::Conformance(report)) => report,
             // Before the first test nothing was changed.
-            Err(Error::Cancelled) => {
+            Err(Error::Master(MasterError::Cancelled)) => {
                 assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment}");
                 continue;
             }
@@ -151,7 +152,7 @@ fn address_assignment_is_refused_when_a_board_has_no_number() {
     let from = bench.log.len();
     let options = ConformanceOptions { init: true, ..Default::default() };
     let refused = bench.go(Request::Conformance(options), 60).unwrap_err();
-    assert_eq!(refused, Error::NotNumbered { reports: 3, boards: 2 });
+    assert_eq!(refused, Error::Address(AddressError::NotNumbered { reports: 3, boards: 2 }));
     assert_eq!(refused.exit(), 4);
     let changes = |f: &ucom::Frame| matches!(f.address(), Ok((Function::Reset | Function::SetStatus, _)));
     assert!(!bench.log[from..].iter().any(|(_, who, f)| *who == From::Master && changes(f)));
@@ -174,7 +175,7 @@ fn programs_the_board_that_is_named_alone() {
         ..Default::default()
     };
     let refused = bench.go(Request::Conformance(options(0x42)), 60).unwrap_err();
-    assert_eq!(refused, Error::WrongBoard { board: 1, wanted: 0x42, found: 0x21 });
+    assert_eq!(refused, Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x42, found: 0x21 }));
     let from = bench.log.len();
     bench.go(Request::Conformance(options(0x21)), 60).unwrap();
     let mut header = Vec::new();
@@ -190,5 +191,5 @@ fn programs_the_board_that_is_named_alone() {
     bench.go(Request::Run(run), 20).unwrap();
     let tested = ConformanceOptions { boards: vec![1], ..options(0x21) };
     let refused = bench.go(Request::Conformance(tested), 60).unwrap_err();
-    assert_eq!(refused, Error::LoopRuns { boards: vec![2] });
+    assert_eq!(refused, Error::Running(RunningError::LoopRuns { boards: vec![2] }));
 }

@@ -5,7 +5,9 @@ use ucom::{Checksum, Profile};
 use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::update::UpdateFailure;
-use ucom_host::master::{Error, Event, InitFinding, InitOptions, Outcome, Request, ScanFinding};
+use ucom_host::master::{
+    Error, Event, IdentityError, InitFinding, InitOptions, Outcome, Request, ScanFinding,
+};
 
 use crate::bench::{Bench, image};
 use crate::chain::initialised;
@@ -74,7 +76,7 @@ fn d10_a_wrong_byte_order_is_named() {
         let before = bench.log.len();
         let Ok(Outcome::Update(report)) = bench.go(Request::Update(options(&[1], 128)), 60) else { panic!() };
         let Some(UpdateFailure::Refused(error)) = &report.boards[0].failure else { panic!("{report:?}") };
-        assert_eq!(**error, Error::ByteOrder { endian: here });
+        assert_eq!(**error, Error::Identity(IdentityError::ByteOrder { endian: here }));
         assert!(error.hint().contains("ucom probe"));
         assert!(bench.log[before..].iter().all(|(_, from, frame)| {
             *from != crate::bench::From::Master || matches!(frame.id() >> 6, 8 | 9 | 26)

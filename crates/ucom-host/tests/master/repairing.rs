@@ -1,7 +1,7 @@
 //! One board gets its number back (5.4): never two boards with one number and a success, whatever is lost.
 
 use crate::bench::Exit;
-use ucom_host::master::{Error, Outcome, Request};
+use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
 
 use crate::bench::{Bench, Fault};
 use crate::chain::initialised;
@@ -32,7 +32,10 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
     let numbers = numbers(bench);
     match result {
         Ok(_) => assert_eq!(numbers, [1, 2, 3, 0], "{what}: {result:?}"),
-        Err(Error::NumberShared { given_back: true, .. } | Error::WrongBoard { .. }) => {
+        Err(
+            Error::Identity(IdentityError::NumberShared { given_back: true, .. })
+            | Error::Identity(IdentityError::WrongBoard { .. }),
+        ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
         // Not received, or its neighbour keeps its pin on: nothing is claimed.
@@ -60,7 +63,7 @@ fn d21_a_number_goes_to_one_board_only() {
 fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);
     let error = repair(&mut bench, 3).unwrap_err();
-    assert_eq!(error, Error::MayTakeNumber { board: 3, other: 1 });
+    assert_eq!(error, Error::Address(AddressError::MayTakeNumber { board: 3, other: 1 }));
     assert_eq!((error.exit(), numbers(&mut bench)), (4, vec![0, 2, 0, 4]));
     repair(&mut bench, 1).unwrap();
     repair(&mut bench, 3).unwrap();
@@ -105,7 +108,10 @@ fn d21_no_losses_give_a_number_twice() {
                     let what = format!("{:?}", bench.lose);
                     let result = repair(&mut bench, 2);
                     is_sound(&mut bench, &result, &what);
-                    shared += u32::from(matches!(result, Err(Error::NumberShared { given_back: true, .. })));
+                    shared += u32::from(matches!(
+                        result,
+                        Err(Error::Identity(IdentityError::NumberShared { given_back: true, .. }))
+                    ));
                 }
             }
         }

@@ -5,8 +5,8 @@ use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
 use ucom_host::master::io::{IoDescription, ParValue};
 use ucom_host::master::{
-    AdminChange, Error, Event, InitOptions, Life, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel,
-    Supervision,
+    AdminChange, Error, Event, ExchangeError, IdentityError, InitOptions, Life, MasterError, Outcome,
+    Request, RunBoard, RunOptions, RunningError, Setting, SignalError, StopLevel, Supervision,
 };
 
 use crate::bench::{Bench, CI, MS, PAR, SO, Script};
@@ -69,7 +69,7 @@ fn d34_d35_inputs_and_parameters() {
     assert_eq!(bench.board(0).application.ci, [7, 77]);
     assert_eq!(bench.board(0).application.par, [0, 5, 0]);
     assert_eq!(bench.master.parameters(1), [ParValue::Unknown, ParValue::Assumed(5), ParValue::Unknown]);
-    assert!(matches!(bench.master.set_input(now, 1, "nonsense", 1), Err(Error::NoSignal { .. })));
+    assert!(matches!(bench.master.set_input(now, 1, "nonsense", 1), Err(SignalError::NoSignal { .. })));
     let stop = Request::Stop { board: 1, level: StopLevel::Application, force: false };
     bench.go(stop, 10).unwrap();
     bench.go(Request::Start { board: 1, force: false }, 10).unwrap();
@@ -102,7 +102,7 @@ fn d36_p14_descriptions_are_cached() {
     // A board without a running application: refused with the command that helps.
     let mut bench = initialised(&[0x21]);
     let error = bench.go(Request::Describe { board: 1, fresh: false }, 10).unwrap_err();
-    assert_eq!(error, Error::NoApplication { board: 1, valid: true });
+    assert_eq!(error, Error::Signal(SignalError::NoApplication { board: 1, valid: true }));
     assert!(error.hint().contains("ucom start 1"));
 }
 
@@ -121,7 +121,7 @@ fn d36_kept_names_of_another_application_start_nothing() {
     let boards = vec![RunBoard { board: 1, ci, par: Vec::new() }];
     let options = RunOptions { boards, active: true, force: false };
     let error = bench.go(Request::Run(options.clone()), 10).unwrap_err();
-    assert_eq!(error, Error::StaleNames { board: 1 });
+    assert_eq!(error, Error::Signal(SignalError::StaleNames { board: 1 }));
     assert_eq!((bench.count("341#"), bench.count("541#")), (0, 0), "no inputs, no loop");
     // Now they are the board's own.
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
@@ -148,10 +148,13 @@ fn d14_dump_is_accepted_only_if_the_totals_fit() {
         let Ok(Outcome::Description { description, .. }) = result else { panic!("{bad:?}: {result:?}") };
         assert_eq!((description.ci, tries), (vec!["speed".to_owned()], 2), "{bad:?}");
         let (result, tries) = read(&[bad; 4]);
-        assert!(matches!(result, Err(Error::Incomplete { .. })), "{bad:?}: {result:?}");
+        assert!(
+            matches!(result, Err(Error::Exchange(ExchangeError::Incomplete { .. }))),
+            "{bad:?}: {result:?}"
+        );
         assert_eq!(tries, 3);
     }
-    assert!(matches!(read(&[]), (Err(Error::NoAnswer { tries: 3, .. }), 3)));
+    assert!(matches!(read(&[]), (Err(Error::Exchange(ExchangeError::NoAnswer { tries: 3, .. })), 3)));
 }
 
 /// P-6: SO of ten other boards at full rate and DSP_INFO of board 3 in the middle of a dump of board 2.
@@ -298,7 +301,10 @@ fn d26_reboot_of_a_running_board() {
     let repair = Request::Repair { board: 2, flash_number: 0x42, force: false };
     assert!(matches!(bench.go(repair, 10), Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42));
     let repair = Request::Repair { board: 2, flash_number: 0x63, force: false };
-    assert!(matches!(bench.go(repair, 10), Err(Error::WrongBoard { found: 0x42, .. })));
+    assert!(matches!(
+        bench.go(repair, 10),
+        Err(Error::Identity(IdentityError::WrongBoard { found: 0x42, .. }))
+    ));
 }
 
 /// D-50: when the session ends, boards stop by themselves.
@@ -328,7 +334,7 @@ fn p19_load_forecast() {
     bench.go(Request::Init(InitOptions::default()), 20).unwrap();
     let options = run_options(&[1, 2, 3]);
     let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
-    assert!(matches!(error, Error::Load(_)), "{error}");
+    assert!(matches!(error, Error::Running(RunningError::Load(_))), "{error}");
     assert_eq!(error.exit(), 4);
     assert!((0..3).all(|i| !bench.board(i).application.running));
     assert!(bench.sent().iter().all(|t| !t.starts_with("54")));
@@ -359,7 +365,7 @@ fn one_procedure_a_board() {
     let now = bench.now;
     let first = bench.master.start(now, Request::Start { board: 1, force: false }).unwrap();
     let again = bench.master.start(now, Request::Info { board: 1 });
-    assert!(matches!(again, Err(Error::Busy { with: "start", .. })), "{again:?}");
+    assert!(matches!(again, Err(Error::Master(MasterError::Busy { with: "start", .. }))), "{again:?}");
     assert!(bench.go(Request::Info { board: 2 }, 5).is_ok());
     assert!(bench.wait(first, 10).is_ok());
 }

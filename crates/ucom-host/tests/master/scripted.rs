@@ -1,7 +1,9 @@
 //! Rows of the acceptance table where the other side is a table of frames and nothing else.
 
 use crate::bench::Exit;
-use ucom_host::master::{Error, Event, InitFinding, InitOptions, Outcome, Request, ScanFinding};
+use ucom_host::master::{
+    AddressError, Error, Event, InitFinding, InitOptions, MasterError, Outcome, Request, ScanFinding,
+};
 
 use crate::bench::{Bench, Script};
 
@@ -103,7 +105,10 @@ fn p4_d24_ack_mismatch_is_refused() {
         );
         let report = init(&mut bench);
         let refused = |f: &InitFinding| {
-            matches!(f, InitFinding::Refused { board: 1, error: Error::AckMismatch { .. } })
+            matches!(
+                f,
+                InitFinding::Refused { board: 1, error: Error::Address(AddressError::AckMismatch { .. }) }
+            )
         };
         assert!(report.findings.iter().any(refused), "{:?}", report.findings);
         assert!(report.boards.is_empty());
@@ -137,7 +142,10 @@ fn p17_d08_second_master() {
     for foreign in ["680#", "341#0000000000000000", "240#", "581#"] {
         let mut bench = Bench::script(golden(1).at(100, foreign));
         let result = bench.go(Request::Init(InitOptions::default()), 10);
-        assert!(matches!(result, Err(Error::CompetingMaster { .. })), "{foreign}: {result:?}");
+        assert!(
+            matches!(result, Err(Error::Master(MasterError::CompetingMaster { .. }))),
+            "{foreign}: {result:?}"
+        );
         assert!(bench.sent().is_empty(), "{:?}", bench.sent());
         assert_eq!(result.unwrap_err().exit(), 4);
         let mut bench = Bench::script(golden(1).at(100, foreign));

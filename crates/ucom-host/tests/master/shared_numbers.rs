@@ -6,7 +6,8 @@ use ucom_host::master::conformance::ConformanceOptions;
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::update::{UpdateFailure, UpdateImage, UpdateOptions, UpdateOutcome, UpdateTarget};
 use ucom_host::master::{
-    AdminChange, Error, Event, InitOptions, Outcome, Request, RunBoard, RunOptions, ScanFinding, StopLevel,
+    AdminChange, Error, Event, IdentityError, InitOptions, Outcome, Request, RunBoard, RunOptions,
+    ScanFinding, StopLevel,
 };
 use ucom_sim::memory::WirePins;
 
@@ -33,7 +34,8 @@ fn sharing(flash: [u16; 2], more: &[(u64, &str)]) -> Bench {
 }
 
 fn is_shared(error: &Error, flash: [u16; 2]) -> bool {
-    let shared = Error::NumberShared { board: 1, found: flash.to_vec(), given_back: false };
+    let shared =
+        Error::Identity(IdentityError::NumberShared { board: 1, found: flash.to_vec(), given_back: false });
     *error == shared && error.exit() == 4 && error.code() == "number-shared"
 }
 
@@ -233,7 +235,8 @@ fn d24_outputs_are_turned_off_on_both() {
 fn d24_an_init_leaves_no_number_to_two_boards() {
     let mut bench = strapped([0x21, 0x42]);
     let error = bench.go(Request::Init(InitOptions::default()), 60).unwrap_err();
-    let wanted = Error::NumberShared { board: 1, found: vec![0x21, 0x42], given_back: true };
+    let wanted =
+        Error::Identity(IdentityError::NumberShared { board: 1, found: vec![0x21, 0x42], given_back: true });
     assert_eq!(error, wanted);
     assert!((0..2).all(|i| bench.board(i).number().is_none()));
     // And it is how a chain that was numbered wrongly gets well again.
@@ -270,7 +273,10 @@ fn d24_a_doubled_frame_is_no_board() {
             let mut bench = crate::chain::initialised(&[0x21]);
             bench.fault = Some((at, fault));
             let result = bench.go(Request::Info { board: 1 }, 10);
-            assert!(!matches!(result, Err(Error::NumberShared { .. })), "{at} {fault:?}: {result:?}");
+            assert!(
+                !matches!(result, Err(Error::Identity(IdentityError::NumberShared { .. }))),
+                "{at} {fault:?}: {result:?}"
+            );
         }
     }
 }

@@ -5,7 +5,8 @@ use ucom::node::Phase;
 use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
 use ucom_host::master::{
-    AdminChange, Error, Event, InitOptions, Outcome, Request, RunBoard, RunOptions, Setting, Supervision,
+    AdminChange, Error, Event, ExchangeError, InitOptions, MasterError, Outcome, Request, RunBoard,
+    RunOptions, RunningError, Setting, SignalError, Supervision,
 };
 
 use crate::bench::{Bench, MS};
@@ -42,7 +43,7 @@ fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
 fn p19_a_refusal_leaves_every_board_as_it_was() {
     let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
-    assert!(matches!(error, Error::Load(_)) && error.exit() == 4, "{error}");
+    assert!(matches!(error, Error::Running(RunningError::Load(_))) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
     // The boards have one program, whose description is known.
     assert_eq!(bench.count("301#"), 0, "nothing was started");
@@ -55,7 +56,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
     for known in [false, true] {
         let before = bench.count("301#");
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
-        assert!(matches!(error, Error::NoSignal { board: 4, .. }), "{error}");
+        assert!(matches!(error, Error::Signal(SignalError::NoSignal { board: 4, .. })), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
         // The names of board 4 are those of board 1, once that has been asked.
         assert_eq!(bench.count("301#") - before, usize::from(!known));
@@ -97,7 +98,9 @@ fn a_run_that_is_cancelled_is_undone() {
         bench.run(at);
         bench.master.cancel(id);
         match bench.wait(id, 60) {
-            Err(Error::Cancelled) => assert_eq!(now_is(&mut bench), FOUND, "cancelled after {at} ms"),
+            Err(Error::Master(MasterError::Cancelled)) => {
+                assert_eq!(now_is(&mut bench), FOUND, "cancelled after {at} ms")
+            }
             Ok(_) => {
                 assert!(now_is(&mut bench).iter().all(|(phase, active)| *phase == Phase::Running && *active))
             }
@@ -127,12 +130,15 @@ fn d51_a_board_lost_while_others_start() {
         let started = ["542#", "543#", "544#"].map(|text| bench.count(text));
         match on_lost {
             OnLost::StopAll => {
-                assert_eq!(result, Err(Error::Lost { board: 1 }));
+                assert_eq!(result, Err(Error::Running(RunningError::Lost { board: 1 })));
                 assert_eq!(started, [0; 3]);
             }
             // It ends with board 1, which does not answer.
             _ => {
-                assert!(matches!(result, Err(Error::NoAnswer { board: 1, .. })), "{result:?}");
+                assert!(
+                    matches!(result, Err(Error::Exchange(ExchangeError::NoAnswer { board: 1, .. }))),
+                    "{result:?}"
+                );
                 assert_eq!(started, [1; 3]);
             }
         }

@@ -3,7 +3,9 @@
 use crate::bench::Exit;
 use ucom::node::Phase;
 use ucom::{ErrorCode, Profile};
-use ucom_host::master::{Error, Master, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel};
+use ucom_host::master::{
+    Error, ExchangeError, Master, MasterError, Outcome, Request, RunBoard, RunOptions, Setting, StopLevel,
+};
 
 use crate::bench::{Bench, CI, MS, Script};
 use crate::chain::initialised;
@@ -38,7 +40,10 @@ fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     bad_bus(&mut bench);
     bench.lose = vec![("< 601#", 1000)];
     let result = bench.go(Request::Stop { board: 1, level: StopLevel::Loop, force: true }, 30);
-    assert!(matches!(result, Err(Error::Device { code: ErrorCode::CanReceive, .. })), "{result:?}");
+    assert!(
+        matches!(result, Err(Error::Exchange(ExchangeError::Device { code: ErrorCode::CanReceive, .. }))),
+        "{result:?}"
+    );
     assert_eq!(bench.count("601#00000000"), 3);
 }
 
@@ -56,7 +61,7 @@ fn an_error_of_a_bad_bus_does_not_end_a_start() {
     let mut bench = Bench::script(refuses);
     let result = bench.go(Request::Start { board: 1, force: true }, 30);
     let code = ErrorCode::AutostartForbidden;
-    assert_eq!(result, Err(Error::Device { board: 1, code, during: "PC_START" }));
+    assert_eq!(result, Err(Error::Exchange(ExchangeError::Device { board: 1, code, during: "PC_START" })));
     assert_eq!(bench.count("301#"), 1);
 }
 
@@ -95,7 +100,7 @@ fn a_board_that_is_still_starting_is_stopped() {
         let commanded = bench.times_of("301#")[0];
         bench.master.cancel(id);
         let result = bench.wait(id, 60);
-        assert_eq!(result, Err(Error::Cancelled));
+        assert_eq!(result, Err(Error::Master(MasterError::Cancelled)));
         if !was_run {
             // A start leaves it to its caller to stop what it began.
             bench.go(Request::Stop { board: 1, level: StopLevel::Application, force: true }, 60).unwrap_err();

@@ -5,7 +5,9 @@ use ucom::Memory;
 use ucom_host::master::update::{
     UpdateFailure, UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateTarget,
 };
-use ucom_host::master::{Error, Event, InitOptions, Outcome, Request, RunBoard, RunOptions};
+use ucom_host::master::{
+    Error, Event, IdentityError, InitOptions, Outcome, Request, RunBoard, RunOptions, RunningError,
+};
 
 use crate::bench::{Bench, Fault, MS, OLD, Script, image};
 use crate::chain::initialised;
@@ -195,12 +197,12 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
     wanted.targets[0].flash_number = Some(0x22);
     let report = update(&mut bench, wanted);
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
-    assert_eq!(**e, Error::WrongBoard { board: 1, wanted: 0x22, found: 0x21 });
+    assert_eq!(**e, Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x22, found: 0x21 }));
     assert_eq!((report.exit(), bench.count("041#")), (4, 0));
     let mut bench = Bench::script(Script::default().on("201#", &["141#2100021934126E38", "141#0000"]));
     let report = update(&mut bench, options(&[1], 1000));
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
-    assert_eq!(**e, Error::WrongSequence { board: 1, reported: 2 });
+    assert_eq!(**e, Error::Identity(IdentityError::WrongSequence { board: 1, reported: 2 }));
     assert_eq!((report.exit(), bench.count("041#")), (4, 0));
 }
 
@@ -270,7 +272,7 @@ fn u2_running_boards() {
     assert!(bench.go(Request::Run(run), 20).is_ok());
     let report = update(&mut bench, options(&[1], 128));
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
-    assert_eq!(**e, Error::Running { boards: vec![2] });
+    assert_eq!(**e, Error::Running(RunningError::Running { boards: vec![2] }));
     assert_eq!(report.exit(), 4);
     let forced = UpdateOptions { force: true, ..options(&[1], 128) };
     assert_eq!(update(&mut bench, forced).boards[0].outcome, UpdateOutcome::Verified);

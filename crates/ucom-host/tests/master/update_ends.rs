@@ -3,7 +3,7 @@
 use crate::bench::Exit;
 use ucom::{Frame, Status};
 use ucom_host::master::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateReport};
-use ucom_host::master::{Error, Event, Master, Outcome, Request};
+use ucom_host::master::{Error, Event, IdentityError, Master, MasterError, Outcome, Request, StatusError};
 
 use crate::bench::{Bench, From, Member, OLD, Script};
 use crate::chain::initialised;
@@ -60,7 +60,7 @@ fn d46_a_bus_that_fails_leaves_a_report() {
         assert_eq!(report.boards.len(), 2);
         for (i, result) in report.boards.iter().enumerate() {
             let holds = check_program(&mut bench, i, 128);
-            let bus = Error::Bus { reason: "the adapter is gone".into() };
+            let bus = Error::Master(MasterError::Bus { reason: "the adapter is gone".into() });
             match result.outcome {
                 UpdateOutcome::NotStarted => {
                     assert_eq!(holds, OLD, "{at}: {report:?}");
@@ -191,7 +191,7 @@ fn a_board_that_does_not_enable_programming_answers() {
     let mut bench = Bench::script(Script::default().on("201#", &info));
     let report = update(&mut bench, options(&[1], 128));
     let Some(UpdateFailure::Reported(e)) = &report.boards[0].failure else { panic!("{report:?}") };
-    assert!(matches!(**e, Error::StatusNotTaken { board: 1, .. }), "{e}");
+    assert!(matches!(**e, Error::Status(StatusError::StatusNotTaken { board: 1, .. })), "{e}");
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::NotStarted, 1));
 }
 
@@ -202,7 +202,7 @@ fn u1_a_board_that_is_swapped_between_attempts() {
     let special = |_, block| (block == 33).then_some("081#01");
     let mut bench = loader(Loader { flash: swapped, special, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
-    let wrong = Error::WrongBoard { board: 1, wanted: 0x21, found: 0x42 };
+    let wrong = Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x21, found: 0x42 });
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::After(Box::new(wrong.clone()))));
     assert_eq!((bench.count("041#"), report.exit()), (1, 5), "{report:?}");
     // In the very moment of XRESET: refused, taken out of programming, and nothing is written.
@@ -276,7 +276,7 @@ impl Member for Impostor {
 fn u4_repair_that_finds_another_board_is_refused() {
     let mut bench = Bench::new(Default::default(), vec![Box::new(Impostor::default())]);
     let report = update(&mut bench, options(&[1], 1000));
-    let wrong = Error::WrongBoard { board: 1, wanted: 0x21, found: 0x42 };
+    let wrong = Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x21, found: 0x42 });
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
     assert_eq!((report.exit(), count(&bench, "2C1#")), (4, 0));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
@@ -297,7 +297,7 @@ fn d08_a_dry_run_looks_for_another_pc() {
     let dry = UpdateOptions { dry_run: true, ..options(&[1], 1000) };
     let report = update(&mut bench, dry.clone());
     let Some(UpdateFailure::Refused(e)) = &report.boards[0].failure else { panic!("{report:?}") };
-    assert!(matches!(**e, Error::CompetingMaster { .. }), "{e}");
+    assert!(matches!(**e, Error::Master(MasterError::CompetingMaster { .. })), "{e}");
     assert_eq!(report.exit(), 4);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
     assert!(!bench.master.is_master());

@@ -3,7 +3,7 @@
 use crate::bench::Exit;
 use ucom::{Frame, Profile};
 use ucom_host::master::update::{UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome};
-use ucom_host::master::{Error, Request};
+use ucom_host::master::{Error, Request, StatusError};
 
 use crate::bench::{Bench, From, Member, OLD};
 use crate::chain::initialised;
@@ -78,7 +78,7 @@ fn d46_a_group_is_refused_while_another_board_listens() {
     let report = update(&mut bench, group(&[1, 2]));
     for result in &report.boards {
         let Some(UpdateFailure::Refused(e)) = &result.failure else { panic!("{report:?}") };
-        assert!(matches!(**e, Error::StatusNotTaken { board: 9, .. }), "{e}");
+        assert!(matches!(**e, Error::Status(StatusError::StatusNotTaken { board: 9, .. })), "{e}");
     }
     assert_eq!((report.exit(), broadcasts(&bench), bench.count("041#")), (4, 0, 0));
     assert_eq!((check_program(&mut bench, 0, 128), check_program(&mut bench, 1, 128)), (OLD, OLD));

@@ -2,7 +2,7 @@
 
 use super::{ParamsBoard, ParamsEntry, Place};
 use crate::files::signals::{BoardSignals, ValueError};
-use crate::master::Error;
+use crate::master::SignalError;
 use crate::master::io::{IoDescription, Kind};
 use std::collections::BTreeMap;
 use ucom::BoardInfo;
@@ -88,7 +88,7 @@ pub enum ParamsProblemKind {
     },
     /// No signal has this name.
     #[error("{0}")]
-    NoSignal(Error),
+    NoSignal(SignalError),
     /// Two entries mean the same signal.
     #[error("{kind} `{name}` is given twice, first in line {first}")]
     Twice {

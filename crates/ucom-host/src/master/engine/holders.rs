@@ -4,7 +4,7 @@
 //! PC can: one PC_INFO is answered twice. What is only asked is compared all the time ([`Holders::received`]); before a
 //! procedure changes something it waits until nobody else answers (`one_board_each`).
 
-use crate::master::error::Error;
+use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
@@ -181,15 +181,15 @@ impl Holders {
     }
 
     /// The lowest of these numbers (by bit) that boards share.
-    pub(crate) fn shared(&self, numbers: u32) -> Option<Error> {
+    pub(crate) fn shared(&self, numbers: u32) -> Option<IdentityError> {
         let mine =
             |(number, holder): &(&u8, &Holder)| numbers >> **number & 1 == 1 && !holder.shared.is_empty();
         let (board, holder) = self.numbers.iter().find(mine)?;
-        Some(Error::NumberShared { board: *board, found: holder.shared.clone(), given_back: false })
+        Some(IdentityError::NumberShared { board: *board, found: holder.shared.clone(), given_back: false })
     }
 
     /// All numbers that boards share.
-    pub(crate) fn all_shared(&self) -> Vec<Error> {
+    pub(crate) fn all_shared(&self) -> Vec<IdentityError> {
         self.numbers.keys().filter_map(|number| self.shared(1 << number)).collect()
     }
 
@@ -250,7 +250,7 @@ mod tests {
         let mut once = Holders::default();
         question(&mut once, &[&[0x21, 0x42]]);
         assert_eq!(question(&mut once, &[&[0x21, 0x42]]), None, "reported once");
-        assert!(matches!(once.shared(2), Some(Error::NumberShared { board: 1, .. })));
+        assert!(matches!(once.shared(2), Some(IdentityError::NumberShared { board: 1, .. })));
         assert!(once.shared(!2).is_none(), "of another number");
         once.forget(1);
         assert!(once.shared(2).is_none());

@@ -13,7 +13,7 @@ use crate::master::engine::event::Event;
 use crate::master::engine::mailbox::{Filter, Forget, Mailbox, Received};
 use crate::master::engine::shared::Core;
 use crate::master::engine::times::{MS, Times};
-use crate::master::error::Error;
+use crate::master::error::{Error, ExchangeError, MasterError};
 use crate::master::reports::ProcedureId;
 use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
 
@@ -173,9 +173,9 @@ impl Link {
         }
     }
 
-    /// Ends `work` with [`Error::Cancelled`] when the caller asks to, with [`Error::Bus`] when he reports that the bus is
-    /// gone, with [`Error::NumberShared`] once when two boards with one number show, unless it bears that; its queued frames
-    /// do not leave then.
+    /// Ends `work` with [`MasterError::Cancelled`] when the caller asks to, with [`MasterError::Bus`] when he reports that
+    /// the bus is gone, with [`NumberShared`](crate::master::IdentityError::NumberShared) once when two boards with one
+    /// number show, unless it bears that; its queued frames do not leave then.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -184,11 +184,12 @@ impl Link {
         poll_fn(|context| {
             let ended = self.with(|core| {
                 let mailbox = core.mailboxes.get_mut(&self.id)?;
-                let gone = mailbox.bus_gone.clone().map(|reason| Error::Bus { reason });
-                let cancelled = core::mem::take(&mut mailbox.cancel).then_some(Error::Cancelled);
+                let gone = mailbox.bus_gone.clone().map(|reason| Error::Master(MasterError::Bus { reason }));
+                let cancelled =
+                    core::mem::take(&mut mailbox.cancel).then_some(Error::Master(MasterError::Cancelled));
                 let mut ended = gone.or(cancelled);
                 if ended.is_none() && !mailbox.bears_shared_numbers {
-                    ended = core.holders.shared(mailbox.claims);
+                    ended = core.holders.shared(mailbox.claims).map(Error::from);
                     // What follows undoes something.
                     mailbox.bears_shared_numbers = ended.is_some();
                 }
@@ -215,22 +216,22 @@ impl Link {
     }
 
     /// The board's number, checked against the profile.
-    pub(crate) fn board(&self, number: u8) -> Result<Sequence, Error> {
+    pub(crate) fn board(&self, number: u8) -> Result<Sequence, ExchangeError> {
         let profile = self.profile();
-        let wrong = Error::NoBoard { number, first: profile.addr_first };
+        let wrong = ExchangeError::NoBoard { number, first: profile.addr_first };
         Sequence::new(number).filter(|n| profile.is_board(*n)).ok_or(wrong)
     }
 
     /// A board's error, as what the procedure ends with.
-    pub(crate) fn device(board: u8, message: &FromBoard, during: &'static str) -> Option<Error> {
+    pub(crate) fn device(board: u8, message: &FromBoard, during: &'static str) -> Option<ExchangeError> {
         match message {
-            FromBoard::Error(code) => Some(Error::Device { board, code: *code, during }),
+            FromBoard::Error(code) => Some(ExchangeError::Device { board, code: *code, during }),
             _ => None,
         }
     }
 
-    pub(crate) fn no_answer(&self, board: u8, asked: Function, tries: u32, since: u64) -> Error {
-        self.with(|core| Error::NoAnswer {
+    pub(crate) fn no_answer(&self, board: u8, asked: Function, tries: u32, since: u64) -> ExchangeError {
+        self.with(|core| ExchangeError::NoAnswer {
             board,
             asked,
             tries,

@@ -1,11 +1,25 @@
-//! What can go wrong, with the facts, the kind of failure and the command that helps.
-mod answer;
-mod codes;
+//! What can go wrong, with the facts, the kind of failure and the command that helps: one small error an operation, and the
+//! one of a procedure, which is any of them.
+mod address;
+mod exchange;
+mod facts;
+mod identity;
+mod master;
 mod plan;
 mod procedure;
+mod running;
+mod signal;
+mod status;
 mod words;
 
-pub use answer::{Incomplete, LastReceived, Received};
+pub use address::AddressError;
+pub use exchange::{ExchangeError, Incomplete, LastReceived, Received};
+pub use identity::IdentityError;
+pub(crate) use identity::SHARED_CAUSE;
+pub use master::MasterError;
 pub use plan::PlanError;
 pub use procedure::Error;
-pub(crate) use words::{MEASURE_ORDER, SHARED_CAUSE, other_order};
+pub use running::RunningError;
+pub use signal::SignalError;
+pub use status::StatusError;
+pub(crate) use words::{MEASURE_ORDER, other_order};

@@ -1,4 +1,5 @@
 //! Why an update cannot be planned.
+use crate::master::error::facts::Facts;
 use host_kit::ErrorKind;
 use ucom::profile::Plan;
 
@@ -49,28 +50,25 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// What kind of failure it is.
-    pub fn kind(&self) -> ErrorKind {
+    pub(crate) fn facts(&self) -> Facts {
         match self {
-            Self::OtherProgram { .. } => ErrorKind::Refused,
-            _ => ErrorKind::Usage,
-        }
-    }
-
-    /// What helps.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            Self::NoTarget | Self::Twice { .. } => "`ucom update N IMAGE` with a number, a list or `all`",
-            Self::Empty | Self::HalfWord { .. } => {
-                "is it the right file? `ucom update --dry-run` shows what it holds"
+            Self::NoTarget | Self::Twice { .. } => {
+                (ErrorKind::Usage, "plan", "`ucom update N IMAGE` with a number, a list or `all`".into())
             }
+            Self::Empty | Self::HalfWord { .. } => (
+                ErrorKind::Usage,
+                "plan",
+                "is it the right file? `ucom update --dry-run` shows what it holds".into(),
+            ),
             Self::SecondMissing { .. } | Self::SecondUnused { .. } => {
-                "see `prog.plan` in `ucom help profile`"
+                (ErrorKind::Usage, "plan", "see `prog.plan` in `ucom help profile`".into())
             }
-            Self::OtherProgram { .. } => {
-                "is it the right file? without `--expect-program-id` it is not compared"
-            }
-            Self::Void => "`--date YYYY-MM-DD`",
+            Self::OtherProgram { .. } => (
+                ErrorKind::Refused,
+                "plan",
+                "is it the right file? without `--expect-program-id` it is not compared".into(),
+            ),
+            Self::Void => (ErrorKind::Usage, "plan", "`--date YYYY-MM-DD`".into()),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Names of a board's inputs, outputs and parameters (D-36).
 use serde::{Deserialize, Serialize};
 
-use crate::master::error::Error;
+use crate::master::error::SignalError;
 use ucom::{BoardInfo, Dimensions};
 
 /// Which of the three buffers.
@@ -76,7 +76,7 @@ impl IoDescription {
 
     /// Place of a signal: by its text, in any case when only one fits, with or without the unit in brackets behind it, or by
     /// its number (`#3` or `3`).
-    pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, Error> {
+    pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {
             let mut found = names.iter().enumerate().filter(|(_, n)| matches(n)).map(|(i, _)| i);
@@ -95,7 +95,7 @@ impl IoDescription {
         near.retain(|(likeness, _)| *likeness > 0.6);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
         let near = near.into_iter().take(3).map(|(_, n)| n.clone()).collect();
-        Err(Error::NoSignal { board, kind: kind.name(), name: name.into(), near })
+        Err(SignalError::NoSignal { board, kind: kind.name(), name: name.into(), near })
     }
 }
 

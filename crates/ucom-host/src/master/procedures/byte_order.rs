@@ -1,6 +1,6 @@
 //! Whether boards send the bytes of a word in the other order than the profile has (D-10): what shows without asking more.
 use crate::master::engine::Link;
-use crate::master::error::Error;
+use crate::master::error::IdentityError;
 use crate::master::procedures::ask_reports::ask_reports;
 use crate::master::reports::{BoardSeen, Reports};
 
@@ -14,14 +14,14 @@ pub(crate) fn exchanged(reports: &Reports, flash_numbers: &[u16]) -> bool {
 
 /// Refuses boards whose words come in the other order. Boards are asked for reports only where a flash number has a high byte,
 /// which most have not.
-pub(crate) async fn right_order(link: &Link, flash_numbers: &[u16]) -> Result<(), Error> {
+pub(crate) async fn right_order(link: &Link, flash_numbers: &[u16]) -> Result<(), IdentityError> {
     if flash_numbers.iter().all(|number| *number < 0x100) {
         return Ok(());
     }
     let mut reports = Reports::default();
     ask_reports(link, &mut reports).await;
     if exchanged(&reports, flash_numbers) {
-        return Err(Error::ByteOrder { endian: link.profile().endian });
+        return Err(IdentityError::ByteOrder { endian: link.profile().endian });
     }
     Ok(())
 }

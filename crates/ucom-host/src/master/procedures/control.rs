@@ -1,6 +1,6 @@
 //! Single acts: status, resets, start, stop, flags.
 use crate::master::engine::{Link, MS};
-use crate::master::error::{Error, MEASURE_ORDER};
+use crate::master::error::{Error, ExchangeError, IdentityError, MEASURE_ORDER, SignalError, StatusError};
 use crate::master::procedures::ask_reports::{REPORTS, ask_reports, collect_reports};
 use crate::master::procedures::byte_order::right_order;
 use crate::master::procedures::exchange::{TRIES, admin, confirmed, info, numbers, set_status};
@@ -54,7 +54,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
     for _ in 0..TRIES {
         link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
         match numbers(link, board).await {
-            Err(Error::NoAnswer { .. }) => {
+            Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
                 // It cannot answer any more: what the rules require (D-22).
                 let status = expected_status(&before, mask.0, value.0);
@@ -65,7 +65,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         }
     }
     let status = before.status;
-    Err(Error::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES })
+    Err(Error::Status(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }))
 }
 
 /// Polls PC_INFO every 200 ms until some bits are as wanted.
@@ -83,15 +83,18 @@ pub(crate) async fn wait_status(
         match numbers(link, board).await {
             Ok(info) if info.status & mask == value => return Ok(info),
             Ok(info) => last = Some(info.status),
-            Err(Error::NoAnswer { .. } | Error::Incomplete { .. }) => {}
+            Err(
+                Error::Exchange(ExchangeError::NoAnswer { .. })
+                | Error::Exchange(ExchangeError::Incomplete { .. }),
+            ) => {}
             Err(e) => return Err(e),
         }
         let waited = link.now().saturating_sub(since);
         if waited >= limit {
             let waited_ms = waited / MS;
             return Err(match last {
-                Some(status) => Error::NotReached { board, what, waited_ms, status },
-                None => link.no_answer(board, Function::Info, TRIES, since),
+                Some(status) => Error::Status(StatusError::NotReached { board, what, waited_ms, status }),
+                None => link.no_answer(board, Function::Info, TRIES, since).into(),
             });
         }
         link.sleep(200 * MS).await;
@@ -150,20 +153,22 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
         }
     }
     match numbers(link, board).await {
-        Err(Error::NoAnswer { .. }) if reports.ids.contains(&ucom_id) => {
+        Err(Error::Exchange(ExchangeError::NoAnswer { .. })) if reports.ids.contains(&ucom_id) => {
             link.with(|core| *core.boards.of(board) = Default::default());
             Ok(())
         }
-        Err(Error::NoAnswer { .. }) => Err(link.no_answer(board, Function::Reset, 1, since)),
+        Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
+            Err(link.no_answer(board, Function::Reset, 1, since).into())
+        }
         Err(error) => Err(error),
         Ok(info) => {
             let waited_ms = link.now().saturating_sub(since) / MS;
-            Err(Error::NotReached {
+            Err(Error::Status(StatusError::NotReached {
                 board,
                 what: "it did not give its number up",
                 waited_ms,
                 status: info.status,
-            })
+            }))
         }
     }
 }
@@ -187,7 +192,7 @@ pub(crate) async fn enter_exloader(
     flash_number: Option<u16>,
 ) -> Result<BoardInfo, Error> {
     let info = match (xreset_taken(link, board).await, flash_number) {
-        (Err(Error::NoAnswer { .. }), Some(flash_number)) => {
+        (Err(Error::Exchange(ExchangeError::NoAnswer { .. })), Some(flash_number)) => {
             link.note(format!("board {board} lost its number: giving it back"));
             repair(link, board, flash_number).await?;
             exloader_runs(link, board, EXLOADER_WAIT).await?
@@ -198,7 +203,7 @@ pub(crate) async fn enter_exloader(
         // One damaged answer is not another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
-            return Err(Error::WrongBoard { board, wanted, found });
+            return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found }));
         }
     }
     if info.status.has(Status::PROG) {
@@ -223,8 +228,10 @@ async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     for _ in 1..TRIES {
         send_xreset(link, to).await;
         match exloader_runs(link, board, soon).await {
-            Err(Error::NotReached { .. }) => {}
-            Err(Error::NoAnswer { .. }) => return exloader_runs(link, board, EXLOADER_WAIT - soon).await,
+            Err(Error::Status(StatusError::NotReached { .. })) => {}
+            Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
+                return exloader_runs(link, board, EXLOADER_WAIT - soon).await;
+            }
             other => return other,
         }
     }
@@ -269,11 +276,11 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                 FromBoard::McaReady => break,
                 FromBoard::Error(ErrorCode::AutostartForbidden) => {
                     link.with(|core| core.boards.of(board).starting_since = None);
-                    return Err(Error::Device {
+                    return Err(Error::Exchange(ExchangeError::Device {
                         board,
                         code: ErrorCode::AutostartForbidden,
                         during: "PC_START",
-                    });
+                    }));
                 }
                 // Errors of a bad bus are only to be logged; they are reported when nothing came of all tries.
                 message => error = Link::device(board, &message, "PC_START").or(error),
@@ -290,10 +297,15 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
         }
     }
     if let Some(error) = error {
-        return Err(error);
+        return Err(error.into());
     }
     let waited_ms = link.now().saturating_sub(since) / MS;
-    Err(Error::NotReached { board, what: "the application did not start", waited_ms, status: last })
+    Err(Error::Status(StatusError::NotReached {
+        board,
+        what: "the application did not start",
+        waited_ms,
+        status: last,
+    }))
 }
 
 pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
@@ -310,7 +322,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
         one_board_each(link, &[board]).await?;
     }
     if !known.status.has(Status::MSTART) {
-        return Err(Error::NoApplication { board, valid: known.has_application() });
+        return Err(Error::Signal(SignalError::NoApplication { board, valid: known.has_application() }));
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);

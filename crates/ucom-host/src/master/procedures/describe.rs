@@ -1,6 +1,6 @@
 //! Reading descriptions and initial inputs: idempotent, at most three tries, accepted only if the totals fit (D-14).
 use crate::master::engine::Link;
-use crate::master::error::{Error, Incomplete};
+use crate::master::error::{Error, ExchangeError, Incomplete, SignalError};
 use crate::master::io::{DescriptionKey, IoDescription, SnapshotAssembler};
 use crate::master::procedures::exchange::{TRIES, info};
 use crate::master::procedures::one_board::one_board_each;
@@ -105,7 +105,7 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
             }
             message => {
                 if let Some(error) = Link::device(board, &message, "the IO description") {
-                    return Err(error);
+                    return Err(error.into());
                 }
             }
         }
@@ -129,8 +129,10 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
     let asked = Function::DumpIo;
     match problem {
-        Some(problem) => Err(Error::Incomplete { board, asked, tries: TRIES, problem }),
-        None => Err(link.no_answer(board, asked, TRIES, since)),
+        Some(problem) => {
+            Err(Error::Exchange(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }))
+        }
+        None => Err(link.no_answer(board, asked, TRIES, since).into()),
     }
 }
 
@@ -204,7 +206,7 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
                 }
                 message => {
                     if let Some(error) = Link::device(board, &message, "MCA_DUMP_CI") {
-                        return Err(error);
+                        return Err(error.into());
                     }
                 }
             }
@@ -217,9 +219,9 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
     let asked = Function::DumpCi;
     if received_any {
         let problem = Incomplete::Packages { missing, of: packages };
-        return Err(Error::Incomplete { board, asked, tries: TRIES, problem });
+        return Err(Error::Exchange(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }));
     }
-    Err(link.no_answer(board, asked, TRIES, since))
+    Err(link.no_answer(board, asked, TRIES, since).into())
 }
 
 fn missing_packages(seen: &[bool]) -> u32 {
@@ -231,7 +233,7 @@ async fn described(link: &Link, board: u8) -> Result<(BoardInfo, IoDescription),
     let known = info(link, board).await?.info;
     one_board_each(link, &[board]).await?;
     if !known.status.has(Status::MSTART) {
-        return Err(Error::NoApplication { board, valid: known.has_application() });
+        return Err(Error::Signal(SignalError::NoApplication { board, valid: known.has_application() }));
     }
     let description = describe(link, board, &known).await?;
     Ok((known, description))

@@ -1,6 +1,6 @@
 //! Requests that the procedures are made of, with their bounded repetition.
 use crate::master::engine::Link;
-use crate::master::error::{Error, Incomplete};
+use crate::master::error::{Error, ExchangeError, IdentityError, Incomplete, StatusError};
 use crate::master::reports::BoardSeen;
 use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
 
@@ -83,7 +83,7 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }
         if info.sequence != board {
-            return Err(Error::WrongSequence { board, reported: info.sequence });
+            return Err(Error::Identity(IdentityError::WrongSequence { board, reported: info.sequence }));
         }
         remember(link, board, info, text.as_deref());
     }
@@ -149,7 +149,11 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
             // One damaged frame may contain anything; a board sends it again.
-            Err(e @ Error::WrongSequence { .. }) if mismatch.as_ref() != Some(&e) => mismatch = Some(e),
+            Err(e @ Error::Identity(IdentityError::WrongSequence { .. }))
+                if mismatch.as_ref() != Some(&e) =>
+            {
+                mismatch = Some(e)
+            }
             Err(e) => return Err(e),
         }
     }
@@ -159,8 +163,10 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     let asked = Function::DspInfo;
     match (mismatch, problem) {
         (Some(mismatch), _) => Err(mismatch),
-        (None, Some(problem)) => Err(Error::Incomplete { board, asked, tries: TRIES, problem }),
-        (None, None) => Err(link.no_answer(board, Function::Info, TRIES, since)),
+        (None, Some(problem)) => {
+            Err(Error::Exchange(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }))
+        }
+        (None, None) => Err(link.no_answer(board, Function::Info, TRIES, since).into()),
     }
 }
 
@@ -176,7 +182,7 @@ pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error
             return Ok(first);
         }
     }
-    Err(Error::Contradiction { board, tries: TRIES + 1 })
+    Err(Error::Exchange(ExchangeError::Contradiction { board, tries: TRIES + 1 }))
 }
 
 /// What does not change from one answer to the next.
@@ -203,7 +209,7 @@ pub(crate) async fn set_status(
             return Ok(info);
         }
     }
-    Err(Error::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES })
+    Err(Error::Status(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }))
 }
 
 /// MCA_ADMIN_DATA, answered by the board's state.
@@ -246,8 +252,8 @@ async fn ask_admin(
         }
     }
     match (error, other) {
-        (Some(error), _) => Err(error),
-        (None, Some(is)) => Err(Error::AdminRefused { board, wanted, is }),
-        (None, None) => Err(link.no_answer(board, ask.function(), TRIES, since)),
+        (Some(error), _) => Err(error.into()),
+        (None, Some(is)) => Err(Error::Status(StatusError::AdminRefused { board, wanted, is })),
+        (None, None) => Err(link.no_answer(board, ask.function(), TRIES, since).into()),
     }
 }

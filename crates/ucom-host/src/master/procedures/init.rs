@@ -5,7 +5,7 @@
 //! a board that raises its pin by itself would otherwise let its neighbour take the same number.
 
 use crate::master::engine::Link;
-use crate::master::error::Error;
+use crate::master::error::{Error, IdentityError};
 use crate::master::procedures::ask_reports::{REPORTS, ask_reports, collect_reports};
 use crate::master::procedures::byte_order::{exchanged, flash_numbers};
 use crate::master::procedures::exchange::{confirmed, info, set_status};
@@ -26,7 +26,7 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
         match next_board(&link, number.number()).await {
             Ok(Some(seen)) => report.boards.push(seen),
             Ok(None) => break,
-            Err(error @ Error::NumberShared { .. }) => {
+            Err(error @ Error::Identity(IdentityError::NumberShared { .. })) => {
                 return Err(given_back(&link, number.number(), error).await?);
             }
             Err(error) => {

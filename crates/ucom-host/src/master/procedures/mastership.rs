@@ -1,6 +1,6 @@
 //! Whether this PC may be the master of the bus (D-08).
 use crate::master::engine::{Core, Link, MS, Session};
-use crate::master::error::Error;
+use crate::master::error::{Error, MasterError};
 use crate::master::procedures::exchange::numbers;
 use ucom::Function;
 
@@ -41,11 +41,11 @@ impl Link {
     }
 
     /// Refuses when a frame of another PC was received within the last `window` µs.
-    fn no_competing_master(&self, window: u64) -> Result<(), Error> {
+    fn no_competing_master(&self, window: u64) -> Result<(), MasterError> {
         let (now, received) = self.with(|core| (core.now, core.competing_master));
         match received.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
             Some((at, function, to)) => {
-                Err(Error::CompetingMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
+                Err(MasterError::CompetingMaster { function, to, ago_ms: now.saturating_sub(at) / MS })
             }
             None => Ok(()),
         }

@@ -36,7 +36,7 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Err
             }
         }
         if let Some(error) = link.with(|core| core.holders.shared(mask)) {
-            return Err(error);
+            return Err(error.into());
         }
         if (ask.is_empty() && until.is_none()) || round > 2 * TRIES {
             return Ok(());
@@ -66,7 +66,7 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Error> 
     out_of_words(link, link.now() + link.times().info).await;
     let doubtful = link.with(|core| core.holders.doubtful());
     one_board_each(link, &doubtful).await?;
-    link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
+    link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), |error| Err(error.into()))
 }
 
 /// Waits until nobody can answer any more what these boards (by bit) were asked last: whoever shares a number with one of

@@ -1,6 +1,6 @@
 //! PC_SETSTATUS as the formula has it, value bits outside the mask included (D-22): for whoever knows why.
 use crate::master::engine::{Link, MS};
-use crate::master::error::Error;
+use crate::master::error::{Error, ExchangeError, RunningError};
 use crate::master::procedures::exchange::numbers;
 use crate::master::procedures::one_board::one_board_each;
 use crate::master::reports::{Outcome, RawStatus, expected_status};
@@ -25,7 +25,7 @@ pub(crate) async fn raw_status(
     let running: Vec<u8> =
         before.iter().filter(|(_, info)| info.status.has(Status::MCARUN)).map(|(board, _)| *board).collect();
     if !running.is_empty() && !force {
-        return Err(Error::LoopRuns { boards: running });
+        return Err(Error::Running(RunningError::LoopRuns { boards: running }));
     }
     link.become_master(force).await?;
     one_board_each(&link, &seen).await?;
@@ -39,7 +39,7 @@ pub(crate) async fn raw_status(
         loop {
             result.after = match numbers(&link, board).await {
                 Ok(info) => Some(info),
-                Err(Error::NoAnswer { .. }) => None,
+                Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => None,
                 Err(e) => return Err(e),
             };
             // Applications need a while to come up.

@@ -5,7 +5,7 @@
 //! Pins that stay low, as after a cancel, do no harm: they only matter to PC_INIT, and a repair raises the one it needs.
 
 use crate::master::engine::{Link, MS, head};
-use crate::master::error::Error;
+use crate::master::error::{AddressError, Error, IdentityError};
 use crate::master::procedures::exchange::{TRIES, confirmed, set_status};
 use crate::master::procedures::one_board::one_board_each;
 use crate::master::procedures::survey::statuses;
@@ -41,7 +41,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
     let since = link.now();
     only_its_pin(link, number, lowered).await?;
     if !take_number(link, number, true).await? {
-        return Err(link.no_answer(number, Function::Init, TRIES, since));
+        return Err(link.no_answer(number, Function::Init, TRIES, since).into());
     }
     let found: Vec<u16> = holders(link, number).await?;
     match found.as_slice() {
@@ -49,16 +49,21 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             Ok(()) => confirmed(link, number).await,
             Err(shared) => Err(given_back(link, number, shared).await?),
         },
-        [] => Err(link.no_answer(number, Function::Info, ROUNDS, since)),
+        [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
         // Whoever took it must not keep it, or the next command means the wrong board.
         [other] => {
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give number {number} back"));
             }
-            Err(Error::WrongBoard { board: number, wanted: flash_number, found: *other })
+            Err(Error::Identity(IdentityError::WrongBoard {
+                board: number,
+                wanted: flash_number,
+                found: *other,
+            }))
         }
         _ => {
-            let shared = Error::NumberShared { board: number, found, given_back: false };
+            let shared =
+                Error::Identity(IdentityError::NumberShared { board: number, found, given_back: false });
             Err(given_back(link, number, shared).await?)
         }
     }
@@ -76,7 +81,7 @@ async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<
         // Only a board with a number holds its pin; without it nobody could take this one.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
-            return Err(Error::MayTakeNumber { board: number, other: first });
+            return Err(Error::Address(AddressError::MayTakeNumber { board: number, other: first }));
         }
     }
     let others: Vec<Sequence> = numbers.into_iter().filter(|n| Some(n.number()) != feeder).collect();
@@ -136,9 +141,9 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
 
 /// A number that two boards took: nobody keeps it.
 pub(crate) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
-    let Error::NumberShared { board, found, .. } = error else { return Ok(error) };
+    let Error::Identity(IdentityError::NumberShared { board, found, .. }) = error else { return Ok(error) };
     let given_back = take_back(link, number).await?;
-    Ok(Error::NumberShared { board, found, given_back })
+    Ok(Error::Identity(IdentityError::NumberShared { board, found, given_back }))
 }
 
 /// Takes a number from whoever has it; `true`: nobody answers to it any more.
@@ -175,7 +180,15 @@ pub(crate) async fn repair_procedure(
             let info = set_status(&link, number, Status::OPINIT, Status::OPINIT).await?;
             Ok(Outcome::Repaired(BoardSeen { info, ..seen }))
         }
-        [found] => Err(Error::WrongBoard { board: number, wanted: flash_number, found: *found }),
-        found => Err(Error::NumberShared { board: number, found: found.to_vec(), given_back: false }),
+        [found] => Err(Error::Identity(IdentityError::WrongBoard {
+            board: number,
+            wanted: flash_number,
+            found: *found,
+        })),
+        found => Err(Error::Identity(IdentityError::NumberShared {
+            board: number,
+            found: found.to_vec(),
+            given_back: false,
+        })),
     }
 }

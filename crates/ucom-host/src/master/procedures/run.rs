@@ -2,7 +2,7 @@
 //! parameters, heartbeats, loop, outputs.
 
 use crate::master::engine::{Core, Life, Link};
-use crate::master::error::Error;
+use crate::master::error::{Error, MasterError, RunningError, SignalError};
 use crate::master::io::{DescriptionKey, IoDescription, Kind};
 use crate::master::load::LoadForecast;
 use crate::master::procedures::control::{change_flags, start_from};
@@ -21,7 +21,7 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
     let mut begun = Vec::new();
     let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
     if let Err(error) = &result
-        && !matches!(error, Error::Bus { .. })
+        && !matches!(error, Error::Master(MasterError::Bus { .. }))
     {
         link.bear_shared_numbers(true);
         let undone = link.or_cancel(async {
@@ -83,7 +83,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         let description = describe(link, plan.board, &seen.info).await?;
         // What is to be written was chosen by the names that were known.
         if described.get(&plan.board).is_some_and(|known| *known != description) {
-            return Err(Error::StaleNames { board: plan.board });
+            return Err(Error::Signal(SignalError::StaleNames { board: plan.board }));
         }
         add(link, options, plan, description, &mut described)?;
     }
@@ -118,7 +118,7 @@ fn add(
     }
     described.insert(plan.board, description);
     let load = forecast(link, described);
-    if load.exceeds() && !options.force { Err(Error::Load(load)) } else { Ok(()) }
+    if load.exceeds() && !options.force { Err(Error::Running(RunningError::Load(load))) } else { Ok(()) }
 }
 
 /// Inputs, parameters, the loop, and the outputs if they are wanted.
@@ -180,7 +180,7 @@ fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
         let stops = core.profile.on_lost == OnLost::StopAll;
         options.boards.iter().map(|plan| plan.board).find(|board| stops && lost(core, *board))
     });
-    lost.map_or(Ok(()), |board| Err(Error::Lost { board }))
+    lost.map_or(Ok(()), |board| Err(Error::Running(RunningError::Lost { board })))
 }
 
 fn repeat_inputs(link: &Link, board: u8) {

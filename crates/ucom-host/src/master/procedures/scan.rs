@@ -1,7 +1,7 @@
 //! Who is there, without changing anything: PC_REPORT to all and PC_INFO to each number, no reset (5.4).
 
 use crate::master::engine::Link;
-use crate::master::error::Error;
+use crate::master::error::{Error, IdentityError};
 use crate::master::procedures::ask_reports::ask_reports;
 use crate::master::procedures::byte_order::{exchanged, flash_numbers};
 use crate::master::procedures::exchange::remember;
@@ -27,7 +27,8 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     };
     for (number, slot) in &slots {
         let board = *number;
-        if let Some(Error::NumberShared { found, .. }) = link.with(|core| core.holders.shared(1 << board))
+        if let Some(IdentityError::NumberShared { found, .. }) =
+            link.with(|core| core.holders.shared(1 << board))
             && let [first, second, ..] = found[..]
         {
             report.findings.push(ScanFinding::NumberShared { board, first, second });

@@ -2,7 +2,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::master::engine::{Link, Received};
-use crate::master::error::Error;
+use crate::master::error::ExchangeError;
 use crate::master::procedures::exchange::{Answer, InfoCollector, TRIES, identity};
 use crate::master::reports::BoardSeen;
 use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
@@ -103,10 +103,13 @@ fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, received: 
 }
 
 /// The status that each of these numbers shows last; an error where its answers contradict each other.
-pub(crate) async fn statuses(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Result<Status, Error>> {
+pub(crate) async fn statuses(
+    link: &Link,
+    numbers: &[Sequence],
+) -> BTreeMap<u8, Result<Status, ExchangeError>> {
     let slots = ask_all(link, numbers).await;
     let status = |(board, slot): (u8, Slot)| {
-        let contradiction = Error::Contradiction { board, tries: TRIES + 1 };
+        let contradiction = ExchangeError::Contradiction { board, tries: TRIES + 1 };
         match slot.answers.last() {
             Some((info, _)) if !slot.contradicts => (board, Ok(info.status)),
             _ => (board, Err(contradiction)),

@@ -1,6 +1,6 @@
 //! PC_INIT to one board (D-21, D-24).
 use crate::master::engine::{Link, MS};
-use crate::master::error::Error;
+use crate::master::error::{AddressError, Error};
 use crate::master::procedures::exchange::TRIES;
 use crate::master::procedures::exchange::{Answer, ask_info};
 use ucom::{ErrorCode, FromBoard, Function, Status, ToBoard};
@@ -23,7 +23,7 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
             match received.message {
                 FromBoard::InitAck(data) if received.from == number || data == number => {
                     if received.from != data {
-                        return Err(Error::AckMismatch { id: received.from, data });
+                        return Err(Error::Address(AddressError::AckMismatch { id: received.from, data }));
                     }
                     acknowledged = true;
                     break;

@@ -1,7 +1,7 @@
 //! Who reports, who has a number, and what is odd about it.
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::master::error::{Error, MEASURE_ORDER, other_order};
+use crate::master::error::{Error, IdentityError, MEASURE_ORDER, other_order};
 use crate::master::reports::seen::BoardSeen;
 use ucom::Report;
 use ucom::profile::Endian;
@@ -125,7 +125,7 @@ pub enum ScanFinding {
 }
 
 fn shared(board: u8, found: [u16; 2]) -> Error {
-    Error::NumberShared { board, found: found.to_vec(), given_back: false }
+    Error::Identity(IdentityError::NumberShared { board, found: found.to_vec(), given_back: false })
 }
 
 impl ScanFinding {

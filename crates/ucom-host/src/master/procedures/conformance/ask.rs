@@ -1,6 +1,6 @@
 //! Tests that change nothing.
 use crate::master::engine::MS;
-use crate::master::error::Error;
+use crate::master::error::{Error, MasterError};
 use crate::master::procedures::conformance::bench::{Bench, list, verdict};
 use crate::master::reports::{BoardSeen, Verdict};
 use ucom::profile::{Endian, ReportMode};
@@ -62,7 +62,9 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
         return Ok(Verdict::Skipped(why.into()));
     }
     match bench.link.look_for_master(bench.options.force).await {
-        Err(e @ Error::CompetingMaster { .. }) => return Ok(Verdict::Skipped(e.to_string())),
+        Err(e @ Error::Master(MasterError::CompetingMaster { .. })) => {
+            return Ok(Verdict::Skipped(e.to_string()));
+        }
         other => other?,
     }
     // A board that has rebooted since would take any number.

@@ -1,7 +1,7 @@
 //! Frames out, frames in, and what was sent and came.
 
 use crate::master::engine::{Forget, Link, MS, Session};
-use crate::master::error::Error;
+use crate::master::error::{Error, ExchangeError, SignalError};
 use crate::master::procedures::control::start_application;
 use crate::master::reports::{BoardSeen, ConformanceOptions, Verdict};
 use ucom::{BoardInfo, Frame, Function, Profile, Sequence, Status};
@@ -145,7 +145,7 @@ impl<'a> Bench<'a> {
 /// Without an application there is nothing to test.
 fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
     match e {
-        Error::Device { .. } | Error::NoApplication { .. } => {
+        Error::Exchange(ExchangeError::Device { .. }) | Error::Signal(SignalError::NoApplication { .. }) => {
             Ok(Err(Verdict::Skipped(format!("its application does not start: {e}"))))
         }
         e => Err(e),

@@ -1,6 +1,6 @@
 //! The tests as a whole: which boards are there, every test that is allowed, and all as it was found.
 use crate::master::engine::Link;
-use crate::master::error::Error;
+use crate::master::error::{AddressError, Error, ExchangeError, IdentityError, MasterError, RunningError};
 use crate::master::procedures::ask_reports::ask_reports;
 use crate::master::procedures::conformance::bench::Found;
 use crate::master::procedures::conformance::restore::put_all_back;
@@ -21,15 +21,17 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
     link.bear_shared_numbers(true);
     if let Err(error) = result {
         let why = match &error {
-            Error::Cancelled => "cancelled".to_owned(),
-            Error::NoAnswer { board, .. } => format!("board {board} does not answer"),
+            Error::Master(MasterError::Cancelled) => "cancelled".to_owned(),
+            Error::Exchange(ExchangeError::NoAnswer { board, .. }) => {
+                format!("board {board} does not answer")
+            }
             other => other.to_string(),
         };
         tests.skip_rest(&why);
         tests.report.error = Some(error);
     }
     let Runner { mut report, unnumbered, at, .. } = tests;
-    if options.changes() && !matches!(report.error, Some(Error::Bus { .. })) {
+    if options.changes() && !matches!(report.error, Some(Error::Master(MasterError::Bus { .. }))) {
         let at = at.filter(|_| report.error.is_some());
         let back = put_all_back(&link, &found, &options, unnumbered, at, &mut report.left);
         if let Err(error) = link.or_cancel(back).await {
@@ -52,7 +54,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
         link.board(board)?;
         match confirmed(link, board).await {
             Ok(seen) => boards.push(seen),
-            Err(Error::NoAnswer { .. }) if options.boards.is_empty() => {}
+            Err(Error::Exchange(ExchangeError::NoAnswer { .. })) if options.boards.is_empty() => {}
             Err(e) => return Err(e),
         }
     }
@@ -63,11 +65,11 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
         let board = program.board;
         let seen = match boards.iter().find(|b| b.number == board) {
             Some(seen) => seen.clone(),
-            None => return Err(link.no_answer(board, Function::Info, 3, link.now())),
+            None => return Err(link.no_answer(board, Function::Info, 3, link.now()).into()),
         };
         if seen.info.flash_number != program.flash_number {
             let (wanted, found) = (program.flash_number, seen.info.flash_number);
-            return Err(Error::WrongBoard { board, wanted, found });
+            return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found }));
         }
         // U-2: program data outrank the process data of any board that runs, tested or not.
         let states = board_states(link).await;
@@ -76,11 +78,14 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
         running.dedup();
     }
     if options.changes() && !running.is_empty() {
-        return Err(Error::LoopRuns { boards: running });
+        return Err(Error::Running(RunningError::LoopRuns { boards: running }));
     }
     let (reports, all) = who_reports(link, &boards).await;
     if options.init && !all {
-        return Err(Error::NotNumbered { reports: reports as u32, boards: boards.len() as u32 });
+        return Err(Error::Address(AddressError::NotNumbered {
+            reports: reports as u32,
+            boards: boards.len() as u32,
+        }));
     }
     if options.changes() {
         link.become_master(options.force).await?;

@@ -1,6 +1,6 @@
 //! Boards as they were found: after the tests, and when these end before their time.
 use crate::master::engine::{Link, MS, Session};
-use crate::master::error::Error;
+use crate::master::error::{Error, ExchangeError, IdentityError, StatusError};
 use crate::master::procedures::conformance::bench::Found;
 use crate::master::procedures::control::{start_application, wait_status};
 use crate::master::procedures::exchange::{confirmed, numbers, set_status};
@@ -18,7 +18,7 @@ pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
         let (board, wanted) = (before.number, before.info.flash_number);
         match report.boards.iter().find(|b| b.number == board).map(|b| b.info.flash_number) {
             Some(found) if found == wanted => {}
-            Some(found) => return Err(Error::WrongBoard { board, wanted, found }),
+            Some(found) => return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found })),
             None => {
                 numbers(link, board).await?;
             }
@@ -111,7 +111,7 @@ async fn answering(
     let what = "it does not answer";
     let now = match wait_status(link, n, Status(0), Status(0), limit, what).await {
         Ok(info) => info,
-        Err(Error::NoAnswer { .. }) => {
+        Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
             // It may run all the same.
             halt(link, n).await?;
             repair(link, n, before.info.flash_number).await?.info
@@ -124,9 +124,11 @@ async fn answering(
     let now = confirmed(link, n).await?.info;
     match now.flash_number == before.info.flash_number {
         true => Ok(now),
-        false => {
-            Err(Error::WrongBoard { board: n, wanted: before.info.flash_number, found: now.flash_number })
-        }
+        false => Err(Error::Identity(IdentityError::WrongBoard {
+            board: n,
+            wanted: before.info.flash_number,
+            found: now.flash_number,
+        })),
     }
 }
 
@@ -149,7 +151,7 @@ async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Resul
     let limit = u64::from(link.profile().autostart_holdoff) * MS + link.times().start;
     match wait_status(link, board, Status::MSTART, Status::MSTART, limit, what).await {
         Ok(up) => Ok(up),
-        Err(Error::NotReached { .. }) => numbers(link, board).await,
+        Err(Error::Status(StatusError::NotReached { .. })) => numbers(link, board).await,
         Err(e) => Err(e),
     }
 }

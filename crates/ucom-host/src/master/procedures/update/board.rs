@@ -1,6 +1,6 @@
 //! One board: attempts, each from its exloader to the read-back (U-4 to U-10).
 use crate::master::engine::Link;
-use crate::master::error::Error;
+use crate::master::error::{Error, IdentityError, StatusError};
 use crate::master::procedures::control::{enter_exloader, start_application};
 use crate::master::procedures::exchange::{confirmed, identity, info, numbers};
 use crate::master::procedures::one_board::one_board_each;
@@ -65,7 +65,7 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
         // One damaged answer is not another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
-            return Err(Error::WrongBoard { board, wanted, found });
+            return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found }));
         }
     }
     one_board_each(link, &[board]).await?;
@@ -139,7 +139,9 @@ pub(super) async fn judge(
     // work: a cancel in this moment sends the command, too.
     leave_programming(link, board).await;
     // Another board that has taken the number since complains of program data, or takes them out of turn.
-    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+    if let Err(error @ Error::Identity(IdentityError::NumberShared { .. })) =
+        one_board_each(link, &[board]).await
+    {
         session.fail_with(board, error);
         return None;
     }
@@ -158,7 +160,9 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
         Err(e) => return session.fail_with(board, e),
     };
     // Whoever shares the number was written, too, or is what has just answered.
-    if let Err(error @ Error::NumberShared { .. }) = one_board_each(link, &[board]).await {
+    if let Err(error @ Error::Identity(IdentityError::NumberShared { .. })) =
+        one_board_each(link, &[board]).await
+    {
         return session.fail_with(board, error);
     }
     if let Some(result) = session.result(board) {
@@ -199,7 +203,12 @@ pub(super) async fn start(link: &Link, session: &mut UpdateSession, board: u8, k
         }
         Ok(seen) => {
             let what = "the application does not run";
-            let error = Error::NotReached { board, what, waited_ms: 0, status: seen.info.status };
+            let error = Error::Status(StatusError::NotReached {
+                board,
+                what,
+                waited_ms: 0,
+                status: seen.info.status,
+            });
             session.fail(board, UpdateFailure::NotRunning(Box::new(error)));
         }
         Err(e) => session.fail(board, UpdateFailure::NotRunning(Box::new(e))),

@@ -1,7 +1,7 @@
 //! The update as a whole: checks U-1 to U-3, then boards one by one or as a group; what is left when it is ended early.
 
 use crate::master::engine::Link;
-use crate::master::error::{Error, PlanError};
+use crate::master::error::{Error, IdentityError, MasterError, PlanError, RunningError};
 use crate::master::procedures::byte_order::right_order;
 use crate::master::procedures::exchange::{confirmed, numbers, set_status};
 use crate::master::procedures::one_board::one_board_each;
@@ -30,7 +30,10 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     let plan = session.plan(&link, None)?;
     let mut end = link.or_cancel(all(&link, &mut session)).await;
     link.bear_shared_numbers(true);
-    if let Err(error @ (Error::Cancelled | Error::NumberShared { .. })) = end {
+    if let Err(
+        error @ (Error::Master(MasterError::Cancelled) | Error::Identity(IdentityError::NumberShared { .. })),
+    ) = end
+    {
         end = link.or_cancel(broken_off(&link, &mut session, &error)).await;
     }
     if let Err(error) = &end {
@@ -41,12 +44,12 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     match end {
         Ok(()) => {}
         // Asked once more: what was still to be undone is not.
-        Err(Error::Cancelled) => {
+        Err(Error::Master(MasterError::Cancelled)) => {
             session.unfinished().into_iter().for_each(|board| session.cancel(board));
             session.cancel_starts();
         }
         // Nothing can be sent any more, but what is known of the boards is still worth reporting.
-        Err(error @ Error::Bus { .. }) => {
+        Err(error @ Error::Master(MasterError::Bus { .. })) => {
             let waiting = core::mem::take(&mut session.to_start);
             for board in session.unfinished().into_iter().chain(waiting) {
                 session.fail_with(board, error.clone());
@@ -81,12 +84,12 @@ async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Re
             link.note(format!("board {board} did not confirm that it left programming"));
         }
         match why {
-            Error::Cancelled => session.cancel(board),
+            Error::Master(MasterError::Cancelled) => session.cancel(board),
             why => session.fail_with(board, why.clone()),
         }
     }
     still_programming(link, session, why).await;
-    if *why != Error::Cancelled {
+    if *why != Error::Master(MasterError::Cancelled) {
         session.refuse(why);
         let waiting = core::mem::take(&mut session.to_start);
         waiting
@@ -155,14 +158,14 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     if !session.options.force
         && let Err(error) = right_order(link, &flash_numbers).await
     {
-        session.refuse(&error);
+        session.refuse(&error.into());
         return Ok(());
     }
     // U-2: program data outrank the process data of a running board.
     let states = board_states(link).await;
     let running: Vec<u8> = states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b).collect();
     if !running.is_empty() && !session.options.force {
-        session.refuse(&Error::Running { boards: running });
+        session.refuse(&Error::Running(RunningError::Running { boards: running }));
         return Ok(());
     }
     // D-08, in a dry run as well: what it reports must be what would happen.
@@ -224,7 +227,7 @@ async fn check(link: &Link, session: &mut UpdateSession) {
             result.before = Some(known);
         }
         if let Some(wanted) = target.flash_number.filter(|wanted| *wanted != found) {
-            let error = Error::WrongBoard { board, wanted, found };
+            let error = Error::Identity(IdentityError::WrongBoard { board, wanted, found });
             session.fail(board, UpdateFailure::Refused(Box::new(error)));
             continue;
         }

@@ -1,0 +1,52 @@
+//! Address assignment that was refused.
+use crate::master::error::facts::Facts;
+use crate::master::error::identity::OTHER_PROTOCOL;
+use host_kit::ErrorKind;
+
+/// Why boards did not get their numbers.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AddressError {
+    /// Acknowledge of PC_INIT under one number with another in it (D-24).
+    #[error("DSP_INITACK under number {id} contains number {data}: the board is refused")]
+    AckMismatch {
+        /// By the identifier.
+        id: u8,
+        /// By the data.
+        data: u8,
+    },
+    /// Giving a number could give it to the first board of the chain.
+    #[error("board {other} does not answer: without a number it would take number {board}")]
+    MayTakeNumber {
+        /// The number that was to be given.
+        board: u8,
+        /// The first board.
+        other: u8,
+    },
+    /// The boards that report are not those that have a number: a new address assignment would mean other boards than before.
+    #[error(
+        "boards that report: {reports}, with a number: {boards}, or two share a flash id: not as `ucom init` leaves a chain"
+    )]
+    NotNumbered {
+        /// Different reports.
+        reports: u32,
+        /// Boards with a number.
+        boards: u32,
+    },
+}
+
+impl AddressError {
+    pub(crate) fn facts(&self) -> Facts {
+        match self {
+            Self::AckMismatch { .. } => (ErrorKind::Refused, "ack-mismatch", OTHER_PROTOCOL.into()),
+            Self::MayTakeNumber { other, .. } => (
+                ErrorKind::Refused,
+                "may-take-number",
+                format!("`ucom repair {other}` first, or number all boards anew: `ucom init`"),
+            ),
+            Self::NotNumbered { .. } => {
+                (ErrorKind::Refused, "not-numbered", "`ucom init`, then again".into())
+            }
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! An exchange with a board that failed.
+use core::fmt;
+
+use crate::master::error::facts::Facts;
+use crate::master::error::words::MEASURE_ORDER;
+use host_kit::ErrorKind;
+use ucom::{ErrorCode, Function};
+
+/// Why an exchange with a board failed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExchangeError {
+    /// A number that no board has.
+    #[error("{number} is no board number (1 to 31, and {first} is the first here)")]
+    NoBoard {
+        /// The number.
+        number: u8,
+        /// `addr.first`.
+        first: u32,
+    },
+    /// A board did not answer.
+    #[error("board {board} does not answer {} ({tries} tries, {waited_ms} ms; {})", asked.name(), Received(*last))]
+    NoAnswer {
+        /// Its number.
+        board: u8,
+        /// What was asked.
+        asked: Function,
+        /// How often.
+        tries: u32,
+        /// Time from the first request to giving up, ms.
+        waited_ms: u64,
+        /// What was last received from it.
+        last: Option<LastReceived>,
+    },
+    /// An answer never came whole.
+    #[error("board {board}: the answer to {} never came whole ({tries} tries): {problem}", asked.name())]
+    Incomplete {
+        /// Its number.
+        board: u8,
+        /// What was asked.
+        asked: Function,
+        /// How often.
+        tries: u32,
+        /// What was wrong with the last one.
+        problem: Incomplete,
+    },
+    /// Answers of a board contradict each other.
+    #[error(
+        "board {board}: its answers to PC_INFO contradict each other in {tries} tries (two boards with one number?)"
+    )]
+    Contradiction {
+        /// Its number.
+        board: u8,
+        /// How often it was asked.
+        tries: u32,
+    },
+    /// The board reported an error.
+    #[error("board {board} reports {code} during {during}: {}", code.meaning())]
+    Device {
+        /// Its number.
+        board: u8,
+        /// The code.
+        code: ErrorCode,
+        /// What was going on.
+        during: &'static str,
+    },
+}
+
+impl ExchangeError {
+    pub(crate) fn facts(&self) -> Facts {
+        match self {
+            Self::NoBoard { .. } => (ErrorKind::Usage, "no-board", "`ucom scan` lists the boards".into()),
+            Self::NoAnswer { board, last: None, .. } => (
+                ErrorKind::NoLink,
+                "no-answer",
+                format!(
+                    "no frame of board {board} was received: `ucom scan` lists who is there, `ucom doctor` why not"
+                ),
+            ),
+            Self::NoAnswer { board, .. } => (
+                ErrorKind::NoLink,
+                "no-answer",
+                format!(
+                    "board {board} talks but does not answer this: `ucom info {board}`, then `ucom doctor`"
+                ),
+            ),
+            Self::Incomplete { problem: Incomplete::ByteOrder { .. }, .. } => {
+                (ErrorKind::NoLink, "incomplete-answer", MEASURE_ORDER.into())
+            }
+            Self::Incomplete { problem: Incomplete::TooMany { .. } | Incomplete::Start { .. }, .. } => (
+                ErrorKind::NoLink,
+                "incomplete-answer",
+                "the board may read the protocol otherwise: `ucom probe` measures it".into(),
+            ),
+            Self::Incomplete { .. } => (
+                ErrorKind::NoLink,
+                "incomplete-answer",
+                "frames get lost: `ucom doctor` looks at bus load, error counters and termination".into(),
+            ),
+            Self::Contradiction { .. } => {
+                (ErrorKind::Refused, "contradiction", "number the boards anew: `ucom init`".into())
+            }
+            Self::Device { code, .. } => (ErrorKind::Device, "device-error", code.reaction().into()),
+        }
+    }
+}
+
+/// The last frame that was received from a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LastReceived {
+    /// What it was.
+    pub function: Function,
+    /// How long before the error, ms.
+    pub ago_ms: u64,
+}
+
+/// Prints `last received: MCA_ALIVE 120 ms ago`, or that there was nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Received(pub Option<LastReceived>);
+
+impl fmt::Display for Received {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(LastReceived { function, ago_ms }) => {
+                write!(f, "last received: {} {ago_ms} ms ago", function.name())
+            }
+            None => f.write_str("nothing received from it at all"),
+        }
+    }
+}
+
+/// What is wrong with an answer of several frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Incomplete {
+    /// The first frame is not what it must be.
+    #[error("it began with {len} bytes instead of {need}")]
+    Start {
+        /// Bytes that came.
+        len: u8,
+        /// Bytes of the first frame.
+        need: u8,
+    },
+    /// Silence in the middle.
+    #[error("{complete} of {of} strings came, then silence")]
+    Silence {
+        /// Whole strings.
+        complete: u32,
+        /// How many there should be.
+        of: u32,
+    },
+    /// A frame that fits nowhere.
+    #[error("a frame of string {string} fits nowhere")]
+    Misfit {
+        /// Number of the string, from 0.
+        string: u32,
+    },
+    /// Frames beyond the end.
+    #[error("more frames came than the totals allow")]
+    Surplus,
+    /// More strings than can be.
+    #[error("it announces {strings} strings; is the byte order right?")]
+    TooMany {
+        /// How many.
+        strings: u32,
+    },
+    /// Counts that are small numbers in the other order of bytes.
+    #[error(
+        "it announces {strings} strings, every count a multiple of 256: the byte order is probably wrong"
+    )]
+    ByteOrder {
+        /// How many.
+        strings: u32,
+    },
+    /// Packages of a buffer are missing.
+    #[error("{missing} of {of} packages are missing")]
+    Packages {
+        /// How many.
+        missing: u32,
+        /// How many there should be.
+        of: u32,
+    },
+}

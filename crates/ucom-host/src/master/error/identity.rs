@@ -1,0 +1,92 @@
+//! A board that is not the one that is meant.
+use core::fmt;
+
+use crate::master::error::facts::Facts;
+use crate::master::error::words::{MEASURE_ORDER, other_order};
+use host_kit::ErrorKind;
+use ucom::profile::Endian;
+
+/// Why a board is not the one that is meant.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IdentityError {
+    /// DSP_INFO under one number with another in it.
+    #[error("board {board} reports that its number is {reported}: it is refused")]
+    WrongSequence {
+        /// By the identifier.
+        board: u8,
+        /// By the data.
+        reported: u8,
+    },
+    /// Another board than the one that was named.
+    #[error("board {board} has flash number 0x{found:04X}, not 0x{wanted:04X}")]
+    WrongBoard {
+        /// Its number.
+        board: u8,
+        /// The flash number that was named.
+        wanted: u16,
+        /// The one it has.
+        found: u16,
+    },
+    /// The flash numbers of boards fit their reports only with their bytes exchanged (D-10).
+    #[error("{}", other_order(*endian))]
+    ByteOrder {
+        /// The order that the profile has.
+        endian: Endian,
+    },
+    /// Two boards have one number: both carry out every command to it.
+    #[error(
+        "two boards answer to number {board}: {}{}",
+        Sharing(found),
+        if *given_back { "; it was taken back from both" } else { "" }
+    )]
+    NumberShared {
+        /// The number.
+        board: u8,
+        /// The flash numbers of those that answered to it; twice the same one when they cannot be distinguished.
+        found: Vec<u16>,
+        /// Nobody answers to it any more.
+        given_back: bool,
+    },
+}
+
+impl IdentityError {
+    pub(crate) fn facts(&self) -> Facts {
+        match self {
+            Self::WrongSequence { .. } => (ErrorKind::Refused, "wrong-sequence", OTHER_PROTOCOL.into()),
+            Self::WrongBoard { wanted, found, .. } if *wanted == found.swap_bytes() => (ErrorKind::Refused, "wrong-board", "only the bytes are exchanged: is the byte order right (`endian` in the profile)? `ucom probe` measures it"
+                    .into()),
+            Self::WrongBoard { board, .. } => (ErrorKind::Refused, "wrong-board", format!("`ucom info {board}` shows who stands there; boards may have been swapped: `ucom init`")),
+            Self::ByteOrder { .. } => (ErrorKind::Refused, "byte-order", MEASURE_ORDER.into()),
+            Self::NumberShared { .. } => (ErrorKind::Refused, "number-shared", format!("{}; {}", SHARED_CAUSE.0, SHARED_CAUSE.1)),
+        }
+    }
+}
+
+/// `flash numbers 0x0021 and 0x0042`, or `both with flash number 0x0021`.
+struct Sharing<'a>(&'a [u16]);
+
+impl fmt::Display for Sharing<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            [first, rest @ ..] if rest.iter().all(|other| other == first) => {
+                write!(f, "both with flash number 0x{first:04X}")
+            }
+            all => {
+                let list: Vec<String> = all.iter().map(|n| format!("0x{n:04X}")).collect();
+                write!(f, "flash numbers {}", list.join(" and "))
+            }
+        }
+    }
+}
+
+/// What makes two boards take one number, and what helps.
+pub(crate) const SHARED_CAUSE: (&str, &str) = (
+    "both took it from one PC_INIT: an init pin is strapped or shorted, or a PC repeated it blindly",
+    "`ucom stop all` if anything runs, then `ucom init` numbers all anew; if it comes again, power one of them down and \
+     check the init wires",
+);
+
+/// What helps against a number that is another one in the data.
+pub(crate) const OTHER_PROTOCOL: &str =
+    "two boards may share a number, or the board reads the protocol otherwise: `ucom reset`, `ucom probe`";

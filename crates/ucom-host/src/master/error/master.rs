@@ -1,0 +1,59 @@
+//! Procedures that this PC did not begin, or ended.
+use crate::master::error::facts::Facts;
+use crate::master::error::words::Boards;
+use host_kit::ErrorKind;
+use ucom::Function;
+
+/// Why this PC did not begin a procedure, or ended it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MasterError {
+    /// A competing master: another PC is on the bus (D-08).
+    #[error("another PC is on the bus: {} to {to} was received {ago_ms} ms ago", function.name())]
+    CompetingMaster {
+        /// What it sent.
+        function: Function,
+        /// To which number.
+        to: u8,
+        /// When, ms.
+        ago_ms: u64,
+    },
+    /// The procedure needs a board that is at work for another one.
+    #[error("{} busy with {with}", Boards(boards))]
+    Busy {
+        /// The boards.
+        boards: Vec<u8>,
+        /// The other procedure.
+        with: &'static str,
+    },
+    /// The caller reports that the bus is gone, see [`Master::abandon`](crate::master::Master::abandon).
+    #[error("the bus failed: {reason}")]
+    Bus {
+        /// The driver's error.
+        reason: String,
+    },
+    /// The caller asked to end.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl MasterError {
+    pub(crate) fn facts(&self) -> Facts {
+        match self {
+            Self::CompetingMaster { .. } => (
+                ErrorKind::Refused,
+                "foreign-master",
+                "end the other program, or force this one if you know that it does not matter".into(),
+            ),
+            Self::Busy { .. } => (ErrorKind::Refused, "busy", "wait for it, or cancel it".into()),
+            Self::Bus { .. } => (
+                ErrorKind::NoLink,
+                "bus",
+                "is the bus still there, the adapter plugged in? `ucom doctor` looks at it".into(),
+            ),
+            Self::Cancelled => {
+                (ErrorKind::Fault, "cancelled", "`ucom scan` shows in what state the boards are".into())
+            }
+        }
+    }
+}

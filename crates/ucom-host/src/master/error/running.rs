@@ -1,0 +1,54 @@
+//! Control loops that run, or that cannot.
+use crate::master::error::facts::Facts;
+use crate::master::error::words::Boards;
+use crate::master::load::LoadForecast;
+use host_kit::ErrorKind;
+
+/// Why control loops keep something from being done, or cannot run themselves.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunningError {
+    /// Boards run their control loop.
+    #[error("{} running: program data would outrank their process data", Boards(boards))]
+    Running {
+        /// Their numbers.
+        boards: Vec<u8>,
+    },
+    /// Control loops run, and what was asked for could stop them where they are, or worse.
+    #[error("{} running its control loop", Boards(boards))]
+    LoopRuns {
+        /// Their numbers.
+        boards: Vec<u8>,
+    },
+    /// The bus would be too busy.
+    #[error("{0}")]
+    Load(LoadForecast),
+    /// A board that was being started, or had been, is gone; by `on_lost` all were stopped (D-51).
+    #[error("board {board} was lost while boards were started: all are stopped")]
+    Lost {
+        /// Its number.
+        board: u8,
+    },
+}
+
+impl RunningError {
+    pub(crate) fn facts(&self) -> Facts {
+        match self {
+            Self::Running { .. } | Self::LoopRuns { .. } => {
+                (ErrorKind::Refused, "running", "`ucom stop all` first, or force it".into())
+            }
+            Self::Load(_) => (
+                ErrorKind::Refused,
+                "load",
+                "fewer boards, longer `so.period` or `ci.period`, or force it".into(),
+            ),
+            Self::Lost { board } => (
+                ErrorKind::Fault,
+                "lost",
+                format!(
+                    "`ucom info {board}`: has it rebooted, has it power? `ucom doctor` looks at bus and boards"
+                ),
+            ),
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Signals that cannot be read or written.
+use core::fmt;
+
+use crate::master::error::facts::Facts;
+use host_kit::ErrorKind;
+
+/// Why a signal cannot be read or written.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SignalError {
+    /// No signal of that name.
+    #[error("board {board} has no {kind} `{name}`{}", Near(near))]
+    NoSignal {
+        /// Its number.
+        board: u8,
+        /// `CI`, `SO` or `PAR`.
+        kind: &'static str,
+        /// What was asked for.
+        name: String,
+        /// Names like it.
+        near: Vec<String>,
+    },
+    /// No application is on the board, or it is not started.
+    #[error("board {board}: {}", if *valid { "its application is not started" } else { "it has no valid application" })]
+    NoApplication {
+        /// Its number.
+        board: u8,
+        /// It has one, but it is not running.
+        valid: bool,
+    },
+    /// A board describes itself otherwise than was known when values for it were chosen (D-36).
+    #[error(
+        "board {board}: its inputs, outputs and parameters are not those that were known under its program"
+    )]
+    StaleNames {
+        /// Its number.
+        board: u8,
+    },
+}
+
+impl SignalError {
+    pub(crate) fn facts(&self) -> Facts {
+        match self {
+            Self::NoSignal { board, .. } => {
+                (ErrorKind::Usage, "no-edge", format!("`ucom io {board}` lists the names"))
+            }
+            Self::NoApplication { board, valid: true } => {
+                (ErrorKind::Refused, "no-application", format!("`ucom start {board}`"))
+            }
+            Self::NoApplication { board, valid: false } => {
+                (ErrorKind::Refused, "no-application", format!("`ucom update {board} IMAGE`"))
+            }
+            Self::StaleNames { board } => {
+                (ErrorKind::Refused, "stale-names", format!("`ucom io {board} --fresh` reads them anew"))
+            }
+        }
+    }
+}
+
+struct Near<'a>(&'a [String]);
+
+impl fmt::Display for Near<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() { Ok(()) } else { write!(f, "; there is `{}`", self.0.join("`, `")) }
+    }
+}

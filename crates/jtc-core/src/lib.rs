@@ -9,6 +9,8 @@ mod config;
 mod controller;
 mod deceleration;
 mod defaults;
+#[cfg(test)]
+mod drawn;
 mod errors;
 mod execution;
 pub mod friction;

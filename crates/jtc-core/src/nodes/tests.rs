@@ -6,6 +6,7 @@ use super::*;
 use crate::io::BusState;
 use crate::response_queue::HOST_LINES;
 
+mod bring_up;
 mod frames;
 mod missing;
 

@@ -1,13 +1,13 @@
-//! The state machine under all its conditions, and its diagram in docs/protocol-jtc.md; `UPDATE_DOCS=1` draws it again.
+//! The state machine under all its conditions, and its diagram in docs/protocol-jtc.md.
 extern crate std;
 use std::format;
-use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
 
 use jtc_wire::{ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Segment, UrgentCommands};
 
 use super::*;
+use crate::drawn::is_in_the_protocol;
 use crate::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, TrajectoryState};
 
 const STATES: [ControllerState; 6] = [
@@ -128,22 +128,7 @@ fn diagram() -> String {
 
 #[test]
 fn j20_the_diagram_is_what_the_code_does() {
-    let drawn = diagram();
-    std::println!("{drawn}");
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/protocol-jtc.md");
-    let text = std::fs::read_to_string(&path).expect("docs/protocol-jtc.md is there");
-    let mark = |mark: &str| text.find(mark).unwrap_or_else(|| panic!("protocol-jtc.md has no mark {mark}"));
-    let begin = mark("<!-- states begin -->\n") + "<!-- states begin -->\n".len();
-    let end = mark("<!-- states end -->");
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        let new = format!("{}{drawn}{}", &text[..begin], &text[end..]);
-        std::fs::write(&path, new).expect("docs/protocol-jtc.md can be written");
-    } else {
-        assert!(
-            text[begin..end] == drawn,
-            "docs/protocol-jtc.md differs from the code: look, then `cargo xtask docs`"
-        );
-    }
+    is_in_the_protocol("states", &diagram());
 }
 
 /// Under every condition, possible or not.

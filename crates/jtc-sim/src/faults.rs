@@ -1,7 +1,7 @@
 //! What can go wrong in the simulated world, and when.
 use core::fmt;
 
-use jtc_bus::{GRIPPER, Joint};
+use jtc_bus::Joint;
 use jtc_core::ControllerState;
 
 use crate::hand::HandPath;
@@ -157,9 +157,9 @@ impl fmt::Display for FaultKind {
         f.write_str(self.name())?;
         match self {
             Self::NodeSilent { node } | Self::NodeReboot { node } | Self::SafetyLine { node } => {
-                match usize::from(*node) {
-                    GRIPPER => f.write_str(" gripper"),
-                    joint => write!(f, " joint {}", joint + 1),
+                match Joint::from_index((*node).into()) {
+                    Some(joint) => write!(f, " {joint}"),
+                    None => f.write_str(" gripper"),
                 }
             }
             Self::MotorFault { joint, bits } => write!(f, " {joint} bits 0x{bits:02X}"),

@@ -1,5 +1,5 @@
 //! What must hold in every millisecond, whatever happens: the checker to run beside a world.
-use jtc_bus::{Request, Target};
+use jtc_bus::{Joint, Request, Target};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::{ExecCommand, FrameType};
 
@@ -131,7 +131,7 @@ impl Invariants {
             } else {
                 continue;
             };
-            return Err(Broken::NotFinite { what, joint });
+            return Err(Broken::NotFinite { what, joint: Joint::ALL[joint] });
         }
         Ok(())
     }
@@ -196,12 +196,12 @@ impl Invariants {
         let powered = powered(state);
         for joint in 0..JOINTS {
             if torque[joint] != 0.0 && !powered {
-                return Err(Broken::Torque { state, joint, torque: torque[joint] });
+                return Err(Broken::Torque { state, joint: Joint::ALL[joint], torque: torque[joint] });
             }
             let limit = moment.config.joints[joint].torque_max;
             // A step of the bus' grid may round up.
             if torque[joint].abs() > limit + 0.02 {
-                return Err(Broken::TorqueLimit { joint, torque: torque[joint], limit });
+                return Err(Broken::TorqueLimit { joint: Joint::ALL[joint], torque: torque[joint], limit });
             }
         }
         Ok(())

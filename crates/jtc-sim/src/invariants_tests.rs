@@ -76,7 +76,11 @@ fn j21_torque_outside_the_powered_states_is_found() {
         }
         script.request = torque(1.0);
         let found = script.tick(state, trajectory);
-        assert_eq!(matches!(found, Some(Broken::Torque { joint: 0, .. })), !powered, "{state:?}: {found:?}");
+        assert_eq!(
+            matches!(found, Some(Broken::Torque { joint, .. }) if joint == Joint::ALL[0]),
+            !powered,
+            "{state:?}: {found:?}"
+        );
     }
 }
 
@@ -86,7 +90,7 @@ fn j43_torque_over_the_limit_is_found() {
     script.request = torque(-80.5);
     assert!(matches!(
         script.tick(ControllerState::HoldPos, TrajectoryState::Null),
-        Some(Broken::TorqueLimit { joint: 0, .. })
+        Some(Broken::TorqueLimit { joint, .. }) if joint == Joint::ALL[0]
     ));
 }
 
@@ -170,13 +174,13 @@ fn nothing_nan_goes_unseen() {
     script.telemetry.joints[4].torque_d = f64::NAN;
     assert_eq!(
         script.tick(ControllerState::Init, TrajectoryState::Null),
-        Some(Broken::NotFinite { what: "part of the torque", joint: 4 })
+        Some(Broken::NotFinite { what: "part of the torque", joint: Joint::ALL[4] })
     );
     let mut script = Script::new();
     script.truth.q[1] = f64::INFINITY;
     assert!(matches!(
         script.tick(ControllerState::Init, TrajectoryState::Null),
-        Some(Broken::NotFinite { joint: 1, .. })
+        Some(Broken::NotFinite { joint, .. }) if joint == Joint::ALL[1]
     ));
 }
 
@@ -279,7 +283,7 @@ fn j35_a_joint_that_races_is_found() {
     let found = (1..=10).find_map(|ms| {
         script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
     });
-    assert_eq!(found, Some((6, Broken::Speed { joint: 3, velocity: -1.01 * limit, ticks: 6 })));
+    assert_eq!(found, Some((6, Broken::Speed { joint: Joint::ALL[3], velocity: -1.01 * limit, ticks: 6 })));
     // Predicted ones do not count, and do not end it.
     let mut script = fast();
     assert!((0..5).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
@@ -319,7 +323,7 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
     let found = (1..=20).find_map(|ms| {
         script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
     });
-    assert_eq!(found, Some((11, Broken::Saturated { joint: 0, ticks: 11 })));
+    assert_eq!(found, Some((11, Broken::Saturated { joint: Joint::ALL[0], ticks: 11 })));
     // A joint that was just enabled has a second to catch its load, and none while it is taught.
     for (state, last) in [(ControllerState::HoldPos, 1_000), (ControllerState::Teaching, 0)] {
         let mut script = Script::new();
@@ -328,5 +332,20 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
         script.command(FrameType::TeachingModeEnable);
         let found = (1..=2_000).find(|_| script.tick(state, TrajectoryState::Null).is_some());
         assert_eq!(found, Some(last + 11), "{state:?}");
+    }
+}
+
+#[test]
+fn what_is_found_names_joints_from_1() {
+    for (broken, words) in [
+        (
+            Broken::Speed { joint: Joint::ALL[3], velocity: -1.9, ticks: 6 },
+            "joint 4 has been too fast for 6 ms",
+        ),
+        (Broken::Enabled { state: ControllerState::Init, node: 0 }, "joint 1 is to be enabled in Init"),
+        (Broken::Enabled { state: ControllerState::Init, node: 6 }, "the gripper is to be enabled in Init"),
+    ] {
+        let shown = Violation { time_us: 1_500_000, broken }.to_string();
+        assert!(shown.starts_with("at 1.500 s: ") && shown.contains(words), "{shown}");
     }
 }

@@ -1,6 +1,7 @@
 //! What the checker finds.
 use core::fmt;
 
+use jtc_bus::Joint;
 use jtc_core::{ControllerState, TrajectoryState};
 
 /// An invariant that was broken.
@@ -11,14 +12,14 @@ pub enum Broken {
         /// State.
         state: ControllerState,
         /// Joint.
-        joint: usize,
+        joint: Joint,
         /// N·m.
         torque: f64,
     },
     /// A torque is larger than the joint's limit.
     TorqueLimit {
         /// Joint.
-        joint: usize,
+        joint: Joint,
         /// N·m.
         torque: f64,
         /// N·m.
@@ -29,7 +30,7 @@ pub enum Broken {
         /// What.
         what: &'static str,
         /// Joint.
-        joint: usize,
+        joint: Joint,
     },
     /// The error state was left, though the host had not cleared anything.
     LeftErrorAlone {
@@ -84,7 +85,7 @@ pub enum Broken {
     /// A joint with torque was too fast for too long (J-35).
     Speed {
         /// Joint.
-        joint: usize,
+        joint: Joint,
         /// Measured velocity, rad/s.
         velocity: f64,
         /// Consecutive measurements above the limit.
@@ -93,7 +94,7 @@ pub enum Broken {
     /// A torque was at its limit too often, though the arm did not brake and no load was caught (J-43).
     Saturated {
         /// Joint.
-        joint: usize,
+        joint: Joint,
         /// So many of the last 100 ticks.
         ticks: u32,
     },
@@ -117,8 +118,45 @@ pub struct Violation {
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "at {:.3} s: {:?}", self.time_us as f64 * 1e-6, self.broken)
+        write!(f, "at {:.3} s: {}", self.time_us as f64 * 1e-6, self.broken)
     }
 }
 
 impl std::error::Error for Violation {}
+
+impl fmt::Display for Broken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Torque { state, joint, torque } => write!(f, "{joint} has {torque} N·m in {state:?}"),
+            Self::TorqueLimit { joint, torque, limit } => {
+                write!(f, "{joint} has {torque} N·m; its limit is {limit} N·m")
+            }
+            Self::NotFinite { what, joint } => write!(f, "a {what} of {joint} is NaN or infinite"),
+            Self::LeftErrorAlone { to } => write!(f, "Error was left for {to:?}, though nothing was cleared"),
+            Self::MovedAlone => f.write_str("Operate was entered without Execute from the host"),
+            Self::TaughtAlone => f.write_str("Teaching was entered without a command from the host"),
+            Self::ExecutionAlone { to } => write!(f, "the trajectory became {to:?} without Execute"),
+            Self::IndexFell { from, to } => {
+                write!(f, "the point index fell from {from} to {to} within a run")
+            }
+            Self::Silent { state } => write!(f, "no frame went out in {state:?}"),
+            Self::NoMove { ticks } => write!(f, "only {ticks} Moves came between two other frames"),
+            Self::ErrorWithoutZero => f.write_str("the first frame after an error is no Move without torque"),
+            Self::Enabled { state, node } => match Joint::from_index(*node) {
+                Some(joint) => write!(f, "{joint} is to be enabled in {state:?}"),
+                None => write!(f, "the gripper is to be enabled in {state:?}"),
+            },
+            Self::UnknownFrame { id } => write!(f, "no frame of the joint bus has id 0x{id:03X}"),
+            Self::NoStop { ticks } => write!(f, "{ticks} ms after a Pause or Stop the arm still moves"),
+            Self::Speed { joint, velocity, ticks } => {
+                write!(f, "{joint} has been too fast for {ticks} ms, at last {velocity} rad/s")
+            }
+            Self::Saturated { joint, ticks } => {
+                write!(f, "the torque of {joint} was at its limit in {ticks} of 100 ms")
+            }
+            Self::SafetyOutput { level, errors } => {
+                write!(f, "the safety output is {} with the error word 0x{errors:04X}", u8::from(*level))
+            }
+        }
+    }
+}

@@ -1,5 +1,5 @@
 //! How the arm moves: a stop comes to its end, no joint races, and no torque stays at its limit.
-use jtc_bus::NodeState;
+use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
 
@@ -84,7 +84,11 @@ impl MotionWatch {
                 (true, true) => ticks + 1,
             };
             if self.fast[joint] > config.overspeed_ms {
-                return Err(Broken::Speed { joint, velocity: t.velocity, ticks: self.fast[joint] });
+                return Err(Broken::Speed {
+                    joint: Joint::ALL[joint],
+                    velocity: t.velocity,
+                    ticks: self.fast[joint],
+                });
             }
         }
         Ok(())
@@ -102,7 +106,7 @@ impl MotionWatch {
             self.saturated[joint] = self.saturated[joint] << 1 | u128::from(counted);
             let ticks = (self.saturated[joint] << (u128::BITS - WINDOW)).count_ones();
             if ticks > u32::from(moment.config.torque_over_ms) {
-                return Err(Broken::Saturated { joint, ticks });
+                return Err(Broken::Saturated { joint: Joint::ALL[joint], ticks });
             }
         }
         Ok(())

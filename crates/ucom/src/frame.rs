@@ -1,8 +1,9 @@
-//! A frame of the bus, and why one is not of this protocol.
+//! A frame of the bus.
 
 use core::fmt;
 use core::str::FromStr;
 
+use crate::foreign::Foreign;
 use crate::function::{Function, Sequence};
 
 /// Up to 8 data bytes.
@@ -91,38 +92,6 @@ impl Format {
     /// The only format of this protocol: a classic data frame with an 11-bit identifier (D-02).
     pub const BUS: Self = Self { extended: false, remote: false, fd: false };
 }
-
-/// Why a frame is not of this protocol: it is counted and shown, never acted on (D-02).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Foreign {
-    /// 29-bit identifier.
-    Extended,
-    /// Remote frame.
-    Remote,
-    /// CAN FD frame.
-    Fd,
-    /// Bit 5 of the identifier is set; no identifier of the formula has it (D-01).
-    Bit5,
-    /// Function 28..31: they fit into the identifier, and nobody has given them a meaning.
-    NoFunction(u8),
-    /// More than 11 bits of identifier or more than 8 bytes of data.
-    Malformed,
-}
-
-impl fmt::Display for Foreign {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Extended => f.write_str("29-bit identifier"),
-            Self::Remote => f.write_str("remote frame"),
-            Self::Fd => f.write_str("CAN FD frame"),
-            Self::Bit5 => f.write_str("bit 5 of the identifier is set"),
-            Self::NoFunction(number) => write!(f, "there is no function {number}"),
-            Self::Malformed => f.write_str("identifier or data longer than classic CAN has"),
-        }
-    }
-}
-
-impl core::error::Error for Foreign {}
 
 impl Frame {
     /// `None` when `id` has more than 11 bits or `data` more than 8 bytes. The id may be one of no function:

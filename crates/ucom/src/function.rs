@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::frame::Foreign;
+use crate::foreign::Foreign;
 
 /// The node address, which the manual calls sequence number and this project number for short: the position of a board in
 /// the chain, 0..31. What 0 means depends on the sender (D-04): from the PC it is broadcast, from a board "I have no number yet".

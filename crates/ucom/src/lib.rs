@@ -9,6 +9,7 @@ extern crate std;
 mod admin;
 mod buffer;
 mod error_code;
+mod foreign;
 mod frame;
 mod function;
 #[cfg(feature = "fuzzing")]
@@ -28,7 +29,8 @@ pub mod profile;
 pub use admin::Admin;
 pub use buffer::{BeyondBuffer, BufferPackage, Packages, package_count};
 pub use error_code::ErrorCode;
-pub use frame::{Foreign, Format, Frame, Payload};
+pub use foreign::Foreign;
+pub use frame::{Format, Frame, Payload};
 pub use function::{Function, Sender, Sequence};
 pub use header::{BLOCK_LEN, Header, HeaderError, Memory};
 pub use info::{BoardInfo, Dimensions};

@@ -11,7 +11,8 @@ use core::fmt;
 pub use from_board::FromBoard;
 pub use to_board::ToBoard;
 
-use crate::frame::{Foreign, Frame, Payload};
+use crate::foreign::Foreign;
+use crate::frame::{Frame, Payload};
 use crate::function::Function;
 use crate::profile::Profile;
 

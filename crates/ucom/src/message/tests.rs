@@ -134,7 +134,7 @@ fn d15_d24_golden_frames() {
 fn errors_in_words() {
     let function = Function::SetStatus;
     for (error, text) in [
-        (DecodeError::Foreign(crate::frame::Foreign::Remote), "remote frame"),
+        (DecodeError::Foreign(crate::foreign::Foreign::Remote), "remote frame"),
         (DecodeError::Direction(function), "PC_SETSTATUS of the other side"),
         (DecodeError::TooShort { function, len: 1, need: 2 }, "PC_SETSTATUS with 1 of at least 2 bytes"),
         (DecodeError::Length { function, len: 3 }, "PC_SETSTATUS cannot have 3 bytes"),

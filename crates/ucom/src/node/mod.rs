@@ -13,21 +13,24 @@ mod answers;
 mod application;
 mod config;
 mod hardware;
+mod jobs;
 mod outbox;
 mod programming;
 mod rate;
 mod receive;
 mod record;
+mod sending;
 mod status;
 mod timers;
+mod transfer;
 
-use answers::Jobs;
 pub use config::{Counters, NodeConfig};
 pub use hardware::{Application, Area, Flash, FlashError, FlashState, Pins, RECORD_LEN, Store, Text};
+use jobs::Jobs;
 use outbox::Outbox;
-use programming::Programming;
 use rate::RateLimit;
 pub use record::Record;
+use transfer::Programming;
 
 use crate::admin::Admin;
 use crate::error_code::ErrorCode;

@@ -1,11 +1,8 @@
-//! Single frames that wait, and the order in which frames go out.
+//! Single frames that wait.
 
-use super::{Application, Flash, Node, Pins, Store};
 use crate::error_code::ErrorCode;
 use crate::frame::Frame;
 use crate::function::Sequence;
-use crate::message::FromBoard;
-use crate::report::Report;
 
 /// Errors that may wait for the bus.
 const ERRORS: usize = 8;
@@ -27,7 +24,7 @@ pub(super) struct Outbox {
     /// DSP_PROGFINISHED.
     pub finished: bool,
     /// When each report is due and which of its frames is next.
-    reports: [Option<(u64, u8)>; REPORTS],
+    pub reports: [Option<(u64, u8)>; REPORTS],
     /// A report is due after the boot.
     pub report_after_boot: bool,
     /// MCA_DSP_READY.
@@ -74,7 +71,7 @@ impl Outbox {
         place.map(|place| *place = Some((code, from))).is_some()
     }
 
-    fn pop_error(&mut self) -> Option<(ErrorCode, Sequence)> {
+    pub fn pop_error(&mut self) -> Option<(ErrorCode, Sequence)> {
         let first = self.errors.first().copied().flatten();
         self.errors.rotate_left(1);
         if let Some(last) = self.errors.last_mut() {
@@ -83,7 +80,7 @@ impl Outbox {
         first
     }
 
-    fn push_report(&mut self, due_us: u64) {
+    pub fn push_report(&mut self, due_us: u64) {
         if let Some(place) = self.reports.iter_mut().find(|place| place.is_none()) {
             *place = Some((due_us, 0));
         }
@@ -97,85 +94,5 @@ impl Outbox {
         }
         let reports = self.reports.iter().flatten().map(|(due, _)| *due);
         reports.chain(self.admin_at).min().unwrap_or(u64::MAX)
-    }
-}
-
-impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// What the board puts into its identifiers: its number, without one what the profile requires (D-06).
-    pub(super) fn own_number(&self) -> Sequence {
-        self.number.unwrap_or(self.config.profile.unnumbered())
-    }
-
-    /// DSP_REPORT, as many milliseconds from now as the UCoM id (D-07).
-    pub(super) fn report(&mut self) {
-        let wait = u32::from(self.config.flash_number & 0xFF);
-        self.outbox.push_report(self.after_ms(wait));
-    }
-
-    /// MCA_ADMIN_DATA as an answer: not at once, the PC's frame with this identifier must be gone (D-05). What was to be
-    /// sent anyway goes with it: one frame is enough for both.
-    pub(super) fn answer_admin(&mut self) {
-        self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
-    }
-
-    /// MCA_ADMIN_DATA unasked: after a random time, the PC may be about to send the same identifier (D-05). An answer that
-    /// waits for its time carries it, too.
-    pub(super) fn send_admin_unasked(&mut self) {
-        let wait = self.random(self.config.profile.shared_backoff);
-        let due = self.after_ms(wait);
-        self.outbox.admin_at.get_or_insert(due);
-    }
-
-    /// The next frame: single ones by urgency, then the answers of several frames.
-    pub(super) fn next_frame(&mut self) -> Option<Frame> {
-        let profile = self.config.profile;
-        if let Some(number) = self.taking.or(self.number)
-            && core::mem::take(&mut self.outbox.ack)
-        {
-            return Some(FromBoard::InitAck(number.number()).encode(number, &profile));
-        }
-        if let Some((code, from)) = self.outbox.pop_error() {
-            return Some(FromBoard::Error(code).encode(from, &profile));
-        }
-        if let Some(report) = self.due_report() {
-            return Some(FromBoard::Report(report).encode(self.own_number(), &profile));
-        }
-        // Everything else needs a number.
-        let number = self.number?;
-        let message = self.single_message().or_else(|| self.next_of_answers())?;
-        Some(message.encode(number, &profile))
-    }
-
-    fn single_message(&mut self) -> Option<FromBoard> {
-        use core::mem::take;
-        if take(&mut self.outbox.block_taken) {
-            return Some(FromBoard::Ready);
-        }
-        if take(&mut self.outbox.finished) {
-            return Some(FromBoard::ProgFinished);
-        }
-        if take(&mut self.outbox.mca_ready) {
-            return Some(FromBoard::McaReady);
-        }
-        if take(&mut self.outbox.alive) {
-            return Some(FromBoard::Alive);
-        }
-        if self.outbox.admin_at.is_some_and(|at| at <= self.now_us) {
-            self.outbox.admin_at = None;
-            return Some(FromBoard::Admin(self.admin()));
-        }
-        None
-    }
-
-    fn due_report(&mut self) -> Option<Report> {
-        let own = self.own_number();
-        let (mode, flash_number) = (self.config.profile.report_mode, self.config.flash_number);
-        let now = self.now_us;
-        let place = self.outbox.reports.iter_mut().find(|place| place.is_some_and(|(due, _)| due <= now))?;
-        let (due, i) = (*place)?;
-        let report = Report::nth(mode, i, flash_number, own)?;
-        let more = Report::nth(mode, i + 1, flash_number, own).is_some();
-        *place = more.then_some((due, i + 1));
-        Some(report)
     }
 }

@@ -1,117 +1,14 @@
 //! Taking a new application: blocks, cycles, checks, flash (D-40 to D-46).
 
-use super::{Application, Area, Flash, FlashState, Node, NodeConfig, Pins, RECORD_LEN, Record, Store};
+use super::transfer::{Cycle, Work};
+use super::{Application, Area, Flash, FlashError, FlashState, Node, Pins, RECORD_LEN, Record, Store};
 use crate::error_code::ErrorCode;
 use crate::header::{BLOCK_LEN, Header, Memory};
-use crate::profile::{HeaderForm, Plan, Profile};
+use crate::profile::{HeaderForm, Plan};
 use crate::program::{Checksum, Digest};
 
 /// Bytes of flash read back in one step, so that a step stays short.
 const VERIFY_STEP: usize = 1024;
-
-/// What is being done with the last block, or after it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Work {
-    /// Waits for frames.
-    None,
-    /// A whole block came; it is looked at at this time.
-    Block(u64),
-    /// The validity record goes first.
-    ClearRecord,
-    Erase,
-    AwaitErase,
-    AwaitWrite,
-    /// The image is read back, bytes done so far.
-    Verify(u32),
-    WriteRecord,
-    AwaitRecord,
-    /// DSP_READY is on its way; until it has left, the block buffer is in use.
-    Answer,
-}
-
-/// A cycle under way.
-#[derive(Clone, Debug)]
-struct Cycle {
-    header: Header,
-    area: Area,
-    memory: Memory,
-    /// Whether its data go to memory, or are only checked.
-    writes: bool,
-    /// Bytes of the image that came.
-    done: u32,
-    /// Over what came, later over what was read back.
-    digest: Digest,
-}
-
-impl Cycle {
-    fn bytes(&self) -> u32 {
-        self.header.length.saturating_mul(2)
-    }
-}
-
-/// State of a transfer.
-#[derive(Clone, Debug)]
-pub(super) struct Programming {
-    block: [u8; BLOCK_LEN],
-    filled: usize,
-    last_frame_us: u64,
-    work: Work,
-    /// 1 or 2.
-    number: u16,
-    cycle: Option<Cycle>,
-    /// Header of the first cycle once that is over.
-    first: Option<Header>,
-    /// After an error frames are dropped silently (D-43).
-    discard: bool,
-}
-
-impl Programming {
-    pub fn new(_: &Profile) -> Self {
-        Self {
-            block: [0; BLOCK_LEN],
-            filled: 0,
-            last_frame_us: 0,
-            work: Work::None,
-            number: 1,
-            cycle: None,
-            first: None,
-            discard: false,
-        }
-    }
-
-    /// A transfer starts anew with cycle 1.
-    pub fn restart(&mut self, profile: &Profile) {
-        *self = Self::new(profile);
-    }
-
-    /// The transfer is dropped; an error keeps the board silent all the same.
-    pub fn cancel(&mut self, profile: &Profile) {
-        *self = Self { discard: self.discard, ..Self::new(profile) };
-    }
-
-    pub const fn discarding(&self) -> bool {
-        self.discard
-    }
-
-    /// DSP_READY has left: the next block may come.
-    pub fn answered(&mut self) {
-        if self.work == Work::Answer {
-            self.work = Work::None;
-        }
-    }
-
-    pub fn deadline(&self, now_us: u64, config: &NodeConfig) -> u64 {
-        let pause = u64::from(config.profile.prog_frame_timeout) * 1000 + 1;
-        match self.work {
-            Work::None if self.filled > 0 => self.last_frame_us.saturating_add(pause),
-            Work::None | Work::Answer => u64::MAX,
-            Work::Block(at) => at,
-            Work::Verify(_) => 0,
-            // The flash is asked again soon.
-            _ => now_us.saturating_add(500),
-        }
-    }
-}
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     /// Whether the flash holds a valid application.
@@ -187,7 +84,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
         let cycle = self.programming.cycle.as_ref().ok_or(ErrorCode::ExloadCycle)?;
         let (memory, area) = (cycle.memory, cycle.area);
-        let flash = |result: Result<(), super::FlashError>| result.map_err(|_| ErrorCode::Flash);
+        let flash = |result: Result<(), FlashError>| result.map_err(|_| ErrorCode::Flash);
         self.programming.work = match self.programming.work {
             Work::ClearRecord => {
                 self.record = None;

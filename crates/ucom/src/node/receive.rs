@@ -2,7 +2,8 @@
 
 use super::{App, Application, Flash, Node, Pins, Store};
 use crate::error_code::ErrorCode;
-use crate::frame::{Foreign, Format, Frame};
+use crate::foreign::Foreign;
+use crate::frame::{Format, Frame};
 use crate::function::{Function, Sequence};
 use crate::message::{DecodeError, ToBoard};
 use crate::profile::AliveMode;

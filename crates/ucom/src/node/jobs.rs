@@ -1,0 +1,107 @@
+//! Answers of several frames that are under way.
+
+use crate::frame::Payload;
+use crate::profile::Profile;
+use crate::string::string_package;
+
+/// Where an answer stands: nothing sent, or the next package of the string `string`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    First,
+    String { string: u32, package: u16 },
+}
+
+/// Answers under way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Jobs {
+    pub info: Option<Place>,
+    pub info_again: bool,
+    pub dump_io: Option<Place>,
+    /// When the dump may begin or go on.
+    pub dump_io_at: u64,
+    /// When the next one may begin, if it was asked for during this one.
+    pub dump_io_again: Option<u64>,
+    /// Offset of the next package.
+    pub dump_ci: Option<u16>,
+    pub dump_ci_again: bool,
+    /// Offset of the next package of the outputs.
+    pub so: Option<u16>,
+    /// Next package of the text under way, and whether it is the node's own.
+    pub text: Option<(u16, bool)>,
+    /// A text of the node itself.
+    pub own_text: Option<&'static [u8]>,
+}
+
+impl Jobs {
+    pub const fn new() -> Self {
+        Self {
+            info: None,
+            info_again: false,
+            dump_io: None,
+            dump_io_at: 0,
+            dump_io_again: None,
+            dump_ci: None,
+            dump_ci_again: false,
+            so: None,
+            text: None,
+            own_text: None,
+        }
+    }
+
+    /// A request during its own answer is served after it: strings are never mixed (D-14).
+    pub fn ask_info(&mut self) {
+        self.info_again = self.info.is_some();
+        self.info = self.info.or(Some(Place::First));
+    }
+
+    /// The same; and no answer leaves before `due_us`, when the request with the same identifier is gone (D-05).
+    pub fn ask_dump_io(&mut self, due_us: u64) {
+        if let Some(Place::String { .. }) = self.dump_io {
+            self.dump_io_again = Some(due_us);
+        } else {
+            self.dump_io = Some(Place::First);
+            self.dump_io_at = due_us;
+        }
+    }
+
+    pub fn info_done(&mut self) {
+        self.info = core::mem::take(&mut self.info_again).then_some(Place::First);
+    }
+
+    pub fn dump_io_done(&mut self) {
+        let again = self.dump_io_again.take();
+        self.dump_io = again.map(|_| Place::First);
+        self.dump_io_at = again.unwrap_or(0);
+    }
+
+    pub fn ask_dump_ci(&mut self) {
+        self.dump_ci_again = self.dump_ci.is_some();
+        self.dump_ci = self.dump_ci.or(Some(0));
+    }
+
+    pub fn forget_application(&mut self) {
+        *self = Self { info: self.info, info_again: self.info_again, ..Self::new() };
+    }
+
+    pub fn deadline(&self) -> u64 {
+        if self.info.is_some() || self.so.is_some() || self.dump_ci.is_some() || self.text.is_some() {
+            0
+        } else if self.dump_io.is_some() {
+            self.dump_io_at
+        } else {
+            u64::MAX
+        }
+    }
+}
+
+/// A package of the `string`-th text, and where the answer goes on; `None` when there is no such package.
+pub(super) fn package(text: &[u8], string: u32, package: u16, profile: &Profile) -> Option<(Payload, Place)> {
+    let payload = string_package(text, package, profile)?;
+    let last = string_package(text, package + 1, profile).is_none();
+    let next = if last {
+        Place::String { string: string + 1, package: 0 }
+    } else {
+        Place::String { string, package: package + 1 }
+    };
+    Some((payload, next))
+}

@@ -1,0 +1,111 @@
+//! How far a transfer of a new application is.
+
+use super::config::NodeConfig;
+use super::hardware::Area;
+use crate::header::{BLOCK_LEN, Header, Memory};
+use crate::profile::Profile;
+use crate::program::Digest;
+
+/// What is being done with the last block, or after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Work {
+    /// Waits for frames.
+    None,
+    /// A whole block came; it is looked at at this time.
+    Block(u64),
+    /// The validity record goes first.
+    ClearRecord,
+    Erase,
+    AwaitErase,
+    AwaitWrite,
+    /// The image is read back, bytes done so far.
+    Verify(u32),
+    WriteRecord,
+    AwaitRecord,
+    /// DSP_READY is on its way; until it has left, the block buffer is in use.
+    Answer,
+}
+
+/// A cycle under way.
+#[derive(Clone, Debug)]
+pub(super) struct Cycle {
+    pub header: Header,
+    pub area: Area,
+    pub memory: Memory,
+    /// Whether its data go to memory, or are only checked.
+    pub writes: bool,
+    /// Bytes of the image that came.
+    pub done: u32,
+    /// Over what came, later over what was read back.
+    pub digest: Digest,
+}
+
+impl Cycle {
+    pub fn bytes(&self) -> u32 {
+        self.header.length.saturating_mul(2)
+    }
+}
+
+/// State of a transfer.
+#[derive(Clone, Debug)]
+pub(super) struct Programming {
+    pub block: [u8; BLOCK_LEN],
+    pub filled: usize,
+    pub last_frame_us: u64,
+    pub work: Work,
+    /// 1 or 2.
+    pub number: u16,
+    pub cycle: Option<Cycle>,
+    /// Header of the first cycle once that is over.
+    pub first: Option<Header>,
+    /// After an error frames are dropped silently (D-43).
+    pub discard: bool,
+}
+
+impl Programming {
+    pub fn new(_: &Profile) -> Self {
+        Self {
+            block: [0; BLOCK_LEN],
+            filled: 0,
+            last_frame_us: 0,
+            work: Work::None,
+            number: 1,
+            cycle: None,
+            first: None,
+            discard: false,
+        }
+    }
+
+    /// A transfer starts anew with cycle 1.
+    pub fn restart(&mut self, profile: &Profile) {
+        *self = Self::new(profile);
+    }
+
+    /// The transfer is dropped; an error keeps the board silent all the same.
+    pub fn cancel(&mut self, profile: &Profile) {
+        *self = Self { discard: self.discard, ..Self::new(profile) };
+    }
+
+    pub const fn discarding(&self) -> bool {
+        self.discard
+    }
+
+    /// DSP_READY has left: the next block may come.
+    pub fn answered(&mut self) {
+        if self.work == Work::Answer {
+            self.work = Work::None;
+        }
+    }
+
+    pub fn deadline(&self, now_us: u64, config: &NodeConfig) -> u64 {
+        let pause = u64::from(config.profile.prog_frame_timeout) * 1000 + 1;
+        match self.work {
+            Work::None if self.filled > 0 => self.last_frame_us.saturating_add(pause),
+            Work::None | Work::Answer => u64::MAX,
+            Work::Block(at) => at,
+            Work::Verify(_) => 0,
+            // The flash is asked again soon.
+            _ => now_us.saturating_add(500),
+        }
+    }
+}

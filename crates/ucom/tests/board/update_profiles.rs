@@ -167,14 +167,27 @@ fn d41_headers_of_the_second_cycle() {
     }
 }
 
-/// D-43: a READY that the controller gave up is over, too: the block buffer is free, and the PC may send again.
-#[test]
-fn d43_ready_that_was_given_up() {
+/// A board that has taken the first of these blocks, and whose READY has not left.
+fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     let all = blocks(&small(), &Profile::default());
     let mut bus = Bus::initialised();
     bus.send("041#");
     bus.hold = |frame| frame.id() == 0x181;
     bus.block(&all[0], 10);
+    (bus, all)
+}
+
+/// The frames of a block, all at one moment.
+fn receive_at_once(bus: &mut Bus, block: &[u8; 64]) {
+    for data in block.chunks_exact(8) {
+        bus.boards[0].receive(bus.now, &ucom::Frame::new(0x2C1, data).unwrap());
+    }
+}
+
+/// D-43: a READY that the controller gave up is over, too: the block buffer is free, and the PC may send again.
+#[test]
+fn d43_ready_that_was_given_up() {
+    let (mut bus, all) = ready_held();
     let (_, ready) = bus.held.pop().unwrap();
     bus.hold = |_| false;
     let now = bus.now;
@@ -189,17 +202,11 @@ fn d43_ready_that_was_given_up() {
 /// from it.
 #[test]
 fn d43_ready_of_the_transfer_before() {
-    let all = blocks(&small(), &Profile::default());
-    let mut bus = Bus::initialised();
-    bus.send("041#");
-    bus.hold = |frame| frame.id() == 0x181;
-    bus.block(&all[0], 10);
+    let (mut bus, all) = ready_held();
     bus.send("041#");
     let (now, ready) = (bus.now, bus.held.pop().unwrap().1);
+    receive_at_once(&mut bus, &all[0]);
     let board = &mut bus.boards[0];
-    for data in all[0].chunks_exact(8) {
-        board.receive(now, &ucom::Frame::new(0x2C1, data).unwrap());
-    }
     board.sent(now, &ready);
     assert_eq!(board.poll(now + board.config().block_us), Some(ready), "the block is taken");
 }
@@ -209,10 +216,8 @@ fn d43_ready_of_the_transfer_before() {
 fn d42_block_time_without_header() {
     let mut bus = headerless(Plan::VerifyWrite);
     bus.send("041#");
+    receive_at_once(&mut bus, &data_blocks(&small())[0]);
     let (now, board) = (bus.now, &mut bus.boards[0]);
-    for data in data_blocks(&small())[0].chunks_exact(8) {
-        board.receive(now, &ucom::Frame::new(0x2C1, data).unwrap());
-    }
     assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
 }
 

@@ -4,7 +4,7 @@ use cli_kit::table;
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Profile, Status};
 use ucom_host::date_text;
-use ucom_host::master::BoardSeen;
+use ucom_host::master::{Board, BoardSeen, Life};
 
 /// The names of the bits that are set.
 pub fn bits(status: Status) -> Vec<&'static str> {
@@ -65,4 +65,42 @@ pub fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
     };
     let rows: Vec<Vec<String>> = boards.iter().map(row).collect();
     table(&[">board", "flash id", "state", "program", "flashed", "status", "description"], &rows)
+}
+
+/// What was last received of a board still holds: it is not lost, and has not begun anew.
+pub fn is_known(board: &Board) -> bool {
+    board.life != Life::Lost && !board.rebooted
+}
+
+/// What a board does, in one word: what comes by itself counts more than an old answer.
+pub fn doing(board: &Board, now_us: u64) -> &'static str {
+    if board.rebooted {
+        return "rebooted";
+    }
+    if board.life == Life::Lost {
+        return "lost";
+    }
+    if board.running(now_us) {
+        return "running";
+    }
+    match (board.life, board.status()) {
+        (Life::Alive, _) => "started",
+        (_, Some(status)) => state(status),
+        (_, None) => "?",
+    }
+}
+
+/// Heartbeats in a word.
+pub fn life(board: &Board) -> &'static str {
+    match board.life {
+        Life::Unarmed => "-",
+        Life::Alive => "alive",
+        Life::Late => "late",
+        Life::Lost => "lost",
+    }
+}
+
+/// Since the last heartbeat, s.
+pub fn age_s(board: &Board, now_us: u64) -> Option<f64> {
+    board.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
 }

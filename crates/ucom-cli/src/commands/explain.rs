@@ -231,10 +231,10 @@ mod tests {
     use ucom::Status;
     use ucom_host::master::{Board, Life};
 
-    use super::super::monitor::{doing, life};
     use super::super::monitor_boards::BITS;
     use super::*;
     use crate::shape::state;
+    use crate::shape::{doing, life};
 
     fn has(all: &[Word], word: &str, family: &str) {
         assert!(find(all, word).iter().any(|w| w.family == family), "{word}");

@@ -5,10 +5,9 @@ use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::Span;
 use ratatui::widgets::{Cell, Row, Table};
 use ucom::Status;
-use ucom_host::master::{Board, Life, Statistics};
+use ucom_host::master::{Board, Boards, Life, Statistics};
 
-use super::monitor::{age_s, doing, is_known, life};
-use super::monitor_view::Picture;
+use crate::shape::{age_s, doing, is_known, life};
 
 /// Status bits from the most significant one: a letter each where room is short, a word where there is more.
 pub const BITS: [(Status, char, &str); 8] = [
@@ -80,11 +79,10 @@ fn columns(width: u16) -> Vec<Column> {
 }
 
 /// The rows from `first` on, as far as the view is wide.
-pub fn table(picture: &Picture<'_>, width: u16, first: usize) -> Table<'static> {
+pub fn table(boards: &Boards, statistics: &Statistics, now: u64, width: u16, first: usize) -> Table<'static> {
     let columns = columns(width);
-    let Picture { boards, statistics, now, .. } = picture;
     let row = |(number, b): (u8, &Board)| {
-        Row::new(columns.iter().map(|c| (c.cell)(number, b, statistics, *now)).collect::<Vec<_>>())
+        Row::new(columns.iter().map(|c| (c.cell)(number, b, statistics, now)).collect::<Vec<_>>())
     };
     let rows: Vec<Row<'static>> = boards.iter().skip(first).map(row).collect();
     let head: Vec<&str> = columns.iter().map(|c| c.head).collect();

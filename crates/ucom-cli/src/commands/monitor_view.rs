@@ -7,12 +7,11 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
 use ratatui::text::Line;
 use ratatui::widgets::{Paragraph, Sparkline};
-use ucom::Function;
 use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
 use ucom_host::master::{Boards, Statistics};
 
-use super::monitor::Watch;
 use super::monitor_boards::{self as rows, WIDE};
+use super::monitor_watch::Watch;
 
 /// Keys, of which the first are shown on terminals that are too small.
 const KEYS: &str = "s stops  q ends";
@@ -85,7 +84,7 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     frame.render_widget(Paragraph::new(above), causes);
     // A head without a row below it has no use.
     if boards > 0 && table.height > 1 {
-        frame.render_widget(rows::table(picture, inner, skip), table);
+        frame.render_widget(rows::table(picture.boards, picture.statistics, picture.now, inner, skip), table);
     }
     events(frame, picture.watch, last, framed);
     let keys = format!("{KEYS}  r asks  {}", scroll.place());
@@ -214,9 +213,6 @@ fn events(frame: &mut Frame<'_>, watch: &Watch, area: Rect, framed: bool) {
     let paragraph = Paragraph::new(lines);
     frame.render_widget(if framed { paragraph.block(panel("events")) } else { paragraph }, area);
 }
-
-/// Function and addressee of another PC's frame.
-pub type CompetingMaster = (Function, u8);
 
 #[cfg(test)]
 #[path = "monitor_tests.rs"]

@@ -3,6 +3,7 @@
 
 mod common;
 
+use cli_kit::trial::{ended, signal};
 use common::Sim;
 use serde_json::json;
 
@@ -39,6 +40,20 @@ fn simulated_boards_conform() {
         let output = ucom(&["conformance", "2", "--program", image, "--flash-id", "0xEEEE"]).ends(4).json();
         assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     }
+}
+
+/// What changes boards is refused while a control loop runs, and no option covers it.
+#[test]
+fn running_loops_are_stopped_first() {
+    let sim = Sim::start(&["--boards", "1"]);
+    sim.ucom(&["init"]).ends(0);
+    let run = sim.spawn(&["run", "1"]);
+    sim.peer().wait("381#");
+    let output = sim.ucom(&["--json", "conformance", "1", "--run", "--force"]).ends(4).json();
+    assert_eq!(output["error"]["code"], "running", "{output}");
+    assert_eq!(output["error"]["hint"], "`ucom stop all` first; --force does not cover this", "{output}");
+    signal(&run, "-INT");
+    ended(run).ends(0);
 }
 
 /// D-22: the formula, literally; what the rules make of it stands beside what came.

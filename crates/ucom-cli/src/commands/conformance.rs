@@ -47,7 +47,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
         force: args.force,
     };
     let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e {
-        SessionError::Procedure(Error::Running(RunningError::Running { .. })) => {
+        SessionError::Procedure(Error::Running(RunningError::LoopRuns { .. })) => {
             Failure::from(e).hint("`ucom stop all` first; --force does not cover this")
         }
         e => e.into(),

@@ -113,11 +113,6 @@ impl ControlLaw {
         self.yielding
     }
 
-    /// What the arm carries is known, or is none of it: an arm that gives way has more likely a contact against it.
-    pub fn load_is_known(&self, config: &Config) -> bool {
-        self.yielding || self.payload.is_known(config)
-    }
-
     /// Teaching begins: what HoldPos had found missing becomes a mass at the flange (J-25). What an arm that gives way has
     /// against it is more likely a contact than a mass.
     pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {

@@ -27,7 +27,7 @@ pub(crate) struct Limited {
 impl Limiter {
     /// The last torque of the joint was beyond the limit: its integral is held (J-41).
     pub fn saturated(&self) -> [bool; JOINTS] {
-        self.saturation.map(|saturation| saturation.saturated)
+        core::array::from_fn(|j| self.saturation[j].saturated)
     }
 
     /// One tick: the computed `torque` within its limits, and the errors of torque and set values. What braking with all the

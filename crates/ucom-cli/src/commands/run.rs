@@ -55,41 +55,45 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
         Ok((report, prepared))
     })?;
-    let running = json!({
-        "event": "running",
-        "boards": report.boards.iter().map(|(n, a)| json!({ "board": n, "flags": a.to_string() })).collect::<Vec<_>>(),
-        "load_percent": report.load.percent(),
-    });
-    stdout.push_always(out.words(&running, || {
-        let outputs = if args.active { "outputs active" } else { "outputs safe; `active on` enables them" };
-        let (run, them) = if report.boards.len() == 1 { ("runs", "it") } else { ("run", "them") };
-        let boards = counted(report.boards.len(), "board");
-        format!("{boards} {run}, {outputs}; {}\nCtrl-C stops {them}", report.load)
-    }));
+    print_running(&report, args.active, &stdout, out);
     let mut followed = Followed::new(prepared.known.keys().copied(), driver.now_us());
     let result = want_texts(&mut driver, args, &boards)
         .and_then(|()| supervise(&mut driver, args, &prepared, &mut followed, &stdout, out));
     followed.ask_no_more(&mut driver.master);
     let running = halt(&mut driver, &boards, result.as_ref().err());
-    let list = || running.iter().map(u8::to_string).collect::<Vec<_>>();
+    let list = running.iter().map(u8::to_string).collect::<Vec<_>>();
+    let not_stopped = format!("not stopped for certain: {}", list.join(", "));
     let stopped = match running.is_empty() {
         true => json!({ "event": "stopped" }),
         false => json!({ "event": "stopped", "not_stopped": running }),
     };
     stdout.push_always(out.words(&stopped, || match running.is_empty() {
         true => "stopped".into(),
-        false => format!("not stopped for certain: {}", list().join(", ")),
+        false => not_stopped.clone(),
     }));
     finish(&mut stdout, &driver);
     result?;
     if !running.is_empty() {
-        let what = format!("not stopped for certain: {}", list().join(", "));
-        let next =
-            format!("without heartbeats they become safe by themselves; ucom stop {}", list().join(","));
-        return Err(Failure::new(FAULT, "not-stopped", what).hint(next));
+        let next = format!("without heartbeats they become safe by themselves; ucom stop {}", list.join(","));
+        return Err(Failure::new(FAULT, "not-stopped", not_stopped).hint(next));
     }
     driver.nobody_lost(&boards)?;
     Ok(followed.nobody_left()?)
+}
+
+/// That the boards run, with which flags and at which load of the bus.
+fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output) {
+    let running = json!({
+        "event": "running",
+        "boards": report.boards.iter().map(|(n, a)| json!({ "board": n, "flags": a.to_string() })).collect::<Vec<_>>(),
+        "load_percent": report.load.percent(),
+    });
+    stdout.push_always(out.words(&running, || {
+        let outputs = if active { "outputs active" } else { "outputs safe; `active on` enables them" };
+        let (run, them) = if report.boards.len() == 1 { ("runs", "it") } else { ("run", "them") };
+        let boards = counted(report.boards.len(), "board");
+        format!("{boards} {run}, {outputs}; {}\nCtrl-C stops {them}", report.load)
+    }));
 }
 
 /// Names, plans, and the start of all boards.
@@ -179,18 +183,23 @@ fn supervise(
         }
         if reported.elapsed() >= REPORT_PERIOD && out.is_json() {
             reported = Instant::now();
-            for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
-                let Some(known) = prepared.known.get(&board) else { continue };
-                let so = named(&known.names.so, known.signals.all(Kind::So), &snapshot.words);
-                let units = units(&known.names.so, known.signals.all(Kind::So));
-                let time_s = snapshot.time_us as f64 * 1e-6;
-                let value = json!({
-                    "event": "so", "board": board, "time_s": time_s, "age_s": age_s, "stale": stale,
-                    "so": so, "units": units,
-                });
-                stdout.push(out.words(&value, String::new));
-            }
+            print_outputs(driver, prepared, followed, stdout, out);
         }
+    }
+}
+
+/// The last outputs of each board, as events of `--json`.
+fn print_outputs(driver: &Driver, prepared: &Prepared, followed: &Followed, stdout: &Lines, out: &Output) {
+    for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
+        let Some(known) = prepared.known.get(&board) else { continue };
+        let so = named(&known.names.so, known.signals.all(Kind::So), &snapshot.words);
+        let units = units(&known.names.so, known.signals.all(Kind::So));
+        let time_s = snapshot.time_us as f64 * 1e-6;
+        let value = json!({
+            "event": "so", "board": board, "time_s": time_s, "age_s": age_s, "stale": stale,
+            "so": so, "units": units,
+        });
+        stdout.push(out.words(&value, String::new));
     }
 }
 

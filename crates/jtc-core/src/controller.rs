@@ -1,4 +1,4 @@
-//! The controller: what it remembers, and how it changes its state (section 6).
+//! The controller: what it remembers, and how it changes its state (J-20 to J-25).
 use jtc_wire::{RawPoint, STATUS_LEN};
 
 use crate::check::{TrajectoryCheck, Violation};

@@ -1,4 +1,4 @@
-//! The execution of a trajectory (section 5): from Execute to standstill, wherever that comes about.
+//! The execution of a trajectory (J-30 to J-36): from Execute to standstill, wherever that comes about.
 pub(crate) mod phase;
 
 use jtc_wire::{DataStatus, ExecCommand, RawPoint};

@@ -1,4 +1,4 @@
-//! The states of the controller: which one follows (section 6). docs/protocol-jtc.md draws this function.
+//! The states of the controller: which one follows (J-20 to J-25). docs/protocol-jtc.md draws this function.
 use crate::ControllerState;
 
 /// What the next state depends on.
@@ -12,7 +12,7 @@ pub(crate) struct Conditions {
     pub initialised: bool,
     /// The host has enabled teaching.
     pub teaching: bool,
-    /// The arm is held at rest, and what it carries is known (J-25).
+    /// The arm is held at rest, and what it carries is known, or does not count (J-25).
     pub teachable: bool,
     /// A trajectory is being executed.
     pub execute: bool,

@@ -1,4 +1,4 @@
-//! Set values (section 6): of the held arm, of what comes to rest, of the approach and of the path.
+//! Set values (J-40 to J-44): of the held arm, of what comes to rest, of the approach and of the path.
 use crate::catch::Catch;
 use crate::config::Config;
 use crate::deceleration::{Deceleration, moves};

@@ -1,4 +1,4 @@
-//! Set values, what is held and what comes to rest (section 6).
+//! Set values, what is held and what comes to rest (J-40 to J-44).
 use super::*;
 use crate::DT;
 use crate::catch::Catch;

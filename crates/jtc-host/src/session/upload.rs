@@ -180,7 +180,7 @@ impl<P: Port> Session<P> {
     ///
     /// [`UploadError::SegmentRefused`] when the controller refuses a segment, for example because it does not hold the arm or because its
     /// own check (J-36) found a problem; [`UploadError::Incomplete`] when the line lost too much to complete it; [`Error::Cancelled`]
-    /// when `progress` ended it; [`LinkError::NoLink`] and [`LinkError::Port`] when the controller or the port is gone. The controller then
+    /// when `progress` ended it; [`LinkError::NoLink`](crate::LinkError::NoLink) and [`LinkError::Port`](crate::LinkError::Port) when the controller or the port is gone. The controller then
     /// holds no complete trajectory, and nothing can be executed.
     pub fn upload(
         &mut self,

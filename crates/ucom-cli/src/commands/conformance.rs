@@ -47,9 +47,9 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
         force: args.force,
     };
     let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e {
-        SessionError::Procedure(Error::Running(RunningError::LoopRuns { .. })) => {
-            Failure::from(e).hint("`ucom stop all` first; --force does not cover this")
-        }
+        SessionError::Procedure(Error::Running(
+            RunningError::Running { .. } | RunningError::LoopRuns { .. },
+        )) => Failure::from(e).hint("`ucom stop all` first; --force does not cover this"),
         e => e.into(),
     });
     let report = match outcome? {

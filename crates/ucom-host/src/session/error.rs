@@ -5,7 +5,7 @@ use host_kit::ErrorKind;
 use super::bus_off;
 use crate::files::signals::ValueError;
 use crate::master::io::Kind;
-use crate::master::{Error, Outcome};
+use crate::master::{Error, ExchangeError, Outcome};
 
 /// Why a session did not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -160,6 +160,15 @@ impl SessionError {
             Self::Lost { .. } => "lost",
             Self::LeftLoop { .. } => "left-loop",
             Self::Unexpected(_) => "internal",
+        }
+    }
+
+    /// A board did not answer, whatever the reason.
+    pub fn is_no_answer(&self) -> bool {
+        match self {
+            Self::Procedure(Error::Exchange(ExchangeError::NoAnswer { .. })) => true,
+            Self::BusOff { failure, .. } => failure.is_no_answer(),
+            _ => false,
         }
     }
 

@@ -15,7 +15,7 @@ use crate::files::params::{
     ParamsBoard, ParamsFile, ParamsProblem, ParamsProblemKind, ParamsTarget, check_board, check_identity,
 };
 use crate::master::io::Kind;
-use crate::master::{AdminChange, Error, ExchangeError, Outcome, Request};
+use crate::master::{AdminChange, Error, Outcome, Request};
 
 /// A board, the words that it is to get, and what it got before.
 #[derive(Debug)]
@@ -130,7 +130,7 @@ impl ParameterFile {
                     let name = name_of(self.inventory.as_ref(), found.info.flash_number);
                     problems.extend(check_identity(board, &ParamsTarget { info: &found.info, name }));
                 }
-                Err(SessionError::Procedure(Error::Exchange(ExchangeError::NoAnswer { .. }))) => {
+                Err(e) if e.is_no_answer() => {
                     let kind = ParamsProblemKind::Absent;
                     problems.push(ParamsProblem { place: board.place, board: board.number, kind });
                 }

@@ -42,7 +42,7 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
     for (unacknowledged, sent_move, valid, before, missed) in [
         (0, true, true, 0, 1),
         (3, true, true, 0, 1),
-        // ReceivedParameters up in this tick: the transmit timeout stands for all of them.
+        // Given up in this tick: the transmit timeout stands for all of them.
         (4, true, true, 0, 0),
         (4, true, true, 3, 0),
         (2, false, true, 3, 3),

@@ -18,7 +18,7 @@ use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status, StatusRecei
 
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
-pub use params::Pushed;
+pub use params::PushReport;
 pub use recover::{ParameterSource, RecoverStep};
 pub use run::Run;
 pub use statistics::LinkStatistics;
@@ -32,9 +32,9 @@ use crate::port::{Port, line_time};
 /// Called with each status and the port's time.
 type Observer = Box<dyn FnMut(Duration, &Status)>;
 
-/// How patient a session is.
+/// Time limits of a session, and how often it tries.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patience {
+pub struct Timeouts {
     /// Longest silence of the controller before the link counts as lost.
     pub status: Duration,
     /// Time for a confirmation beyond what the line needs for the bytes.
@@ -43,7 +43,7 @@ pub struct Patience {
     pub tries: u32,
 }
 
-impl Default for Patience {
+impl Default for Timeouts {
     fn default() -> Self {
         Self { status: Duration::from_secs(2), confirmation: Duration::from_millis(300), tries: 4 }
     }
@@ -62,8 +62,8 @@ pub struct Session<P> {
     observer: Option<Observer>,
     /// The check of the trajectory that the controller holds from this session.
     uploaded: Option<u64>,
-    /// How patient the session is.
-    pub patience: Patience,
+    /// Time limits.
+    pub timeouts: Timeouts,
 }
 
 impl<P: Port> Session<P> {
@@ -81,7 +81,7 @@ impl<P: Port> Session<P> {
             last_heard: start,
             observer: None,
             uploaded: None,
-            patience: Patience::default(),
+            timeouts: Timeouts::default(),
         }
     }
 
@@ -151,10 +151,10 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoLink`] when none comes within [`Patience::status`], [`LinkError::Port`] when the port is gone.
+    /// [`LinkError::NoLink`] when none comes within [`Timeouts::status`], [`LinkError::Port`] when the port is gone.
     pub fn next_status(&mut self) -> Result<Status, LinkError> {
         let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
-        match self.poll(self.patience.status)? {
+        match self.poll(self.timeouts.status)? {
             Some(status) => Ok(status),
             None => Err(LinkError::NoLink {
                 port: self.port.name(),
@@ -229,7 +229,7 @@ impl<P: Port> Session<P> {
     /// Longest time until the confirmation of a frame of `len` bytes must have come.
     fn confirmation_time(&self, len: usize) -> Duration {
         // The frame, a status that is just being sent, and the one with the record.
-        line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.patience.confirmation
+        line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
     /// Sends a frame and waits for its record; frames that arrive damaged are sent again. Not public: a frame can start a motion.
@@ -238,7 +238,7 @@ impl<P: Port> Session<P> {
         let mut bad = None;
         self.catch_up()?;
         self.records.clear();
-        for attempt in 0..self.patience.tries {
+        for attempt in 0..self.timeouts.tries {
             self.statistics.retries += u64::from(attempt > 0);
             self.write(frame)?;
             match self.record_for(kind, frame.len())? {
@@ -247,10 +247,10 @@ impl<P: Port> Session<P> {
                 None => {}
             }
         }
-        if self.port.now() - self.last_heard > self.patience.status {
+        if self.port.now() - self.last_heard > self.timeouts.status {
             self.next_status()?;
         }
-        Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.patience.tries, last: bad })
+        Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.timeouts.tries, last: bad })
     }
 
     /// The record of the frame just sent; `None` when none came in time.

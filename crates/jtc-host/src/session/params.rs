@@ -11,7 +11,7 @@ use crate::port::Port;
 
 /// A parameter that the controller confirmed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Pushed {
+pub struct PushReport {
     /// Which.
     pub parameter: Parameter,
     /// Bytes of its frame.
@@ -30,7 +30,11 @@ impl<P: Port> Session<P> {
     /// [`ParametersError::Value`] before anything is sent, for numbers that no frame carries or that are not physical;
     /// [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] when the controller refuses one, which keeps what it had;
     /// the other [`LinkError`]s of the line.
-    pub fn push(&mut self, set: &ParameterSet, mut done: impl FnMut(&Pushed)) -> Result<Vec<Pushed>, Error> {
+    pub fn push(
+        &mut self,
+        set: &ParameterSet,
+        mut done: impl FnMut(&PushReport),
+    ) -> Result<Vec<PushReport>, Error> {
         set.check()?;
         let mut frames = Vec::new();
         if let Some(friction) = &set.friction {
@@ -54,7 +58,7 @@ impl<P: Port> Session<P> {
                 self.command(&frame).map_err(|e| explained(e, set))?;
             }
             let time_s = (self.port.now() - start).as_secs_f64();
-            let pushed = Pushed { parameter, bytes: frame.len(), times, time_s };
+            let pushed = PushReport { parameter, bytes: frame.len(), times, time_s };
             done(&pushed);
             all.push(pushed);
         }

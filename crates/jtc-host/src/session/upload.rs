@@ -180,7 +180,7 @@ impl<P: Port> Session<P> {
     ///
     /// [`UploadError::SegmentRefused`] when the controller refuses a segment, for example because it does not hold the arm or because its
     /// own check (J-36) found a problem; [`UploadError::Incomplete`] when the line lost too much to complete it; [`Error::Cancelled`]
-    /// when `progress` ended it; [`LinkError::NoLink`](crate::LinkError::NoLink) and [`LinkError::Port`](crate::LinkError::Port) when the controller or the port is gone. The controller then
+    /// when `progress` ended it; those of [`Session::next_status`] when the controller or the port is gone. The controller then
     /// holds no complete trajectory, and nothing can be executed.
     pub fn upload(
         &mut self,
@@ -306,7 +306,7 @@ impl<P: Port> Session<P> {
 
     fn deadline(&self, up: &Upload) -> Duration {
         let oldest = up.in_flight.front().map_or(self.port.now(), |f| f.done);
-        oldest + line_time(2 * STATUS_LEN, self.port.baud()) + self.patience.confirmation
+        oldest + line_time(2 * STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
     fn take_record(&mut self, up: &mut Upload, record: Response) -> Result<(), Error> {
@@ -337,7 +337,7 @@ impl<P: Port> Session<P> {
 
     /// No record came in time.
     fn overdue(&mut self, up: &mut Upload) -> Result<(), Error> {
-        if self.port.now() - self.last_heard > self.patience.status {
+        if self.port.now() - self.last_heard > self.timeouts.status {
             self.next_status()?;
         }
         // All sent and complete: only confirmations were lost. (TES is Null since segment 0 was confirmed.)

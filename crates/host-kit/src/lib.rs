@@ -3,6 +3,7 @@
 
 mod finding;
 mod kind;
+#[cfg(feature = "mcap")]
 pub mod mcap;
 mod whole;
 

@@ -161,6 +161,7 @@ impl FileError {
         FileError::At { path: PathBuf::new(), place, problem: problem.into() }
     }
 
+    #[cfg(feature = "urdf")]
     pub(crate) fn choice(place: Place, problem: impl Into<String>) -> Self {
         FileError::Choice { path: PathBuf::new(), place, problem: problem.into() }
     }

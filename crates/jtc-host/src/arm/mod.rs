@@ -4,11 +4,11 @@ mod collect;
 mod csv;
 mod device;
 mod export;
-mod frames;
 mod parameters;
 #[cfg(test)]
 mod tests;
 mod toml_form;
+#[cfg(feature = "urdf")]
 mod urdf;
 
 use std::path::Path;
@@ -19,9 +19,17 @@ use jtc_dynamics::ArmModel;
 pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
 pub use parameters::{Beyond, ParameterError, ParameterSet};
-pub use urdf::ArmChoice;
 
 use crate::file::{FileError, Place, read_text};
+
+#[cfg(not(feature = "urdf"))]
+mod urdf {
+    use super::{Arm, ArmChoice, FileError};
+
+    pub(super) fn read(_: &str, _: &ArmChoice) -> Result<Arm, FileError> {
+        Err(FileError::form("a robot description; built without URDF (feature `urdf` of jtc-host)"))
+    }
+}
 
 /// The default arm's file, as delivered.
 pub const AVENA_TOML: &str = include_str!("../../../../arms/avena.toml");
@@ -39,6 +47,15 @@ impl std::fmt::Display for Warning {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}", self.place, self.problem)
     }
+}
+
+/// The part of a robot description that is the arm, where it holds more than one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ArmChoice {
+    /// Names of the six joints that move, base to wrist; `None`: there are no others.
+    pub joints: Option<Vec<String>>,
+    /// The link that is the flange; only joints on the way to it are looked at. `None`: what is fixed to the last joint.
+    pub tip: Option<String>,
 }
 
 /// One arm.
@@ -90,6 +107,24 @@ impl Arm {
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let arm = if is_xml(text) { Self::from_urdf(text)? } else { Self::from_toml(text)? };
         arm.checked()
+    }
+
+    /// From the text of a URDF file in which nothing but the arm moves.
+    ///
+    /// # Errors
+    ///
+    /// A text that is no URDF, or does not have exactly one chain of six revolute joints.
+    pub fn from_urdf(text: &str) -> Result<Self, FileError> {
+        Self::from_urdf_with(text, &ArmChoice::default())
+    }
+
+    /// From the text of a URDF file, of which `choice` selects the arm.
+    ///
+    /// # Errors
+    ///
+    /// A text that is no URDF, or in which `choice` does not name six revolute joints in a row.
+    pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
+        urdf::read(text, choice)
     }
 
     /// From a URDF file, of which `choice` selects the arm.

@@ -4,15 +4,15 @@
 //! torques. Bodies behind fixed joints, and behind joints that are none of the six, become part of the link that carries them.
 
 mod choice;
+mod frames;
 
 use jtc_core::{Config, JOINTS, JointConfig};
 use jtc_dynamics::{ArmModel, Link, Origin};
 use urdf_rs::{Joint, JointType, Robot};
 
-pub use self::choice::ArmChoice;
 use self::choice::{about, choose};
-use super::frames::{Body, Frame};
-use super::{Arm, Warning};
+use self::frames::{Body, Frame};
+use super::{Arm, ArmChoice, Warning};
 use crate::file::FileError;
 
 /// Deeper nesting than any description of an arm has.
@@ -27,44 +27,29 @@ struct Chain<'a> {
     warnings: Vec<Warning>,
 }
 
-impl Arm {
-    /// From the text of a URDF file in which nothing but the arm moves.
-    ///
-    /// # Errors
-    ///
-    /// A text that is no URDF, or does not have exactly one chain of six revolute joints.
-    pub fn from_urdf(text: &str) -> Result<Self, FileError> {
-        Self::from_urdf_with(text, &ArmChoice::default())
+/// The arm of a description; `choice` selects its joints.
+pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Arm, FileError> {
+    let depth = depth(text);
+    if depth > DEPTH_MAX {
+        return Err(FileError::form(format!("XML nested {depth} deep is no description of an arm")));
     }
-
-    /// From the text of a URDF file, of which `choice` selects the arm.
-    ///
-    /// # Errors
-    ///
-    /// A text that is no URDF, or in which `choice` does not name six revolute joints in a row.
-    pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
-        let depth = depth(text);
-        if depth > DEPTH_MAX {
-            return Err(FileError::form(format!("XML nested {depth} deep is no description of an arm")));
-        }
-        let robot = urdf_rs::read_from_string(text).map_err(|e| FileError::form(format!("URDF: {e}")))?;
-        let mut chain = Chain::of(&robot, choice)?;
-        let model = chain.model()?;
-        let limits = chain.limits()?;
-        Ok(Arm {
-            name: robot.name.clone(),
-            joint_names: chain.rotary.map(|j| j.name.clone()),
-            model,
-            joints: limits,
-            // The form has no place for it.
-            rotors_given: [false; JOINTS],
-            gravity: None,
-            pid: None,
-            polynomial: None,
-            table: None,
-            warnings: chain.warnings,
-        })
-    }
+    let robot = urdf_rs::read_from_string(text).map_err(|e| FileError::form(format!("URDF: {e}")))?;
+    let mut chain = Chain::of(&robot, choice)?;
+    let model = chain.model()?;
+    let limits = chain.limits()?;
+    Ok(Arm {
+        name: robot.name.clone(),
+        joint_names: chain.rotary.map(|j| j.name.clone()),
+        model,
+        joints: limits,
+        // The form has no place for it.
+        rotors_given: [false; JOINTS],
+        gravity: None,
+        pid: None,
+        polynomial: None,
+        table: None,
+        warnings: chain.warnings,
+    })
 }
 
 /// Deepest nesting of elements; the reader descends by recursion.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use jtc_wire::{Code, NodeState};
 
-use super::{Ending, Recording, RecordingError};
+use super::{Ending, Recording, RecordingError, Writer};
 use crate::sample::{JointSample, Sample};
 
 /// A number of a joint: column name after `q1_`…, and how to reach it.
@@ -50,8 +50,10 @@ impl<W: Write> CsvWriter<W> {
         writeln!(out, "{}", header.join(","))?;
         Ok(Self { out, row: String::new(), ending })
     }
+}
 
-    pub(super) fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
+impl<W: Write + Send> Writer for CsvWriter<W> {
+    fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
         use std::fmt::Write as _;
         let row = &mut self.row;
         row.clear();
@@ -77,15 +79,16 @@ impl<W: Write> CsvWriter<W> {
         Ok(())
     }
 
-    pub(super) fn flush(&mut self) -> Result<(), RecordingError> {
+    fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }
 
-    pub(super) fn end(&mut self, ending: &Ending) {
+    fn end(&mut self, ending: &Ending) -> Result<(), RecordingError> {
         self.ending = ending.clone();
+        Ok(())
     }
 
-    pub(super) fn finish(mut self) -> Result<(), RecordingError> {
+    fn finish(mut self: Box<Self>) -> Result<(), RecordingError> {
         let Ending { outcome, reason } = &self.ending;
         if !matches!(outcome.as_str(), "" | "finished") {
             writeln!(self.out, "{OUTCOME}{outcome}")?;

@@ -11,6 +11,11 @@ pub enum RecordingError {
         /// The file.
         path: PathBuf,
     },
+    /// An MCAP file, and this program was built without the feature `mcap`.
+    BuiltWithout {
+        /// The file.
+        path: PathBuf,
+    },
     /// Nothing is in the file.
     Empty {
         /// The file.
@@ -60,6 +65,7 @@ impl RecordingError {
     /// The same error with the file it is about.
     pub(super) fn at(mut self, file: &Path) -> Self {
         let (RecordingError::UnknownFormat { path }
+        | RecordingError::BuiltWithout { path }
         | RecordingError::Empty { path }
         | RecordingError::Io { path, .. }
         | RecordingError::Line { path, .. }
@@ -77,6 +83,13 @@ impl fmt::Display for RecordingError {
                 write!(
                     f,
                     "{}: recordings are .mcap or .csv files; choose one of these endings",
+                    path.display()
+                )
+            }
+            RecordingError::BuiltWithout { path } => {
+                write!(
+                    f,
+                    "{}: built without MCAP (feature `mcap` of jtc-host); name a .csv file",
                     path.display()
                 )
             }

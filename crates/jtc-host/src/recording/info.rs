@@ -1,7 +1,5 @@
 //! The description that a recording carries: the arm, its limits, where the samples come from.
 
-use std::collections::BTreeMap;
-
 use crate::Arm;
 
 /// One joint's name and limits.
@@ -102,71 +100,4 @@ impl RecordingInfo {
             _ => format!("joint_{}", j + 1),
         }
     }
-
-    /// As the key-value pairs of an MCAP metadata record.
-    pub(super) fn to_map(&self) -> BTreeMap<String, String> {
-        let mut map = BTreeMap::new();
-        let mut put = |key: String, value: String| drop(map.insert(key, value));
-        put("arm".into(), self.arm.clone());
-        put("source".into(), self.source.clone());
-        put("trajectory".into(), self.trajectory.clone());
-        put("start_unix_ns".into(), self.start_unix_ns.to_string());
-        put("flange_origin".into(), join(&self.flange));
-        for (key, value) in [("outcome", &self.ending.outcome), ("reason", &self.ending.reason)] {
-            if !value.is_empty() {
-                put(key.into(), value.clone());
-            }
-        }
-        for (i, joint) in self.joints.iter().enumerate() {
-            let n = i + 1;
-            put(format!("joint{n}_name"), self.joint_name(i));
-            put(format!("joint{n}_origin"), join(&joint.origin));
-            for (key, value) in [
-                ("position_min_rad", joint.position_min_rad),
-                ("position_max_rad", joint.position_max_rad),
-                ("velocity_max_rad_s", joint.velocity_max_rad_s),
-                ("torque_max_nm", joint.torque_max_nm),
-                ("position_error_max_rad", joint.position_error_max_rad),
-            ] {
-                put(format!("joint{n}_{key}"), value.to_string());
-            }
-        }
-        map
-    }
-
-    /// The reverse of `to_map`; what is missing or unreadable stays at its default.
-    pub(super) fn from_map(map: &BTreeMap<String, String>) -> Self {
-        let text = |key: &str| map.get(key).cloned().unwrap_or_default();
-        let number = |key: String| map.get(&key).and_then(|v| v.parse().ok()).unwrap_or(f64::NAN);
-        let joints = std::array::from_fn(|i| {
-            let n = i + 1;
-            JointInfo {
-                name: text(&format!("joint{n}_name")),
-                position_min_rad: number(format!("joint{n}_position_min_rad")),
-                position_max_rad: number(format!("joint{n}_position_max_rad")),
-                velocity_max_rad_s: number(format!("joint{n}_velocity_max_rad_s")),
-                torque_max_nm: number(format!("joint{n}_torque_max_nm")),
-                position_error_max_rad: number(format!("joint{n}_position_error_max_rad")),
-                origin: split(&text(&format!("joint{n}_origin"))),
-            }
-        });
-        Self {
-            arm: text("arm"),
-            source: text("source"),
-            trajectory: text("trajectory"),
-            start_unix_ns: text("start_unix_ns").parse().unwrap_or(0),
-            joints,
-            flange: split(&text("flange_origin")),
-            ending: Ending { outcome: text("outcome"), reason: text("reason") },
-        }
-    }
-}
-
-fn join(values: &[f64; 6]) -> String {
-    values.map(|v| v.to_string()).join(" ")
-}
-
-fn split(text: &str) -> [f64; 6] {
-    let mut values = text.split_whitespace().map(|v| v.parse().unwrap_or(0.0));
-    std::array::from_fn(|_| values.next().unwrap_or(0.0))
 }

@@ -10,7 +10,7 @@ use mcap::records::{self, MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
-use super::{Ending, Recording, RecordingError, RecordingInfo, schema};
+use super::{Ending, Recording, RecordingError, RecordingInfo, Writer, schema};
 use crate::sample::Sample;
 
 /// Name of the metadata record with the [`RecordingInfo`].
@@ -68,8 +68,10 @@ impl<W: Write + Seek> McapWriter<W> {
             cdr: Encoder::default(),
         })
     }
+}
 
-    pub(super) fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
+impl<W: Write + Seek + Send> Writer for McapWriter<W> {
+    fn write(&mut self, s: &Sample) -> Result<(), RecordingError> {
         let j = &s.joints;
         let stamp = self.start_ns + (s.time_s * 1e9).round().max(0.0) as u64;
         let header = |channel_id| MessageHeader {
@@ -127,18 +129,18 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(())
     }
 
-    pub(super) fn flush(&mut self) -> Result<(), RecordingError> {
+    fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }
 
-    pub(super) fn end(&mut self, ending: &Ending) -> Result<(), RecordingError> {
+    fn end(&mut self, ending: &Ending) -> Result<(), RecordingError> {
         let pairs = [("outcome", &ending.outcome), ("reason", &ending.reason)];
         let metadata = pairs.into_iter().filter(|(_, value)| !value.is_empty());
         let metadata = metadata.map(|(key, value)| (key.to_owned(), value.clone())).collect();
         Ok(self.out.write_metadata(&Metadata { name: END.into(), metadata })?)
     }
 
-    pub(super) fn finish(mut self) -> Result<(), RecordingError> {
+    fn finish(mut self: Box<Self>) -> Result<(), RecordingError> {
         self.out.finish()?;
         self.out.into_inner().flush()?;
         Ok(())

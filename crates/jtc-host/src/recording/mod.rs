@@ -8,12 +8,17 @@
 //! A file that breaks off (a program that was killed, a full disk) is read as far as it is whole, and [`Recording::cut`] gives what
 //! is missing.
 
+#[cfg(feature = "mcap")]
 mod cdr;
 mod csv;
 mod error;
 mod info;
 mod live;
+#[cfg(feature = "mcap")]
 mod mcap;
+#[cfg(feature = "mcap")]
+mod metadata;
+#[cfg(feature = "mcap")]
 mod schema;
 #[cfg(test)]
 mod tests;
@@ -42,24 +47,29 @@ impl Format {
     ///
     /// # Errors
     ///
-    /// Another ending.
+    /// Another ending, or one whose format this program was built without.
     pub fn of(path: &Path) -> Result<Self, RecordingError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("mcap") => Ok(Format::Mcap),
+            Some("mcap") if cfg!(feature = "mcap") => Ok(Format::Mcap),
+            Some("mcap") => Err(RecordingError::BuiltWithout { path: path.to_owned() }),
             Some("csv") => Ok(Format::Csv),
             _ => Err(RecordingError::UnknownFormat { path: path.to_owned() }),
         }
     }
 }
 
-enum Writer {
-    Mcap(Box<mcap::McapWriter<BufWriter<File>>>),
-    Csv(csv::CsvWriter<BufWriter<File>>),
+/// Writes samples in one format.
+trait Writer: Send {
+    fn write(&mut self, sample: &Sample) -> Result<(), RecordingError>;
+    fn flush(&mut self) -> Result<(), RecordingError>;
+    /// How the run ended, known at its end only.
+    fn end(&mut self, ending: &Ending) -> Result<(), RecordingError>;
+    fn finish(self: Box<Self>) -> Result<(), RecordingError>;
 }
 
 /// Writes samples into a file as they come.
 pub struct Recorder {
-    writer: Writer,
+    writer: Box<dyn Writer>,
     path: PathBuf,
     samples: u64,
 }
@@ -83,9 +93,12 @@ impl Recorder {
     pub fn on(file: File, path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
         let format = Format::of(path)?;
         let file = BufWriter::with_capacity(1 << 16, file);
-        let writer = match format {
-            Format::Mcap => mcap::McapWriter::new(file, info).map(|w| Writer::Mcap(Box::new(w))),
-            Format::Csv => csv::CsvWriter::new(file, info.ending.clone()).map(Writer::Csv),
+        let writer: Result<Box<dyn Writer>, _> = match format {
+            #[cfg(feature = "mcap")]
+            Format::Mcap => mcap::McapWriter::new(file, info).map(|w| Box::new(w) as _),
+            #[cfg(not(feature = "mcap"))]
+            Format::Mcap => Err(RecordingError::BuiltWithout { path: path.to_owned() }),
+            Format::Csv => csv::CsvWriter::new(file, info.ending.clone()).map(|w| Box::new(w) as _),
         };
         Ok(Self { writer: writer.map_err(|e| e.at(path))?, path: path.to_owned(), samples: 0 })
     }
@@ -96,12 +109,8 @@ impl Recorder {
     ///
     /// The file cannot be written, on a full disk for example.
     pub fn write(&mut self, sample: &Sample) -> Result<(), RecordingError> {
-        let done = match &mut self.writer {
-            Writer::Mcap(w) => w.write(sample),
-            Writer::Csv(w) => w.write(sample),
-        };
         self.samples += 1;
-        done.map_err(|e| e.at(&self.path))
+        self.writer.write(sample).map_err(|e| e.at(&self.path))
     }
 
     /// Samples written so far.
@@ -116,23 +125,12 @@ impl Recorder {
 
     /// Hands all samples so far to the operating system: they are in the file whatever becomes of this program.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        let done = match &mut self.writer {
-            Writer::Mcap(w) => w.flush(),
-            Writer::Csv(w) => w.flush(),
-        };
-        done.map_err(|e| e.at(&self.path))
+        self.writer.flush().map_err(|e| e.at(&self.path))
     }
 
     /// Completes the file as [`Self::finish`], with how the run ended, which nobody knew when it was begun.
     pub fn finish_as(mut self, ending: &Ending) -> Result<u64, RecordingError> {
-        let done = match &mut self.writer {
-            Writer::Mcap(w) => w.end(ending),
-            Writer::Csv(w) => {
-                w.end(ending);
-                Ok(())
-            }
-        };
-        done.map_err(|e| e.at(&self.path))?;
+        self.writer.end(ending).map_err(|e| e.at(&self.path))?;
         self.finish()
     }
 
@@ -142,11 +140,7 @@ impl Recorder {
     ///
     /// The file cannot be written, on a full disk for example.
     pub fn finish(self) -> Result<u64, RecordingError> {
-        let done = match self.writer {
-            Writer::Mcap(w) => w.finish(),
-            Writer::Csv(w) => w.finish(),
-        };
-        done.map(|()| self.samples).map_err(|e| e.at(&self.path))
+        self.writer.finish().map(|()| self.samples).map_err(|e| e.at(&self.path))
     }
 }
 
@@ -199,7 +193,10 @@ impl Recording {
             return Err(RecordingError::Empty { path: path.to_owned() });
         }
         match format {
+            #[cfg(feature = "mcap")]
             Format::Mcap => mcap::read(&bytes),
+            #[cfg(not(feature = "mcap"))]
+            Format::Mcap => Err(RecordingError::BuiltWithout { path: path.to_owned() }),
             Format::Csv => csv::read(&bytes),
         }
         .map_err(|e| e.at(path))

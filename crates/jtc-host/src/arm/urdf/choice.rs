@@ -8,16 +8,8 @@ use std::path::PathBuf;
 use jtc_core::JOINTS;
 use urdf_rs::{Joint, JointType, Robot};
 
+use crate::arm::ArmChoice;
 use crate::file::{FileError, Place};
-
-/// The part of a robot description that is the arm, where it holds more than one.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ArmChoice {
-    /// Names of the six joints that move, base to wrist; `None`: there are no others.
-    pub joints: Option<Vec<String>>,
-    /// The link that is the flange; only joints on the way to it are looked at. `None`: what is fixed to the last joint.
-    pub tip: Option<String>,
-}
 
 /// The six, base to wrist, each carried by the one before it.
 pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Joint; JOINTS], FileError> {

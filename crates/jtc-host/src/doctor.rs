@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use host_kit::Findings;
 pub use host_kit::{Finding, Severity};
-use jtc_bus::{NODES, warning};
+use jtc_bus::warning;
 use jtc_wire::{ControllerState, NodeState, Status, error};
 
 use crate::port::Port;
@@ -198,7 +198,7 @@ fn set_up(s: &Status, all: &mut Findings) {
             "`jtc params push FILE` or `jtc params use-defaults`",
         );
     }
-    for n in (0..NODES).filter(|n| words::is_awaited(s, *n)) {
+    for n in words::nodes_in(s.node_init) {
         let (state, warnings) = match (s.joints.get(n), s.gripper) {
             (Some(j), _) => (j.state, j.warnings),
             (None, Some(g)) => (g.state, g.warnings),

@@ -173,8 +173,9 @@ impl Sample {
         }
     }
 
-    /// The trajectory is being executed.
-    pub fn is_executing(&self) -> bool {
+    /// The controller moves the arm along the trajectory (state Operate, trajectory Execute). Unlike
+    /// [`jtc_wire::Status::is_executing`], which looks at the trajectory alone.
+    pub fn is_operating(&self) -> bool {
         self.state == ControllerState::Operate && self.trajectory == TrajectoryState::Execute
     }
 

@@ -106,7 +106,7 @@ pub fn is_silent(s: &Status, node: usize) -> bool {
 
 /// Whether the controller still waits for a node to be ready.
 pub fn is_awaited(s: &Status, node: usize) -> bool {
-    s.node_init >> node & 1 == 1
+    nodes_in(s.node_init).any(|n| n == node)
 }
 
 /// What the controller still waits for in Init: friction, PID, arm model.
@@ -114,9 +114,14 @@ pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
     list(u32::from(jtc_init), &jtc_wire::words::JTC_INIT)
 }
 
-/// Nodes that are not ready.
-pub fn missing_nodes(node_init: u8) -> Vec<String> {
-    (0..NODES).filter(|n| node_init >> n & 1 == 1).map(node).collect()
+/// The nodes of a mask with a bit for each, node 0 first.
+pub fn nodes_in(mask: u8) -> impl Iterator<Item = usize> {
+    (0..NODES).filter(move |n| mask >> n & 1 == 1)
+}
+
+/// Their names.
+pub fn node_names(mask: u8) -> Vec<String> {
+    nodes_in(mask).map(node).collect()
 }
 
 /// All current errors of a status, the most particular ones first: nodes that do not answer, the safety input, what each joint and
@@ -178,7 +183,7 @@ pub fn waiting_for(s: &Status) -> String {
     let mut missing: Vec<String> =
         missing_parameters(s.jtc_init).into_iter().map(|m| format!("{m} not given")).collect();
     if s.is_coming_up() {
-        missing.extend(missing_nodes(s.node_init).into_iter().map(|n| format!("{n} not ready")));
+        missing.extend(node_names(s.node_init).into_iter().map(|n| format!("{n} not ready")));
     }
     if s.errors != 0 {
         missing.push(errors_line(s));

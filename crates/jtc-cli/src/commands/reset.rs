@@ -16,7 +16,8 @@ const GRIPPER: u8 = 1 << 6;
 /// Resets the nodes that are named. Where the arm is held, only after a person has agreed; where it moves, no joint.
 pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let nodes = nodes(args)?;
-    let names = words::missing_nodes(nodes).join(", ");
+    let reset = words::node_names(nodes);
+    let names = reset.join(", ");
     let mut session = args.link.session()?;
     let state = session.fresh_status()?.state;
     if state.is_in(&[ControllerState::Operate, ControllerState::Teaching]) && nodes & !GRIPPER != 0 {
@@ -33,7 +34,6 @@ pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
         confirm(&question, "--yes")?;
     }
     session.reset(nodes)?;
-    let reset = words::missing_nodes(nodes);
     out.result(&json!({ "reset": reset }), || format!("reset: {names}"));
     Ok(())
 }

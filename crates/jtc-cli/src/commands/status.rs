@@ -64,7 +64,7 @@ pub fn as_json(s: &Status) -> Value {
         "errors_occurred": words::errors(s.occurred),
         "occurred_word": s.occurred,
         "missing_parameters": words::missing_parameters(s.jtc_init),
-        "missing_nodes": words::missing_nodes(s.node_init),
+        "missing_nodes": words::node_names(s.node_init),
         "friction": if s.friction_type == 0 { "polynomial" } else { "table" },
         "can_flags": words::can_flags(s.can_current),
         "can_flags_occurred": words::can_flags(s.can_occurred),

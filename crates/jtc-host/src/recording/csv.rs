@@ -149,7 +149,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
         }
         samples.push(sample);
     }
-    let in_motion = samples.last().is_some_and(Sample::is_executing);
+    let in_motion = samples.last().is_some_and(Sample::is_operating);
     let cut = if !rest.trim().is_empty() {
         Some("the file breaks off within a line")
     } else if in_motion && ending.outcome.is_empty() {

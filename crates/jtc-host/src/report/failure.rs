@@ -80,7 +80,7 @@ impl RunFailure {
         if let Some(found) = Self::find(info, samples) {
             return Some(found);
         }
-        let unseen = samples.last().is_some_and(Sample::is_executing);
+        let unseen = samples.last().is_some_and(Sample::is_operating);
         let reason = match (ending.is_fault(), ending.reason.as_str()) {
             (true, "") => "the run ended in a fault that the recording does not name".to_owned(),
             (true, reason) => reason.to_owned(),
@@ -242,7 +242,7 @@ fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint
 
 /// The first sample of the execution, or the first of all.
 fn begin(samples: &[Sample]) -> usize {
-    samples.iter().position(Sample::is_executing).unwrap_or(0)
+    samples.iter().position(Sample::is_operating).unwrap_or(0)
 }
 
 /// When the run began, s: the controller's own count of milliseconds at the last sample of the motion is the most exact.

@@ -42,7 +42,7 @@ pub struct Summary {
 impl Summary {
     /// The figures over the samples in which a trajectory was executed, or over all when there is none.
     pub fn of(info: &RecordingInfo, samples: &[Sample]) -> Self {
-        let executing = |s: &&Sample| s.is_executing();
+        let executing = |s: &&Sample| s.is_operating();
         let any = samples.iter().any(|s| executing(&s));
         let counted: Vec<&Sample> = samples.iter().filter(|s| !any || executing(s)).collect();
         let span = |first: Option<f64>, last: Option<f64>| last.zip(first).map_or(0.0, |(l, f)| l - f);

@@ -255,7 +255,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn bring_up(&mut self, status: &Status) -> Result<(), Error> {
-        (self.report)(&RecoverStep::WaitNodes(words::missing_nodes(status.node_init)));
+        (self.report)(&RecoverStep::WaitNodes(words::node_names(status.node_init)));
         let up = |s: &Status| !s.is_coming_up() || (self.ended)();
         match self.session.wait_for("nodes ready", NODE_TIME, up) {
             Err(Error::State(StateError::Timeout { status, .. })) if !self.reset_slow => {
@@ -296,7 +296,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
             self.reset |= silent;
             self.reset_nodes(silent)?;
         }
-        (self.report)(&RecoverStep::Clear(names(nodes)));
+        (self.report)(&RecoverStep::Clear(words::node_names(nodes)));
         self.clear(nodes)?;
         self.clears += 1;
         if self.clears > CLEARS_MAX {
@@ -324,7 +324,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn reset_nodes(&mut self, nodes: u8) -> Result<(), Error> {
-        (self.report)(&RecoverStep::Reset(names(nodes)));
+        (self.report)(&RecoverStep::Reset(words::node_names(nodes)));
         self.session.reset(nodes)?;
         self.session.pause_for(BOOT, &self.ended)
     }
@@ -397,8 +397,4 @@ fn faulty(s: &Status) -> u8 {
         mask |= 1 << 6;
     }
     mask
-}
-
-fn names(mask: u8) -> Vec<String> {
-    words::missing_nodes(mask)
 }

@@ -7,6 +7,7 @@ use jtc_host::file::FileError;
 use jtc_host::port::PortError;
 use jtc_host::recording::RecordingError;
 use jtc_host::{CheckError, LinkError, ParametersError, StateError};
+use serde_json::json;
 
 pub use cli_kit::exit::{FAULT, NO_LINK, REFUSED, USAGE};
 
@@ -72,6 +73,12 @@ impl Failure {
         let message = format!("{}; the recording ends where that happened", self.message);
         Self { exit: FAULT, code: "output-lost".into(), message, ..self }
             .hint("make room or name another place, and run again")
+    }
+
+    /// As programs read it.
+    pub fn to_json(&self) -> serde_json::Value {
+        let Self { exit, code, message, hint, .. } = self;
+        json!({ "code": code, "message": message, "hint": hint, "exit": exit })
     }
 
     /// A verdict that was printed as the command's result.

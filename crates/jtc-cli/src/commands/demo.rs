@@ -104,6 +104,54 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
+/// A port to `world` that takes a sample at each tick while it is recording.
+fn observed(
+    world: World,
+    speed: SimSpeed,
+    sinks: Vec<SampleSink>,
+    samples: &Rc<RefCell<Vec<Sample>>>,
+    recording: &Rc<Cell<bool>>,
+) -> SimPort {
+    let mut port = SimPort::new(world);
+    let mut zero = None;
+    let (taken, on, start) = (Rc::clone(samples), Rc::clone(recording), Instant::now());
+    port.observe(move |world| {
+        if on.get() && world.ticked() {
+            let now = Sample::from(world.telemetry());
+            let zero = *zero.get_or_insert(now.time_s);
+            let sample = Sample { time_s: now.time_s - zero, ..now };
+            sinks.iter().for_each(|sink| sink.write(&sample));
+            taken.borrow_mut().push(sample);
+        }
+        if speed == SimSpeed::Realtime {
+            std::thread::sleep(Duration::from_micros(world.now_us()).saturating_sub(start.elapsed()));
+        }
+    });
+    port
+}
+
+fn upload(
+    session: &mut Session<SimPort>,
+    checked: &CheckedTrajectory,
+    progress: &Progress,
+    out: &Output,
+) -> Result<UploadReport, Failure> {
+    let bar = out.bar(1, "upload");
+    let upload = session.upload(checked, |p| {
+        bar.set_length(p.segments as u64);
+        bar.set_position(p.segments_done as u64);
+        progress.uploading("motion", p);
+        Flow::Continue
+    })?;
+    bar.finish();
+    progress.event("uploaded", run_report::uploaded("motion", &upload));
+    out.note(format!(
+        "uploaded: {} points in {} segments, {:.2} s on the line",
+        upload.points, upload.segments, upload.time_s
+    ));
+    Ok(upload)
+}
+
 fn execute(
     speed: SimSpeed,
     info: RecordingInfo,
@@ -122,25 +170,8 @@ fn execute(
         .map(|i| percent(world.true_model().links[i].mass, arm.model.links[i].mass))
         .collect::<Vec<_>>();
 
-    let samples: Rc<RefCell<Vec<Sample>>> = Rc::default();
-    let recording = Rc::new(Cell::new(false));
-    let mut port = SimPort::new(world);
-    let mut zero = None;
-    let (taken, on, start) = (Rc::clone(&samples), Rc::clone(&recording), Instant::now());
-    port.observe(move |world| {
-        if on.get() && world.ticked() {
-            let mut taken = taken.borrow_mut();
-            let now = Sample::from(world.telemetry());
-            let zero = *zero.get_or_insert(now.time_s);
-            let sample = Sample { time_s: now.time_s - zero, ..now };
-            sinks.iter().for_each(|sink| sink.write(&sample));
-            taken.push(sample);
-        }
-        if speed == SimSpeed::Realtime {
-            std::thread::sleep(Duration::from_micros(world.now_us()).saturating_sub(start.elapsed()));
-        }
-    });
-    let mut session = Session::new(port);
+    let (samples, recording) = (Rc::default(), Rc::default());
+    let mut session = Session::new(observed(world, speed, sinks, &samples, &recording));
     progress.watch(&mut session);
 
     out.note("parameters: friction, gains and arm model over the serial protocol");
@@ -153,20 +184,7 @@ fn execute(
     out.note(format!("  HoldPos, drives enabled after {:.1} s", session.now().as_secs_f64()));
 
     let checked = CheckedTrajectory::check(&trajectory, &arm, &here, &CheckOptions::default())?;
-    let bar = out.bar(1, "upload");
-    let upload = session.upload(&checked, |p| {
-        bar.set_length(p.segments as u64);
-        bar.set_position(p.segments_done as u64);
-        progress.uploading("motion", p);
-        Flow::Continue
-    })?;
-    bar.finish();
-    progress.event("uploaded", run_report::uploaded("motion", &upload));
-    out.note(format!(
-        "uploaded: {} points in {} segments, {:.2} s on the line",
-        upload.points, upload.segments, upload.time_s
-    ));
-
+    let upload = upload(&mut session, &checked, progress, out)?;
     recording.set(true);
     wait(&mut session, MARGIN)?;
     let bar = out.motion_bar((trajectory.duration_s() * 1e3) as u64, "motion", "");

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use cli_kit::{Output, OutputFile};
-use jtc_host::check::ProblemKind;
+use jtc_host::check::{ProblemKind, Verdict};
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
 use jtc_host::report::{self, ReportInput, RunFailure, Summary};
@@ -94,23 +94,30 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
         }
     };
     drop(operator);
-    let Leg { phase, upload, mut info, tape, samples, outcome } = leg;
+    conclude(job, leg, checked.verdict(), &session, outputs, out)
+}
 
+/// Writes the files of a run and prints how it ended.
+fn conclude(
+    job: &Job,
+    leg: Leg,
+    verdict: &Verdict,
+    session: &Session<SerialPort>,
+    outputs: Outputs,
+    out: &Output,
+) -> Result<(), Failure> {
+    let Leg { phase, upload, mut info, tape, samples, outcome } = leg;
     let link = session.statistics();
     // A run that ended in a fault is what one wants to look at most: it is recorded and reported as well.
     let facts = [run_report::link_facts(&upload, &link, session.port().baud())];
-    let broken = match &outcome {
-        Ok(_) => None,
-        Err(e) => {
-            let found = RunFailure::find(&info, &samples);
-            let found = found.unwrap_or_else(|| RunFailure::ended_by(&info, &samples, e.to_string()));
-            Some(if let Error::Motion(MotionError::RunFault { status, .. }) = e {
-                found.with_status(status)
-            } else {
-                found
-            })
+    let broken = outcome.as_ref().err().map(|e| {
+        let found = RunFailure::find(&info, &samples);
+        let found = found.unwrap_or_else(|| RunFailure::ended_by(&info, &samples, e.to_string()));
+        match e {
+            Error::Motion(MotionError::RunFault { status, .. }) => found.with_status(status),
+            _ => found,
         }
-    };
+    });
     let word = match &outcome {
         Ok(Outcome::Finished(_)) => "finished",
         Ok(Outcome::Stopped(_)) => "stopped",
@@ -136,6 +143,7 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
         .err()
         .map(|e| job.named(Failure { message: info.ending.reason.clone(), ..Failure::of(e) }));
     let failure = of_run.or(lost.into_iter().next());
+    let error = failure.as_ref().map(Failure::to_json);
     let value = json!({
         "outcome": word,
         "phase": phase,
@@ -144,11 +152,11 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
         "samples": summary.samples,
         "joints": summary.joints,
         "failure": broken,
-        "verdict": checked.verdict(),
+        "verdict": verdict,
         "upload": upload,
         "link": link,
         "files": files,
-        "error": failure.as_ref().map(|f| json!({ "code": f.code, "message": f.message, "hint": f.hint, "exit": f.exit })),
+        "error": error,
     });
     out.result(&value, || {
         let made: String = files.iter().map(|f| format!("\n{f}")).collect();

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use cli_kit::{Output, OutputFile, Stop};
 use jtc_host::trajectory::Loaded;
-use jtc_host::words;
-use jtc_wire::ControllerState;
+use jtc_host::{LinkError, words};
+use jtc_wire::{ControllerState, Status};
 use serde_json::json;
 
 use super::job::typed;
@@ -51,26 +51,8 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
 
 fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
-    let (teaching, begun, its_out) =
-        (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)), *out);
-    let (its_teaching, its_begun) = (Arc::clone(&teaching), Arc::clone(&begun));
-    let stop = Stop::listen_with(move || {
-        let holds = "`jtc teach off` holds the arm";
-        match (its_teaching.load(Ordering::Relaxed), its_begun.load(Ordering::Relaxed)) {
-            (true, true) => ended_at_once(
-                its_out,
-                "ended at once; the file holds the motion up to here. The controller stays in Teaching: the arm can be moved by hand",
-                holds,
-            ),
-            (true, false) => ended_at_once(
-                its_out,
-                "ended at once, nothing was recorded; the controller stays in Teaching: the arm can be moved by hand",
-                holds,
-            ),
-            (false, true) => ended_at_once(its_out, "ended at once; the file holds the motion", ""),
-            (false, false) => ended_at_once(its_out, "ended at once, nothing was recorded", ""),
-        }
-    })?;
+    let (teaching, begun) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+    let stop = stop_at_once_with(*out, Arc::clone(&teaching), Arc::clone(&begun))?;
     let mut session = link.session()?;
     progress.watch(&mut session);
     let status = session.fresh_status()?;
@@ -89,20 +71,9 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
     out.note("teaching: move the arm by hand; Ctrl-C ends the recording");
     let start = session.now();
     let mut taught = TaughtFile::new(file);
-    let (mut lost, mut failed): (Option<Failure>, Option<Failure>) = (None, None);
+    let (mut lost, mut failed) = (None, None);
     while !stop.asked() && duration.is_none_or(|s| (session.now() - start).as_secs_f64() < s) {
-        match session.next_status() {
-            Ok(s) if s.state == ControllerState::Error || s.errors != 0 => {
-                failed = Some(
-                    Failure {
-                        exit: FAULT,
-                        code: "run-fault".into(),
-                        ..Failure::usage(words::errors_line(&s))
-                    }
-                    .hint(words::next_step(&s)),
-                );
-                break;
-            }
+        match session.next_status().map_err(still_teaching).and_then(without_error) {
             Ok(s) if s.state == ControllerState::Teaching => {
                 match taught.take((session.now() - start).as_secs_f64(), s.positions()) {
                     Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
@@ -114,13 +85,8 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
                 }
             }
             Ok(_) => {}
-            Err(e) => {
-                let failure = Failure::from(e);
-                let message = format!(
-                    "{}. The controller stays in teaching: the arm can be moved by hand",
-                    failure.message
-                );
-                failed = Some(Failure { message, ..failure });
+            Err(failure) => {
+                failed = Some(failure);
                 break;
             }
         }
@@ -132,6 +98,43 @@ fn record(file: OutputFile, link: &LinkArgs, duration: Option<f64>, out: &Output
         teaching.store(false, Ordering::Relaxed);
     }
     failed.map_or(written, Err)
+}
+
+/// Ctrl-C: the first one is asked for, the second one ends the command with what is so at that moment.
+fn stop_at_once_with(
+    out: Output,
+    teaching: Arc<AtomicBool>,
+    begun: Arc<AtomicBool>,
+) -> std::io::Result<Stop> {
+    Stop::listen_with(move || {
+        let (teaching, begun) = (teaching.load(Ordering::Relaxed), begun.load(Ordering::Relaxed));
+        let message = match (teaching, begun) {
+            (true, true) => {
+                "ended at once; the file holds the motion up to here. The controller stays in Teaching: the arm can be moved by hand"
+            }
+            (true, false) => {
+                "ended at once, nothing was recorded; the controller stays in Teaching: the arm can be moved by hand"
+            }
+            (false, true) => "ended at once; the file holds the motion",
+            (false, false) => "ended at once, nothing was recorded",
+        };
+        ended_at_once(out, message, if teaching { "`jtc teach off` holds the arm" } else { "" })
+    })
+}
+
+fn still_teaching(e: LinkError) -> Failure {
+    let failure = Failure::from(e);
+    let message =
+        format!("{}. The controller stays in teaching: the arm can be moved by hand", failure.message);
+    Failure { message, ..failure }
+}
+
+fn without_error(s: Status) -> Result<Status, Failure> {
+    if s.state != ControllerState::Error && s.errors == 0 {
+        return Ok(s);
+    }
+    let failure = Failure { exit: FAULT, code: "run-fault".into(), ..Failure::usage(words::errors_line(&s)) };
+    Err(failure.hint(words::next_step(&s)))
 }
 
 fn finish(taught: TaughtFile, out: &Output) -> Result<(), Failure> {

@@ -33,12 +33,11 @@ pub fn approach(
         if !out.is_json() {
             return failure;
         }
-        let Failure { exit, code, message, hint, .. } = failure;
-        let error = json!({ "code": code, "message": message, "hint": hint, "exit": exit });
+        let error = failure.to_json();
         let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
         out.result(&value, String::new);
-        out.note(format!("jtc: {message}\n     {hint}"));
-        Failure::printed(exit)
+        out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
+        Failure::printed(failure.exit)
     })?;
     out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
     Ok(checked)

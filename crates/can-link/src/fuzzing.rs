@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use crate::slcan::line;
-use crate::socketcand::text::{LONGEST, Reply, Request, Splitter, push_frame, push_send};
+use crate::socketcand::splitter::{LONGEST, Splitter};
+use crate::socketcand::text::{Reply, Request, push_frame, push_send};
 use crate::{CanFrame, SlcanAdapter};
 
 /// A stream of the socketcand protocol in any pieces: the messages are those that a look at the whole finds; memory is bounded;

@@ -6,14 +6,18 @@ use std::time::Duration;
 use jtc_bus::Joint;
 use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
-use jtc_host::session::{Flow, ParameterSource};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session, plan};
+use jtc_host::session::{Flow, ParameterSource, RecoverStep};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, ErrorKind, ParametersError, Session, plan};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;
 
 fn session() -> Sim {
-    Session::new(SimPort::new(World::new(SimConfig { baud: None, ..SimConfig::default() })))
+    session_at(None)
+}
+
+fn session_at(baud: Option<u32>) -> Sim {
+    Session::new(SimPort::new(World::new(SimConfig { baud, ..SimConfig::default() })))
 }
 
 /// On a path of some seconds, from HoldPos.
@@ -113,4 +117,94 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
         (s.statistics().frames_sent, s.fresh_status().unwrap().state),
         (sent, ControllerState::Teaching.into())
     );
+}
+
+#[test]
+fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
+    let mut s = session_at(Some(921_600));
+    let status = s.recover(ParameterSource::ControllerDefaults, |_| {}).unwrap();
+    assert_eq!(status.state, ControllerState::HoldPos);
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::SafetyInput,
+        trigger: Trigger::At(0),
+        duration_ms: Some(5_000),
+    });
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    let mut steps = Vec::new();
+    let status = s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
+    assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0));
+    assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
+}
+
+/// J-55: a controller without parameters is not given a stranger's, and no part of an arm is filled in.
+#[test]
+fn j55_recover_gives_no_numbers_that_nobody_named() {
+    let mut s = session_at(Some(921_600));
+    let (sent, mut steps) = (s.statistics().frames_sent, 0);
+    let error = s.recover(ParameterSource::None, |_| steps += 1).unwrap_err();
+    assert!(
+        matches!(&error, Error::Parameters(ParametersError::NoSource { missing }) if missing.len() == 3),
+        "{error}"
+    );
+    assert_eq!((error.kind(), s.statistics().frames_sent, steps), (ErrorKind::Refused, sent, 0));
+    assert!(error.hint().contains("--arm FILE") && error.hint().contains("--defaults"), "{}", error.hint());
+
+    let arm = Arm { pid: None, ..Arm::avena() };
+    let half = arm.parameter_set();
+    let error = s.recover(ParameterSource::Arm { name: "half.toml", set: &half }, |_| {}).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Refused);
+    assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
+    assert_eq!(s.statistics().frames_sent, sent);
+
+    // One part is there, of another arm: the file's are sent whole.
+    s.use_default(jtc_host::session::Parameter::Pid).unwrap();
+    let set = Arm::avena().parameter_set();
+    let before = s.statistics().frames_sent;
+    let mut steps = Vec::new();
+    let status = s
+        .recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
+        .unwrap();
+    assert_eq!(
+        (status.state, s.statistics().frames_sent - before),
+        (ControllerState::HoldPos.into(), 3),
+        "{steps:?}"
+    );
+    assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
+    // Held: nothing is sent under the arm's weight, and that is reported.
+    let mut steps = Vec::new();
+    s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
+        .unwrap();
+    assert_eq!(s.statistics().frames_sent - before, 3);
+    assert!(steps.iter().any(|s| s.contains("not with those of avena.toml")), "{steps:?}");
+}
+
+/// After an error, an arm that is named is the one that is powered again.
+#[test]
+fn j55_after_an_error_the_named_arm_is_powered() {
+    let mut s = session_at(Some(921_600));
+    s.use_defaults().unwrap();
+    s.wait_hold(Duration::from_secs(15)).unwrap();
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::SafetyInput,
+        trigger: Trigger::At(0),
+        duration_ms: Some(500),
+    });
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    let set = Arm::avena().parameter_set();
+    let mut steps = Vec::new();
+    s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.clone()))
+        .unwrap();
+    let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
+    let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
+    assert!(give < clear, "{steps:?}");
+    // Without one the controller keeps what it has, and the step reports it.
+    s.port_mut().world_mut().inject(Fault {
+        kind: FaultKind::SafetyInput,
+        trigger: Trigger::At(0),
+        duration_ms: Some(500),
+    });
+    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    let mut steps = Vec::new();
+    s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
+    assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
 }

@@ -5,7 +5,8 @@ use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-use super::text::{CLASS_BUS_OFF, CLASS_RESTARTED, Reply, Splitter, has_form, push_send};
+use super::splitter::Splitter;
+use super::text::{CLASS_BUS_OFF, CLASS_RESTARTED, Reply, has_form, push_send};
 use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
 
 /// How long connecting and each answer while opening may take.

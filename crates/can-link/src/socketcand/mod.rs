@@ -9,6 +9,7 @@ mod gateway;
 mod server;
 mod session;
 mod shared;
+pub(crate) mod splitter;
 pub(crate) mod text;
 
 pub use client::SocketcandBus;

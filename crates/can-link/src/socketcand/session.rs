@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::shared::{ClientAction, ClientId, Inner, Route};
-use super::text::{Request, Splitter, has_form, push_frame, push_state};
+use super::splitter::Splitter;
+use super::text::{Request, has_form, push_frame, push_state};
 use crate::virtual_bus::Received;
 use crate::{CanBus, VirtualBus};
 

@@ -5,6 +5,7 @@ pub mod fit;
 mod overshoot;
 mod replay;
 mod segments;
+mod spline;
 mod structured;
 #[cfg(test)]
 mod tests;

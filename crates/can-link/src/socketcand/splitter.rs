@@ -1,0 +1,101 @@
+//! Messages of a TCP stream, wherever it is cut.
+
+/// Longest message that is kept; the longest of the protocol, a CAN FD frame with blanks between its bytes, has 240.
+pub(crate) const LONGEST: usize = 512;
+
+/// Finds messages in a stream that may be cut anywhere, in bounded memory.
+pub(crate) struct Splitter {
+    /// What followed the last `<`.
+    message: Vec<u8>,
+    inside: bool,
+    /// The message in `message` was handed out.
+    complete: bool,
+    noise: u64,
+}
+
+impl Splitter {
+    pub(crate) fn new() -> Self {
+        Self { message: Vec::with_capacity(LONGEST), inside: false, complete: false, noise: 0 }
+    }
+
+    /// Messages that were too long, not ASCII or never ended, so far.
+    pub(crate) fn noise(&self) -> u64 {
+        self.noise
+    }
+
+    /// Bytes that it holds at most.
+    #[cfg(any(test, feature = "fuzzing"))]
+    pub(crate) fn capacity(&self) -> usize {
+        self.message.capacity()
+    }
+
+    /// The text between `<` and `>` of the next message; what it takes of `bytes` is gone from there.
+    pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<&'a str> {
+        if self.complete {
+            self.complete = false;
+            self.message.clear();
+        }
+        while let Some((&byte, rest)) = bytes.split_first() {
+            *bytes = rest;
+            match byte {
+                b'<' => {
+                    // A message within a message: the first one lost its end.
+                    self.noise += u64::from(self.inside);
+                    self.inside = true;
+                    self.message.clear();
+                }
+                b'>' if self.inside => {
+                    self.inside = false;
+                    if self.message.is_ascii() {
+                        self.complete = true;
+                        return str::from_utf8(&self.message).ok();
+                    }
+                    self.noise += 1;
+                    self.message.clear();
+                }
+                _ if !self.inside => {}
+                _ if self.message.len() == LONGEST => {
+                    self.noise += 1;
+                    self.inside = false;
+                    self.message.clear();
+                }
+                _ => self.message.push(byte),
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn messages(splitter: &mut Splitter, mut bytes: &[u8]) -> Vec<String> {
+        std::iter::from_fn(|| splitter.next(&mut bytes).map(str::to_owned)).collect()
+    }
+
+    #[test]
+    fn messages_are_found_wherever_the_stream_is_cut() {
+        let stream = b"xx< hi ><ok>\n< frame 1 1.0  > > < send < echo >\xFF<\xFF>";
+        let whole = [" hi ", "ok", " frame 1 1.0  ", " echo "];
+        for cut in 0..=stream.len() {
+            let mut splitter = Splitter::new();
+            let mut found = messages(&mut splitter, &stream[..cut]);
+            found.extend(messages(&mut splitter, &stream[cut..]));
+            assert_eq!(found, whole, "cut at {cut}");
+            assert_eq!(splitter.noise(), 2);
+        }
+    }
+
+    #[test]
+    fn an_endless_message_takes_bounded_memory_and_the_next_is_found() {
+        let mut splitter = Splitter::new();
+        assert!(messages(&mut splitter, b"<").is_empty());
+        for _ in 0..1000 {
+            assert!(messages(&mut splitter, &[b'a'; 4096]).is_empty());
+        }
+        assert_eq!(splitter.capacity(), LONGEST);
+        assert_eq!(messages(&mut splitter, b"> < hi >"), [" hi "]);
+        assert_eq!(splitter.noise(), 1);
+    }
+}

@@ -1,0 +1,118 @@
+//! A session with a controller that answers by script: what it sends, and what it reports when the link is lost.
+
+use jtc_wire::{ControllerState, TrajectoryState};
+use std::time::Duration;
+
+use jtc_host::session::Flow;
+use jtc_host::{Error, ErrorKind, MotionError};
+
+/// What the session wrote, while a controller behind a scripted port sends nothing or the same status again and again.
+mod scripted {
+    use std::cell::RefCell;
+    use std::rc::Rc;
+    use std::time::Duration;
+
+    use jtc_host::Port;
+    use jtc_host::Session;
+    use jtc_host::port::test::ScriptedPort;
+    use jtc_wire::{Response, Status};
+
+    pub type Written = Rc<RefCell<Vec<u8>>>;
+
+    /// Answers each frame with `status` and its record; silent when there is none. Statuses come every 40 ms until `end`.
+    pub fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
+        let written = Written::default();
+        let taken = Rc::clone(&written);
+        let mut next = Duration::ZERO;
+        let port = ScriptedPort::new(None, move |now, bytes| {
+            taken.borrow_mut().extend_from_slice(bytes);
+            if now >= end {
+                return Vec::new();
+            }
+            let mut out = Vec::new();
+            if let [_, kind, ..] = bytes {
+                let response = Response {
+                    frame_type: *kind,
+                    status: jtc_wire::FrameStatus::NoError,
+                    data: jtc_wire::DataStatus::NoError,
+                    length: bytes.len() as u16,
+                };
+                out.extend(Status { response, ..status }.emit());
+            }
+            if now >= next {
+                next = now + Duration::from_millis(40);
+                out.extend(status.emit());
+            }
+            out
+        });
+        (Session::new(port), written)
+    }
+}
+
+/// J-34: resume goes on with what is paused and starts nothing else.
+#[test]
+fn j34_resume_only_after_a_pause() {
+    use TrajectoryState::{Execute, Finish, Null, Stop};
+    for trajectory in [Null, Stop, Execute, Finish] {
+        let (mut s, written) = scripted::session(
+            jtc_wire::Status {
+                state: ControllerState::HoldPos.into(),
+                trajectory: trajectory.into(),
+                ..Default::default()
+            },
+            Duration::MAX,
+        );
+        let error = s.resume().unwrap_err();
+        assert!(
+            matches!(error, Error::Motion(MotionError::NotPaused { trajectory: t, .. }) if t == trajectory),
+            "{error}"
+        );
+        assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
+        // Only a motion that may be slowing down can be resumed by the same command a little later.
+        assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
+    }
+    let (mut s, written) = scripted::session(
+        jtc_wire::Status {
+            state: ControllerState::HoldPos.into(),
+            trajectory: TrajectoryState::Pause.into(),
+            ..Default::default()
+        },
+        Duration::MAX,
+    );
+    s.resume().unwrap();
+    assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Execute));
+}
+
+/// A link that is lost in motion: the error states that the arm may be moving, and a stop goes out that may still arrive.
+#[test]
+fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
+    let moving = jtc_wire::Status {
+        state: ControllerState::Operate.into(),
+        trajectory: TrajectoryState::Execute.into(),
+        point: 1234,
+        ..Default::default()
+    };
+    let (mut s, written) = scripted::session(moving, Duration::from_millis(500));
+    let error = s.follow(|_| Flow::Continue).unwrap_err();
+    assert_eq!((error.kind(), error.code()), (ErrorKind::NoLink, "link-lost"));
+    let text = error.to_string();
+    assert!(text.contains("THE ARM MAY BE MOVING") && text.contains("point 1234 (1.234 s)"), "{text}");
+    assert!(text.contains("a stop was sent") && !text.contains("goes on"), "{text}");
+    assert!(error.hint().contains("emergency stop"), "{}", error.hint());
+    assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Stop));
+
+    let (mut s, _) = scripted::session(moving, Duration::ZERO);
+    let text = s.stop().unwrap_err().to_string();
+    assert!(text.contains("THE ARM MAY BE MOVING"), "{text}");
+
+    let paused = jtc_wire::Status {
+        state: ControllerState::HoldPos.into(),
+        trajectory: TrajectoryState::Pause.into(),
+        point: 700,
+        ..Default::default()
+    };
+    let (mut s, written) = scripted::session(paused, Duration::from_millis(500));
+    let text = s.follow(|_| Flow::Continue).unwrap_err().to_string();
+    assert!(text.contains("paused at point 700") && !text.contains("MAY BE MOVING"), "{text}");
+    assert_eq!(written.borrow().len(), 0);
+}

@@ -32,7 +32,7 @@ impl Master {
             if let Some(other) = core.mailboxes.values().find(|mailbox| mailbox.claims & claims != 0) {
                 let shared = other.claims & claims;
                 let boards = (0..32).filter(|b| shared >> b & 1 == 1).collect();
-                return Err(Error::Master(MasterError::Busy { boards, with: other.name }));
+                return Err(MasterError::Busy { boards, with: other.name }.into());
             }
             let bears_shared_numbers = request.bears_shared_numbers();
             core.mailboxes.insert(id, Mailbox { name, claims, bears_shared_numbers, ..Default::default() });

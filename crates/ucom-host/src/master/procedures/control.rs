@@ -65,7 +65,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         }
     }
     let status = before.status;
-    Err(Error::Status(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }))
+    Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
 /// Polls PC_INFO every 200 ms until some bits are as wanted.
@@ -83,10 +83,7 @@ pub(crate) async fn wait_status(
         match numbers(link, board).await {
             Ok(info) if info.status & mask == value => return Ok(info),
             Ok(info) => last = Some(info.status),
-            Err(
-                Error::Exchange(ExchangeError::NoAnswer { .. })
-                | Error::Exchange(ExchangeError::Incomplete { .. }),
-            ) => {}
+            Err(Error::Exchange(ExchangeError::NoAnswer { .. } | ExchangeError::Incomplete { .. })) => {}
             Err(e) => return Err(e),
         }
         let waited = link.now().saturating_sub(since);
@@ -163,12 +160,13 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
         Err(error) => Err(error),
         Ok(info) => {
             let waited_ms = link.now().saturating_sub(since) / MS;
-            Err(Error::Status(StatusError::NotReached {
+            Err(StatusError::NotReached {
                 board,
                 what: "it did not give its number up",
                 waited_ms,
                 status: info.status,
-            }))
+            }
+            .into())
         }
     }
 }
@@ -203,7 +201,7 @@ pub(crate) async fn enter_exloader(
         // One damaged answer is not another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
-            return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found }));
+            return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
     }
     if info.status.has(Status::PROG) {
@@ -276,11 +274,12 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                 FromBoard::McaReady => break,
                 FromBoard::Error(ErrorCode::AutostartForbidden) => {
                     link.with(|core| core.boards.of(board).starting_since = None);
-                    return Err(Error::Exchange(ExchangeError::Device {
+                    return Err(ExchangeError::Device {
                         board,
                         code: ErrorCode::AutostartForbidden,
                         during: "PC_START",
-                    }));
+                    }
+                    .into());
                 }
                 // Errors of a bad bus are only to be logged; they are reported when nothing came of all tries.
                 message => error = Link::device(board, &message, "PC_START").or(error),
@@ -300,12 +299,8 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
         return Err(error.into());
     }
     let waited_ms = link.now().saturating_sub(since) / MS;
-    Err(Error::Status(StatusError::NotReached {
-        board,
-        what: "the application did not start",
-        waited_ms,
-        status: last,
-    }))
+    Err(StatusError::NotReached { board, what: "the application did not start", waited_ms, status: last }
+        .into())
 }
 
 pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
@@ -322,7 +317,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
         one_board_each(link, &[board]).await?;
     }
     if !known.status.has(Status::MSTART) {
-        return Err(Error::Signal(SignalError::NoApplication { board, valid: known.has_application() }));
+        return Err(SignalError::NoApplication { board, valid: known.has_application() }.into());
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);

@@ -129,9 +129,7 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
     let asked = Function::DumpIo;
     match problem {
-        Some(problem) => {
-            Err(Error::Exchange(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }))
-        }
+        Some(problem) => Err(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }.into()),
         None => Err(link.no_answer(board, asked, TRIES, since).into()),
     }
 }
@@ -219,7 +217,7 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
     let asked = Function::DumpCi;
     if received_any {
         let problem = Incomplete::Packages { missing, of: packages };
-        return Err(Error::Exchange(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }));
+        return Err(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }.into());
     }
     Err(link.no_answer(board, asked, TRIES, since).into())
 }
@@ -233,7 +231,7 @@ async fn described(link: &Link, board: u8) -> Result<(BoardInfo, IoDescription),
     let known = info(link, board).await?.info;
     one_board_each(link, &[board]).await?;
     if !known.status.has(Status::MSTART) {
-        return Err(Error::Signal(SignalError::NoApplication { board, valid: known.has_application() }));
+        return Err(SignalError::NoApplication { board, valid: known.has_application() }.into());
     }
     let description = describe(link, board, &known).await?;
     Ok((known, description))

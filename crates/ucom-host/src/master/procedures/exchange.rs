@@ -83,7 +83,7 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }
         if info.sequence != board {
-            return Err(Error::Identity(IdentityError::WrongSequence { board, reported: info.sequence }));
+            return Err(IdentityError::WrongSequence { board, reported: info.sequence }.into());
         }
         remember(link, board, info, text.as_deref());
     }
@@ -164,7 +164,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     match (mismatch, problem) {
         (Some(mismatch), _) => Err(mismatch),
         (None, Some(problem)) => {
-            Err(Error::Exchange(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }))
+            Err(ExchangeError::Incomplete { board, asked, tries: TRIES, problem }.into())
         }
         (None, None) => Err(link.no_answer(board, Function::Info, TRIES, since).into()),
     }
@@ -182,7 +182,7 @@ pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error
             return Ok(first);
         }
     }
-    Err(Error::Exchange(ExchangeError::Contradiction { board, tries: TRIES + 1 }))
+    Err(ExchangeError::Contradiction { board, tries: TRIES + 1 }.into())
 }
 
 /// What does not change from one answer to the next.
@@ -209,7 +209,7 @@ pub(crate) async fn set_status(
             return Ok(info);
         }
     }
-    Err(Error::Status(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }))
+    Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
 /// MCA_ADMIN_DATA, answered by the board's state.
@@ -253,7 +253,7 @@ async fn ask_admin(
     }
     match (error, other) {
         (Some(error), _) => Err(error.into()),
-        (None, Some(is)) => Err(Error::Status(StatusError::AdminRefused { board, wanted, is })),
+        (None, Some(is)) => Err(StatusError::AdminRefused { board, wanted, is }.into()),
         (None, None) => Err(link.no_answer(board, ask.function(), TRIES, since).into()),
     }
 }

@@ -2,7 +2,7 @@
 use std::collections::BTreeMap;
 
 use crate::master::engine::{Link, MS, Open};
-use crate::master::error::Error;
+use crate::master::error::IdentityError;
 use crate::master::procedures::exchange::TRIES;
 use ucom::{Function, ToBoard};
 
@@ -10,9 +10,10 @@ use ucom::{Function, ToBoard};
 const FRESH: u64 = 2_000 * MS;
 /// Between two questions, µs: the answers of 31 boards do not come as one burst.
 const SPACING: u64 = 2 * MS;
+
 /// Sees that each of these numbers belongs to one board: nobody else answers PC_INFO within the time that a board may take. A
 /// number that nobody answers to is not refused.
-pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Error> {
+pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), IdentityError> {
     let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
@@ -22,21 +23,23 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Err
         let mut until = None;
         let mut ask = Vec::new();
         for board in boards {
+            // Nobody can be asked under a number that no board has.
+            let Ok(to) = link.board(*board) else { continue };
             match link.with(|core| core.holders.open(*board, core.fired, patience, oldest)) {
                 Open::Nothing => {}
                 Open::Wait(end) => until = until.max(Some(end)),
-                Open::AskAgain => ask.push(link.board(*board)?),
+                Open::AskAgain => ask.push(to),
                 Open::Ask => {
                     let times = silent.entry(*board).or_default();
                     *times += 1;
                     if *times < TRIES {
-                        ask.push(link.board(*board)?);
+                        ask.push(to);
                     }
                 }
             }
         }
         if let Some(error) = link.with(|core| core.holders.shared(mask)) {
-            return Err(error.into());
+            return Err(error);
         }
         if (ask.is_empty() && until.is_none()) || round > 2 * TRIES {
             return Ok(());
@@ -53,7 +56,7 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Err
 }
 
 /// The same for every number.
-pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Error> {
+pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), IdentityError> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let asked = match link.profile().broadcast_number() {
         Some(broadcast) => vec![broadcast],
@@ -66,7 +69,7 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Error> 
     out_of_words(link, link.now() + link.times().info).await;
     let doubtful = link.with(|core| core.holders.doubtful());
     one_board_each(link, &doubtful).await?;
-    link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), |error| Err(error.into()))
+    link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
 }
 
 /// Waits until nobody can answer any more what these boards (by bit) were asked last: whoever shares a number with one of

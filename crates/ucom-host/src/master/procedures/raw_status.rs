@@ -25,7 +25,7 @@ pub(crate) async fn raw_status(
     let running: Vec<u8> =
         before.iter().filter(|(_, info)| info.status.has(Status::MCARUN)).map(|(board, _)| *board).collect();
     if !running.is_empty() && !force {
-        return Err(Error::Running(RunningError::LoopRuns { boards: running }));
+        return Err(RunningError::LoopRuns { boards: running }.into());
     }
     link.become_master(force).await?;
     one_board_each(&link, &seen).await?;

@@ -47,7 +47,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
     match found.as_slice() {
         [found] if *found == flash_number => match one_board_each(link, &[number]).await {
             Ok(()) => confirmed(link, number).await,
-            Err(shared) => Err(given_back(link, number, shared).await?),
+            Err(shared) => Err(given_back(link, number, shared.into()).await?),
         },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
         // Whoever took it must not keep it, or the next command means the wrong board.
@@ -55,11 +55,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give number {number} back"));
             }
-            Err(Error::Identity(IdentityError::WrongBoard {
-                board: number,
-                wanted: flash_number,
-                found: *other,
-            }))
+            Err(IdentityError::WrongBoard { board: number, wanted: flash_number, found: *other }.into())
         }
         _ => {
             let shared =
@@ -81,7 +77,7 @@ async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<
         // Only a board with a number holds its pin; without it nobody could take this one.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
-            return Err(Error::Address(AddressError::MayTakeNumber { board: number, other: first }));
+            return Err(AddressError::MayTakeNumber { board: number, other: first }.into());
         }
     }
     let others: Vec<Sequence> = numbers.into_iter().filter(|n| Some(n.number()) != feeder).collect();
@@ -180,15 +176,12 @@ pub(crate) async fn repair_procedure(
             let info = set_status(&link, number, Status::OPINIT, Status::OPINIT).await?;
             Ok(Outcome::Repaired(BoardSeen { info, ..seen }))
         }
-        [found] => Err(Error::Identity(IdentityError::WrongBoard {
-            board: number,
-            wanted: flash_number,
-            found: *found,
-        })),
-        found => Err(Error::Identity(IdentityError::NumberShared {
-            board: number,
-            found: found.to_vec(),
-            given_back: false,
-        })),
+        [found] => {
+            Err(IdentityError::WrongBoard { board: number, wanted: flash_number, found: *found }.into())
+        }
+        found => {
+            Err(IdentityError::NumberShared { board: number, found: found.to_vec(), given_back: false }
+                .into())
+        }
     }
 }

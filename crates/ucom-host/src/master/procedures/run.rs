@@ -83,7 +83,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         let description = describe(link, plan.board, &seen.info).await?;
         // What is to be written was chosen by the names that were known.
         if described.get(&plan.board).is_some_and(|known| *known != description) {
-            return Err(Error::Signal(SignalError::StaleNames { board: plan.board }));
+            return Err(SignalError::StaleNames { board: plan.board }.into());
         }
         add(link, options, plan, description, &mut described)?;
     }
@@ -118,7 +118,7 @@ fn add(
     }
     described.insert(plan.board, description);
     let load = forecast(link, described);
-    if load.exceeds() && !options.force { Err(Error::Running(RunningError::Load(load))) } else { Ok(()) }
+    if load.exceeds() && !options.force { Err(RunningError::Load(load).into()) } else { Ok(()) }
 }
 
 /// Inputs, parameters, the loop, and the outputs if they are wanted.
@@ -180,7 +180,7 @@ fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
         let stops = core.profile.on_lost == OnLost::StopAll;
         options.boards.iter().map(|plan| plan.board).find(|board| stops && lost(core, *board))
     });
-    lost.map_or(Ok(()), |board| Err(Error::Running(RunningError::Lost { board })))
+    lost.map_or(Ok(()), |board| Err(RunningError::Lost { board }.into()))
 }
 
 fn repeat_inputs(link: &Link, board: u8) {

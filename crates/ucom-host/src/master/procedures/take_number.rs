@@ -23,7 +23,7 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
             match received.message {
                 FromBoard::InitAck(data) if received.from == number || data == number => {
                     if received.from != data {
-                        return Err(Error::Address(AddressError::AckMismatch { id: received.from, data }));
+                        return Err(AddressError::AckMismatch { id: received.from, data }.into());
                     }
                     acknowledged = true;
                     break;

@@ -69,7 +69,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
         };
         if seen.info.flash_number != program.flash_number {
             let (wanted, found) = (program.flash_number, seen.info.flash_number);
-            return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found }));
+            return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
         // U-2: program data outrank the process data of any board that runs, tested or not.
         let states = board_states(link).await;
@@ -78,14 +78,11 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
         running.dedup();
     }
     if options.changes() && !running.is_empty() {
-        return Err(Error::Running(RunningError::LoopRuns { boards: running }));
+        return Err(RunningError::LoopRuns { boards: running }.into());
     }
     let (reports, all) = who_reports(link, &boards).await;
     if options.init && !all {
-        return Err(Error::Address(AddressError::NotNumbered {
-            reports: reports as u32,
-            boards: boards.len() as u32,
-        }));
+        return Err(AddressError::NotNumbered { reports: reports as u32, boards: boards.len() as u32 }.into());
     }
     if options.changes() {
         link.become_master(options.force).await?;

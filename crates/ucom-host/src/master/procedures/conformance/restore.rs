@@ -18,7 +18,7 @@ pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
         let (board, wanted) = (before.number, before.info.flash_number);
         match report.boards.iter().find(|b| b.number == board).map(|b| b.info.flash_number) {
             Some(found) if found == wanted => {}
-            Some(found) => return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found })),
+            Some(found) => return Err(IdentityError::WrongBoard { board, wanted, found }.into()),
             None => {
                 numbers(link, board).await?;
             }
@@ -124,11 +124,12 @@ async fn answering(
     let now = confirmed(link, n).await?.info;
     match now.flash_number == before.info.flash_number {
         true => Ok(now),
-        false => Err(Error::Identity(IdentityError::WrongBoard {
+        false => Err(IdentityError::WrongBoard {
             board: n,
             wanted: before.info.flash_number,
             found: now.flash_number,
-        })),
+        }
+        .into()),
     }
 }
 

@@ -65,7 +65,7 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
         // One damaged answer is not another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
-            return Err(Error::Identity(IdentityError::WrongBoard { board, wanted, found }));
+            return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
     }
     one_board_each(link, &[board]).await?;
@@ -139,10 +139,8 @@ pub(super) async fn judge(
     // work: a cancel in this moment sends the command, too.
     leave_programming(link, board).await;
     // Another board that has taken the number since complains of program data, or takes them out of turn.
-    if let Err(error @ Error::Identity(IdentityError::NumberShared { .. })) =
-        one_board_each(link, &[board]).await
-    {
-        session.fail_with(board, error);
+    if let Err(error) = one_board_each(link, &[board]).await {
+        session.fail_with(board, error.into());
         return None;
     }
     session.fail(board, failure);
@@ -160,10 +158,8 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
         Err(e) => return session.fail_with(board, e),
     };
     // Whoever shares the number was written, too, or is what has just answered.
-    if let Err(error @ Error::Identity(IdentityError::NumberShared { .. })) =
-        one_board_each(link, &[board]).await
-    {
-        return session.fail_with(board, error);
+    if let Err(error) = one_board_each(link, &[board]).await {
+        return session.fail_with(board, error.into());
     }
     if let Some(result) = session.result(board) {
         result.after = Some(known);

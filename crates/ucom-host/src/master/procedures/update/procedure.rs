@@ -218,7 +218,7 @@ async fn check(link: &Link, session: &mut UpdateSession) {
             }
         };
         if let Err(error) = one_board_each(link, &[board]).await {
-            session.fail(board, UpdateFailure::Refused(Box::new(error)));
+            session.fail(board, UpdateFailure::Refused(Box::new(error.into())));
             continue;
         }
         let found = known.flash_number;

@@ -127,7 +127,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);
         let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
-        let at = (!self.nodes.fallen_back()).then_some(self.nodes.positions());
         match command {
             Command::ClearCurrentErrors { jtc, nodes } => {
                 if jtc {
@@ -178,12 +177,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Command::PidParamUseDefault => {
                 parameters.set_pid(defaults::PID, config).map(|()| motion.law.change_mode()).into()
             }
-            Command::ArmModel(floats) => {
-                parameters.take_model(&floats, at, config).map(|()| motion.law.change_model()).into()
-            }
-            Command::ArmModelUseDefault => {
-                parameters.set_model(&defaults::MODEL, at, config).map(|()| motion.law.change_model()).into()
-            }
+            Command::ArmModel(floats) => parameters
+                .take_model(&floats, self.nodes.known_positions(), config)
+                .map(|()| motion.law.change_model())
+                .into(),
+            Command::ArmModelUseDefault => parameters
+                .set_model(&defaults::MODEL, self.nodes.known_positions(), config)
+                .map(|()| motion.law.change_model())
+                .into(),
             Command::FrictionPolynomial(floats) => parameters.take_polynomial(&floats, config).into(),
             Command::FrictionPolynomialUseDefault => {
                 parameters.take_default_polynomial();

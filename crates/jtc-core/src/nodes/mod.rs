@@ -148,6 +148,11 @@ impl Nodes {
         &self.position
     }
 
+    /// The positions, once that of every joint counts.
+    pub fn known_positions(&self) -> Option<&[f64; JOINTS]> {
+        (!self.fallen_back()).then_some(&self.position)
+    }
+
     /// Measured velocities, rad/s, alike.
     pub fn velocities(&self) -> &[f64; JOINTS] {
         &self.velocity

@@ -4,34 +4,13 @@ use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener};
 use std::time::Duration;
 
-use can_link::{
-    CanBus, CanError, CanFrame, ErrorState, Id, SocketcandBus, SocketcandServer, VirtualHub, open,
-};
+use can_link::{CanBus, CanError, CanFrame, ErrorState, Id, SocketcandBus, open};
 
-/// Only something broken waits so long.
-const TIMEOUT: Duration = Duration::from_secs(60);
-
-fn frame(id: u32, data: &[u8]) -> CanFrame {
-    CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
-}
-
-fn numbered(number: u32) -> CanFrame {
-    frame(0x100, &number.to_be_bytes())
-}
-
-fn bench() -> (SocketcandServer, VirtualHub) {
-    let hub = VirtualHub::new();
-    let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
-    (server, hub)
-}
-
-fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
-}
+use crate::{TIMEOUT, frame, numbered, socketcand_bench, take};
 
 #[test]
 fn the_client_reports_when_the_server_goes_and_when_it_was_never_there() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let url = server.url("can0");
     let mut client = open(&url).unwrap();
     let mut node = hub.join();
@@ -48,7 +27,7 @@ fn the_client_reports_when_the_server_goes_and_when_it_was_never_there() {
 
 #[test]
 fn the_client_refuses_what_the_protocol_cannot_carry() {
-    let (server, _hub) = bench();
+    let (server, _hub) = socketcand_bench();
     let mut client = open(&server.url("can0")).unwrap();
     for frame in [
         CanFrame::fd(Id::standard(1).unwrap(), &[1]).unwrap(),

@@ -1,34 +1,8 @@
 //! Fault confinement of the bus in virtual time: error counters, bus off, recovery, disturbed frames.
 
-use can_link::{
-    BusError, BusEvent, CanFrame, ErrorState, FaultConfig, FaultSchedule, Id, MemberId, TimedBus, TimedEvent,
-};
+use can_link::{BusError, BusEvent, ErrorState, FaultConfig, FaultSchedule, Id, TimedBus, TimedEvent};
 
-const MS: u64 = 1_000_000;
-
-fn frame(id: u32, data: &[u8]) -> CanFrame {
-    CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
-}
-
-fn run(bus: &mut TimedBus, until_ns: u64) -> Vec<TimedEvent> {
-    std::iter::from_fn(|| bus.advance_to(until_ns)).collect()
-}
-
-fn received(events: &[TimedEvent], by: MemberId) -> Vec<CanFrame> {
-    let frame = |event: &TimedEvent| match event.what {
-        BusEvent::Received { member, frame } if member == by => Some(frame),
-        _ => None,
-    };
-    events.iter().filter_map(frame).collect()
-}
-
-fn errors(events: &[TimedEvent]) -> Vec<BusError> {
-    let error = |event: &TimedEvent| match event.what {
-        BusEvent::Error { error, .. } => Some(error),
-        _ => None,
-    };
-    events.iter().filter_map(error).collect()
-}
+use crate::{MS, errors, frame, received, run};
 
 #[test]
 fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {

@@ -12,16 +12,7 @@ use can_link::{
     VirtualBus, VirtualHub, open,
 };
 
-/// Only something broken waits so long.
-const TIMEOUT: Duration = Duration::from_secs(60);
-
-fn frame(id: u32, data: &[u8]) -> CanFrame {
-    CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
-}
-
-fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
-}
+use crate::{TIMEOUT, frame, take};
 
 /// An adapter between a port and a bus, in a thread of its own.
 struct Running {

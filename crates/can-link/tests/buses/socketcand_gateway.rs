@@ -2,28 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use can_link::{BusEvent, CanBus, CanFrame, ClientEvent, ErrorState, Id, SocketcandGateway, TimedBus, open};
 
-/// Only something broken waits so long.
-const TIMEOUT: Duration = Duration::from_secs(60);
-
-fn numbered(number: u32) -> CanFrame {
-    CanFrame::classic(Id::standard(0x100).unwrap(), &number.to_be_bytes()).unwrap()
-}
-
-fn until(mut done: impl FnMut() -> bool) {
-    let end = Instant::now() + TIMEOUT;
-    while !done() {
-        assert!(Instant::now() < end, "it does not happen");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
-
-fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
-}
+use crate::{TIMEOUT, numbered, take, until};
 
 #[test]
 fn a_host_can_run_the_bus_itself() {

@@ -1,40 +1,16 @@
 //! The bus in virtual time against ISO 11898-1.
 
 use can_link::{
-    BusError, BusEvent, CanFrame, ErrorState, FaultConfig, FaultSchedule, Id, MemberId, QueueError, TimedBus,
-    TimedEvent, classic_frame_bits,
+    BusError, BusEvent, CanFrame, ErrorState, FaultConfig, FaultSchedule, Id, QueueError, TimedBus,
+    classic_frame_bits,
 };
 use proptest::prelude::*;
 
-const MS: u64 = 1_000_000;
-
-fn frame(id: u32, data: &[u8]) -> CanFrame {
-    CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
-}
-
-fn run(bus: &mut TimedBus, until_ns: u64) -> Vec<TimedEvent> {
-    std::iter::from_fn(|| bus.advance_to(until_ns)).collect()
-}
+use crate::{MS, errors, frame, received, run};
 
 /// Bits of a frame on the wire without the intermission.
 fn bits(frame: &CanFrame) -> u64 {
     u64::from(classic_frame_bits(frame).unwrap()) - 3
-}
-
-fn received(events: &[TimedEvent], by: MemberId) -> Vec<CanFrame> {
-    let frame = |event: &TimedEvent| match event.what {
-        BusEvent::Received { member, frame } if member == by => Some(frame),
-        _ => None,
-    };
-    events.iter().filter_map(frame).collect()
-}
-
-fn errors(events: &[TimedEvent]) -> Vec<BusError> {
-    let error = |event: &TimedEvent| match event.what {
-        BusEvent::Error { error, .. } => Some(error),
-        _ => None,
-    };
-    events.iter().filter_map(error).collect()
 }
 
 #[test]

@@ -3,26 +3,11 @@
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use can_link::{CanBus, CanFrame, Id, SocketcandServer, VirtualHub, open};
 
-/// Only something broken waits so long.
-const TIMEOUT: Duration = Duration::from_secs(60);
-
-fn frame(id: u32, data: &[u8]) -> CanFrame {
-    CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
-}
-
-fn numbered(number: u32) -> CanFrame {
-    frame(0x100, &number.to_be_bytes())
-}
-
-fn bench() -> (SocketcandServer, VirtualHub) {
-    let hub = VirtualHub::new();
-    let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
-    (server, hub)
-}
+use crate::{TIMEOUT, frame, numbered, socketcand_bench, take, until};
 
 /// A client as simple as python-can's.
 struct Raw(TcpStream);
@@ -79,22 +64,9 @@ impl Drop for Guard<'_> {
     }
 }
 
-/// Waits for something that other threads do.
-fn until(mut done: impl FnMut() -> bool) {
-    let end = Instant::now() + TIMEOUT;
-    while !done() {
-        assert!(Instant::now() < end, "it does not happen");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
-
-fn take(bus: &mut impl CanBus) -> CanFrame {
-    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
-}
-
 #[test]
 fn answers_come_alone_and_no_frame_is_glued_to_them() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let mut node = hub.join();
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -135,7 +107,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
 
 #[test]
 fn what_was_on_the_bus_before_raw_mode_is_not_received() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let mut node = hub.join();
     let mut client = Raw::connect(&server);
     assert_eq!(client.read(), "< hi >");
@@ -149,7 +121,7 @@ fn what_was_on_the_bus_before_raw_mode_is_not_received() {
 
 #[test]
 fn frames_are_lines_with_a_time_and_two_blanks_without_data() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let mut node = hub.join();
     let mut client = Raw::raw_mode(&server);
     node.send(&frame(0x680, &[])).unwrap();
@@ -165,7 +137,7 @@ fn frames_are_lines_with_a_time_and_two_blanks_without_data() {
 
 #[test]
 fn commands_may_be_cut_anywhere_and_glued_together() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let mut node = hub.join();
     let commands = b"< send 281 0  >< send 1C1 2 2 f >< send 00000281 8 1 2 3 4 5 6 7 8 >";
     let expected = [
@@ -186,7 +158,7 @@ fn commands_may_be_cut_anywhere_and_glued_together() {
 
 #[test]
 fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let mut node = hub.join();
     let mut clients: Vec<_> = (0..3).map(|_| open(&server.url("can0")).unwrap()).collect();
     let count = 300;
@@ -252,7 +224,7 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
 
 #[test]
 fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let mut node = hub.join();
     let mut client = Raw::connect(&server);
     assert_eq!(client.read(), "< hi >");
@@ -284,7 +256,7 @@ fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
 
 #[test]
 fn an_unknown_bus_is_refused_with_what_there_is() {
-    let (server, _hub) = bench();
+    let (server, _hub) = socketcand_bench();
     let mut client = Raw::connect(&server);
     assert_eq!(client.read(), "< hi >");
     assert_eq!(client.ask("< open can7 >"), "< error no such bus; there is can0 >");
@@ -296,7 +268,7 @@ fn an_unknown_bus_is_refused_with_what_there_is() {
 /// Frames that a client sent before it ended are delivered, even when it did not read what was sent to it.
 #[test]
 fn the_last_frames_of_a_client_are_delivered() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let mut node = hub.join();
     for number in 0..20 {
         let mut client = open(&server.url("can0")).unwrap();
@@ -312,7 +284,7 @@ fn the_last_frames_of_a_client_are_delivered() {
 
 #[test]
 fn ten_thousand_visitors_leave_nothing_behind() {
-    let (server, _hub) = bench();
+    let (server, _hub) = socketcand_bench();
     let texts: [&[u8]; 5] = [b"", b"< open can0 >", b"< open can0 >< rawmode >", b"<", &[0xFF; 3000]];
     for number in 0..10_000 {
         let mut stream = TcpStream::connect(server.local_addr()).unwrap();
@@ -331,7 +303,7 @@ fn ten_thousand_visitors_leave_nothing_behind() {
 
 #[test]
 fn more_clients_than_there_is_room_for_are_turned_away() {
-    let (server, _hub) = bench();
+    let (server, _hub) = socketcand_bench();
     let clients: Vec<_> = (0..64).map(|_| Raw::raw_mode(&server)).collect();
     let mut one_more = Raw::connect(&server);
     match one_more.0.read(&mut [0; 10]) {
@@ -347,7 +319,7 @@ fn more_clients_than_there_is_room_for_are_turned_away() {
 
 #[test]
 fn a_taken_address_is_an_error_with_the_way_out() {
-    let (server, hub) = bench();
+    let (server, hub) = socketcand_bench();
     let again = SocketcandServer::bind(server.local_addr(), &[("can0", &hub)]).err().expect("taken");
     let message = again.to_string();
     assert!(message.contains(&server.local_addr().to_string()) && message.contains("Port 0"), "{message}");

@@ -1,0 +1,70 @@
+//! Every kind of bus as its users see it: adapters, servers and clients on real lines, and the bus in virtual time.
+
+mod slcan;
+mod socketcand;
+mod socketcand_client;
+mod socketcand_gateway;
+mod timed_bus;
+mod timed_confinement;
+
+use std::time::{Duration, Instant};
+
+use can_link::{
+    BusError, BusEvent, CanBus, CanFrame, Id, MemberId, SocketcandServer, TimedBus, TimedEvent, VirtualHub,
+};
+
+/// Only something broken waits so long.
+const TIMEOUT: Duration = Duration::from_secs(60);
+
+const MS: u64 = 1_000_000;
+
+fn frame(id: u32, data: &[u8]) -> CanFrame {
+    CanFrame::classic(Id::standard(id).unwrap(), data).unwrap()
+}
+
+fn numbered(number: u32) -> CanFrame {
+    frame(0x100, &number.to_be_bytes())
+}
+
+/// The next frame of a bus in real time.
+fn take(bus: &mut impl CanBus) -> CanFrame {
+    bus.receive(TIMEOUT).unwrap().expect("a frame is on its way")
+}
+
+/// Waits for something that other threads do.
+fn until(mut done: impl FnMut() -> bool) {
+    let end = Instant::now() + TIMEOUT;
+    while !done() {
+        assert!(Instant::now() < end, "it does not happen");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// A server of the socketcand protocol and the bus behind it.
+fn socketcand_bench() -> (SocketcandServer, VirtualHub) {
+    let hub = VirtualHub::new();
+    let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
+    (server, hub)
+}
+
+/// What happens on a bus in virtual time up to a moment.
+fn run(bus: &mut TimedBus, until_ns: u64) -> Vec<TimedEvent> {
+    std::iter::from_fn(|| bus.advance_to(until_ns)).collect()
+}
+
+/// The frames that a member received.
+fn received(events: &[TimedEvent], by: MemberId) -> Vec<CanFrame> {
+    let frame = |event: &TimedEvent| match event.what {
+        BusEvent::Received { member, frame } if member == by => Some(frame),
+        _ => None,
+    };
+    events.iter().filter_map(frame).collect()
+}
+
+fn errors(events: &[TimedEvent]) -> Vec<BusError> {
+    let error = |event: &TimedEvent| match event.what {
+        BusEvent::Error { error, .. } => Some(error),
+        _ => None,
+    };
+    events.iter().filter_map(error).collect()
+}

@@ -89,7 +89,15 @@ fn main() {
     let mut recorded: Vec<Vec<Frame>> = Vec::new();
     let mut start = None;
     let mut ticks = 0;
-    let bus_state = BusState { acknowledged: true, bus_off: false };
+    let quiet = Inputs {
+        bus: &[],
+        bus_state: BusState { acknowledged: true, bus_off: false },
+        safety_input: true,
+        missed_ticks: 0,
+        urgent: [UrgentCommands::NONE; HOST_LINES],
+        host: &[],
+        status_free: true,
+    };
     while recorded.len() < 4_000 {
         // Later commands need HoldPos.
         let ready = queue.len() > 2 || controller.telemetry().state == ControllerState::HoldPos;
@@ -104,15 +112,7 @@ fn main() {
         if start.is_some() {
             recorded.push(bus.clone());
         }
-        let outputs = controller.tick(&Inputs {
-            bus: &bus,
-            bus_state,
-            safety_input: true,
-            missed_ticks: 0,
-            urgent: [UrgentCommands::NONE; HOST_LINES],
-            host: host.as_slice(),
-            status_free: true,
-        });
+        let outputs = controller.tick(&Inputs { bus: &bus, host: host.as_slice(), ..quiet });
         queue.drain(..outputs.host_done);
         ticks += 1;
         assert!(ticks < 60_000, "the trajectory is not executed: {:?}", controller.violation());
@@ -127,16 +127,7 @@ fn main() {
         let mut controller = start.clone();
         let begin = Instant::now();
         for bus in &recorded {
-            let inputs = Inputs {
-                bus,
-                bus_state,
-                safety_input: true,
-                missed_ticks: 0,
-                urgent: [UrgentCommands::NONE; HOST_LINES],
-                host: &[],
-                status_free: true,
-            };
-            black_box(controller.tick(black_box(&inputs)));
+            black_box(controller.tick(black_box(&Inputs { bus, ..quiet })));
         }
         times.push(begin.elapsed().as_nanos() as f64 / recorded.len() as f64);
         assert_eq!(controller.telemetry().state, ControllerState::Operate);

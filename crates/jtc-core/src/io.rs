@@ -47,6 +47,20 @@ pub struct Inputs<'a> {
     pub status_free: bool,
 }
 
+#[cfg(test)]
+impl Inputs<'_> {
+    /// A tick in which nothing comes and nothing is wrong.
+    pub(crate) const QUIET: Self = Inputs {
+        bus: &[],
+        bus_state: BusState { acknowledged: true, bus_off: false },
+        safety_input: true,
+        missed_ticks: 0,
+        urgent: [UrgentCommands::NONE; HOST_LINES],
+        host: &[],
+        status_free: true,
+    };
+}
+
 /// Outputs of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs {

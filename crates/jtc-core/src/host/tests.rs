@@ -2,11 +2,11 @@
 extern crate std;
 use std::vec::Vec;
 
-use jtc_wire::{FrameRef, FrameStatus, FrameType, UrgentCommands, missing_parameter};
+use jtc_wire::{FrameRef, FrameStatus, FrameType, missing_parameter};
 
 use super::*;
 use crate::nodes::Nodes;
-use crate::{BusState, Config, HOST_LINES};
+use crate::{Config, HOST_LINES};
 
 type Bench = Controller<[RawPoint; 64]>;
 
@@ -20,15 +20,8 @@ fn holding() -> Bench {
 fn done_of_three(controller: &mut Bench, frame_type: FrameType, body: &[u8]) -> usize {
     let bytes: Vec<u8> = [&[0; 4], body, &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
-    controller.serve_host(&Inputs {
-        bus: &[],
-        bus_state: BusState { acknowledged: true, bus_off: false },
-        safety_input: true,
-        missed_ticks: 0,
-        urgent: [UrgentCommands::NONE; HOST_LINES],
-        host: &[HostEvent { line: 0, overtaken: false, event }; 3],
-        status_free: true,
-    })
+    let host = [HostEvent { line: 0, overtaken: false, event }; 3];
+    controller.serve_host(&Inputs { host: &host, ..Inputs::QUIET })
 }
 
 #[test]

@@ -1,10 +1,8 @@
 //! What one tick makes of a node, state by state (J-14, J-16, J-20, J-21, J-23).
 use jtc_bus::{Frame, GripperReport, Request, Target};
-use jtc_wire::UrgentCommands;
 
 use super::*;
 use crate::io::BusState;
-use crate::response_queue::HOST_LINES;
 
 mod bring_up;
 mod frames;
@@ -15,15 +13,7 @@ const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
 
 /// What a tick finds on the bus, and nothing else.
 fn inputs(bus: &[Frame], bus_state: BusState) -> Inputs<'_> {
-    Inputs {
-        bus,
-        bus_state,
-        safety_input: true,
-        missed_ticks: 0,
-        urgent: [UrgentCommands::NONE; HOST_LINES],
-        host: &[],
-        status_free: true,
-    }
+    Inputs { bus, bus_state, ..Inputs::QUIET }
 }
 
 fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {

@@ -4,11 +4,11 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use jtc_wire::{ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Segment, UrgentCommands};
+use jtc_wire::{ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Segment};
 
 use super::*;
 use crate::drawn::is_in_the_protocol;
-use crate::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, TrajectoryState};
+use crate::{Config, Controller, HostEvent, Inputs, TrajectoryState};
 
 const STATES: [ControllerState; 6] = [
     ControllerState::Start,
@@ -57,15 +57,8 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     controller.enter(state);
     let bytes = [&[0; 4], &body[..], &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
-    controller.serve_host(&Inputs {
-        bus: &[],
-        bus_state: BusState { acknowledged: true, bus_off: false },
-        safety_input: true,
-        missed_ticks: 0,
-        urgent: [UrgentCommands::NONE; HOST_LINES],
-        host: &[HostEvent { line: 0, overtaken: false, event }],
-        status_free: true,
-    });
+    let host = [HostEvent { line: 0, overtaken: false, event }];
+    controller.serve_host(&Inputs { host: &host, ..Inputs::QUIET });
     let (teaching, execute) = (controller.teaching, controller.trajectory == TrajectoryState::Execute);
     Conditions { teaching, execute, ..Conditions::default() }
 }

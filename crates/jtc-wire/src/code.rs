@@ -2,6 +2,48 @@
 use core::fmt;
 use core::marker::PhantomData;
 
+/// Declares a closed list of codes: an enum, all of it, which one a byte is, and the names. A name without a text of its own is the
+/// variant's.
+macro_rules! codes {
+    (@text $name:ident $text:literal) => { $text };
+    (@text $name:ident) => { stringify!($name) };
+    ($(#[$doc:meta])* $list:ident { $($(#[$meaning:meta])* $name:ident = $code:literal $(, $text:literal)?;)+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum $list {
+            $($(#[$meaning])* $name = $code,)+
+        }
+
+        impl $list {
+            /// Every one, in the order of the numbers.
+            pub const ALL: [Self; [$($code),+].len()] = [$(Self::$name),+];
+
+            /// The one of number `byte`.
+            pub const fn from_byte(byte: u8) -> Option<Self> {
+                match byte {
+                    $($code => Some(Self::$name),)+
+                    _ => None,
+                }
+            }
+
+            /// In words.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $crate::code::codes!(@text $name $($text)?),)+
+                }
+            }
+        }
+
+        impl core::fmt::Display for $list {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+    };
+}
+pub(crate) use codes;
+
 /// A closed list of codes with their names.
 pub trait Known: Copy + Eq + fmt::Debug + 'static {
     /// Every one, in the order of the codes.

@@ -1,27 +1,16 @@
 //! The commands of the host: the meaning of each frame type.
+use crate::code::codes;
 use crate::frame::{FrameRef, FrameType};
 use crate::response::DataStatus;
 use crate::segment::Segment;
 
-/// The command in TrajSetExecStatus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-#[allow(missing_docs)]
-pub enum ExecCommand {
-    Stop = 1,
-    Pause = 2,
-    Execute = 3,
-}
-
-impl ExecCommand {
-    /// The command of number `byte`.
-    pub const fn from_byte(byte: u8) -> Option<Self> {
-        match byte {
-            1 => Some(Self::Stop),
-            2 => Some(Self::Pause),
-            3 => Some(Self::Execute),
-            _ => None,
-        }
+codes! {
+    /// The command in TrajSetExecStatus.
+    #[allow(missing_docs)]
+    ExecCommand {
+        Stop = 1, "stop";
+        Pause = 2, "pause";
+        Execute = 3, "execute";
     }
 }
 

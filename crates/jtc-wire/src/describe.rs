@@ -1,7 +1,7 @@
 //! Frames in words: a line each, like a network sniffer's; `{:#}` adds every number.
 use core::fmt::{Display, Formatter, Result};
 
-use crate::command::{Command, ExecCommand, Floats};
+use crate::command::{Command, Floats};
 use crate::encode::FloatName;
 use crate::frame::{FrameRef, FrameType, HEADER, field};
 use crate::segment::Segment;
@@ -72,16 +72,6 @@ impl Display for FrameRef<'_> {
             }
             Err(data) => write!(f, "{}: {data}", self.frame_type),
         }
-    }
-}
-
-impl Display for ExecCommand {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        f.write_str(match self {
-            Self::Stop => "stop",
-            Self::Pause => "pause",
-            Self::Execute => "execute",
-        })
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a frame is: header, type, length, body, CRC, and which lengths each type can have.
-use core::fmt;
 use core::ops::Range;
 
+use crate::code::codes;
 use crate::crc16;
 
 /// First byte of every frame.
@@ -33,28 +33,29 @@ pub mod field {
     }
 }
 
-/// Frame types (J-06 table).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
-#[allow(missing_docs)]
-pub enum FrameType {
-    ClearCurrentErrors = 0x01,
-    ClearOccurredErrors = 0x02,
-    JtcStatus = 0x03,
-    Trajectory = 0x04,
-    FrictionTable = 0x05,
-    FrictionTableUseDefault = 0x06,
-    PidParam = 0x07,
-    PidParamUseDefault = 0x08,
-    ArmModel = 0x09,
-    ArmModelUseDefault = 0x0A,
-    TrajSetExecStatus = 0x0B,
-    TeachingModeEnable = 0x0C,
-    TeachingModeDisable = 0x0D,
-    FrictionPolynomial = 0x0E,
-    FrictionPolynomialUseDefault = 0x0F,
-    ResetCanDevices = 0x10,
-    GripperControl = 0x11,
+codes! {
+    /// Frame types (J-06 table), named as there.
+    #[derive(PartialOrd, Ord)]
+    #[allow(missing_docs)]
+    FrameType {
+        ClearCurrentErrors = 0x01;
+        ClearOccurredErrors = 0x02;
+        JtcStatus = 0x03;
+        Trajectory = 0x04;
+        FrictionTable = 0x05;
+        FrictionTableUseDefault = 0x06;
+        PidParam = 0x07;
+        PidParamUseDefault = 0x08;
+        ArmModel = 0x09;
+        ArmModelUseDefault = 0x0A;
+        TrajSetExecStatus = 0x0B;
+        TeachingModeEnable = 0x0C;
+        TeachingModeDisable = 0x0D;
+        FrictionPolynomial = 0x0E;
+        FrictionPolynomialUseDefault = 0x0F;
+        ResetCanDevices = 0x10;
+        GripperControl = 0x11;
+    }
 }
 
 /// Lengths that frames of one type can have.
@@ -79,35 +80,6 @@ pub const POINT_LEN: usize = 36;
 pub const FRAME_POINTS_MAX: usize = (FRAME_MAX - TRAJECTORY_OVERHEAD) / POINT_LEN;
 
 impl FrameType {
-    /// All types in the order of their numbers.
-    pub const ALL: [FrameType; 17] = [
-        FrameType::ClearCurrentErrors,
-        FrameType::ClearOccurredErrors,
-        FrameType::JtcStatus,
-        FrameType::Trajectory,
-        FrameType::FrictionTable,
-        FrameType::FrictionTableUseDefault,
-        FrameType::PidParam,
-        FrameType::PidParamUseDefault,
-        FrameType::ArmModel,
-        FrameType::ArmModelUseDefault,
-        FrameType::TrajSetExecStatus,
-        FrameType::TeachingModeEnable,
-        FrameType::TeachingModeDisable,
-        FrameType::FrictionPolynomial,
-        FrameType::FrictionPolynomialUseDefault,
-        FrameType::ResetCanDevices,
-        FrameType::GripperControl,
-    ];
-
-    /// The type of number `byte`.
-    pub const fn from_byte(byte: u8) -> Option<FrameType> {
-        match byte {
-            0x01..=0x11 => Some(FrameType::ALL[byte as usize - 1]),
-            _ => None,
-        }
-    }
-
     /// Lengths of whole frames of this type. The 6 bytes of ClearCurrentErrors and FrictionPolynomial are what some
     /// hosts send (J-06); the three of JtcStatus are those of J-08.
     pub const fn lengths(self) -> Lengths {
@@ -166,36 +138,6 @@ impl FrameType {
     /// Sent by the host (all but JtcStatus).
     pub const fn from_host(self) -> bool {
         !matches!(self, FrameType::JtcStatus)
-    }
-
-    /// Name as in the table of frames.
-    pub const fn name(self) -> &'static str {
-        use FrameType::*;
-        match self {
-            ClearCurrentErrors => "ClearCurrentErrors",
-            ClearOccurredErrors => "ClearOccurredErrors",
-            JtcStatus => "JtcStatus",
-            Trajectory => "Trajectory",
-            FrictionTable => "FrictionTable",
-            FrictionTableUseDefault => "FrictionTableUseDefault",
-            PidParam => "PidParam",
-            PidParamUseDefault => "PidParamUseDefault",
-            ArmModel => "ArmModel",
-            ArmModelUseDefault => "ArmModelUseDefault",
-            TrajSetExecStatus => "TrajSetExecStatus",
-            TeachingModeEnable => "TeachingModeEnable",
-            TeachingModeDisable => "TeachingModeDisable",
-            FrictionPolynomial => "FrictionPolynomial",
-            FrictionPolynomialUseDefault => "FrictionPolynomialUseDefault",
-            ResetCanDevices => "ResetCanDevices",
-            GripperControl => "GripperControl",
-        }
-    }
-}
-
-impl fmt::Display for FrameType {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
     }
 }
 

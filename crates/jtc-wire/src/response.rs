@@ -2,105 +2,38 @@
 use core::fmt;
 
 use crate::FrameType;
+use crate::code::codes;
 
-/// Status code of a received frame (J-05).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
-#[repr(u8)]
-#[allow(missing_docs)]
-pub enum FrameStatus {
-    #[default]
-    Idle = 0,
-    NoError = 1,
-    IncorrectHeader = 2,
-    IncorrectFrameType = 3,
-    IncorrectCrc = 4,
-    DiscontinuousFrame = 5,
-}
-
-impl FrameStatus {
-    /// The code of number `byte`.
-    pub const fn from_byte(byte: u8) -> Option<Self> {
-        Some(match byte {
-            0 => Self::Idle,
-            1 => Self::NoError,
-            2 => Self::IncorrectHeader,
-            3 => Self::IncorrectFrameType,
-            4 => Self::IncorrectCrc,
-            5 => Self::DiscontinuousFrame,
-            _ => return None,
-        })
-    }
-    /// In words.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Idle => "idle",
-            Self::NoError => "no error",
-            Self::IncorrectHeader => "incorrect header",
-            Self::IncorrectFrameType => "incorrect frame type",
-            Self::IncorrectCrc => "incorrect CRC",
-            Self::DiscontinuousFrame => "discontinuous frame",
-        }
+codes! {
+    /// Status code of a received frame (J-05).
+    #[derive(Default)]
+    #[allow(missing_docs)]
+    FrameStatus {
+        #[default]
+        Idle = 0, "idle";
+        NoError = 1, "no error";
+        IncorrectHeader = 2, "incorrect header";
+        IncorrectFrameType = 3, "incorrect frame type";
+        IncorrectCrc = 4, "incorrect CRC";
+        DiscontinuousFrame = 5, "discontinuous frame";
     }
 }
 
-/// Data status code of a received frame (J-06).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
-#[repr(u8)]
-#[allow(missing_docs)]
-pub enum DataStatus {
-    #[default]
-    Idle = 0,
-    NoError = 1,
-    TooManyPoints = 2,
-    TooManySegments = 3,
-    IncorrectSegmentOrder = 4,
-    IncorrectStepTime = 5,
-    IncorrectValue = 6,
-    NotAllowed = 7,
-    StartPositionMismatch = 8,
-}
-
-impl DataStatus {
-    /// The code of number `byte`.
-    pub const fn from_byte(byte: u8) -> Option<Self> {
-        Some(match byte {
-            0 => Self::Idle,
-            1 => Self::NoError,
-            2 => Self::TooManyPoints,
-            3 => Self::TooManySegments,
-            4 => Self::IncorrectSegmentOrder,
-            5 => Self::IncorrectStepTime,
-            6 => Self::IncorrectValue,
-            7 => Self::NotAllowed,
-            8 => Self::StartPositionMismatch,
-            _ => return None,
-        })
-    }
-    /// In words.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Idle => "idle",
-            Self::NoError => "no error",
-            Self::TooManyPoints => "too many points",
-            Self::TooManySegments => "too many segments",
-            Self::IncorrectSegmentOrder => "incorrect segment order",
-            Self::IncorrectStepTime => "incorrect step time",
-            Self::IncorrectValue => "incorrect value",
-            Self::NotAllowed => "not allowed in this state",
-            Self::StartPositionMismatch => "start position mismatch",
-        }
-    }
-}
-
-impl fmt::Display for FrameStatus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl fmt::Display for DataStatus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+codes! {
+    /// Data status code of a received frame (J-06).
+    #[derive(Default)]
+    #[allow(missing_docs)]
+    DataStatus {
+        #[default]
+        Idle = 0, "idle";
+        NoError = 1, "no error";
+        TooManyPoints = 2, "too many points";
+        TooManySegments = 3, "too many segments";
+        IncorrectSegmentOrder = 4, "incorrect segment order";
+        IncorrectStepTime = 5, "incorrect step time";
+        IncorrectValue = 6, "incorrect value";
+        NotAllowed = 7, "not allowed in this state";
+        StartPositionMismatch = 8, "start position mismatch";
     }
 }
 

@@ -1,18 +1,17 @@
 //! States of the controller and of its trajectory: code, name and meaning of each, in one table.
-use crate::code::Known;
+use crate::code::{Known, codes};
 
-/// Declares an enum of codes and what is known of each.
+/// Declares a list of codes that a status carries, known and unknown ones.
 macro_rules! states {
-    ($(#[$doc:meta])* $list:ident, $unknown:literal: $($(#[$meaning:meta])* $name:ident = $code:literal,)*) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-        #[repr(u8)]
-        pub enum $list {
-            $($(#[$meaning])* $name = $code,)*
+    ($(#[$doc:meta])* $list:ident, $unknown:literal $rows:tt) => {
+        codes! {
+            $(#[$doc])*
+            #[derive(Default)]
+            $list $rows
         }
 
         impl Known for $list {
-            const ALL: &'static [Self] = &[$(Self::$name,)*];
+            const ALL: &'static [Self] = &Self::ALL;
             const UNKNOWN: &'static str = $unknown;
 
             fn code(self) -> u8 {
@@ -20,9 +19,7 @@ macro_rules! states {
             }
 
             fn name(self) -> &'static str {
-                match self {
-                    $(Self::$name => stringify!($name),)*
-                }
+                self.name()
             }
         }
     };
@@ -30,20 +27,21 @@ macro_rules! states {
 
 states! {
     /// State of the controller.
-    ControllerState, "unknown state":
-    /// Set-up is not complete.
-    #[default]
-    Start = 0,
-    /// Nodes are brought up, parameters are awaited; zero torque.
-    Init = 1,
-    /// Holds a position.
-    HoldPos = 2,
-    /// Follows the trajectory.
-    Operate = 3,
-    /// Gravity compensation only.
-    Teaching = 4,
-    /// Zero torque until the cause is gone and the host has cleared.
-    Error = 5,
+    ControllerState, "unknown state" {
+        /// Set-up is not complete.
+        #[default]
+        Start = 0;
+        /// Nodes are brought up, parameters are awaited; zero torque.
+        Init = 1;
+        /// Holds a position.
+        HoldPos = 2;
+        /// Follows the trajectory.
+        Operate = 3;
+        /// Gravity compensation only.
+        Teaching = 4;
+        /// Zero torque until the cause is gone and the host has cleared.
+        Error = 5;
+    }
 }
 
 impl ControllerState {
@@ -55,18 +53,19 @@ impl ControllerState {
 
 states! {
     /// What becomes of the trajectory, "trajectory execution state" (TES) in manuals.
-    TrajectoryState, "unknown":
-    /// No trajectory.
-    #[default]
-    Null = 0,
-    /// Complete, at its start.
-    Stop = 1,
-    /// Paused on the path.
-    Pause = 2,
-    /// Being executed (until standstill).
-    Execute = 3,
-    /// Executed to its last point.
-    Finish = 4,
-    /// Being received. Only older controllers report it.
-    TransNullToStop = 5,
+    TrajectoryState, "unknown" {
+        /// No trajectory.
+        #[default]
+        Null = 0;
+        /// Complete, at its start.
+        Stop = 1;
+        /// Paused on the path.
+        Pause = 2;
+        /// Being executed (until standstill).
+        Execute = 3;
+        /// Executed to its last point.
+        Finish = 4;
+        /// Being received. Only older controllers report it.
+        TransNullToStop = 5;
+    }
 }

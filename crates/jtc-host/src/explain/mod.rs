@@ -5,7 +5,7 @@ mod controller;
 mod link;
 mod nodes;
 
-use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, Known, NodeState, TrajectoryState};
+use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, TrajectoryState};
 
 use crate::check::ProblemKind;
 use crate::words;

@@ -1,14 +1,11 @@
 //! ROS 2 message definitions that the MCAP file carries.
 
-/// Name of the standard joint message.
-pub(super) const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
-/// Its definition with the definitions it needs.
-pub(super) const JOINT_STATE_TEXT: &str = "\
-std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
+/// A definition with those that every header needs.
+macro_rules! with_header {
+    ($fields:literal) => {
+        concat!(
+            $fields,
+            "\
 ================================================================================
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
@@ -17,12 +14,29 @@ string frame_id
 MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
-";
+"
+        )
+    };
+}
+
+/// Name of the standard joint message.
+pub(super) const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
+/// Its definition with the definitions it needs.
+pub(super) const JOINT_STATE_TEXT: &str = with_header!(
+    "\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+"
+);
 
 /// Name of the control law's message.
 pub(super) const CONTROL: &str = "openjtc_msgs/msg/JointControl";
 /// Per joint, base to wrist; NaN where the source does not know a value.
-pub(super) const CONTROL_TEXT: &str = "\
+pub(super) const CONTROL_TEXT: &str = with_header!(
+    "\
 std_msgs/Header header
 # rad, commanded minus measured
 float64[6] position_error
@@ -37,20 +51,14 @@ float64[6] torque_friction
 float64[6] torque
 # degrees Celsius, bearing
 float64[6] temperature
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-";
+"
+);
 
 /// Name of the state message.
 pub(super) const STATE: &str = "openjtc_msgs/msg/ControllerState";
 /// States, error words and the point index.
-pub(super) const STATE_TEXT: &str = "\
+pub(super) const STATE_TEXT: &str = with_header!(
+    "\
 uint8 STATE_START=0
 uint8 STATE_INIT=1
 uint8 STATE_HOLD_POS=2
@@ -70,12 +78,5 @@ uint16 errors
 uint32 can_current
 uint8[6] joint_fsm
 uint16[6] joint_internal
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-";
+"
+);

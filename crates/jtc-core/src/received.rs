@@ -13,6 +13,9 @@ use crate::parameters::{PidGains, TableOf};
 /// Floats of one joint's friction table; a tick checks or copies one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
+/// What stands in place of a table that was not received; not in use.
+const NO_TABLE: TableOf<f32> = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
+
 /// The parameters in use, the defaults where the host has sent none, and which of them it has sent.
 #[derive(Clone, Debug)]
 pub(crate) struct ReceivedParameters {
@@ -21,6 +24,7 @@ pub(crate) struct ReceivedParameters {
     pub dynamics: Dynamics,
     pub pid: [PidGains; JOINTS],
     polynomial: [[f64; 6]; JOINTS],
+    /// Zeros until they are received.
     pub tables: [TableOf<f32>; JOINTS],
     pub friction_is_table: bool,
     /// Friction was received since the trajectory was checked.
@@ -35,7 +39,7 @@ impl ReceivedParameters {
             dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
             pid: defaults::PID,
             polynomial: defaults::POLYNOMIAL,
-            tables: core::array::from_fn(|j| *defaults::friction_table(j)),
+            tables: [NO_TABLE; JOINTS],
             friction_is_table: false,
             friction_is_new: false,
         }
@@ -177,7 +181,10 @@ impl ReceivedParameters {
     }
 
     pub fn take_default_tables(&mut self) {
-        self.tables = core::array::from_fn(|j| *defaults::friction_table(j));
+        // One after the other: all of them at once would stand on the stack first.
+        for (j, table) in self.tables.iter_mut().enumerate() {
+            *table = *defaults::friction_table(j);
+        }
         self.friction_received(true);
     }
 
@@ -227,7 +234,7 @@ impl Reader<'_> {
 }
 
 fn read_table(floats: &Floats<'_>, joint: usize) -> Result<TableOf<f32>, DataStatus> {
-    let mut table = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
+    let mut table = NO_TABLE;
     let start = joint * TABLE_FLOATS;
     let slots =
         table.velocity.iter_mut().chain(&mut table.temperature).chain(table.torque.iter_mut().flatten());

@@ -1,4 +1,4 @@
-//! The motion of the arm (section 6): set values, the control law, its limits.
+//! The motion of the arm (J-40 to J-44): set values, the control law, its limits.
 //!
 //! Each part has its state and one step a tick; [`Motion`] connects them, and does to all of them what a change of the
 //! controller's state asks for.
@@ -33,9 +33,15 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Torque off: nothing is held, no torque is remembered.
+    /// Torque off: nothing is held, no torque is remembered. Without torque that is so in every tick: each part is made new in
+    /// its place, not all of them on the stack and copied.
     pub fn release(&mut self, nodes: &Nodes) {
-        *self = Self { set: SetValues::released(nodes), ..Self::default() };
+        let Self { set, law, limiter, over_speed, ramp } = self;
+        set.release(nodes);
+        law.release();
+        *limiter = Limiter::default();
+        *over_speed = OverSpeed::default();
+        *ramp = PathRamp::default();
     }
 
     /// Whatever comes next begins at rest at `position`.

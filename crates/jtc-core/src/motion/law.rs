@@ -70,6 +70,16 @@ pub(crate) struct ControlLaw {
 }
 
 impl ControlLaw {
+    /// No torque is remembered.
+    pub fn release(&mut self) {
+        let Self { pid, torque, payload, transfer, yielding } = self;
+        *pid = Default::default();
+        *torque = Default::default();
+        *payload = Payload::default();
+        *transfer = Transfer::default();
+        *yielding = false;
+    }
+
     /// The control mode changes among HoldPos, Operate and Teaching: bumpless transfer, with no step but that of the model (J-44).
     pub fn change_mode(&mut self) {
         self.transfer.change_mode();

@@ -23,8 +23,12 @@ pub(crate) struct SetValues {
 
 impl SetValues {
     /// Nothing is held; the set position is the measured one.
-    pub fn released(nodes: &Nodes) -> Self {
-        Self { point: SetPoint::still(*nodes.positions()), ..Self::default() }
+    pub fn release(&mut self, nodes: &Nodes) {
+        let Self { point, holding, catch, deceleration } = self;
+        *point = SetPoint::still(*nodes.positions());
+        *holding = [false; JOINTS];
+        *catch = [Catch::default(); JOINTS];
+        *deceleration = [None; JOINTS];
     }
 
     /// Whatever comes next begins at rest at `position`.

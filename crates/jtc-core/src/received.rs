@@ -14,7 +14,8 @@ use crate::parameters::{PidGains, TableOf};
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
 /// What stands in place of a table that was not received; not in use.
-const NO_TABLE: TableOf<f32> = TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
+const NO_TABLE: TableOf<f32> =
+    TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
 
 /// The parameters in use, the defaults where the host has sent none, and which of them it has sent.
 #[derive(Clone, Debug)]

@@ -8,6 +8,8 @@ extern crate std;
 
 mod admin;
 mod buffer;
+#[cfg(feature = "embedded-can")]
+mod can;
 mod error_code;
 mod foreign;
 mod frame;

@@ -1,0 +1,54 @@
+//! Frames of a HAL's CAN driver: whatever implements the trait of `embedded-can`.
+
+use embedded_can::{Id, StandardId};
+
+use crate::foreign::Foreign;
+use crate::frame::{Format, Frame};
+
+impl Frame {
+    /// A frame as a driver received it.
+    ///
+    /// # Errors
+    /// What makes it a frame of others (D-02).
+    pub fn from_can(frame: &impl embedded_can::Frame) -> Result<Self, Foreign> {
+        let id = match frame.id() {
+            Id::Standard(id) => u32::from(id.as_raw()),
+            Id::Extended(id) => id.as_raw(),
+        };
+        let (extended, remote) = (frame.is_extended(), frame.is_remote_frame());
+        Self::received(id, Format { extended, remote, ..Format::BUS }, frame.data())
+    }
+
+    /// The frame for a driver to send; `None` where the driver's type refuses it.
+    pub fn to_can<F: embedded_can::Frame>(&self) -> Option<F> {
+        F::new(StandardId::new(self.id())?, self.data())
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use embedded_can::{ExtendedId, Frame as _};
+    use socketcan::CanFrame;
+
+    use super::*;
+
+    #[test]
+    fn d01_d02_frames_of_a_driver_are_told_apart_like_those_of_a_bus() {
+        let id = StandardId::new(0x281).unwrap();
+        let data = [0, 1, 2, 3, 4, 5, 6, 7];
+        for len in 0..=8 {
+            let driver = CanFrame::new(id, &data[..len]).unwrap();
+            let frame = Frame::from_can(&driver).unwrap();
+            assert_eq!((frame.id(), frame.data()), (0x281, &data[..len]));
+            let sent: CanFrame = frame.to_can().unwrap();
+            assert!(sent.id() == Id::Standard(id) && sent.data() == &data[..len] && sent.is_data_frame());
+        }
+        let remote = CanFrame::new_remote(id, 0).unwrap();
+        assert_eq!(Frame::from_can(&remote), Err(Foreign::Remote));
+        // A number of 11 bits does not make a 29-bit identifier one of this bus.
+        let extended = CanFrame::new(ExtendedId::new(0x281).unwrap(), &data).unwrap();
+        assert_eq!(Frame::from_can(&extended), Err(Foreign::Extended));
+        let bit5 = CanFrame::new(StandardId::new(0x2A1).unwrap(), &data).unwrap();
+        assert_eq!(Frame::from_can(&bit5), Err(Foreign::Bit5));
+    }
+}

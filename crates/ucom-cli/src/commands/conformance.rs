@@ -142,12 +142,8 @@ fn not_allowed(report: &ConformanceReport) -> String {
         .collect()
 }
 
-fn who(test: &ConformanceTest) -> String {
-    test.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
-}
-
 fn line(test: &ConformanceTest) -> String {
-    let head = |mark: &str| format!("{mark} {:6} {:9} {}\n", test.id, who(test), test.expected);
+    let head = |mark: &str| format!("{mark} {:6} {:9} {}\n", test.id, test.subject(), test.expected);
     match &test.verdict {
         Verdict::Pass => head("✓"),
         Verdict::Skipped(why) => head("-") + &format!("    skipped: {why}\n"),

@@ -287,6 +287,5 @@ fn test_text(test: &ConformanceTest) -> String {
         Verdict::Fail(_) => "failed",
         Verdict::Skipped(_) => "skipped",
     };
-    let of = test.board.map_or_else(|| "chain".into(), |n| format!("board {n}"));
-    format!("{} {of}: {how}", test.id)
+    format!("{} {}: {how}", test.id, test.subject())
 }

@@ -73,6 +73,13 @@ pub struct ConformanceTest {
     pub came: Vec<String>,
 }
 
+impl ConformanceTest {
+    /// What was tested, in words: `board 3`, or `chain`.
+    pub fn subject(&self) -> String {
+        self.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
+    }
+}
+
 /// All tests.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ConformanceReport {

@@ -4,6 +4,7 @@
 
 mod bar;
 pub mod exit;
+mod failure;
 mod keys;
 mod lines;
 mod output;
@@ -18,6 +19,8 @@ pub mod usage;
 pub mod view;
 
 pub use bar::{Stderr, draws_bars};
+pub use failure::Failure;
+pub use host_kit::{Diagnose, ErrorKind};
 pub use indicatif::ProgressBar;
 pub use keys::{Key, Keys};
 pub use lines::Lines;

@@ -12,6 +12,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::bar::{self, suspended};
+use crate::failure::Failure;
 use crate::lines::Lines;
 use crate::stdout;
 
@@ -135,13 +136,12 @@ impl Output {
         bar::of_motion(total_ms, what, keys)
     }
 
-    /// Prints why a command failed: the exit code, a short name for programs, what happened, what to do next.
-    pub fn failure(&self, exit: u8, code: &str, message: &str, hint: &str) {
+    /// Prints why a command failed.
+    pub fn failure(&self, failure: &Failure) {
         if self.json {
-            let error = json!({ "code": code, "message": message, "hint": hint, "exit": exit });
-            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error }));
+            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": failure.to_json() }));
         }
-        self.warn(message, hint);
+        self.warn(&failure.message, &failure.hint);
     }
 
     /// What is wrong and what to do next, as it is printed at the end of a command; on a terminal broken between words.

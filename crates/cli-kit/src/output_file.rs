@@ -1,23 +1,65 @@
 //! Files that a command writes: opened before anything is sent or moved, never written over unless that was asked for.
 
+use std::fmt;
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Seek, Write};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::exit::{REFUSED, USAGE};
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 /// Why an output is not written.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct OutputError {
-    /// Exit code of the process.
-    pub exit: u8,
-    /// Short name for programs: `exists`, `same-file` or `io`.
-    pub code: &'static str,
-    /// What is wrong, with the file.
-    pub message: String,
-    /// The next act; empty when there is none.
-    pub hint: &'static str,
+#[derive(Debug)]
+pub enum OutputError {
+    /// A file is there already, and writing over it was not asked for.
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file that the command reads, or another one that it writes.
+    SameFile {
+        /// The file.
+        path: PathBuf,
+        /// By its other name.
+        other: PathBuf,
+    },
+    /// The system does not open or write it.
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: io::Error,
+    },
+}
+
+impl fmt::Display for OutputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exists { path } => write!(f, "{} is there already", path.display()),
+            Self::SameFile { path, other } => {
+                write!(f, "{} is {}, which this command uses itself", path.display(), other.display())
+            }
+            Self::Io { path, source } => write!(f, "{}: {source}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for OutputError {}
+
+impl Diagnose for OutputError {
+    fn diagnosis(&self) -> Diagnosis {
+        match self {
+            Self::Exists { .. } => {
+                Diagnosis::new(ErrorKind::Refused, "exists", "name another file; --force writes over it")
+            }
+            Self::SameFile { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "same-file",
+                "name another file; --force does not cover this",
+            ),
+            Self::Io { source, .. } => source.diagnosis(),
+        }
+    }
 }
 
 /// Outputs that this process made and has not written yet.
@@ -49,23 +91,20 @@ impl OutputFile {
     /// its other outputs) always. To report that nothing was sent is left to commands that send.
     pub fn open(path: &Path, force: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
-            let message =
-                format!("{} is {}, which this command uses itself", path.display(), other.display());
-            return Err(refused("same-file", message, "name another file; --force does not cover this"));
+            return Err(OutputError::SameFile { path: path.to_owned(), other: other.to_path_buf() });
         }
-        let io = |e| io(format!("{}: {e}", path.display()));
+        let io = |source| OutputError::Io { path: path.to_owned(), source };
         match OpenOptions::new().write(true).create_new(true).open(path) {
             Ok(file) => {
                 UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
                 return Ok(Self { path: path.to_owned(), file, made: true, written: false });
             }
-            Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
             Err(e) => return Err(io(e)),
         }
         // A pipe or a device holds nothing that could be lost.
         if !force && path.is_file() {
-            let message = format!("{} is there already", path.display());
-            return Err(refused("exists", message, "name another file; --force writes over it"));
+            return Err(OutputError::Exists { path: path.to_owned() });
         }
         let file = OpenOptions::new().write(true).open(path).map_err(io)?;
         Ok(Self { path: path.to_owned(), file, made: false, written: false })
@@ -85,17 +124,17 @@ impl OutputFile {
     pub fn write(mut self, bytes: impl AsRef<[u8]>) -> Result<(), OutputError> {
         let mut file = self.begin()?;
         let done = file.write_all(bytes.as_ref()).and_then(|()| settle(&file));
-        done.map_err(|e| self.failure(&e))
+        done.map_err(|e| self.failure(e))
     }
 
     /// A handle to write with; what was in the file goes only now. [`settle`] it at the end.
     pub fn begin(&mut self) -> Result<File, OutputError> {
         self.written = true;
         settled(&self.path);
-        self.emptied().map_err(|e| self.failure(&e))
+        self.emptied().map_err(|e| self.failure(e))
     }
 
-    fn emptied(&self) -> std::io::Result<File> {
+    fn emptied(&self) -> io::Result<File> {
         let mut file = self.file.try_clone()?;
         if file.metadata()?.is_file() {
             file.set_len(0)?;
@@ -116,8 +155,8 @@ impl OutputFile {
     }
 
     /// Why writing failed.
-    pub fn failure(&self, e: &std::io::Error) -> OutputError {
-        io(format!("{}: {e}", self.name()))
+    pub fn failure(&self, source: io::Error) -> OutputError {
+        OutputError::Io { path: self.path.clone(), source }
     }
 }
 
@@ -131,16 +170,8 @@ impl Drop for OutputFile {
 }
 
 /// Waits until the bytes are on the disk: a full one may show only then.
-pub fn settle(file: &File) -> std::io::Result<()> {
+pub fn settle(file: &File) -> io::Result<()> {
     if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
-}
-
-fn refused(code: &'static str, message: String, hint: &'static str) -> OutputError {
-    OutputError { exit: REFUSED, code, message, hint }
-}
-
-fn io(message: String) -> OutputError {
-    OutputError { exit: USAGE, code: "io", message, hint: "" }
 }
 
 /// Both names lead to the same file that is there.
@@ -165,6 +196,7 @@ fn one_inode(_: &Path, _: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exit;
 
     #[test]
     fn an_output_is_opened_at_once_and_nothing_is_lost_before_it_is_written() {
@@ -172,10 +204,11 @@ mod tests {
         let (old, new, input) = (dir.path().join("old"), dir.path().join("new"), dir.path().join("input"));
         std::fs::write(&old, "precious").unwrap();
         std::fs::write(&input, "read").unwrap();
-        let code = |result: Result<OutputFile, OutputError>| result.err().map(|f| (f.exit, f.code));
+        let code =
+            |result: Result<OutputFile, OutputError>| result.err().map(|e| (exit::of(e.kind()), e.code()));
         // Commands without a port or bus send nothing whatever happens.
         let there = OutputFile::open(&old, false, &[]).err().unwrap();
-        assert!(there.message.ends_with("is there already"), "{}", there.message);
+        assert!(there.to_string().ends_with("is there already"), "{there}");
         assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists")));
         assert_eq!(code(OutputFile::open(&input, true, &[&input])), Some((4, "same-file")));
         let around = dir.path().join(".").join("input");
@@ -207,6 +240,6 @@ mod tests {
     fn a_full_disk_is_an_error_of_its_own() {
         let failure =
             OutputFile::open(Path::new("/dev/full"), false, &[]).unwrap().write("text").unwrap_err();
-        assert!(failure.message.contains("No space left"), "{}", failure.message);
+        assert!(failure.to_string().contains("No space left"), "{failure}");
     }
 }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use clap::error::ErrorKind;
 
-use crate::{Output, exit};
+use crate::{Failure, Output, exit};
 
 /// The command line of this process; otherwise help, version or wrong usage is printed, and the exit code is to be returned. Wrong
 /// usage is one JSON object on stdout where `--json` or the variable `json_env` asks for JSON, besides the words on stderr.
@@ -22,8 +22,7 @@ pub fn parse<Cli: Parser>(program: &'static str, json_env: &str) -> Result<Cli, 
         }
         if json_is_asked(std::env::args_os().skip(1), std::env::var_os(json_env).as_deref()) {
             let (message, hint) = words(&e, program);
-            let error =
-                serde_json::json!({ "code": "usage", "message": message, "hint": hint, "exit": exit::USAGE });
+            let error = Failure::usage(message).hint(hint).to_json();
             Output::bytes(format!("{}\n", serde_json::json!({ "error": error })).as_bytes());
         }
         ExitCode::from(exit::USAGE)

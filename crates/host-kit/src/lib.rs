@@ -1,12 +1,14 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod diagnosis;
 mod finding;
 mod kind;
 #[cfg(feature = "mcap")]
 pub mod mcap;
 mod whole;
 
+pub use diagnosis::{Diagnose, Diagnosis};
 pub use finding::{Finding, Findings, Severity};
 pub use kind::ErrorKind;
 pub use whole::write_whole;

@@ -1,14 +1,13 @@
 //! A question to the person at the terminal, which an option answers as well.
 
+use cli_kit::{ErrorKind, Failure};
 use std::io::{BufRead, IsTerminal, Write};
-
-use crate::failure::{Failure, REFUSED};
 
 /// Asks `question` and goes on only when the answer is `yes`. Without a terminal nobody can be asked: the command is refused, and
 /// `option` is what answers the question beforehand.
 pub fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {
-        Failure { exit: REFUSED, code: "not-confirmed-by-person".into(), ..Failure::usage(message) }
+        Failure::new(ErrorKind::Refused, "not-confirmed-by-person", message)
             .hint(format!("nothing was sent; {option} answers yes"))
     };
     if !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {

@@ -1,10 +1,8 @@
 //! What of an arm file a controller does not use: listed, and refused where it matters.
 
-use cli_kit::Output;
+use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::arm::{Arm, Difference, NOT_CARRIED};
 use serde_json::json;
-
-use crate::failure::{Failure, REFUSED};
 
 /// Returns the settings of `arm` that the controller uses otherwise; where there are any, they must have been accepted. They are
 /// listed either way.
@@ -29,7 +27,7 @@ pub fn accept(arm: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>
          --accept-device-limits"
     );
     if out.is_json() {
-        let error = json!({ "code": "device-limits", "message": message, "hint": hint, "exit": REFUSED });
+        let error = Failure::new(ErrorKind::Refused, "device-limits", &message).hint(&hint).to_json();
         out.result(&json!({ "outcome": "refused", "differences": differences, "error": error }), String::new);
     }
     out.note(format!("jtc: {message}"));
@@ -37,5 +35,5 @@ pub fn accept(arm: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>
         out.note(format!("     {difference}"));
     }
     out.note(format!("     {hint}"));
-    Err(Failure::printed(REFUSED))
+    Err(Failure::printed(ErrorKind::Refused))
 }

@@ -1,10 +1,10 @@
 //! The way to the controller: the port named, or the only one found.
 
+use cli_kit::Failure;
 use jtc_host::Session;
 use jtc_host::port::{SerialPort, only_one};
 
 use crate::args::LinkArgs;
-use crate::failure::Failure;
 
 impl LinkArgs {
     /// The port's name.

@@ -16,7 +16,7 @@ mod tape;
 
 use std::process::ExitCode;
 
-use cli_kit::Output;
+use cli_kit::{Output, exit};
 
 use args::Cli;
 
@@ -31,14 +31,14 @@ fn main() -> ExitCode {
     if let Err(failure) = &done
         && !failure.printed
     {
-        out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
+        out.failure(failure);
     }
     Output::finish();
     match done {
         Ok(()) => match Output::lost() {
             None => ExitCode::SUCCESS,
             Some(why) => {
-                let exit = if moves { failure::FAULT } else { failure::USAGE };
+                let exit = if moves { exit::FAULT } else { exit::USAGE };
                 out.note(format_args!("jtc: the result could not be printed: {why}"));
                 ExitCode::from(exit)
             }
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
             if let Some(why) = Output::lost().filter(|_| failure.printed) {
                 out.note(format_args!("jtc: the result could not be printed: {why}"));
             }
-            ExitCode::from(failure.exit)
+            ExitCode::from(failure.exit())
         }
     }
 }

@@ -5,11 +5,10 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use cli_kit::view::LEAST;
-use cli_kit::{Keys, Output, Stop, draws_bars};
+use cli_kit::{ErrorKind, Failure, Keys, Output, Stop, draws_bars, exit::FAULT};
 use jtc_host::session::Flow;
 use jtc_wire::{Code, Status, TrajectoryState};
 
-use crate::failure::{FAULT, Failure};
 use crate::keys::{HELP, NO_SPEED, Wish, wish};
 use crate::progress::Progress;
 use cli_kit::output_file;
@@ -22,7 +21,7 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
     output_file::abandon();
     let (done, written) = mpsc::channel();
     std::thread::spawn(move || {
-        out.failure(FAULT, "ended-at-once", message, hint);
+        out.failure(&Failure::new(ErrorKind::Fault, "ended-at-once", message).hint(hint));
         Output::finish();
         let _ = done.send(());
     });

@@ -4,14 +4,12 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use jtc_host::port::Port;
 use jtc_host::sample::is_measured;
 use jtc_host::{Session, session, words};
 use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 use serde_json::{Value, json};
-
-use crate::failure::Failure;
 
 /// The page of `jtc help events`.
 pub const EVENTS_HELP: &str = include_str!("progress.md");

@@ -1,12 +1,11 @@
 //! Recordings that are written while the arm moves.
 
+use crate::failure::recording_broken_off;
 use std::fs::File;
 
-use cli_kit::Output;
 use cli_kit::output_file::{OutputFile, settle};
+use cli_kit::{Failure, Output};
 use jtc_host::recording::{Ending, LiveRecorder, RecordingInfo, SampleSink};
-
-use crate::failure::Failure;
 
 /// A recording in the making.
 pub struct Tape {
@@ -25,7 +24,7 @@ impl Tape {
         out: &Output,
     ) -> Result<Self, Failure> {
         let file = output.begin()?;
-        let on_disk = file.try_clone().map_err(|e| output.failure(&e))?;
+        let on_disk = file.try_clone().map_err(|e| output.failure(e))?;
         let out = *out;
         let live = LiveRecorder::begin(file, output.path(), info, move |e| {
             out.note(format!("jtc: {e}; nothing more is recorded, {goes_on}"));
@@ -53,8 +52,8 @@ impl Tape {
     /// Completes it with how the run ended.
     pub fn finish(self, ending: &Ending) -> Result<(), Failure> {
         let Self { name, live, on_disk } = self;
-        live.finish(ending).map_err(|e| Failure::from(e).recording_broken_off())?;
-        settle(&on_disk).map_err(|e| Failure::usage(format!("{name}: {e}")).recording_broken_off())
+        live.finish(ending).map_err(recording_broken_off)?;
+        settle(&on_disk).map_err(|e| recording_broken_off(Failure::usage(format!("{name}: {e}"))))
     }
 
     /// Ends it without completing the file, which is about to be begun again.

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
+
 /// Largest file that is read.
 pub const FILE_MAX: u64 = 64 << 20;
 
@@ -118,10 +120,9 @@ impl std::fmt::Display for Place {
     }
 }
 
-impl FileError {
-    /// The next command or act that helps.
-    pub fn hint(&self) -> String {
-        match self {
+impl Diagnose for FileError {
+    fn diagnosis(&self) -> Diagnosis {
+        let next = match self {
             FileError::Io { .. } => "check the name and the rights of the file".into(),
             FileError::TooLarge { .. } => "is it the right file?".into(),
             FileError::Joints { path, six, .. } => format!(
@@ -141,9 +142,12 @@ impl FileError {
             FileError::At { .. } | FileError::Form { .. } => {
                 "`jtc help files` shows the forms of files, `jtc example` writes one of each".into()
             }
-        }
+        };
+        Diagnosis::new(ErrorKind::Usage, "file", next)
     }
+}
 
+impl FileError {
     /// The same error, about `file`.
     pub fn in_file(mut self, file: &Path) -> Self {
         let (FileError::Io { path, .. }

@@ -24,7 +24,7 @@ pub mod words;
 pub use arm::Arm;
 pub use check::{CheckOptions, CheckedTrajectory};
 pub use error::{
-    CheckError, Diagnosis, Error, LinkError, MotionError, ParametersError, StateError, UploadError,
+    CheckError, Diagnose, Diagnosis, Error, LinkError, MotionError, ParametersError, StateError, UploadError,
 };
 pub use host_kit::ErrorKind;
 pub use port::{Port, PortError};

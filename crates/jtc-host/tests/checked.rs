@@ -7,8 +7,8 @@ use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{
-    Arm, CheckError, CheckOptions, CheckedTrajectory, Error, ErrorKind, LinkError, MotionError, Session,
-    Trajectory, plan,
+    Arm, CheckError, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, MotionError,
+    Session, Trajectory, plan,
 };
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 

@@ -10,7 +10,8 @@ use jtc_host::port::sim::SimPort;
 use jtc_host::port::{Port, PortError};
 use jtc_host::session::{Flow, Outcome, ParameterSource, RecoverStep, UploadOptions, UploadReport};
 use jtc_host::{
-    CheckOptions, CheckedTrajectory, Error, ErrorKind, MotionError, Session, Trajectory, UploadError, plan,
+    CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, MotionError, Session, Trajectory,
+    UploadError, plan,
 };
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 

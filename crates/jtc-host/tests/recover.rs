@@ -7,7 +7,9 @@ use jtc_bus::Joint;
 use jtc_core::Config;
 use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, ParameterSource, RecoverStep};
-use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Error, ErrorKind, ParametersError, Session, plan};
+use jtc_host::{
+    Arm, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, ParametersError, Session, plan,
+};
 use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
 
 type Sim = Session<SimPort>;

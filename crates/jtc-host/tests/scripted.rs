@@ -4,7 +4,7 @@ use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
 
 use jtc_host::session::Flow;
-use jtc_host::{Error, ErrorKind, MotionError};
+use jtc_host::{Diagnose, Error, ErrorKind, MotionError};
 
 /// What the session wrote, while a controller behind a scripted port sends nothing or the same status again and again.
 mod scripted {

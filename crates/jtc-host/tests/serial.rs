@@ -4,8 +4,8 @@
 use std::io::{Read, Write};
 use std::time::Duration;
 
-use jtc_host::Port;
 use jtc_host::port::{PortError, STANDARD_RATES, SerialPort};
+use jtc_host::{Diagnose, Port};
 use serialport::{SerialPort as _, TTYPort};
 
 /// The far end, and the path of the near one.

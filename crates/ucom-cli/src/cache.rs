@@ -1,28 +1,28 @@
 //! What is remembered of boards, and what their words mean (D-11), as the command line names it.
 
+use cli_kit::Failure;
 use std::path::{Path, PathBuf};
 
 use ucom_host::files::SignalTable;
-use ucom_host::session::Cache;
+use ucom_host::session::{Cache, SessionError};
 
 use crate::args::{Boards, CacheArgs, LinkArgs};
-use crate::failure::Failure;
 
 /// The signal table that is taken without being named.
 const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 /// A board of several whose application is not started is seldom the only one.
-pub fn of_several(failure: Failure, boards: &Boards) -> Failure {
+pub fn of_several(error: SessionError, boards: &Boards) -> Failure {
     let list = match boards {
         Boards::Some(numbers) if numbers.len() > 1 => {
             numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(",")
         }
         Boards::All => "all".into(),
-        _ => return failure,
+        _ => return error.into(),
     };
-    match failure.code.as_str() {
-        "no-application" if !failure.hint.contains("update") => failure.hint(format!("`ucom start {list}`")),
-        _ => failure,
+    match error.is_not_started() {
+        true => Failure::of(&error).hint(format!("`ucom start {list}`")),
+        false => error.into(),
     }
 }
 

@@ -4,7 +4,6 @@
 mod args;
 mod cache;
 mod commands;
-mod failure;
 mod interrupt;
 mod session;
 mod shape;
@@ -12,7 +11,7 @@ mod shape;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use cli_kit::Output;
+use cli_kit::{Output, exit};
 
 use args::Cli;
 
@@ -30,23 +29,20 @@ fn main() -> ExitCode {
         Ok(()) => match Output::lost() {
             None => ExitCode::SUCCESS,
             Some(why) => {
-                let exit = if acts { failure::FAULT } else { failure::USAGE };
+                let exit = if acts { exit::FAULT } else { exit::USAGE };
                 let text = format!("ucom: the result could not be printed: {why}");
                 interrupt::print_within(PRINT_TIMEOUT, move || out.note(text));
                 ExitCode::from(exit)
             }
         },
         Err(failure) => {
+            let exit = failure.exit();
             if !failure.printed {
                 // Nobody reads what stands in stdout already.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
-                let exit = failure.exit;
-                interrupt::print_within(PRINT_TIMEOUT, move || {
-                    out.failure(failure.exit, &failure.code, &failure.message, &failure.hint);
-                });
-                return ExitCode::from(exit);
+                interrupt::print_within(PRINT_TIMEOUT, move || out.failure(&failure));
             }
-            ExitCode::from(failure.exit)
+            ExitCode::from(exit)
         }
     }
 }

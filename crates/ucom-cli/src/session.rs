@@ -1,14 +1,13 @@
 //! A session as the command line opens it: its bus and profile, Ctrl-C, and notes on stderr.
 
-use cli_kit::{Lines, Stop};
+use cli_kit::{Diagnose, Failure, Lines, Stop};
 use serde_json::{Value, json};
 use ucom::Profile;
 use ucom_host::ProfileFile;
-use ucom_host::master::{Error, IdentityError, Master, SignalError};
-use ucom_host::session::{CleanupList, Driver, Link, Operator, SessionError, ValuesError};
+use ucom_host::master::{Error, IdentityError, Master};
+use ucom_host::session::{CleanupList, Driver, Link, Operator};
 
 use crate::args::LinkArgs;
-use crate::failure::{Failure, exit};
 use crate::interrupt::listen;
 
 struct Console {
@@ -70,28 +69,4 @@ pub fn shared_numbers(master: &Master) -> Vec<Value> {
         json!({ "board": board, "flash_numbers": found, "code": e.code(), "message": e.to_string(), "hint": e.hint() })
     };
     master.shared_numbers().iter().map(value).collect()
-}
-
-impl From<SessionError> for Failure {
-    fn from(e: SessionError) -> Self {
-        Self::new(exit(e.kind()), e.code(), &e).hint(e.hint())
-    }
-}
-
-impl From<ValuesError> for Failure {
-    fn from(e: ValuesError) -> Self {
-        SessionError::from(e).into()
-    }
-}
-
-impl From<Error> for Failure {
-    fn from(e: Error) -> Self {
-        SessionError::from(e).into()
-    }
-}
-
-impl From<SignalError> for Failure {
-    fn from(e: SignalError) -> Self {
-        Error::from(e).into()
-    }
 }

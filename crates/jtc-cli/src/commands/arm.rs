@@ -1,11 +1,10 @@
 //! `jtc arm`: arm files.
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use jtc_host::arm::{Arm, ArmChoice};
 use serde_json::json;
 
 use crate::args::{ArmCommand, ImportArgs};
-use crate::failure::Failure;
 use cli_kit::OutputFile;
 
 /// Does one of the family.

@@ -2,13 +2,12 @@
 
 use std::io::Read;
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use jtc_host::port::{Direction, read_capture};
 use jtc_wire::{Described, FrameType, Piece, Status, pieces};
 use serde_json::{Value, json};
 
 use super::status;
-use crate::failure::Failure;
 
 /// Longest piece of noise that is shown byte by byte.
 const SHOWN: usize = 32;

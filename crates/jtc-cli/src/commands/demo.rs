@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use cli_kit::{Output, OutputFile};
+use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use jtc_host::arm::Arm;
 use jtc_host::port::Port;
 use jtc_host::port::sim::SimPort;
@@ -18,7 +18,7 @@ use serde_json::json;
 
 use super::run_report;
 use crate::args::{DemoArgs, SimSpeed};
-use crate::failure::{FAULT, Failure};
+use crate::failure::output_lost;
 use crate::progress::Progress;
 use crate::tape::Tape;
 
@@ -73,8 +73,8 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let ending = Ending { outcome: "finished".into(), ..Ending::default() };
     tapes.into_iter().try_for_each(|tape| tape.finish(&ending))?;
     let input = ReportInput { info: &run.info, samples: &run.samples, facts: &facts, failure: None };
-    page.write(report::html(&input)).map_err(Failure::output_lost)?;
-    picture.write(report::picture_svg(&input)).map_err(Failure::output_lost)?;
+    page.write(report::html(&input)).map_err(output_lost)?;
+    picture.write(report::picture_svg(&input)).map_err(output_lost)?;
     let files: Vec<String> = NAMES.iter().map(|n| file(n).display().to_string()).collect();
     let value = json!({
         "outcome": "finished",
@@ -196,11 +196,7 @@ fn execute(
     })?;
     bar.finish();
     if !matches!(outcome, Outcome::Finished(_)) {
-        return Err(Failure {
-            exit: FAULT,
-            code: "stopped".into(),
-            ..Failure::usage("the motion was stopped")
-        });
+        return Err(Failure::new(ErrorKind::Fault, "stopped", "the motion was stopped"));
     }
     wait(&mut session, MARGIN)?;
     recording.set(false);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cli_kit::Output;
+use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::Session;
 use jtc_host::doctor::{Observation, RATES, Severity, findings};
 use jtc_host::port::SerialPort;
@@ -10,7 +10,6 @@ use serde_json::json;
 
 use super::status;
 use crate::args::LinkArgs;
-use crate::failure::{Failure, NO_LINK};
 
 /// Listening at the rate asked for: 50 statuses.
 const LISTEN: Duration = Duration::from_secs(2);
@@ -46,8 +45,8 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     });
     match (bad, no_link(&seen)) {
         (false, _) => Ok(()),
-        (true, true) => Err(Failure::printed(NO_LINK)),
-        (true, false) => Err(Failure::printed(1)),
+        (true, true) => Err(Failure::printed(ErrorKind::NoLink)),
+        (true, false) => Err(Failure::printed(ErrorKind::Device)),
     }
 }
 

@@ -2,13 +2,12 @@
 
 use std::io::{BufRead, Write};
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use jtc_dynamics::{Dynamics, JOINTS, JointVec};
 use jtc_host::arm::Arm;
 use serde_json::json;
 
 use crate::args::{DynamicsArgs, DynamicsKind};
-use crate::failure::Failure;
 
 /// Reads lines of numbers until the end of stdin.
 pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {

@@ -1,12 +1,11 @@
 //! `jtc example`: files to try.
 
-use cli_kit::{Output, table};
+use cli_kit::{Failure, Output, table};
 use jtc_host::example::{EXAMPLES, Example};
 use serde_json::json;
 
 use super::job::typed;
 use crate::args::ExampleArgs;
-use crate::failure::Failure;
 use cli_kit::OutputFile;
 
 /// Writes an example, or lists them.

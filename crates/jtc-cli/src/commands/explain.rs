@@ -1,11 +1,10 @@
 //! `jtc explain`: one page about a code, or about fault files.
 
-use cli_kit::{Output, table};
+use cli_kit::{Failure, Output, table};
 use jtc_host::explain::{Page, find, pages};
 use serde_json::{Value, json};
 
 use crate::args::ExplainArgs;
-use crate::failure::Failure;
 
 /// Prints the pages that fit, or the list of all.
 pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {

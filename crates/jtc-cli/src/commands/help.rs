@@ -1,11 +1,10 @@
 //! `jtc help`: pages, and the help of each command.
 
 use clap::CommandFactory;
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use serde_json::json;
 
 use crate::args::{Cli, HelpArgs};
-use crate::failure::Failure;
 
 /// Pages that belong to no command.
 const PAGES: [(&str, &str); 3] = [

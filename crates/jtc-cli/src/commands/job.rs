@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cli_kit::Output;
+use cli_kit::{ErrorKind, Failure, Output, exit::REFUSED};
 use jtc_core::{Config, JOINTS};
 use jtc_host::arm::Arm;
 use jtc_host::check::{Checker, Suspicion, Verdict};
@@ -12,7 +12,6 @@ use jtc_host::trajectory::{Form, Loaded, Trajectory, overshoot_words};
 use serde_json::json;
 
 use crate::args::CheckArgs;
-use crate::failure::{Failure, REFUSED};
 
 /// Speeds tried between one that passes and one that does not.
 const TRIES: usize = 4;
@@ -131,7 +130,7 @@ impl Job {
             out.result(&value, String::new);
         }
         out.note(format!("jtc: {verdict}\n     {hint}"));
-        Failure::printed(REFUSED)
+        Failure::printed(ErrorKind::Refused)
     }
 
     /// A failure of this job, with the file's name where its hint leaves it open.

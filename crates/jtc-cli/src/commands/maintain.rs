@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cli_kit::{Output, Stop};
+use cli_kit::{ErrorKind, Failure, Output, Stop};
 use jtc_host::arm::Arm;
 use jtc_host::session::ParameterSource;
 use jtc_host::{Error, ParametersError, words};
@@ -10,7 +10,6 @@ use serde_json::json;
 
 use super::status;
 use crate::args::{ClearArgs, GripperArgs, RecoverArgs, Switch};
-use crate::failure::Failure;
 use crate::limits;
 use crate::operator::ended_at_once;
 use crate::progress::Progress;
@@ -39,7 +38,7 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
             format!("still there: {}\nnext: jtc recover", words::errors_line(&s))
         }
     });
-    if s.errors == 0 { Ok(()) } else { Err(Failure::printed(1)) }
+    if s.errors == 0 { Ok(()) } else { Err(Failure::printed(ErrorKind::Device)) }
 }
 
 /// Switches the pump.

@@ -22,10 +22,9 @@ mod status;
 mod teach;
 mod traj;
 
-use cli_kit::{Output, pages};
+use cli_kit::{Failure, Output, pages};
 
 use crate::args::Command;
-use crate::failure::Failure;
 
 /// Does what the command line asks for.
 pub fn run(command: Command, out: &Output) -> Result<(), Failure> {

@@ -5,14 +5,13 @@ mod view;
 
 use std::time::{Duration, Instant};
 
-use cli_kit::{Key, Output, Screen, Stop, figure};
+use cli_kit::{Failure, Key, Output, Screen, Stop, figure};
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::sample::is_measured;
 use jtc_host::{Session, words};
 
 use super::status;
 use crate::args::MonitorArgs;
-use crate::failure::Failure;
 use view::View;
 
 /// 25 pictures a second are enough, however fast statuses come.

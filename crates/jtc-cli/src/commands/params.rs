@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 
-use cli_kit::{Output, table};
+use cli_kit::{Failure, Output, table};
 use jtc_host::arm::{Arm, FrictionChoice, NOT_CARRIED, ParameterFile, ParameterSet};
 use jtc_host::words;
 use jtc_wire::Joint;
 use serde_json::json;
 
 use crate::args::{AcceptArgs, FrictionKind, LinkArgs, ParamsCommand};
-use crate::failure::Failure;
 use crate::limits;
 use crate::progress::Progress;
 

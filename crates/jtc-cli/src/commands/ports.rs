@@ -1,10 +1,8 @@
 //! `jtc ports`: what is there, and why something cannot be used.
 
-use cli_kit::Output;
+use cli_kit::{Diagnose, Failure, Output};
 use jtc_host::port::{PortKind, list};
 use serde_json::json;
-
-use crate::failure::Failure;
 
 /// Lists the serial ports.
 pub fn ports(out: &Output) -> Result<(), Failure> {

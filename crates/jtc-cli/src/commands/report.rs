@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
 use jtc_host::recording::Recording;
 use jtc_host::report::{ReportInput, RunFailure, Summary, html, picture_svg};
@@ -10,7 +10,6 @@ use serde_json::json;
 
 use super::run_report;
 use crate::args::ReportArgs;
-use crate::failure::Failure;
 use cli_kit::OutputFile;
 
 /// Writes the page and prints the figures.

@@ -1,13 +1,12 @@
 //! `jtc reset`: restarts nodes of the joint bus, named as people count them.
 
-use cli_kit::Output;
+use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::words;
 use jtc_wire::{ControllerState, Joint};
 use serde_json::json;
 
 use crate::args::ResetArgs;
 use crate::ask::confirm;
-use crate::failure::{Failure, REFUSED};
 
 /// All joints and the gripper.
 const ALL: u8 = 0x7F;
@@ -24,7 +23,7 @@ pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
         let message = format!("{names} cannot be reset in {}: the arm would fall", state);
         let next =
             if state == ControllerState::Operate { "`jtc traj stop` first" } else { "`jtc teach off` first" };
-        return Err(Failure { exit: REFUSED, code: "powered".into(), ..Failure::usage(message) }.hint(next));
+        return Err(Failure::new(ErrorKind::Refused, "powered", message).hint(next));
     }
     if state.known().is_some_and(ControllerState::has_torque) && !args.yes {
         let question = format!(
@@ -90,7 +89,7 @@ mod tests {
     #[test]
     fn a_bare_mask_is_refused_with_both_things_that_it_may_mean() {
         let failure = of_mask("3");
-        assert_eq!(failure.exit, 2);
+        assert_eq!(failure.kind, ErrorKind::Usage);
         assert!(failure.hint.contains("`jtc reset --joints 3` resets joint 3"), "{}", failure.hint);
         assert!(failure.hint.contains("`jtc reset --joints 1,2`"), "{}", failure.hint);
         assert!(of_mask("0x44").hint.contains("--joints 3 --gripper"));

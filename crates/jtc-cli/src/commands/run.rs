@@ -5,7 +5,7 @@ mod approach;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use cli_kit::{Output, OutputFile};
+use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use jtc_host::check::{ProblemKind, Verdict};
 use jtc_host::port::{Port, SerialPort};
 use jtc_host::recording::{Ending, Format, RecordingInfo, SampleSink};
@@ -21,7 +21,7 @@ use serde_json::json;
 use super::job::Job;
 use super::run_report;
 use crate::args::RunArgs;
-use crate::failure::{FAULT, Failure};
+use crate::failure::output_lost;
 use crate::limits;
 use crate::operator::Operator;
 use crate::progress::Progress;
@@ -170,10 +170,10 @@ fn conclude(
     match (outcome, failure) {
         (_, Some(failure)) if out.is_json() => {
             out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-            Err(Failure::printed(failure.exit))
+            Err(Failure::printed(failure.kind))
         }
         (_, Some(failure)) => Err(failure),
-        (Ok(Outcome::Stopped(_)), None) => Err(Failure::printed(FAULT)),
+        (Ok(Outcome::Stopped(_)), None) => Err(Failure::printed(ErrorKind::Fault)),
         (_, None) => Ok(()),
     }
 }
@@ -247,8 +247,7 @@ fn ready(session: &mut Session<SerialPort>, operator: &Operator) -> Result<Statu
         return Err(cancelled("wait for the drives"));
     }
     if status.state != ControllerState::HoldPos {
-        let failure =
-            Failure { exit: 1, code: "not-ready".into(), ..Failure::usage(words::waiting_for(&status)) };
+        let failure = Failure::new(ErrorKind::Device, "not-ready", words::waiting_for(&status));
         return Err(failure.hint(words::next_step(&status)));
     }
     let enabled = |s: &Status| s.joints.iter().all(|j| j.state == NodeState::ENABLED);
@@ -358,9 +357,8 @@ impl Outputs {
     /// Completes all of them; one that is lost does not cost the other. Returns the names of those that are whole.
     fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
         let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
-        let report = self
-            .report
-            .map(|file| (file.name(), file.write(report::html(input)).map_err(Failure::output_lost)));
+        let report =
+            self.report.map(|file| (file.name(), file.write(report::html(input)).map_err(output_lost)));
         let (mut files, mut lost) = (Vec::new(), Vec::new());
         for (name, done) in record.into_iter().chain(report) {
             match done {

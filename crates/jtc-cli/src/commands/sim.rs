@@ -1,9 +1,8 @@
 //! `jtc sim`: a simulated controller for other programs.
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 
 use crate::args::SimArgs;
-use crate::failure::Failure;
 
 /// What carries the arm while no drive does.
 #[cfg(unix)]

@@ -1,13 +1,12 @@
 //! `jtc status`, and a status as text and as JSON for all commands that show one.
 
-use cli_kit::{Output, figure, table};
+use cli_kit::{Failure, Output, figure, table};
 use jtc_host::sample::is_measured;
 use jtc_host::words::{self, GRIPPER};
 use jtc_wire::{Joint, NodeState, Status};
 use serde_json::{Value, json};
 
 use crate::args::LinkArgs;
-use crate::failure::Failure;
 
 /// Prints one status.
 pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cli_kit::{Output, OutputFile, Stop};
+use cli_kit::{ErrorKind, Failure, Output, OutputFile, Stop};
 use jtc_host::trajectory::Loaded;
 use jtc_host::{LinkError, words};
 use jtc_wire::{ControllerState, Status};
@@ -14,7 +14,6 @@ use serde_json::json;
 
 use super::job::typed;
 use crate::args::{LinkArgs, TeachCommand};
-use crate::failure::{FAULT, Failure};
 use crate::operator::ended_at_once;
 use crate::progress::Progress;
 use taught_file::TaughtFile;
@@ -133,7 +132,7 @@ fn without_error(s: Status) -> Result<Status, Failure> {
     if s.state != ControllerState::Error && s.errors == 0 {
         return Ok(s);
     }
-    let failure = Failure { exit: FAULT, code: "run-fault".into(), ..Failure::usage(words::errors_line(&s)) };
+    let failure = Failure::new(ErrorKind::Fault, "run-fault", words::errors_line(&s));
     Err(failure.hint(words::next_step(&s)))
 }
 

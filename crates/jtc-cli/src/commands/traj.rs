@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cli_kit::{Output, figure, table};
+use cli_kit::{ErrorKind, Failure, Output, figure, table};
 use jtc_host::check::Verdict;
 use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
@@ -13,8 +13,7 @@ use serde_json::json;
 
 use super::job::{Job, typed};
 use super::run;
-use crate::args::{CheckArgs, LinkArgs, TrajCommand};
-use crate::failure::{Failure, REFUSED};
+use crate::args::{CheckArgs, TrajCommand};
 use crate::progress::Progress;
 
 /// Does one of the family.
@@ -32,25 +31,29 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
             }
             run::run(args, out)
         }
-        TrajCommand::Pause(link) => {
-            send(link, Session::pause, "pause", "pausing on the path", out).map_err(may_be_moving)
-        }
-        TrajCommand::Resume(link) => send(link, Session::resume, "resume", "going on", out),
+        TrajCommand::Pause(link) => send(
+            || link.session().map_err(may_be_moving),
+            Session::pause,
+            "pause",
+            "pausing on the path",
+            out,
+        ),
+        TrajCommand::Resume(link) => send(|| link.session(), Session::resume, "resume", "going on", out),
         TrajCommand::Stop(link) => {
-            send(link, Session::stop, "stop", "stopping on the path", out).map_err(may_be_moving)
+            send(|| link.session().map_err(may_be_moving), Session::stop, "stop", "stopping on the path", out)
         }
     }
 }
 
 fn send(
-    link: &LinkArgs,
+    open: impl FnOnce() -> Result<Session<SerialPort>, Failure>,
     command: impl FnOnce(&mut Session<SerialPort>) -> Result<(), Error>,
     name: &str,
     words: &str,
     out: &Output,
 ) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
-    let mut session = link.session()?;
+    let mut session = open()?;
     progress.watch(&mut session);
     command(&mut session)?;
     out.result(&json!({ "command": name, "accepted": true }), || words.to_owned());
@@ -59,9 +62,6 @@ fn send(
 
 /// Whoever wants an arm to stand and has no port must know that nothing was sent.
 fn may_be_moving(failure: Failure) -> Failure {
-    if failure.code != "port" {
-        return failure;
-    }
     let hint = format!(
         "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
          stops there). {}",
@@ -97,7 +97,7 @@ fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
         let without = job.without().map_or(String::new(), |words| words + "\n");
         format!("{verdict}\n{}{without}next: {}", figures(&verdict), hint.replace('`', ""))
     });
-    if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(REFUSED)) }
+    if verdict.is_ok() { Ok(()) } else { Err(Failure::printed(ErrorKind::Refused)) }
 }
 
 fn figures(verdict: &Verdict) -> String {

@@ -1,5 +1,6 @@
 //! What a controller is given, and the checks that come before.
 
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 use jtc_wire::Joint;
@@ -82,10 +83,9 @@ impl std::fmt::Display for Beyond {
     }
 }
 
-impl ParameterError {
-    /// The next command or act that helps.
-    pub fn hint(&self) -> String {
-        "correct the file; nothing was sent".into()
+impl Diagnose for ParameterError {
+    fn diagnosis(&self) -> Diagnosis {
+        Diagnosis::new(ErrorKind::Usage, "parameter", "correct the file; nothing was sent")
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use jtc_dynamics::{Dynamics, Origin};
 
 use super::*;
+use host_kit::Diagnose;
 
 fn data(name: &str) -> Option<PathBuf> {
     let dir = std::env::var("OPENJTC_DATA")

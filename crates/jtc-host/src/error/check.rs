@@ -1,8 +1,7 @@
 //! Errors of a check for a run.
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-use super::Diagnosis;
 use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::file::FileError;
@@ -35,9 +34,8 @@ fn listed(differences: &[Difference]) -> String {
     differences.iter().map(Difference::to_string).collect::<Vec<_>>().join("; ")
 }
 
-impl CheckError {
-    /// Kind, name and what helps.
-    pub fn diagnosis(&self) -> Diagnosis {
+impl Diagnose for CheckError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::Refused(verdict) => Diagnosis::new(ErrorKind::Refused, "check", verdict.hint()),
             Self::DeviceLimits { .. } => Diagnosis::new(
@@ -48,7 +46,7 @@ impl CheckError {
                      it, accept them (`--accept-device-limits`)"
                 ),
             ),
-            Self::Arm(e) => Diagnosis::new(ErrorKind::Usage, "file", e.hint()),
+            Self::Arm(e) => e.diagnosis(),
         }
     }
 }

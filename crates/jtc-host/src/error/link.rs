@@ -1,9 +1,8 @@
 //! Errors of an exchange with the controller.
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Response, TrajectoryState};
 
-use super::Diagnosis;
 use crate::port::PortError;
 use crate::words;
 
@@ -57,12 +56,11 @@ fn received(bytes: u64) -> String {
     }
 }
 
-impl LinkError {
-    /// Kind, name and what helps.
-    pub fn diagnosis(&self) -> Diagnosis {
+impl Diagnose for LinkError {
+    fn diagnosis(&self) -> Diagnosis {
         let no_link = |code, next: String| Diagnosis::new(ErrorKind::NoLink, code, next);
         match self {
-            Self::Port(e) => no_link("port", e.hint()),
+            Self::Port(e) => e.diagnosis(),
             Self::NoLink { bytes: 0, .. } => no_link(
                 "no-link",
                 "check cable and power of the controller, then `jtc doctor`; is it the right one of `jtc ports`?".into(),
@@ -86,7 +84,9 @@ impl LinkError {
             }
         }
     }
+}
 
+impl LinkError {
     /// The line or the port failed: whether the controller received the request is not known.
     pub(crate) fn is_loss(&self) -> bool {
         !matches!(self, Self::Refused { .. })

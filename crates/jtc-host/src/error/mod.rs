@@ -9,6 +9,7 @@ mod state;
 mod upload;
 
 use host_kit::ErrorKind;
+pub use host_kit::{Diagnose, Diagnosis};
 
 pub use check::CheckError;
 pub use link::LinkError;
@@ -21,23 +22,6 @@ pub use upload::UploadError;
 use crate::arm::ParameterError;
 use crate::file::FileError;
 use crate::port::PortError;
-
-/// What a caller can act on without knowing each error.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Diagnosis {
-    /// What kind of failure it is.
-    pub kind: ErrorKind,
-    /// A short name for programs.
-    pub code: &'static str,
-    /// The next command or act that helps.
-    pub next: String,
-}
-
-impl Diagnosis {
-    fn new(kind: ErrorKind, code: &'static str, next: impl Into<String>) -> Self {
-        Self { kind, code, next: next.into() }
-    }
-}
 
 /// Any failure of this library, where an operation can fail in ways of several.
 #[derive(Debug, thiserror::Error)]
@@ -84,9 +68,8 @@ impl From<ParameterError> for Error {
     }
 }
 
-impl Error {
-    /// Kind, name and what helps.
-    pub fn diagnosis(&self) -> Diagnosis {
+impl Diagnose for Error {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::Link(e) => e.diagnosis(),
             Self::State(e) => e.diagnosis(),
@@ -94,7 +77,7 @@ impl Error {
             Self::Motion(e) => e.diagnosis(),
             Self::Parameters(e) => e.diagnosis(),
             Self::Check(e) => e.diagnosis(),
-            Self::File(e) => Diagnosis::new(ErrorKind::Usage, "file", e.hint()),
+            Self::File(e) => e.diagnosis(),
             Self::Frame(_) => Diagnosis::new(
                 ErrorKind::Usage,
                 "frame",
@@ -104,20 +87,5 @@ impl Error {
                 Diagnosis::new(ErrorKind::Fault, "cancelled", "`jtc status` shows where the arm is")
             }
         }
-    }
-
-    /// What kind of failure it is.
-    pub fn kind(&self) -> ErrorKind {
-        self.diagnosis().kind
-    }
-
-    /// A short name for programs.
-    pub fn code(&self) -> &'static str {
-        self.diagnosis().code
-    }
-
-    /// The next command or act that helps.
-    pub fn hint(&self) -> String {
-        self.diagnosis().next
     }
 }

@@ -1,9 +1,9 @@
 //! Errors of an execution: before it begins, and on the way.
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 
-use super::{Diagnosis, LinkError};
+use super::LinkError;
 use crate::words;
 
 /// Why a motion did not begin, or did not end as asked for.
@@ -85,9 +85,8 @@ fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
     }
 }
 
-impl MotionError {
-    /// Kind, name and what helps.
-    pub fn diagnosis(&self) -> Diagnosis {
+impl Diagnose for MotionError {
+    fn diagnosis(&self) -> Diagnosis {
         let (kind, code, next) = match self {
             Self::NotUploaded => (
                 ErrorKind::Refused,

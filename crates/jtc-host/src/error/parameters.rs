@@ -1,9 +1,8 @@
 //! Errors of giving friction, gains and arm model to the controller.
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::{DataStatus, FrameType};
 
-use super::Diagnosis;
 use crate::arm::{Beyond, ParameterError};
 use crate::words;
 
@@ -38,11 +37,10 @@ pub enum ParametersError {
     },
 }
 
-impl ParametersError {
-    /// Kind, name and what helps.
-    pub fn diagnosis(&self) -> Diagnosis {
+impl Diagnose for ParametersError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::Value(e) => Diagnosis::new(ErrorKind::Usage, "parameter", e.hint()),
+            Self::Value(e) => e.diagnosis(),
             Self::BeyondBounds { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "beyond-bounds",

@@ -1,9 +1,8 @@
 //! Errors of waiting for a state.
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::Status;
 
-use super::Diagnosis;
 use crate::words;
 
 /// Why the controller did not come to the state that was waited for.
@@ -28,9 +27,8 @@ pub enum StateError {
     },
 }
 
-impl StateError {
-    /// Kind, name and what helps.
-    pub fn diagnosis(&self) -> Diagnosis {
+impl Diagnose for StateError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::Device { .. } => Diagnosis::new(
                 ErrorKind::Device,

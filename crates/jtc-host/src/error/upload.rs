@@ -1,9 +1,8 @@
 //! Errors of an upload.
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::{Code, ControllerState, DataStatus, TrajectoryState};
 
-use super::Diagnosis;
 use super::link::after_refusal;
 use crate::words;
 
@@ -38,9 +37,8 @@ pub enum UploadError {
     },
 }
 
-impl UploadError {
-    /// Kind, name and what helps.
-    pub fn diagnosis(&self) -> Diagnosis {
+impl Diagnose for UploadError {
+    fn diagnosis(&self) -> Diagnosis {
         let (code, next) = match self {
             Self::SegmentRefused { code, .. } => {
                 ("segment-refused", after_refusal(*code, ControllerState::HoldPos.into()))

@@ -2,6 +2,8 @@
 
 use std::io;
 
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
+
 /// Why a port cannot be opened, read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -71,10 +73,9 @@ pub enum PortError {
     },
 }
 
-impl PortError {
-    /// The next command or act that helps.
-    pub fn hint(&self) -> String {
-        match self {
+impl Diagnose for PortError {
+    fn diagnosis(&self) -> Diagnosis {
+        let next = match self {
             PortError::NotFound { .. } | PortError::NoPort { .. } => "`jtc ports` lists the ports that are there".into(),
             PortError::Permission { path } if cfg!(target_os = "linux") => {
                 format!("`sudo usermod -aG dialout $USER`, then log in again (owner and group: `ls -l {path}`)")
@@ -96,9 +97,12 @@ impl PortError {
             }
             PortError::Several { .. } => "name one with `--port PATH` (or JTC_PORT)".into(),
             PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is"),
-        }
+        };
+        Diagnosis::new(ErrorKind::NoLink, "port", next)
     }
+}
 
+impl PortError {
     pub(crate) fn io(path: &str, source: io::Error) -> Self {
         let path = path.to_owned();
         match source.kind() {

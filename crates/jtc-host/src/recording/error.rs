@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
+
 /// Why a recording could not be written or read.
 #[derive(Debug)]
 pub enum RecordingError {
@@ -122,6 +124,12 @@ impl std::error::Error for RecordingError {
             RecordingError::Io { source, .. } => Some(source),
             _ => None,
         }
+    }
+}
+
+impl Diagnose for RecordingError {
+    fn diagnosis(&self) -> Diagnosis {
+        Diagnosis::new(ErrorKind::Usage, "recording", "")
     }
 }
 

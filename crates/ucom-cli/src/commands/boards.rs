@@ -1,13 +1,12 @@
 //! `ucom info`, `status`, `reset`, `xreset`, `start`, `stop`: single acts on boards.
 
-use cli_kit::Output;
+use cli_kit::{Diagnose, ErrorKind, Failure, Output};
 use serde_json::json;
 use ucom::{BoardInfo, Profile, Status};
 use ucom_host::master::{Outcome, RawStatus, Reports, Request, StopLevel, counted};
 use ucom_host::session::{Driver, SessionError};
 
 use crate::args::{ActArgs, Boards, BoardsArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
-use crate::failure::{DEVICE, Failure, NO_LINK};
 use crate::session::shared_numbers;
 use crate::shape::{bits, board_table, board_value, info_value, state};
 
@@ -116,7 +115,7 @@ fn raw_status(
     });
     match all.iter().all(RawStatus::as_expected) {
         true => Ok(()),
-        false => Err(Failure::printed(DEVICE)),
+        false => Err(Failure::printed(ErrorKind::Device)),
     }
 }
 
@@ -162,7 +161,7 @@ pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         }
     }
     if reports.ids.is_empty() {
-        return Err(Failure::new(NO_LINK, "no-boards", "no board reported after the reset")
+        return Err(Failure::new(ErrorKind::NoLink, "no-boards", "no board reported after the reset")
             .hint("ucom doctor looks for the reason"));
     }
     out.result(&json!({ "reports": reports.ids }), || {
@@ -263,7 +262,8 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     for error in driver.master.shared_numbers() {
         driver.note(format!("{error}; both were commanded to stop\n  {}", error.hint()));
     }
-    let Some(worst) = failures.iter().map(|(_, failure)| failure.exit).max() else {
+    let Some(worst) = failures.iter().map(|(_, failure)| failure).max_by_key(|f| f.exit()).map(|f| f.kind)
+    else {
         let boards = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
         out.result(&json!({ "boards": boards, "shared_numbers": shared }), || lines_of(&all));
         return Ok(());
@@ -275,13 +275,9 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     }
     let stopped = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
     let error = |(board, f): &(u8, Failure)| {
-        json!({
-            "board": board,
-            "code": f.code,
-            "message": f.message,
-            "hint": f.hint,
-            "exit": f.exit,
-        })
+        let mut value = f.to_json();
+        value["board"] = json!(board);
+        value
     };
     let failed = failures.iter().map(error).collect::<Vec<_>>();
     out.result(&json!({ "boards": stopped, "failed": failed, "shared_numbers": shared }), || {

@@ -1,13 +1,12 @@
 //! `ucom scan` and `init`: who is in the chain, and which numbers boards have.
 
-use cli_kit::{Output, OutputFile};
+use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use serde_json::json;
 use ucom_host::files::{Inventory, InventoryBoard};
 use ucom_host::master::{InitOptions, InitReport, Outcome, Request, ScanFinding, counted};
 use ucom_host::session::{SessionError, nothing_shared};
 
 use crate::args::{InitArgs, LinkArgs};
-use crate::failure::{Failure, NO_LINK, exit};
 use crate::shape::{board_table, board_value};
 
 /// Who is there; changes nothing.
@@ -25,11 +24,11 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     });
     let shared = nothing_shared(&driver.master).err().map(Failure::from);
     if let Some(f) = &shared {
-        value["error"] = json!({ "code": f.code, "message": f.message, "hint": f.hint, "exit": f.exit });
+        value["error"] = f.to_json();
     }
     if report.boards.is_empty() && report.reports.ids.is_empty() {
-        let failure =
-            Failure::new(NO_LINK, "no-boards", "no board answers").hint("ucom doctor looks for the reason");
+        let failure = Failure::new(ErrorKind::NoLink, "no-boards", "no board answers")
+            .hint("ucom doctor looks for the reason");
         return Err(failure);
     }
     out.result(&value, || {
@@ -52,7 +51,7 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         // stdout has it already.
         Some(failure) => {
             out.note(format!("{}\n  {}", failure.message, failure.hint));
-            Err(Failure::printed(failure.exit))
+            Err(Failure::printed(failure.kind))
         }
         None => Ok(()),
     }
@@ -124,7 +123,7 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     });
     match report.failure() {
         None => Ok(()),
-        Some(kind) => Err(Failure::printed(exit(kind))),
+        Some(kind) => Err(Failure::printed(kind)),
     }
 }
 

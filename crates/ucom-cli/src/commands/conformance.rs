@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use cli_kit::Output;
+use cli_kit::{Diagnose, ErrorKind, Failure, Output};
 use serde_json::json;
 use ucom::Profile;
 use ucom_host::files::{Image, ImageOptions, Inventory};
@@ -14,7 +14,6 @@ use ucom_host::master::{Error, Outcome, Request, RunningError};
 use ucom_host::session::SessionError;
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
-use crate::failure::{Failure, REFUSED, exit};
 
 /// 2026-01-01: what a test programs has a date of its own, and none of the boards' own time.
 fn date(profile: &Profile) -> u16 {
@@ -60,7 +59,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
     print(&report, out);
     match report.failure() {
         None => Ok(()),
-        Some(kind) => Err(Failure::printed(exit(kind))),
+        Some(kind) => Err(Failure::printed(kind)),
     }
 }
 
@@ -95,12 +94,12 @@ fn listed(inventory: &Path, board: u8) -> Result<u16, Failure> {
     let hint = "name its --flash-id; ucom init writes the inventory";
     if !inventory.exists() {
         let text = format!("which board is board {board}? there is no inventory {}", inventory.display());
-        return Err(Failure::new(REFUSED, "no-inventory", text).hint(hint));
+        return Err(Failure::new(ErrorKind::Refused, "no-inventory", text).hint(hint));
     }
     let known = Inventory::read(inventory).map_err(Failure::usage)?;
     known.get(board).map(|b| b.flash_number).ok_or_else(|| {
         let text = format!("board {board} is not in the inventory {}", inventory.display());
-        Failure::new(REFUSED, "not-in-inventory", text).hint(hint)
+        Failure::new(ErrorKind::Refused, "not-in-inventory", text).hint(hint)
     })
 }
 

@@ -4,7 +4,7 @@ use std::io::BufRead;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
-use cli_kit::{Output, Stop};
+use cli_kit::{Failure, Output, Stop};
 use serde_json::json;
 use ucom_host::Decoder;
 use ucom_host::ProfileFile;
@@ -13,7 +13,6 @@ use ucom_host::session::{CleanupList, protocol_frame, recorded};
 
 use super::record::report_broken_off;
 use crate::args::{DecodeArgs, LinkArgs};
-use crate::failure::Failure;
 use crate::interrupt::listen;
 
 /// Lines that are read before they are decoded, at most.

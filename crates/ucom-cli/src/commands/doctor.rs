@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use can_link::ErrorState;
-use cli_kit::{Output, OutputFile};
+use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use serde_json::json;
 use ucom_host::ProfileFile;
 use ucom_host::files::{Image, ImageOptions};
@@ -14,7 +14,6 @@ use ucom_host::session::{Driver, SessionError};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};
-use crate::failure::{DEVICE, Failure, NO_LINK};
 use crate::shape::board_value;
 
 /// How long the bus is listened to before anything is asked.
@@ -63,8 +62,8 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     out.result(&value, || all.iter().map(line).collect());
     match (bad, seen.statistics.received) {
         (false, _) => Ok(()),
-        (true, 0) => Err(Failure::printed(NO_LINK)),
-        (true, _) => Err(Failure::printed(DEVICE)),
+        (true, 0) => Err(Failure::printed(ErrorKind::NoLink)),
+        (true, _) => Err(Failure::printed(ErrorKind::Device)),
     }
 }
 
@@ -110,7 +109,9 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     if report.boards.is_empty() && report.reports == 0 {
         // Nothing was measured: a profile of defaults would pass for what these boards are.
         let what = "no board answers: nothing was measured, no profile written";
-        return Err(Failure::new(NO_LINK, "no-boards", what).hint("ucom doctor looks for the reason"));
+        return Err(
+            Failure::new(ErrorKind::NoLink, "no-boards", what).hint("ucom doctor looks for the reason")
+        );
     }
     if report.boards.is_empty() {
         let n = report.reports;

@@ -1,11 +1,10 @@
 //! `ucom explain`: what a word means that a screen shows, and what to do.
 
-use cli_kit::{Output, table};
+use cli_kit::{Failure, Output, table};
 use serde_json::{Value, json};
 use ucom::ErrorCode;
 
 use crate::args::ExplainArgs;
-use crate::failure::Failure;
 
 /// A word of a screen.
 struct Word {

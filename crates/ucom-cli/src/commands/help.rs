@@ -1,11 +1,10 @@
 //! `ucom help`: pages about the files that ucom reads.
 
 use clap::CommandFactory;
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use serde_json::json;
 
 use crate::args::{Cli, Topic};
-use crate::failure::Failure;
 
 /// Prints a page, or the program's own help.
 pub fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {

@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use cli_kit::{Output, table};
+use cli_kit::output_file::OutputError;
+use cli_kit::{ErrorKind, Failure, Output, table};
 use serde_json::{Value, json};
 use ucom_host::files::{DbcBoard, Signal, SignalTable, SignalType, dbc as dbc_text};
 use ucom_host::master::io::{IoDescription, Kind};
@@ -16,22 +17,22 @@ use super::outputs::{named, units};
 use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 use crate::cache::of_several;
-use crate::failure::{FAULT, Failure};
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
     let file = args.template.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose();
     // What is there is a table that somebody has filled in.
-    let file = file.map_err(|e| match e.code == "exists" {
-        true => e.hint("--template - shows the table, to be added by hand; --force writes over it"),
-        false => e,
+    let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
+        true => Failure::nothing_sent(e)
+            .hint("--template - shows the table, to be added by hand; --force writes over it"),
+        false => Failure::nothing_sent(e),
     })?;
     let mut driver = link.session()?;
     let mut boards = Vec::new();
     for board in driver.numbers(&args.boards)? {
         let known = cache.known(&mut driver, &signals, board);
-        let known = known.map_err(|e| of_several(e.into(), &args.boards))?;
+        let known = known.map_err(|e| of_several(e, &args.boards))?;
         // Without a started application there is nobody to ask for them.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
@@ -226,15 +227,11 @@ fn move_for(
     driver.nothing_is_left();
     driver.nobody_lost(&[board])?;
     followed.nobody_left()?;
-    nothing_shared(&driver.master).map_err(|e| Failure { exit: FAULT, ..e.into() })?;
+    nothing_shared(&driver.master).map_err(|e| Failure { kind: ErrorKind::Fault, ..e.into() })?;
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
-        return Err(Failure::new(
-            crate::failure::NO_LINK,
-            "no-outputs",
-            format!("board {board} sent no outputs"),
-        )
-        .hint("ucom doctor looks for the reason"));
+        return Err(Failure::new(ErrorKind::NoLink, "no-outputs", format!("board {board} sent no outputs"))
+            .hint("ucom doctor looks for the reason"));
     }
     print_words("so", known, Kind::So, &words, out);
     Ok(())

@@ -25,10 +25,9 @@ mod update_bar;
 mod update_files;
 mod update_report;
 
-use cli_kit::{Output, pages};
+use cli_kit::{Failure, Output, pages};
 
 use crate::args::{Command, LinkArgs};
-use crate::failure::Failure;
 
 /// Does what the command line asks for.
 pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use cli_kit::view::Scroll;
-use cli_kit::{Key, Lines, Output, Screen};
+use cli_kit::{Failure, Key, Lines, Output, Screen};
 use serde_json::{Value, json};
 use ucom_host::master::Board;
 use ucom_host::session::{Driver, nothing_shared};
@@ -12,7 +12,6 @@ use super::doctor::controller;
 use super::monitor_view as view;
 use super::monitor_watch::Watch;
 use crate::args::{LinkArgs, MonitorArgs};
-use crate::failure::Failure;
 use crate::session::shared_numbers;
 use crate::shape::{age_s, bits, doing, info_value, is_known, life};
 

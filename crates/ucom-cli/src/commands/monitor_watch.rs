@@ -1,13 +1,12 @@
 //! What `ucom monitor` knows beside the boards: load, events, and what became of the last key.
 
+use cli_kit::Failure;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use ucom::{Function, Profile};
 use ucom_host::master::{Event, Request};
 use ucom_host::session::{Driver, event_text};
-
-use crate::failure::Failure;
 
 /// Function and addressee of another PC's frame.
 pub type CompetingMaster = (Function, u8);

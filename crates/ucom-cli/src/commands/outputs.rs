@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use cli_kit::{Lines, Output};
+use cli_kit::{ErrorKind, Failure, Lines, Output};
 use serde_json::{Map, Value, json};
 use ucom_host::files::Signal;
 use ucom_host::master::Event;
@@ -11,7 +11,6 @@ use ucom_host::master::io::{Kind, Snapshot, short};
 use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
-use crate::failure::{Failure, NO_LINK};
 
 /// Keys for so many values: the short names; the whole text where another signal has the same one, with its place where
 /// that does not help either.
@@ -85,7 +84,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         if received.elapsed() > Duration::from_secs(3) && patient {
             if args.count.is_some() {
                 return Err(Failure::new(
-                    NO_LINK,
+                    ErrorKind::NoLink,
                     "no-outputs",
                     "no board sends outputs: no control loop runs",
                 )

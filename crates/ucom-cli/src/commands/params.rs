@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use cli_kit::{Output, OutputFile, table};
+use cli_kit::output_file::OutputError;
+use cli_kit::{Failure, Output, OutputFile, table};
 use serde_json::{Value, json};
 use ucom_host::files::SignalTable;
 use ucom_host::files::params::{SavedBoard, SavedSignal, params_text};
@@ -15,7 +16,6 @@ use ucom_host::session::{
 
 use crate::args::{Boards, LinkArgs, ParArgs};
 use crate::cache::of_several;
-use crate::failure::Failure;
 
 /// Shows parameters, writes some, saves or applies a file.
 pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -26,7 +26,8 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         return Err(Failure::usage("--dry-run goes with --apply FILE"));
     }
     let signals = link.signal_table()?;
-    let file = args.save.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose()?;
+    let file = args.save.as_deref().map(|file| file_or_stdout(file, args.force.force)).transpose();
+    let file = file.map_err(Failure::nothing_sent)?;
     let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.values, "set")?;
@@ -37,7 +38,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
             true => args.cache.cache().known(&mut driver, &signals, *board),
             false => args.cache.cache().described(&mut driver, &signals, *board),
         };
-        let known = known.map_err(|e| of_several(e.into(), &args.boards))?;
+        let known = known.map_err(|e| of_several(e, &args.boards))?;
         let words = words(&known, Kind::Par, &values)?;
         note_rounded(&driver, *board, Kind::Par, &words);
         let history = History::of(&args.cache.cache(), &known.info);
@@ -56,12 +57,11 @@ pub fn open_output(file: &Path, force: bool) -> Result<OutputFile, Failure> {
     OutputFile::open(file, force, &[]).map_err(Failure::nothing_sent)
 }
 
-/// [`open_output`], but `-`, and so `None`, is
-/// stdout.
-pub fn file_or_stdout(file: &Path, force: bool) -> Result<Option<OutputFile>, Failure> {
+/// The same; `-` is stdout, and so `None`.
+pub fn file_or_stdout(file: &Path, force: bool) -> Result<Option<OutputFile>, OutputError> {
     match file.as_os_str() == "-" {
         true => Ok(None),
-        false => open_output(file, force).map(Some),
+        false => OutputFile::open(file, force, &[]).map(Some),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use cli_kit::{Output, OutputFile, Stop};
+use cli_kit::{Diagnose, ErrorKind, Failure, Output, OutputFile, Stop};
 use serde_json::json;
 use ucom_host::files::recording::{Record, Recording, RecordingError, RecordingFormat, profile_path};
 use ucom_host::master::counted;
@@ -11,7 +11,6 @@ use ucom_host::session::{self, CleanupList, Operator, Recorder, is_intrusive};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
-use crate::failure::{FAULT, Failure};
 use crate::interrupt::listen;
 use crate::session::shared_numbers;
 
@@ -19,7 +18,7 @@ use crate::session::shared_numbers;
 const FLUSH: Duration = Duration::from_secs(1);
 
 fn failed(e: RecordingError) -> Failure {
-    Failure::new(FAULT, "recording", e).hint("is the disk full?")
+    Failure::new(ErrorKind::Fault, "recording", e).hint("is the disk full?")
 }
 
 /// Reports that a recording does not end as one does.

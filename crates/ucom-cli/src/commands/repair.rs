@@ -4,11 +4,10 @@ use serde_json::json;
 use ucom_host::files::Inventory;
 use ucom_host::master::{Outcome, Request};
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use ucom_host::session::SessionError;
 
 use crate::args::{LinkArgs, RepairArgs};
-use crate::failure::Failure;
 use crate::shape::{board_table, board_value};
 
 /// Repairs the board; its flash number must be the one that is named, else as the inventory has it.

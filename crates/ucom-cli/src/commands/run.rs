@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use cli_kit::{Lines, Output};
+use cli_kit::{ErrorKind, Failure, Lines, Output};
 use serde_json::{Value, json};
 use ucom_host::files::SignalTable;
 use ucom_host::master::io::Kind;
@@ -16,7 +16,6 @@ use ucom_host::session::{
 use super::outputs::{finish, named, units};
 use super::typed::{obey, typed};
 use crate::args::{Boards, LinkArgs, OnLost, RunArgs};
-use crate::failure::{FAULT, Failure};
 
 /// How often `run` shows how things are.
 const REPORT_PERIOD: Duration = Duration::from_secs(1);
@@ -75,7 +74,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     result?;
     if !running.is_empty() {
         let next = format!("without heartbeats they become safe by themselves; ucom stop {}", list.join(","));
-        return Err(Failure::new(FAULT, "not-stopped", not_stopped).hint(next));
+        return Err(Failure::new(ErrorKind::Fault, "not-stopped", not_stopped).hint(next));
     }
     driver.nobody_lost(&boards)?;
     Ok(followed.nobody_left()?)
@@ -164,7 +163,7 @@ fn supervise(
             print(driver, notice);
         }
         // What was found while it runs: a fault, not a refusal.
-        nothing_shared(&driver.master).map_err(|e| Failure { exit: FAULT, ..e.into() })?;
+        nothing_shared(&driver.master).map_err(|e| Failure { kind: ErrorKind::Fault, ..e.into() })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {
                 return Ok(());

@@ -9,7 +9,7 @@ use can_link::{
     BusError, BusEvent, BusStats, CanFrame, ClientEvent, ClientId, ErrorState, MemberId, SocketcandGateway,
     TimedBus, TimedEvent,
 };
-use cli_kit::{Output, Stop};
+use cli_kit::{Failure, Output, Stop};
 use serde_json::json;
 use ucom::{Format, Frame, Profile};
 use ucom_host::master::counted;
@@ -17,7 +17,6 @@ use ucom_host::session::{CleanupList, to_wire};
 use ucom_sim::{ChainConfig, ChainSim, Fault};
 
 use crate::args::{LinkArgs, SimArgs};
-use crate::failure::Failure;
 use crate::interrupt::listen;
 
 /// The name of the bus.

@@ -1,5 +1,6 @@
 //! What is typed while `ucom run` runs: inputs, parameters, outputs on and off.
 
+use cli_kit::Failure;
 use std::io::{BufRead, ErrorKind};
 use std::sync::mpsc::{Receiver, channel};
 
@@ -8,7 +9,6 @@ use ucom_host::master::{AdminChange, Request, Setting};
 use ucom_host::session::{Driver, History, Prepared, note_rounded, only, words};
 
 use crate::args::{Assignment, RunArgs};
-use crate::failure::Failure;
 
 /// Lines on stdin, read beside the bus.
 pub fn typed() -> Receiver<String> {

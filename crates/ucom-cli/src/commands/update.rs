@@ -1,19 +1,18 @@
 //! `ucom update`: firmware onto boards, checked, written, verified.
 
-use cli_kit::Output;
+use cli_kit::{ErrorKind, Failure, Output};
 use ucom::Profile;
 use ucom_host::files::Inventory;
 use ucom_host::master::update::{
     UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult, UpdateTarget,
 };
 use ucom_host::master::{Outcome, Request};
-use ucom_host::session::{Driver, SessionError};
+use ucom_host::session::SessionError;
 
 use super::update_bar::Bar;
 use super::update_files::{Files, day};
 use super::update_report::print;
 use crate::args::{Boards, LinkArgs, UpdateArgs};
-use crate::failure::{Failure, REFUSED, exit};
 
 /// Programs the boards that are meant.
 pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -21,9 +20,9 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let files = Files::read(args, &profile, out)?;
     let day = day(args.date.as_deref(), &profile)?;
     let mut driver = link.session_with(profile)?;
-    let numbers = match numbers(&mut driver, args) {
-        Err(failure) if driver.stop_asked() => return Err(cancelled(failure, args, &profile, out)),
-        numbers => numbers?,
+    let numbers = match driver.numbers(&args.boards) {
+        Err(e) if e.is_cancelled() => return Err(cancelled(e, args, &profile, out)),
+        answered => with_listed(answered?, args)?,
     };
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
@@ -53,7 +52,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     print(&report, &files.names, &profile, out);
     match report.failure() {
         None => Ok(()),
-        Some(kind) => Err(Failure::printed(exit(kind))),
+        Some(kind) => Err(Failure::printed(kind)),
     }
 }
 
@@ -65,8 +64,7 @@ fn target(target: &UpdateTarget) -> String {
 }
 
 /// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is reported.
-fn numbers(driver: &mut Driver, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
-    let mut numbers = driver.numbers(&args.boards)?;
+fn with_listed(mut numbers: Vec<u8>, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
     if args.boards == Boards::All && args.inventory.exists() {
         let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
         numbers.extend(inventory_numbers(&inventory));
@@ -81,10 +79,7 @@ fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
 }
 
 /// Ctrl-C while it was still asked who is there: nothing was sent that changes a board, which the report shows.
-fn cancelled(failure: Failure, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
-    if failure.code != "cancelled" {
-        return failure;
-    }
+fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
     let inventory = Inventory::read(&args.inventory).ok();
     let left = UpdateOutcome::Cancelled;
     let board = |board| UpdateResult {
@@ -99,11 +94,11 @@ fn cancelled(failure: Failure, args: &UpdateArgs, profile: &Profile, out: &Outpu
     };
     let boards = inventory.as_ref().map_or_else(Vec::new, |i| inventory_numbers(i).map(board).collect());
     if boards.is_empty() {
-        return Failure { exit: REFUSED, ..failure };
+        return Failure { kind: ErrorKind::Refused, ..error.into() };
     }
     let report = UpdateReport { dry_run: args.dry_run, boards, ..UpdateReport::default() };
     print(&report, &[], profile, out);
-    Failure::printed(report.failure().map_or(0, exit))
+    Failure::printed(report.failure().unwrap_or(ErrorKind::Refused))
 }
 
 /// Which flash number each board must have: named, else as the inventory has it.
@@ -121,7 +116,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
             return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
         }
         return Err(Failure::new(
-            REFUSED,
+            ErrorKind::Refused,
             "no-inventory",
             format!("which boards stand where? there is no inventory {}", args.inventory.display()),
         )
@@ -131,7 +126,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
     let target = |board: &u8| match inventory.get(*board) {
         Some(known) => Ok(UpdateTarget { board: *board, flash_number: Some(known.flash_number) }),
         None => Err(Failure::new(
-            REFUSED,
+            ErrorKind::Refused,
             "not-in-inventory",
             format!("board {board} is not in the inventory {}", args.inventory.display()),
         )

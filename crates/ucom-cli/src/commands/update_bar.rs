@@ -3,11 +3,9 @@
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
 
-use cli_kit::{Output, ProgressBar};
+use cli_kit::{ErrorKind, Failure, Output, ProgressBar};
 use ucom_host::master::Event;
 use ucom_host::master::update::Progress;
-
-use crate::failure::{FAULT, Failure};
 
 /// Steps that wait to be drawn; more are left out.
 const WAITING: usize = 4;
@@ -42,10 +40,9 @@ impl<'a> Bar<'a> {
             draw(&drawn);
             drop(end);
         };
-        std::thread::Builder::new()
-            .name("progress".into())
-            .spawn(draw)
-            .map_err(|e| Failure::new(FAULT, "thread", format!("no thread for the progress bar: {e}")))?;
+        std::thread::Builder::new().name("progress".into()).spawn(draw).map_err(|e| {
+            Failure::new(ErrorKind::Fault, "thread", format!("no thread for the progress bar: {e}"))
+        })?;
         Ok(Self { out, bar: None, serial: 0, steps, ended })
     }
 

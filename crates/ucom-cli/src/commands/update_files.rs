@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cli_kit::Output;
+use cli_kit::{Failure, Output};
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
 use ucom::profile::{HeaderForm, Plan};
@@ -11,7 +11,6 @@ use ucom_host::files::{Image, ImageOptions};
 use ucom_host::master::update::UpdateImage;
 
 use crate::args::{Addresses, UpdateArgs};
-use crate::failure::Failure;
 
 /// What the files hold.
 pub struct Files {

@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 
-use cli_kit::{Output, table};
+use cli_kit::{Diagnose, Failure, Output, exit, table};
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Memory, Profile};
 use ucom_host::date_text;
 use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult};
 
 use super::update_files::has_header;
-use crate::failure::exit;
 
 /// Prints the report; `names` are the files of its images.
 pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {
@@ -27,7 +26,7 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
             _ => Value::Null,
         },
         "boards": report.boards.iter().map(|b| result(b, report, profile)).collect::<Vec<_>>(),
-        "exit": report.failure().map_or(0, exit),
+        "exit": report.failure().map_or(0, exit::of),
     });
     out.result(&value, || {
         let mut text = String::new();
@@ -153,8 +152,6 @@ fn result(b: &UpdateResult, report: &UpdateReport, profile: &Profile) -> Value {
         "changed": changed(b),
         "attempts": b.attempts,
         "time_s": b.time_us as f64 * 1e-6,
-        "error": b.failure.as_ref().map(|f| json!({
-            "code": f.code(), "message": f.to_string(), "hint": f.hint(), "exit": exit(f.kind()),
-        })),
+        "error": b.failure.as_ref().map(|f| Failure::of(f).to_json()),
     })
 }

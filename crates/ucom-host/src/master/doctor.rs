@@ -2,7 +2,7 @@
 use crate::master::engine::{Boards, Life, Statistics};
 use crate::master::error::SHARED_CAUSE;
 use crate::master::reports::{InitFinding, InitReport, ScanFinding, ScanReport};
-use host_kit::Findings;
+use host_kit::{Diagnose, Findings};
 pub use host_kit::{Finding, Severity};
 
 use crate::master::counted::counted;

@@ -71,7 +71,7 @@ pub use error::{
     AddressError, Error, ExchangeError, IdentityError, Incomplete, LastReceived, MasterError, Received,
     RunningError, SignalError, StatusError,
 };
-pub use host_kit::ErrorKind;
+pub use host_kit::{Diagnose, Diagnosis, ErrorKind};
 pub use interface::Master;
 pub use load::{LoadForecast, frame_bits};
 pub use reports::{

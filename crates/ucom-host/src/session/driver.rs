@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, ErrorKind};
 use ucom::Profile;
 
 use super::cleanup::CleanupList;

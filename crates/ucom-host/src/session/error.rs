@@ -1,11 +1,11 @@
 //! Why a session did not do what was asked: a procedure failed, or what is around it did.
 use can_link::{CanError, InvalidFrame};
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 use super::bus_off;
 use crate::files::signals::ValueError;
 use crate::master::io::Kind;
-use crate::master::{Error, ExchangeError, Outcome};
+use crate::master::{Error, ExchangeError, MasterError, Outcome, SignalError};
 
 /// Why a session did not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -17,6 +17,9 @@ pub enum SessionError {
     /// Values do not fit the boards, or what became of them is not known.
     #[error(transparent)]
     Values(#[from] ValuesError),
+    /// The bus cannot be opened.
+    #[error("{0}")]
+    Open(Box<CanError>),
     /// The open bus failed.
     #[error("{0}")]
     Bus(CanError),
@@ -134,33 +137,14 @@ pub enum ValuesError {
 }
 
 impl SessionError {
-    /// What kind of failure it is.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Self::Procedure(e) => e.kind(),
-            Self::Values(e) => e.kind(),
-            Self::BusOff { failure, .. } => failure.kind(),
-            Self::Bus(_) | Self::NoBoards | Self::NoNumbers { .. } => ErrorKind::NoLink,
-            Self::Frame(_) | Self::Lost { .. } | Self::LeftLoop { .. } | Self::Unexpected(_) => {
-                ErrorKind::Fault
-            }
-        }
+    /// The operator asked for an end before the procedure came to its own.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Procedure(Error::Master(MasterError::Cancelled)))
     }
 
-    /// A short name for programs.
-    pub fn code(&self) -> &'static str {
-        match self {
-            Self::Procedure(e) => e.code(),
-            Self::Values(e) => e.code(),
-            Self::BusOff { failure, .. } => failure.code(),
-            Self::Bus(_) => "bus",
-            Self::Frame(_) => "frame",
-            Self::NoBoards => "no-boards",
-            Self::NoNumbers { .. } => "no-numbers",
-            Self::Lost { .. } => "lost",
-            Self::LeftLoop { .. } => "left-loop",
-            Self::Unexpected(_) => "internal",
-        }
+    /// A board could be asked if its application were started.
+    pub fn is_not_started(&self) -> bool {
+        matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }
 
     /// A board did not answer, whatever the reason.
@@ -171,24 +155,34 @@ impl SessionError {
             _ => false,
         }
     }
+}
 
-    /// The next command or act; empty when there is none.
-    pub fn hint(&self) -> String {
-        let hint = match self {
-            Self::Procedure(e) => return e.hint(),
-            Self::Values(e) => return e.hint(),
-            Self::BusOff { url, .. } => return bus_off::next(url),
-            Self::Bus(_) => "is the bus still there? ucom doctor looks at it",
-            Self::Frame(_) => "",
-            Self::NoBoards => "ucom doctor looks for the reason",
-            Self::NoNumbers { .. } => "ucom init numbers them",
-            Self::Lost { .. } => "ucom doctor looks at bus and boards",
-            Self::LeftLoop { .. } => {
-                "ucom doctor: another PC on the bus, heartbeats that did not arrive, an application that stops"
+impl Diagnose for SessionError {
+    fn diagnosis(&self) -> Diagnosis {
+        use ErrorKind::{Fault, NoLink, Usage};
+        let (kind, code, next) = match self {
+            Self::Procedure(e) => return e.diagnosis(),
+            Self::Values(e) => return e.diagnosis(),
+            Self::BusOff { failure, url } => {
+                return Diagnosis { next: bus_off::next(url), ..failure.diagnosis() };
             }
-            Self::Unexpected(_) => "this is a mistake in ucom; please report it",
+            Self::Open(e) if matches!(**e, CanError::Url(_)) => {
+                (Usage, "usage", "ucom --help shows the forms of --bus")
+            }
+            Self::Open(_) => (NoLink, "bus", "is the bus there and up? ucom sim makes a simulated one"),
+            Self::Bus(_) => (NoLink, "bus", "is the bus still there? ucom doctor looks at it"),
+            Self::Frame(_) => (Fault, "frame", ""),
+            Self::NoBoards => (NoLink, "no-boards", "ucom doctor looks for the reason"),
+            Self::NoNumbers { .. } => (NoLink, "no-numbers", "ucom init numbers them"),
+            Self::Lost { .. } => (Fault, "lost", "ucom doctor looks at bus and boards"),
+            Self::LeftLoop { .. } => (
+                Fault,
+                "left-loop",
+                "ucom doctor: another PC on the bus, heartbeats that did not arrive, an application that stops",
+            ),
+            Self::Unexpected(_) => (Fault, "internal", "this is a mistake in ucom; please report it"),
         };
-        hint.into()
+        Diagnosis::new(kind, code, next)
     }
 }
 
@@ -198,48 +192,34 @@ impl From<Outcome> for SessionError {
     }
 }
 
-impl ValuesError {
-    /// What kind of failure it is.
-    pub fn kind(&self) -> ErrorKind {
+impl Diagnose for ValuesError {
+    fn diagnosis(&self) -> Diagnosis {
+        use ErrorKind::{Fault, Refused, Usage};
         match self {
-            Self::NoSignal { .. } | Self::Twice { .. } | Self::NotMeant { .. } | Self::File { .. } => {
-                ErrorKind::Usage
-            }
-            Self::Value { .. } | Self::Misfit { .. } => ErrorKind::Refused,
-            Self::Unknown { .. } => ErrorKind::Fault,
-        }
-    }
-
-    /// A short name for programs.
-    pub fn code(&self) -> &'static str {
-        match self {
-            Self::NoSignal { .. } | Self::Twice { .. } | Self::NotMeant { .. } | Self::File { .. } => "usage",
-            Self::Value { .. } => "value",
-            Self::Unknown { .. } => "unknown",
-            Self::Misfit { .. } => "params",
-        }
-    }
-
-    /// The next command or act; empty when there is none.
-    pub fn hint(&self) -> String {
-        match self {
-            Self::NoSignal { .. } | Self::NotMeant { .. } => String::new(),
-            Self::Twice { .. } => "give each name once: nothing was sent".into(),
+            Self::NoSignal { .. } | Self::NotMeant { .. } => Diagnosis::new(Usage, "usage", ""),
+            Self::Twice { .. } => Diagnosis::new(Usage, "usage", "give each name once: nothing was sent"),
             Self::Value { error, program_id, .. } if matches!(**error, ValueError::Meaning { .. }) => {
-                format!(
+                let next = format!(
                     "add program 0x{program_id:04X} to the signal table (ucom help edges), or give the word as 0x0000"
-                )
+                );
+                Diagnosis::new(Refused, "value", next)
             }
-            Self::Value { board, .. } => {
-                format!("ucom io {board} shows types, scales and units; a word as 0x05DC is sent as it is")
-            }
-            Self::Unknown { board, .. } => {
-                format!("ucom status {board} shows its state; ucom start {board}, and write them again")
-            }
-            Self::File { hint, .. } => (*hint).into(),
-            Self::Misfit { .. } => {
-                "nothing was written; ucom io shows names and ranges, ucom info the boards".into()
-            }
+            Self::Value { board, .. } => Diagnosis::new(
+                Refused,
+                "value",
+                format!("ucom io {board} shows types, scales and units; a word as 0x05DC is sent as it is"),
+            ),
+            Self::Unknown { board, .. } => Diagnosis::new(
+                Fault,
+                "unknown",
+                format!("ucom status {board} shows its state; ucom start {board}, and write them again"),
+            ),
+            Self::File { hint, .. } => Diagnosis::new(Usage, "usage", *hint),
+            Self::Misfit { .. } => Diagnosis::new(
+                Refused,
+                "params",
+                "nothing was written; ucom io shows names and ranges, ucom info the boards",
+            ),
         }
     }
 }

@@ -238,6 +238,7 @@ fn age_s(last: &Snapshot, now_us: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use host_kit::Diagnose;
     use ucom::Profile;
 
     use super::*;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use can_link::{CanBus, CanError, CanFrame, ControllerState, Id};
+use can_link::{CanBus, CanFrame, ControllerState, Id};
 use ucom::{Foreign, Format, Frame};
 
 use super::bus_off::BusOff;
@@ -30,8 +30,8 @@ impl Link {
     ///
     /// # Errors
     /// The URL is none, or the bus cannot be opened.
-    pub fn open(url: &str) -> Result<Self, CanError> {
-        let bus = can_link::open(url)?;
+    pub fn open(url: &str) -> Result<Self, SessionError> {
+        let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
         Ok(Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() })
     }
 

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, ErrorKind};
 
 use super::driver::Driver;
 use super::error::{SessionError, ValuesError};

@@ -7,7 +7,7 @@ use ucom::{Frame, Profile};
 use ucom_host::master::conformance::ConformanceReport;
 use ucom_host::master::update::UpdateReport;
 use ucom_host::master::{
-    Error, ErrorKind, Event, InitReport, Master, Outcome, ProcedureId, Request, frame_bits,
+    Diagnose, Error, ErrorKind, Event, InitReport, Master, Outcome, ProcedureId, Request, frame_bits,
 };
 use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 

@@ -5,7 +5,7 @@ use ucom::Profile;
 use ucom::node::Phase;
 use ucom::{Function, Status};
 use ucom_host::master::{
-    Error, Event, ExchangeError, InitOptions, Life, MasterError, Outcome, Request, StatusError,
+    Diagnose, Error, Event, ExchangeError, InitOptions, Life, MasterError, Outcome, Request, StatusError,
 };
 
 use crate::bench::{Bench, MS, Script, frame};

@@ -6,7 +6,7 @@ use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::update::UpdateFailure;
 use ucom_host::master::{
-    Error, Event, IdentityError, InitFinding, InitOptions, Outcome, Request, ScanFinding,
+    Diagnose, Error, Event, IdentityError, InitFinding, InitOptions, Outcome, Request, ScanFinding,
 };
 
 use crate::bench::{Bench, image};

@@ -5,8 +5,8 @@ use ucom::profile::OnLost;
 use ucom::{Admin, Profile};
 use ucom_host::master::io::{IoDescription, ParValue};
 use ucom_host::master::{
-    AdminChange, Error, Event, ExchangeError, IdentityError, InitOptions, Life, MasterError, Outcome,
-    Request, RunBoard, RunOptions, RunningError, Setting, SignalError, StopLevel, Supervision,
+    AdminChange, Diagnose, Error, Event, ExchangeError, IdentityError, InitOptions, Life, MasterError,
+    Outcome, Request, RunBoard, RunOptions, RunningError, Setting, SignalError, StopLevel, Supervision,
 };
 
 use crate::bench::{Bench, CI, MS, PAR, SO, Script};

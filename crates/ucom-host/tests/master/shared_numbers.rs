@@ -6,7 +6,7 @@ use ucom_host::master::conformance::ConformanceOptions;
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::update::{UpdateFailure, UpdateImage, UpdateOptions, UpdateOutcome, UpdateTarget};
 use ucom_host::master::{
-    AdminChange, Error, Event, IdentityError, InitOptions, Outcome, Request, RunBoard, RunOptions,
+    AdminChange, Diagnose, Error, Event, IdentityError, InitOptions, Outcome, Request, RunBoard, RunOptions,
     ScanFinding, StopLevel,
 };
 use ucom_sim::memory::WirePins;

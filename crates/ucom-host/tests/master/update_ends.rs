@@ -3,7 +3,9 @@
 use crate::bench::Exit;
 use ucom::{Frame, Status};
 use ucom_host::master::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdateReport};
-use ucom_host::master::{Error, Event, IdentityError, Master, MasterError, Outcome, Request, StatusError};
+use ucom_host::master::{
+    Diagnose, Error, Event, IdentityError, Master, MasterError, Outcome, Request, StatusError,
+};
 
 use crate::bench::{Bench, From, Member, OLD, Script};
 use crate::chain::initialised;

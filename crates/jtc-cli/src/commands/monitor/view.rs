@@ -5,8 +5,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use cli_kit::figure;
 use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small};
+use cli_kit::{Failure, figure};
 use jtc_host::sample::is_measured;
 use jtc_host::words;
 use jtc_wire::{Code, ControllerState, Status};
@@ -17,7 +17,6 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Sparkline};
 
 use super::joints::{self, COLOURS};
-use crate::failure::Failure;
 
 /// Values that the curves show: 8 s of statuses.
 const HISTORY: usize = 200;

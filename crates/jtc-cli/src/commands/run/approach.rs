@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cli_kit::Output;
+use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::check::CheckedTrajectory;
 use jtc_host::session::UploadOptions;
 use jtc_host::{CheckError, plan};
@@ -12,7 +12,6 @@ use serde_json::json;
 use super::super::job::{Job, typed};
 use super::APPROACH;
 use crate::args::RunArgs;
-use crate::failure::{Failure, REFUSED};
 
 /// A motion to the first point, checked.
 pub fn approach(
@@ -37,7 +36,7 @@ pub fn approach(
         let value = json!({ "outcome": "refused", "phase": APPROACH, "verdict": verdict, "error": error });
         out.result(&value, String::new);
         out.note(format!("jtc: {}\n     {}", failure.message, failure.hint));
-        Failure::printed(failure.exit)
+        Failure::printed(failure.kind)
     })?;
     out.note(format!("approach: {:.1} s to the first point", path.duration_s()));
     Ok(checked)
@@ -52,7 +51,7 @@ fn refused(why: &str, file: &Path) -> Failure {
         "nothing moved, and {file} itself passed: bring the arm nearer to its first point (`jtc traj info {file}` shows it), by hand \
          with `jtc teach on` and `jtc teach off`, or with a trajectory of your own around what is in the way"
     );
-    Failure { exit: REFUSED, code: APPROACH.into(), ..Failure::usage(message) }.hint(hint)
+    Failure::new(ErrorKind::Refused, APPROACH, message).hint(hint)
 }
 
 #[cfg(test)]
@@ -63,7 +62,7 @@ mod tests {
     #[test]
     fn a_refused_approach_does_not_send_people_to_correct_their_file() {
         let failure = refused("joint 2: no stop in time", Path::new("my motion.csv"));
-        assert_eq!((failure.exit, failure.code.as_str()), (4, "approach"));
+        assert_eq!((failure.kind, failure.code), (ErrorKind::Refused, "approach"));
         assert!(failure.message.contains("first point of 'my motion.csv' is refused: joint 2"));
         assert!(
             failure.hint.contains("jtc traj info 'my motion.csv'") && failure.hint.contains("jtc teach on")

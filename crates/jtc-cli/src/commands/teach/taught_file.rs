@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write;
 
-use crate::failure::Failure;
-use cli_kit::OutputFile;
+use cli_kit::{Failure, OutputFile};
+
+use crate::failure::recording_broken_off;
 
 /// Movement below this is standing still, rad.
 const STILL: f64 = 0.002;
@@ -88,7 +89,7 @@ impl TaughtFile {
         };
         let Some(file) = &mut self.file else { return Ok(()) };
         let done = file.write_all(&self.text.as_bytes()[fresh..]);
-        done.map_err(|e| Failure::usage(format!("{}: {e}", self.name)).recording_broken_off())
+        done.map_err(|e| recording_broken_off(Failure::usage(format!("{}: {e}", self.name))))
     }
 
     fn row(&mut self, slot: i64, position: [f64; 6]) {
@@ -122,8 +123,7 @@ impl TaughtFile {
             }
             Ok(())
         };
-        settle()
-            .map_err(|e: std::io::Error| Failure::usage(format!("{name}: {e}")).recording_broken_off())?;
+        settle().map_err(|e: std::io::Error| recording_broken_off(Failure::usage(format!("{name}: {e}"))))?;
         Ok(Some(text))
     }
 }
@@ -135,6 +135,7 @@ fn moved(a: &[f64; 6], b: &[f64; 6]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cli_kit::ErrorKind;
     use jtc_host::trajectory::Loaded;
 
     /// Rest for 0.4 s, to 0.5 rad in 1 s, rest for 0.4 s.
@@ -189,8 +190,7 @@ mod tests {
         let output = OutputFile::open(std::path::Path::new("/dev/full"), false, &[]).unwrap();
         let mut taught = TaughtFile::new(output);
         let failure = (0..45).find_map(|k| taught.take(f64::from(k) * GRID_S, pose(k)).err()).unwrap();
-        assert!(failure.exit == FAULT && failure.message.contains("No space left"), "{}", failure.message);
+        assert_eq!(failure.kind, ErrorKind::Fault);
+        assert!(failure.message.contains("No space left"), "{}", failure.message);
     }
-
-    use crate::failure::FAULT;
 }

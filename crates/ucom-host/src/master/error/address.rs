@@ -1,7 +1,6 @@
 //! Address assignment that was refused.
-use crate::master::error::facts::Facts;
 use crate::master::error::identity::OTHER_PROTOCOL;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 /// Why boards did not get their numbers.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -35,17 +34,17 @@ pub enum AddressError {
     },
 }
 
-impl AddressError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for AddressError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::AckMismatch { .. } => (ErrorKind::Refused, "ack-mismatch", OTHER_PROTOCOL.into()),
-            Self::MayTakeNumber { other, .. } => (
+            Self::AckMismatch { .. } => Diagnosis::new(ErrorKind::Refused, "ack-mismatch", OTHER_PROTOCOL),
+            Self::MayTakeNumber { other, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "may-take-number",
                 format!("`ucom repair {other}` first, or number all boards anew: `ucom init`"),
             ),
             Self::NotNumbered { .. } => {
-                (ErrorKind::Refused, "not-numbered", "`ucom init`, then again".into())
+                Diagnosis::new(ErrorKind::Refused, "not-numbered", "`ucom init`, then again")
             }
         }
     }

@@ -1,9 +1,8 @@
 //! An exchange with a board that failed.
 use core::fmt;
 
-use crate::master::error::facts::Facts;
 use crate::master::error::words::MEASURE_ORDER;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::{ErrorCode, Function};
 
 /// Why an exchange with a board failed.
@@ -66,18 +65,20 @@ pub enum ExchangeError {
     },
 }
 
-impl ExchangeError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for ExchangeError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::NoBoard { .. } => (ErrorKind::Usage, "no-board", "`ucom scan` lists the boards".into()),
-            Self::NoAnswer { board, last: None, .. } => (
+            Self::NoBoard { .. } => {
+                Diagnosis::new(ErrorKind::Usage, "no-board", "`ucom scan` lists the boards")
+            }
+            Self::NoAnswer { board, last: None, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "no-answer",
                 format!(
                     "no frame of board {board} was received: `ucom scan` lists who is there, `ucom doctor` why not"
                 ),
             ),
-            Self::NoAnswer { board, .. } => (
+            Self::NoAnswer { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "no-answer",
                 format!(
@@ -85,22 +86,24 @@ impl ExchangeError {
                 ),
             ),
             Self::Incomplete { problem: Incomplete::ByteOrder { .. }, .. } => {
-                (ErrorKind::NoLink, "incomplete-answer", MEASURE_ORDER.into())
+                Diagnosis::new(ErrorKind::NoLink, "incomplete-answer", MEASURE_ORDER)
             }
-            Self::Incomplete { problem: Incomplete::TooMany { .. } | Incomplete::Start { .. }, .. } => (
+            Self::Incomplete { problem: Incomplete::TooMany { .. } | Incomplete::Start { .. }, .. } => {
+                Diagnosis::new(
+                    ErrorKind::NoLink,
+                    "incomplete-answer",
+                    "the board may read the protocol otherwise: `ucom probe` measures it",
+                )
+            }
+            Self::Incomplete { .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "incomplete-answer",
-                "the board may read the protocol otherwise: `ucom probe` measures it".into(),
-            ),
-            Self::Incomplete { .. } => (
-                ErrorKind::NoLink,
-                "incomplete-answer",
-                "frames get lost: `ucom doctor` looks at bus load, error counters and termination".into(),
+                "frames get lost: `ucom doctor` looks at bus load, error counters and termination",
             ),
             Self::Contradiction { .. } => {
-                (ErrorKind::Refused, "contradiction", "number the boards anew: `ucom init`".into())
+                Diagnosis::new(ErrorKind::Refused, "contradiction", "number the boards anew: `ucom init`")
             }
-            Self::Device { code, .. } => (ErrorKind::Device, "device-error", code.reaction().into()),
+            Self::Device { code, .. } => Diagnosis::new(ErrorKind::Device, "device-error", code.reaction()),
         }
     }
 }

@@ -1,9 +1,8 @@
 //! A board that is not the one that is meant.
 use core::fmt;
 
-use crate::master::error::facts::Facts;
 use crate::master::error::words::{MEASURE_ORDER, other_order};
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::profile::Endian;
 
 /// Why a board is not the one that is meant.
@@ -50,15 +49,30 @@ pub enum IdentityError {
     },
 }
 
-impl IdentityError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for IdentityError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::WrongSequence { .. } => (ErrorKind::Refused, "wrong-sequence", OTHER_PROTOCOL.into()),
-            Self::WrongBoard { wanted, found, .. } if *wanted == found.swap_bytes() => (ErrorKind::Refused, "wrong-board", "only the bytes are exchanged: is the byte order right (`endian` in the profile)? `ucom probe` measures it"
-                    .into()),
-            Self::WrongBoard { board, .. } => (ErrorKind::Refused, "wrong-board", format!("`ucom info {board}` shows who stands there; boards may have been swapped: `ucom init`")),
-            Self::ByteOrder { .. } => (ErrorKind::Refused, "byte-order", MEASURE_ORDER.into()),
-            Self::NumberShared { .. } => (ErrorKind::Refused, "number-shared", format!("{}; {}", SHARED_CAUSE.0, SHARED_CAUSE.1)),
+            Self::WrongSequence { .. } => {
+                Diagnosis::new(ErrorKind::Refused, "wrong-sequence", OTHER_PROTOCOL)
+            }
+            Self::WrongBoard { wanted, found, .. } if *wanted == found.swap_bytes() => Diagnosis::new(
+                ErrorKind::Refused,
+                "wrong-board",
+                "only the bytes are exchanged: is the byte order right (`endian` in the profile)? `ucom probe` measures it",
+            ),
+            Self::WrongBoard { board, .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "wrong-board",
+                format!(
+                    "`ucom info {board}` shows who stands there; boards may have been swapped: `ucom init`"
+                ),
+            ),
+            Self::ByteOrder { .. } => Diagnosis::new(ErrorKind::Refused, "byte-order", MEASURE_ORDER),
+            Self::NumberShared { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "number-shared",
+                format!("{}; {}", SHARED_CAUSE.0, SHARED_CAUSE.1),
+            ),
         }
     }
 }

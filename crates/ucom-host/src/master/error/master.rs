@@ -1,7 +1,6 @@
 //! Procedures that this PC did not begin, or ended.
-use crate::master::error::facts::Facts;
 use crate::master::error::words::Boards;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Function;
 
 /// Why this PC did not begin a procedure, or ended it.
@@ -37,23 +36,25 @@ pub enum MasterError {
     Cancelled,
 }
 
-impl MasterError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for MasterError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::CompetingMaster { .. } => (
+            Self::CompetingMaster { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "foreign-master",
-                "end the other program, or force this one if you know that it does not matter".into(),
+                "end the other program, or force this one if you know that it does not matter",
             ),
-            Self::Busy { .. } => (ErrorKind::Refused, "busy", "wait for it, or cancel it".into()),
-            Self::Bus { .. } => (
+            Self::Busy { .. } => Diagnosis::new(ErrorKind::Refused, "busy", "wait for it, or cancel it"),
+            Self::Bus { .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "bus",
-                "is the bus still there, the adapter plugged in? `ucom doctor` looks at it".into(),
+                "is the bus still there, the adapter plugged in? `ucom doctor` looks at it",
             ),
-            Self::Cancelled => {
-                (ErrorKind::Fault, "cancelled", "`ucom scan` shows in what state the boards are".into())
-            }
+            Self::Cancelled => Diagnosis::new(
+                ErrorKind::Fault,
+                "cancelled",
+                "`ucom scan` shows in what state the boards are",
+            ),
         }
     }
 }

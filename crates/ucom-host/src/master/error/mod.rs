@@ -2,7 +2,6 @@
 //! one of a procedure, which is any of them.
 mod address;
 mod exchange;
-mod facts;
 mod identity;
 mod master;
 mod plan;

@@ -1,6 +1,5 @@
 //! Why an update cannot be planned.
-use crate::master::error::facts::Facts;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::profile::Plan;
 
 /// Why an update cannot be planned.
@@ -49,26 +48,28 @@ pub enum PlanError {
     Void,
 }
 
-impl PlanError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for PlanError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::NoTarget | Self::Twice { .. } => {
-                (ErrorKind::Usage, "plan", "`ucom update N IMAGE` with a number, a list or `all`".into())
-            }
-            Self::Empty | Self::HalfWord { .. } => (
+            Self::NoTarget | Self::Twice { .. } => Diagnosis::new(
                 ErrorKind::Usage,
                 "plan",
-                "is it the right file? `ucom update --dry-run` shows what it holds".into(),
+                "`ucom update N IMAGE` with a number, a list or `all`",
+            ),
+            Self::Empty | Self::HalfWord { .. } => Diagnosis::new(
+                ErrorKind::Usage,
+                "plan",
+                "is it the right file? `ucom update --dry-run` shows what it holds",
             ),
             Self::SecondMissing { .. } | Self::SecondUnused { .. } => {
-                (ErrorKind::Usage, "plan", "see `prog.plan` in `ucom help profile`".into())
+                Diagnosis::new(ErrorKind::Usage, "plan", "see `prog.plan` in `ucom help profile`")
             }
-            Self::OtherProgram { .. } => (
+            Self::OtherProgram { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "plan",
-                "is it the right file? without `--expect-program-id` it is not compared".into(),
+                "is it the right file? without `--expect-program-id` it is not compared",
             ),
-            Self::Void => (ErrorKind::Usage, "plan", "`--date YYYY-MM-DD`".into()),
+            Self::Void => Diagnosis::new(ErrorKind::Usage, "plan", "`--date YYYY-MM-DD`"),
         }
     }
 }

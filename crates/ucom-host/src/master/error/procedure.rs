@@ -1,16 +1,16 @@
 //! What can go wrong in a procedure, with the facts in it, the kind of failure and the command that helps.
 use crate::master::error::address::AddressError;
 use crate::master::error::exchange::ExchangeError;
-use crate::master::error::facts::Facts;
 use crate::master::error::identity::IdentityError;
 use crate::master::error::master::MasterError;
 use crate::master::error::plan::PlanError;
 use crate::master::error::running::RunningError;
 use crate::master::error::signal::SignalError;
 use crate::master::error::status::StatusError;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis};
 
-/// Why a procedure did not do what was asked.
+/// Why a procedure did not do what was asked. The kind of an update that failed is that of its report, see
+/// [`UpdateReport::failure`](crate::master::update::UpdateReport::failure).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(transparent)]
 #[non_exhaustive]
@@ -33,33 +33,17 @@ pub enum Error {
     Master(#[from] MasterError),
 }
 
-impl Error {
-    fn facts(&self) -> Facts {
+impl Diagnose for Error {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::Exchange(e) => e.facts(),
-            Self::Identity(e) => e.facts(),
-            Self::Address(e) => e.facts(),
-            Self::Status(e) => e.facts(),
-            Self::Running(e) => e.facts(),
-            Self::Signal(e) => e.facts(),
-            Self::Plan(e) => e.facts(),
-            Self::Master(e) => e.facts(),
+            Self::Exchange(e) => e.diagnosis(),
+            Self::Identity(e) => e.diagnosis(),
+            Self::Address(e) => e.diagnosis(),
+            Self::Status(e) => e.diagnosis(),
+            Self::Running(e) => e.diagnosis(),
+            Self::Signal(e) => e.diagnosis(),
+            Self::Plan(e) => e.diagnosis(),
+            Self::Master(e) => e.diagnosis(),
         }
-    }
-
-    /// What kind of failure it is. An update has its own, see
-    /// [`UpdateReport::failure`](crate::master::update::UpdateReport::failure).
-    pub fn kind(&self) -> ErrorKind {
-        self.facts().0
-    }
-
-    /// A short name for programs.
-    pub fn code(&self) -> &'static str {
-        self.facts().1
-    }
-
-    /// The likely cause and the next command or act that helps.
-    pub fn hint(&self) -> String {
-        self.facts().2
     }
 }

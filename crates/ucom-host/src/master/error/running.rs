@@ -1,8 +1,7 @@
 //! Control loops that run, or that cannot.
-use crate::master::error::facts::Facts;
 use crate::master::error::words::Boards;
 use crate::master::load::LoadForecast;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 /// Why control loops keep something from being done, or cannot run themselves.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -31,18 +30,18 @@ pub enum RunningError {
     },
 }
 
-impl RunningError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for RunningError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::Running { .. } | Self::LoopRuns { .. } => {
-                (ErrorKind::Refused, "running", "`ucom stop all` first, or force it".into())
+                Diagnosis::new(ErrorKind::Refused, "running", "`ucom stop all` first, or force it")
             }
-            Self::Load(_) => (
+            Self::Load(_) => Diagnosis::new(
                 ErrorKind::Refused,
                 "load",
-                "fewer boards, longer `so.period` or `ci.period`, or force it".into(),
+                "fewer boards, longer `so.period` or `ci.period`, or force it",
             ),
-            Self::Lost { board } => (
+            Self::Lost { board } => Diagnosis::new(
                 ErrorKind::Fault,
                 "lost",
                 format!(

@@ -1,8 +1,7 @@
 //! Signals that cannot be read or written.
 use core::fmt;
 
-use crate::master::error::facts::Facts;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 /// Why a signal cannot be read or written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -38,21 +37,23 @@ pub enum SignalError {
     },
 }
 
-impl SignalError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for SignalError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::NoSignal { board, .. } => {
-                (ErrorKind::Usage, "no-edge", format!("`ucom io {board}` lists the names"))
+                Diagnosis::new(ErrorKind::Usage, "no-edge", format!("`ucom io {board}` lists the names"))
             }
             Self::NoApplication { board, valid: true } => {
-                (ErrorKind::Refused, "no-application", format!("`ucom start {board}`"))
+                Diagnosis::new(ErrorKind::Refused, "no-application", format!("`ucom start {board}`"))
             }
             Self::NoApplication { board, valid: false } => {
-                (ErrorKind::Refused, "no-application", format!("`ucom update {board} IMAGE`"))
+                Diagnosis::new(ErrorKind::Refused, "no-application", format!("`ucom update {board} IMAGE`"))
             }
-            Self::StaleNames { board } => {
-                (ErrorKind::Refused, "stale-names", format!("`ucom io {board} --fresh` reads them anew"))
-            }
+            Self::StaleNames { board } => Diagnosis::new(
+                ErrorKind::Refused,
+                "stale-names",
+                format!("`ucom io {board} --fresh` reads them anew"),
+            ),
         }
     }
 }

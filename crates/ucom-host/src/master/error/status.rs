@@ -1,6 +1,5 @@
 //! A state that a board did not reach.
-use crate::master::error::facts::Facts;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Status;
 
 /// Why a board is not in the state that was asked for.
@@ -50,24 +49,23 @@ pub enum StatusError {
     },
 }
 
-impl StatusError {
-    pub(crate) fn facts(&self) -> Facts {
+impl Diagnose for StatusError {
+    fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::StatusNotTaken { .. } => (
+            Self::StatusNotTaken { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "status-not-taken",
-                "bits that mirror reality cannot be set, PROG only in the exloader: `ucom help status`"
-                    .into(),
+                "bits that mirror reality cannot be set, PROG only in the exloader: `ucom help status`",
             ),
-            Self::NotReached { board, .. } => (
+            Self::NotReached { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "not-reached",
                 format!("`ucom info {board}`, then `ucom reset` and `ucom init`"),
             ),
-            Self::AdminRefused { .. } => (
+            Self::AdminRefused { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "admin-refused",
-                "outputs need a running control loop: `ucom start`".into(),
+                "outputs need a running control loop: `ucom start`",
             ),
         }
     }

@@ -1,7 +1,7 @@
 //! What the conformance tests may do, and how each ended.
 use crate::master::error::Error;
 use crate::master::reports::update::UpdateImage;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, ErrorKind};
 use serde::Serialize;
 
 /// What the tests may do.

@@ -3,7 +3,7 @@
 use crate::master::engine::Link;
 use crate::master::error::Error;
 use crate::master::reports::update::{UpdateFailure, UpdateOptions, UpdateOutcome, UpdatePlan, UpdateResult};
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, ErrorKind};
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Header};
 

@@ -1,7 +1,7 @@
 //! Why a board was not updated, with the facts, the kind and what helps.
 use crate::master::error::Error;
 use crate::master::reports::update::outcome::UpdateOutcome;
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::{ErrorCode, Status};
 
 /// Why a board was not updated.
@@ -99,9 +99,15 @@ pub enum UpdateFailure {
     },
 }
 
+impl Diagnose for UpdateFailure {
+    fn diagnosis(&self) -> Diagnosis {
+        Diagnosis::new(self.kind_of(), self.name(), self.next())
+    }
+}
+
 impl UpdateFailure {
-    /// What kind of failure it is: whatever fails or is cancelled once something may be erased is a fault.
-    pub fn kind(&self) -> ErrorKind {
+    /// Whatever fails or is cancelled once something may be erased is a fault.
+    fn kind_of(&self) -> ErrorKind {
         match self {
             Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {
                 kind @ (ErrorKind::Usage | ErrorKind::NoLink) => kind,
@@ -124,8 +130,7 @@ impl UpdateFailure {
         }
     }
 
-    /// A short name for programs.
-    pub fn code(&self) -> &'static str {
+    fn name(&self) -> &'static str {
         match self {
             Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::After(e) => e.code(),
             Self::MayBeErased(_) => "may-be-erased",
@@ -140,8 +145,7 @@ impl UpdateFailure {
         }
     }
 
-    /// The likely cause and what helps.
-    pub fn hint(&self) -> String {
+    fn next(&self) -> String {
         match self {
             Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::NotRunning(e) => e.hint(),
             Self::StillProgramming(e) => match e.hint() {

@@ -2,7 +2,7 @@
 use crate::master::reports::update::failure::UpdateFailure;
 use crate::master::reports::update::outcome::UpdateOutcome;
 use crate::master::reports::update::plan::{PlannedImage, Unverifiable};
-use host_kit::ErrorKind;
+use host_kit::{Diagnose, ErrorKind};
 use ucom::BoardInfo;
 
 /// What became of one board.

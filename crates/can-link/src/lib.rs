@@ -21,7 +21,7 @@ mod url;
 mod virtual_bus;
 
 pub use bus::CanBus;
-pub use error::CanError;
+pub use error::{AnswerError, AttachError, CanError, InterfaceError, ListenError, OpenError};
 pub use faulty::{FaultConfig, FaultSchedule, FaultStats, Faulty};
 pub use frame::{CanFrame, Id, InvalidFrame};
 pub use multicast::MulticastBus;

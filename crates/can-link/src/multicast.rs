@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use socket2::{Domain, Protocol, Socket, Type};
 
 use crate::datagram::{MAX_DATAGRAM, decode, encode};
-use crate::{CanBus, CanError, CanFrame, CanUrl};
+use crate::{AttachError, CanBus, CanError, CanFrame, CanUrl};
 
 /// Bytes that may wait in the system for this member: some 4,000 frames.
 const RECEIVE_BUFFER: usize = 2 << 20;
@@ -32,8 +32,8 @@ pub struct MulticastBus {
 
 impl MulticastBus {
     /// Joins a group. With `ttl` 0 frames stay on this host; 1 lets them into the local network.
-    pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, CanError> {
-        let failed = |(step, source)| CanError::Join { group, port, step, source };
+    pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, AttachError> {
+        let failed = |(step, source)| AttachError::Join { group, port, step, source };
         // A host without a network has no default interface, but may still talk to itself by IPv4.
         let (listener, sender) = open_sockets(group, port, ttl, Ipv4Addr::UNSPECIFIED)
             .or_else(|first| open_sockets(group, port, ttl, Ipv4Addr::LOCALHOST).map_err(|_| first))

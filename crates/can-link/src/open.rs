@@ -1,14 +1,16 @@
 //! Opens a bus of any kind from its URL: the one place that knows all transports.
 
-use crate::{CanBus, CanError, CanUrl, MulticastBus, SlcanBus, SlcanOptions, SocketcandBus, VirtualBus};
+#[cfg(target_os = "linux")]
+use crate::AttachError;
+use crate::{CanBus, CanUrl, MulticastBus, OpenError, SlcanBus, SlcanOptions, SocketcandBus, VirtualBus};
 
 /// Opens the bus of a URL such as `multicast:239.74.163.2:43113` or `virtual:bench`.
-pub fn open(url: &str) -> Result<Box<dyn CanBus + Send>, CanError> {
+pub fn open(url: &str) -> Result<Box<dyn CanBus + Send>, OpenError> {
     open_url(&url.parse()?)
 }
 
 /// Opens the bus of a parsed URL.
-pub fn open_url(url: &CanUrl) -> Result<Box<dyn CanBus + Send>, CanError> {
+pub fn open_url(url: &CanUrl) -> Result<Box<dyn CanBus + Send>, OpenError> {
     match url {
         CanUrl::Virtual { name } => Ok(Box::new(VirtualBus::join(name))),
         CanUrl::Multicast { group, port, ttl } => Ok(Box::new(MulticastBus::join(*group, *port, *ttl)?)),
@@ -21,9 +23,11 @@ pub fn open_url(url: &CanUrl) -> Result<Box<dyn CanBus + Send>, CanError> {
             Ok(Box::new(SlcanBus::open(&options)?))
         }
         #[cfg(target_os = "linux")]
-        CanUrl::SocketCan { interface } => Ok(Box::new(crate::SocketCanBus::open(interface)?)),
+        CanUrl::SocketCan { interface } => {
+            Ok(Box::new(crate::SocketCanBus::open(interface).map_err(AttachError::from)?))
+        }
         #[cfg(not(target_os = "linux"))]
-        CanUrl::SocketCan { .. } => Err(CanError::Unsupported { url: url.to_string(), kind: url.scheme() }),
+        CanUrl::SocketCan { .. } => Err(OpenError::Unsupported { url: url.to_string(), kind: url.scheme() }),
     }
 }
 
@@ -33,7 +37,7 @@ mod tests {
 
     #[test]
     fn what_is_no_url_is_refused() {
-        assert!(matches!(open("can0"), Err(CanError::Url(_))));
+        assert!(matches!(open("can0"), Err(OpenError::Url(_))));
     }
 
     #[cfg(not(target_os = "linux"))]

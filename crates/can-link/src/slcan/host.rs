@@ -8,7 +8,7 @@ use super::line::{Lines, Piece, parse_flags, parse_frame, parse_state, push_fram
 use super::options::{BIT_RATES, DATA_RATES, SlcanOptions};
 use super::port::Port;
 
-use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState};
+use crate::{AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, OpenError};
 
 /// How long an adapter may take to answer its first question; it may still be starting.
 const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
@@ -70,10 +70,10 @@ pub struct SlcanBus {
 
 impl SlcanBus {
     /// Opens the port, sets the rates and opens the adapter's channel.
-    pub fn open(options: &SlcanOptions) -> Result<Self, CanError> {
+    pub fn open(options: &SlcanOptions) -> Result<Self, OpenError> {
         let SlcanOptions { device, rate, data_rate, baud } = options.clone();
         let url = CanUrl::Slcan { device, rate, data_rate, baud }.to_string();
-        let wrong_rate = |what: &'static str, rate: u32, possible: String| CanError::Rate {
+        let wrong_rate = |what: &'static str, rate: u32, possible: String| OpenError::Rate {
             url: url.clone(),
             what,
             rate,
@@ -97,7 +97,7 @@ impl SlcanBus {
         };
         let port = match Port::open(&options.device, options.baud) {
             Ok(port) => port,
-            Err(source) => return Err(CanError::Port { url, source }),
+            Err(source) => return Err(AttachError::Port { url, source }.into()),
         };
         let mut bus = Self {
             url,
@@ -151,7 +151,8 @@ impl SlcanBus {
         }
         let hint = "is it an SLCAN adapter, is its firmware the right one, and does the line have this rate (?baud=N)?";
         let seconds = VERSION_TIMEOUT.as_secs() * u64::from(VERSION_QUESTIONS);
-        Err(CanError::NoAnswer { url: self.url.clone(), step: "asking for the version", seconds, hint })
+        Err(AnswerError::NoAnswer { url: self.url.clone(), step: "asking for the version", seconds, hint }
+            .into())
     }
 
     /// Sends a command. Of an adapter that never answers it is taken for carried out.
@@ -168,7 +169,7 @@ impl SlcanBus {
         if self.last_answer == Some(Answer::No) {
             let answer =
                 "the adapter answers with a bell: it does not know that, or does not do it now".to_owned();
-            return Err(CanError::Refused { url: self.url.clone(), step, answer });
+            return Err(AnswerError::Refused { url: self.url.clone(), step, answer }.into());
         }
         Ok(())
     }
@@ -267,11 +268,8 @@ impl SlcanBus {
                 self.outstanding = None;
                 let answer = "the adapter refused the frame for 2 s: its transmit queue is full; does anybody acknowledge \
                               on the bus, and has the bus this bit rate?";
-                return Err(CanError::Refused {
-                    url: self.url.clone(),
-                    step: "sending",
-                    answer: answer.to_owned(),
-                });
+                let (url, answer) = (self.url.clone(), answer.to_owned());
+                return Err(AnswerError::Refused { url, step: "sending", answer }.into());
             }
             if now.saturating_duration_since(frame.written) >= RETRY {
                 frame.refused = false;
@@ -288,7 +286,8 @@ impl SlcanBus {
             self.outstanding = None;
             let hint = "does anybody acknowledge on the bus? Unplug the adapter and try again";
             let seconds = SEND_TIMEOUT.as_secs();
-            return Err(CanError::NoAnswer { url: self.url.clone(), step: "sending a frame", seconds, hint });
+            let url = self.url.clone();
+            return Err(AnswerError::NoAnswer { url, step: "sending a frame", seconds, hint }.into());
         }
         Ok(self.outstanding.is_none())
     }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use socketcan::{CanFdSocket, Socket, SocketOptions};
 
-use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
+use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState, InterfaceError};
 use convert::{Received, from_kernel, to_kernel};
 use retry::retry_while_full;
 
@@ -33,8 +33,8 @@ pub struct SocketCanBus {
 
 impl SocketCanBus {
     /// Opens an interface that is up.
-    pub fn open(interface: &str) -> Result<Self, CanError> {
-        let failed = |source: io::Error| CanError::Interface {
+    pub fn open(interface: &str) -> Result<Self, InterfaceError> {
+        let failed = |source: io::Error| InterfaceError {
             url: CanUrl::SocketCan { interface: interface.to_owned() }.to_string(),
             hint: hint(&source, interface),
             source,
@@ -62,7 +62,7 @@ impl SocketCanBus {
         let url = self.url.clone();
         match source.raw_os_error() {
             Some(ENETDOWN | ENODEV | ENXIO) => {
-                CanError::Interface { url, hint: hint(&source, &self.interface), source }
+                InterfaceError { url, hint: hint(&source, &self.interface), source }.into()
             }
             _ => CanError::Io { url, step, source },
         }

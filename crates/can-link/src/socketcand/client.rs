@@ -7,7 +7,9 @@ use std::time::{Duration, Instant};
 
 use super::splitter::Splitter;
 use super::text::{CLASS_BUS_OFF, CLASS_RESTARTED, Reply, has_form, push_send};
-use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState};
+use crate::{
+    AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState, OpenError,
+};
 
 /// How long connecting and each answer while opening may take.
 const TIMEOUT: Duration = Duration::from_secs(5);
@@ -43,11 +45,11 @@ pub struct SocketcandBus {
 
 impl SocketcandBus {
     /// Connects to a server and opens one of its buses. An IPv6 address comes without brackets.
-    pub fn connect(host: &str, port: u16, channel: &str) -> Result<Self, CanError> {
+    pub fn connect(host: &str, port: u16, channel: &str) -> Result<Self, OpenError> {
         let url = CanUrl::Socketcand { host: host.to_owned(), port, channel: channel.to_owned() }.to_string();
         let stream = match connect(host, port) {
             Ok(stream) => stream,
-            Err(source) => return Err(CanError::Connect { url, source }),
+            Err(source) => return Err(AttachError::Connect { url, source }.into()),
         };
         let mut bus = Self {
             url,
@@ -102,12 +104,8 @@ impl SocketcandBus {
             };
             let Some(count) = count else {
                 let hint = "is it a socketcand server, and does it still take clients?";
-                return Err(CanError::NoAnswer {
-                    url: self.url.clone(),
-                    step,
-                    seconds: TIMEOUT.as_secs(),
-                    hint,
-                });
+                let (url, seconds) = (self.url.clone(), TIMEOUT.as_secs());
+                return Err(AnswerError::NoAnswer { url, step, seconds, hint }.into());
             };
             let mut bytes = &buffer[..count];
             while let Some(message) = self.splitter.next(&mut bytes) {
@@ -118,7 +116,7 @@ impl SocketcandBus {
                     }
                     Reply::Refused(text) => {
                         let (url, answer) = (self.url.clone(), text.to_owned());
-                        return Err(CanError::Refused { url, step, answer });
+                        return Err(AnswerError::Refused { url, step, answer }.into());
                     }
                     _ => {}
                 }

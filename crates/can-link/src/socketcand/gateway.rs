@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::shared::{Channel, ClientAction, ClientId, Route};
 use super::{ServerStats, SocketcandServer};
-use crate::{CanError, CanFrame, ErrorState, VirtualHub};
+use crate::{CanFrame, ErrorState, ListenError, VirtualHub};
 
 /// What clients did and the host has not taken yet; beyond that their connections wait.
 const WAITING: usize = 1024;
@@ -43,7 +43,7 @@ pub struct SocketcandGateway {
 
 impl SocketcandGateway {
     /// Listens at an address (port 0 takes a free one) and offers buses under the given names.
-    pub fn bind(address: impl ToSocketAddrs, channels: &[&str]) -> Result<Self, CanError> {
+    pub fn bind(address: impl ToSocketAddrs, channels: &[&str]) -> Result<Self, ListenError> {
         let (sender, events) = sync_channel(WAITING);
         let channel = |(channel, name): (usize, &&str)| {
             let sender = sender.clone();

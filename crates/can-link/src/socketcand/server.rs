@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::session;
 use super::shared::{Channel, Client, ClientId, Inner, Route};
-use crate::{CanError, CanFrame, CanUrl, ErrorState, VirtualHub};
+use crate::{CanFrame, CanUrl, ErrorState, ListenError, VirtualHub};
 
 /// Clients at a time.
 const MOST_CLIENTS: usize = 64;
@@ -62,7 +62,7 @@ pub struct SocketcandServer {
 impl SocketcandServer {
     /// Listens at an address (port 0 takes a free one) and offers buses of this process under the given names, which have
     /// no blanks and at most 16 characters.
-    pub fn bind(address: impl ToSocketAddrs, buses: &[(&str, &VirtualHub)]) -> Result<Self, CanError> {
+    pub fn bind(address: impl ToSocketAddrs, buses: &[(&str, &VirtualHub)]) -> Result<Self, ListenError> {
         let channel = |(name, hub): &(&str, &VirtualHub)| Channel {
             name: (*name).to_owned(),
             hub: (*hub).clone(),
@@ -71,10 +71,10 @@ impl SocketcandServer {
         Self::listen(address, buses.iter().map(channel).collect())
     }
 
-    pub(super) fn listen(address: impl ToSocketAddrs, channels: Vec<Channel>) -> Result<Self, CanError> {
+    pub(super) fn listen(address: impl ToSocketAddrs, channels: Vec<Channel>) -> Result<Self, ListenError> {
         let asked = address.to_socket_addrs().map(|found| found.map(|a| a.to_string()).collect::<Vec<_>>());
         let asked = asked.map_or_else(|_| "this address".to_owned(), |found| found.join(", "));
-        let failed = |source| CanError::Listen { address: asked.clone(), source };
+        let failed = |source| ListenError { address: asked.clone(), source };
         let listener = TcpListener::bind(address).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         let inner = Arc::new(Inner { channels, ..Inner::default() });

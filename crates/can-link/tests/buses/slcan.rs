@@ -8,8 +8,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use can_link::{
-    CanBus, CanError, CanFrame, ControllerState, ErrorState, Id, SlcanAdapter, SlcanBus, SlcanOptions,
-    VirtualBus, VirtualHub, open,
+    AnswerError, CanBus, CanError, CanFrame, ControllerState, ErrorState, Id, OpenError, SlcanAdapter,
+    SlcanBus, SlcanOptions, VirtualBus, VirtualHub, open,
 };
 
 use crate::{TIMEOUT, frame, take};
@@ -272,14 +272,27 @@ fn what_cannot_be_set_is_an_error_that_lists_what_can() {
         })
     });
     let error = SlcanBus::open(&options(&device, None, Some(5_000_000))).err().unwrap();
-    assert!(matches!(error, CanError::Refused { step: "setting the data bit rate", .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            OpenError::SetUp(CanError::Answer(AnswerError::Refused {
+                step: "setting the data bit rate",
+                ..
+            }))
+        ),
+        "{error}"
+    );
 }
 
 #[test]
 fn a_port_without_an_adapter_and_one_that_goes_are_distinguished() {
     let (device, mute) = served(|mut stream| stream.read_to_end(&mut Vec::new()).map(|_| ()));
     let error = SlcanBus::open(&options(&device, None, None)).err().unwrap();
-    assert!(matches!(error, CanError::NoAnswer { .. }) && error.to_string().contains("baud"), "{error}");
+    assert!(
+        matches!(error, OpenError::SetUp(CanError::Answer(AnswerError::NoAnswer { .. })))
+            && error.to_string().contains("baud"),
+        "{error}"
+    );
     mute.join().unwrap().unwrap();
     let (device, adapter) = served(|stream| {
         let end = stream.try_clone().unwrap();

@@ -4,7 +4,7 @@ use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener};
 use std::time::Duration;
 
-use can_link::{CanBus, CanError, CanFrame, ErrorState, Id, SocketcandBus, open};
+use can_link::{AnswerError, CanBus, CanError, CanFrame, ErrorState, Id, OpenError, SocketcandBus, open};
 
 use crate::{TIMEOUT, frame, numbered, socketcand_bench, take};
 
@@ -69,9 +69,14 @@ fn servers_that_are_none_end_in_words() {
         server.join().unwrap();
         result
     };
-    assert!(matches!(end_with(&["HTTP/1.1 400 Bad Request\r\n"]), Err(CanError::Closed { .. })));
+    assert!(matches!(
+        end_with(&["HTTP/1.1 400 Bad Request\r\n"]),
+        Err(OpenError::SetUp(CanError::Closed { .. }))
+    ));
     let refused = end_with(&["< hi >", "< error could not open bus >"]);
-    assert!(matches!(&refused, Err(CanError::Refused { answer, .. }) if answer == "could not open bus"));
+    assert!(
+        matches!(&refused, Err(OpenError::SetUp(CanError::Answer(AnswerError::Refused { answer, .. }))) if answer == "could not open bus")
+    );
     // All in one piece, blanks or not between bytes, an old and a new kind of line, a cut line at the end.
     let (frames, ignored, errors) = end_with(&[
         "< hi >< ok >< ok >< frame 123 1.0 11 22 >< frame 123 1.0 1122 >\n< frame 00000001 2.5  >",

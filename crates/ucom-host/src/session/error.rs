@@ -1,5 +1,5 @@
 //! Why a session did not do what was asked: a procedure failed, or what is around it did.
-use can_link::{CanError, InvalidFrame};
+use can_link::{CanError, InvalidFrame, OpenError};
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 use super::bus_off;
@@ -19,7 +19,7 @@ pub enum SessionError {
     Values(#[from] ValuesError),
     /// The bus cannot be opened.
     #[error("{0}")]
-    Open(Box<CanError>),
+    Open(Box<OpenError>),
     /// The open bus failed.
     #[error("{0}")]
     Bus(CanError),
@@ -166,7 +166,7 @@ impl Diagnose for SessionError {
             Self::BusOff { failure, url } => {
                 return Diagnosis { next: bus_off::next(url), ..failure.diagnosis() };
             }
-            Self::Open(e) if matches!(**e, CanError::Url(_)) => {
+            Self::Open(e) if matches!(**e, OpenError::Url(_)) => {
                 (Usage, "usage", "ucom --help shows the forms of --bus")
             }
             Self::Open(_) => (NoLink, "bus", "is the bus there and up? ucom sim makes a simulated one"),

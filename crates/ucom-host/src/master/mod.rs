@@ -61,7 +61,7 @@ pub mod probe {
 
 /// Firmware update: options, plan and report.
 pub mod update {
-    pub use crate::master::error::PlanError;
+    pub use crate::master::error::{PlanError, SecondImageError, TargetError};
     pub use crate::master::reports::update::*;
 }
 

@@ -16,7 +16,7 @@ pub use exchange::{ExchangeError, Incomplete, LastReceived, Received};
 pub use identity::IdentityError;
 pub(crate) use identity::SHARED_CAUSE;
 pub use master::MasterError;
-pub use plan::PlanError;
+pub use plan::{PlanError, SecondImageError, TargetError};
 pub use procedure::Error;
 pub use running::RunningError;
 pub use signal::SignalError;

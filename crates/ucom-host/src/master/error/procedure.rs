@@ -3,7 +3,7 @@ use crate::master::error::address::AddressError;
 use crate::master::error::exchange::ExchangeError;
 use crate::master::error::identity::IdentityError;
 use crate::master::error::master::MasterError;
-use crate::master::error::plan::PlanError;
+use crate::master::error::plan::{PlanError, TargetError};
 use crate::master::error::running::RunningError;
 use crate::master::error::signal::SignalError;
 use crate::master::error::status::StatusError;
@@ -27,7 +27,9 @@ pub enum Error {
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
-    /// The board's image or plan cannot be sent.
+    /// Nobody knows which boards an update is for.
+    Target(#[from] TargetError),
+    /// An update cannot be planned.
     Plan(#[from] PlanError),
     /// This PC did not begin the procedure, or ended it.
     Master(#[from] MasterError),
@@ -42,6 +44,7 @@ impl Diagnose for Error {
             Self::Status(e) => e.diagnosis(),
             Self::Running(e) => e.diagnosis(),
             Self::Signal(e) => e.diagnosis(),
+            Self::Target(e) => e.diagnosis(),
             Self::Plan(e) => e.diagnosis(),
             Self::Master(e) => e.diagnosis(),
         }

@@ -1,7 +1,7 @@
 //! The update as a whole: checks U-1 to U-3, then boards one by one or as a group; what is left when it is ended early.
 
 use crate::master::engine::Link;
-use crate::master::error::{Error, IdentityError, MasterError, PlanError, RunningError};
+use crate::master::error::{Error, IdentityError, MasterError, RunningError, TargetError};
 use crate::master::procedures::byte_order::right_order;
 use crate::master::procedures::exchange::{confirmed, numbers, set_status};
 use crate::master::procedures::one_board::one_board_each;
@@ -18,12 +18,12 @@ use ucom::Status;
 pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome, Error> {
     let mut seen = BTreeSet::new();
     if options.targets.is_empty() {
-        return Err(PlanError::NoTarget.into());
+        return Err(TargetError::None.into());
     }
     for target in &options.targets {
         link.board(target.board)?;
         if !seen.insert(target.board) {
-            return Err(PlanError::Twice { board: target.board }.into());
+            return Err(TargetError::Twice { board: target.board }.into());
         }
     }
     let mut session = UpdateSession::new(options);

@@ -2,7 +2,7 @@
 use core::fmt;
 use std::sync::Arc;
 
-use crate::master::error::PlanError;
+use crate::master::error::{PlanError, SecondImageError};
 use crate::master::reports::update::options::{UpdateImage, UpdateOptions};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{BLOCK_LEN, BoardInfo, Checksum, Header, Memory, Profile, block_count, checksum, data_block};
@@ -117,9 +117,9 @@ impl UpdatePlan {
             }
         }
         let other = options.second.as_ref();
-        let second = || other.ok_or(PlanError::SecondMissing { plan });
+        let second = || other.ok_or(SecondImageError::Missing { plan });
         let [first, last] = match plan {
-            Plan::VerifyWrite if other.is_some() => return Err(PlanError::SecondUnused { plan }),
+            Plan::VerifyWrite if other.is_some() => return Err(SecondImageError::Unused { plan }.into()),
             Plan::VerifyWrite => [(image, Memory::Program); 2],
             Plan::ExloaderApp => [(second()?, Memory::Ram), (image, Memory::Program)],
             Plan::PmemXmem => [(image, Memory::Program), (second()?, Memory::Data)],
@@ -234,10 +234,13 @@ mod tests {
         let planned = |options: &UpdateOptions, prog_plan| {
             UpdatePlan::new(options, Header::ANY_BOARD, &Profile { prog_plan, ..Profile::default() })
         };
-        assert!(matches!(planned(&two, Plan::VerifyWrite), Err(PlanError::SecondUnused { .. })));
+        assert!(matches!(
+            planned(&two, Plan::VerifyWrite),
+            Err(PlanError::Second(SecondImageError::Unused { .. }))
+        ));
         assert!(matches!(
             planned(&options(vec![1; 2]), Plan::ExloaderApp),
-            Err(PlanError::SecondMissing { .. })
+            Err(PlanError::Second(SecondImageError::Missing { .. }))
         ));
         let plan = planned(&two, Plan::ExloaderApp).unwrap();
         assert_eq!((plan.cycles[0].block(0).unwrap()[6], plan.cycles[1].block(0).unwrap()[6]), (0x10, 0));

@@ -8,8 +8,7 @@ use common::Sim;
 /// ISO 11898-1: boards that were bus-off are back when the wire is sound again, and so is a client.
 #[test]
 fn bus_off_is_not_for_ever() {
-    let mut sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "3"]);
     let mut peer = sim.peer();
     sim.fault("disturbed share=1 for_s=2");
     // Each frame of the client and of the boards is tried until its sender is bus-off.
@@ -18,26 +17,25 @@ fn bus_off_is_not_for_ever() {
     std::thread::sleep(std::time::Duration::from_millis(2_000));
     peer.send("240#");
     peer.wait("4");
-    let boards = sim.ucom(&["--json", "scan"]).ends(0).json();
+    let boards = sim.json(&["scan"], 0);
     assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
 }
 
 /// A client learns of its own bus-off, not only the simulator's stderr: as an error frame, and `ucom` in words with what to do.
 #[test]
 fn the_bus_off_controller_is_named() {
-    let mut sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "2"]);
     let (mut sender, mut listener) = (sim.peer(), sim.peer());
     sim.fault("disturbed share=1 for_s=60");
     let output = sim.ucom(&["info", "1"]).ends(3);
     assert!(output.err.contains("the CAN controller of this computer is bus-off"), "{}", output.err);
     assert!(output.err.contains("next: ucom doctor"), "{}", output.err);
-    let output = sim.ucom(&["--json", "info", "1"]).ends(3).json();
+    let output = sim.json(&["info", "1"], 3);
     assert!(output["error"]["message"].as_str().unwrap().contains("was bus-off meanwhile"), "{output}");
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{output}");
-    let output = sim.ucom(&["--json", "send", "201#"]).ends(3).json();
+    let output = sim.json(&["send", "201#"], 3);
     assert_eq!(output["error"]["code"], "bus-off", "{output}");
-    let output = sim.ucom(&["--json", "doctor"]).ends(3).json();
+    let output = sim.json(&["doctor"], 3);
     assert!(output["findings"].to_string().contains("has left the bus"), "{output}");
     sender.send("202#");
     assert_eq!(sender.all(500), [""; 0]);

@@ -4,7 +4,7 @@
 mod common;
 
 use cli_kit::trial::{ended, signal};
-use common::Sim;
+use common::{Sim, ended_by};
 use serde_json::json;
 
 #[test]
@@ -19,7 +19,7 @@ fn the_simulator_ends_with_0_on_a_signal() {
 fn p1_scan_only_asks() {
     let sim = Sim::start(&["--boards", "5", "--flash-ids", "0x21,0x42,0x63,0x04,0x7F"]);
     let mut peer = sim.peer();
-    let scan = sim.ucom(&["--json", "scan"]).ends(0).json();
+    let scan = sim.json(&["scan"], 0);
     assert_eq!(scan["reports"], json!([0x04, 0x21, 0x42, 0x63, 0x7F]));
     assert_eq!(scan["boards"], json!([]));
     let asks = |f: &String| f == "240#" || f.starts_with("20") || f.starts_with("21");
@@ -28,7 +28,7 @@ fn p1_scan_only_asks() {
     assert!(of_pc.iter().all(|f| asks(f)) && !of_pc.is_empty(), "{of_pc:?}");
     sim.ucom(&["init"]).ends(0);
     peer.all(100);
-    let scan = sim.ucom(&["--json", "scan"]).ends(0).json();
+    let scan = sim.json(&["scan"], 0);
     assert_eq!(scan["boards"].as_array().unwrap().len(), 5);
     assert_eq!(scan["boards"][4]["flash_number"], 0x7F);
     assert_eq!(scan["findings"], json!([]));
@@ -46,7 +46,7 @@ fn p2_init_of_chains_and_their_inventory() {
 
     let sim = Sim::start(&["--boards", "31"]);
     let mut peer = sim.peer();
-    let init = sim.ucom(&["--json", "init"]).ends(0).json();
+    let init = sim.json(&["init"], 0);
     assert_eq!(init["boards"].as_array().unwrap().len(), 31);
     assert_eq!(init["boards"][30]["number"], 31);
     let frames = peer.all(100);
@@ -54,7 +54,7 @@ fn p2_init_of_chains_and_their_inventory() {
     drop(sim);
 
     let sim = Sim::start(&["--boards", "3"]);
-    let init = sim.ucom(&["--json", "init"]).ends(0).json();
+    let init = sim.json(&["init"], 0);
     let first = &init["boards"][0];
     assert_eq!(first["status"], json!(["EXLRUN", "INIT", "OPINIT", "IPINIT"]));
     assert_eq!(first["flash_date"], "2008-03-14");
@@ -73,7 +73,7 @@ fn p2_init_of_chains_and_their_inventory() {
 fn a_broken_init_wire_is_reported_with_its_place() {
     let mut sim = Sim::start(&["--boards", "4"]);
     sim.fault("wire-broken board=2");
-    let init = sim.ucom(&["--json", "init"]).ends(1).json();
+    let init = sim.json(&["init"], 1);
     assert_eq!(init["boards"].as_array().unwrap().len(), 2);
     let text = init["findings"][0].as_str().unwrap();
     assert!(text.contains("after position 2") && text.contains("0x23") && text.contains("0x31"), "{text}");
@@ -83,47 +83,45 @@ fn a_broken_init_wire_is_reported_with_its_place() {
 #[test]
 fn d07_equal_flash_ids_are_found_out() {
     let sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x22,0x22"]);
-    let init = sim.ucom(&["--json", "init"]).ends(1).json();
+    let init = sim.json(&["init"], 1);
     let all = init["findings"].to_string();
     assert!(all.contains("more boards than reports"), "{all}");
 }
 
 #[test]
 fn status_bits_are_set_and_cleared_by_name() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
-    let status = sim.ucom(&["--json", "status", "2", "--set", "ASTART"]).ends(0).json();
+    let sim = Sim::numbered(&["--boards", "2"]);
+    let status = sim.json(&["status", "2", "--set", "ASTART"], 0);
     assert_eq!(status["boards"][0]["status_byte"], 0x5B);
-    let status = sim.ucom(&["--json", "status", "2", "--clear", "astart"]).ends(0).json();
+    let status = sim.json(&["status", "2", "--clear", "astart"], 0);
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
     // D-T8: the walk of the status byte.
     let byte = |words: &[&str]| sim.ucom(words).ends(0).json()["boards"][0]["status_byte"].clone();
     assert_eq!(byte(&["--json", "xreset", "1"]), 0x1F);
     assert_eq!(byte(&["--json", "start", "1"]), 0x8B);
     assert_eq!(byte(&["--json", "stop", "1"]), 0x1B);
-    let reset = sim.ucom(&["--json", "reset"]).ends(0).json();
+    let reset = sim.json(&["reset"], 0);
     assert_eq!(reset["reports"], json!([0x21, 0x22]));
     sim.ucom(&["info", "1"]).ends(3);
 }
 
 #[test]
 fn names_inputs_and_motion() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let output = sim.ucom(&["--json", "io", "1"]).ends(4);
     assert!(output.json()["error"]["hint"].as_str().unwrap().contains("ucom start 1"), "{}", output.out);
     sim.ucom(&["start", "1"]).ends(0);
-    let io = sim.ucom(&["--json", "io", "1"]).ends(0).json();
+    let io = sim.json(&["io", "1"], 0);
     assert_eq!(io["boards"][0]["ci"][0], "set_position [0.01 deg]");
     assert_eq!(io["boards"][0]["initial_ci"], json!([0, 1000, 900]));
     // Inputs move outputs, under supervision.
-    let so = sim.ucom(&["--json", "ci", "1", "set_position=1500", "--for", "1.5"]).ends(0).json();
+    let so = sim.json(&["ci", "1", "set_position=1500", "--for", "1.5"], 0);
     let position = so["so"]["position"].as_i64().unwrap();
     assert!((1450..1550).contains(&position), "{so}");
-    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+    let status = sim.json(&["status", "1"], 0);
     assert_eq!(status["boards"][0]["state"], "started", "the loop was stopped");
     // D-35: what was written is only assumed.
-    let par = sim.ucom(&["--json", "par", "1", "kp=150"]).ends(0).json();
+    let par = sim.json(&["par", "1", "kp=150"], 0);
     assert_eq!(
         (par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()),
         (json!(150), json!(null))
@@ -141,46 +139,42 @@ fn names_inputs_and_motion() {
 /// P-17, D-08, D-50: while one PC runs the boards a second one is refused; when it dies the boards become safe.
 #[test]
 fn p17_one_master_at_a_time_and_none_is_safe() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let run = sim.spawn(&["--json", "run", "1", "--active", "--ci", "1.set_position=1000"]);
     let mut peer = sim.peer();
     peer.wait("601#01010000");
     // Listening is welcome: the names are asked for before the loop runs, or known.
-    let so = sim.ucom(&["--json", "so", "1", "--count", "1"]).ends(0).json();
+    let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["position"].is_i64(), "{so}");
     // So is asking who is there: the running PC takes the answers for what they are.
-    let scan = sim.ucom(&["--json", "scan"]).ends(0).json();
+    let scan = sim.json(&["scan"], 0);
     assert_eq!(
         (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
         (Some("running"), Some("exloader"))
     );
     let output = sim.ucom(&["--json", "reset"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "foreign-master", "{}", output.out);
-    let so = sim.ucom(&["--json", "so", "1", "--count", "1"]).ends(0).json();
+    let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["current"].is_i64(), "the board still runs: {so}");
     sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
     // kill -9: nobody sends a stop, the board itself must stop.
-    signal(&run, "-KILL");
-    ended(run);
+    ended_by(run, "-KILL");
     peer.wait("601#00000000");
-    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+    let status = sim.json(&["status", "1"], 0);
     assert_eq!(status["boards"][0]["state"], "started");
 }
 
 /// Ctrl-C stops control, then applications.
 #[test]
 fn run_stops_in_order() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let run = sim.spawn(&["--json", "run", "all"]);
     let mut peer = sim.peer();
     peer.wait("602#01000000");
     std::thread::sleep(std::time::Duration::from_millis(1200));
-    signal(&run, "-INT");
-    let output = ended(run).ends(0);
+    let output = ended_by(run, "-INT").ends(0);
     assert!(output.out.contains("\"running\"") && output.out.contains("\"stopped\""), "{}", output.out);
-    let status = sim.ucom(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
     assert_eq!(status["boards"][1]["status_byte"], 0x1B);
 }
@@ -188,8 +182,7 @@ fn run_stops_in_order() {
 /// P-19: too much load is refused before the loops start.
 #[test]
 fn p19_load_is_refused() {
-    let sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "3"]);
     let profile = sim.file("slow.toml", b"load.limit = 1\n");
     let output = sim.ucom(&["--json", "run", "all", "--profile", &profile, "--for", "1"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "load", "{}", output.out);
@@ -197,15 +190,14 @@ fn p19_load_is_refused() {
 
 #[test]
 fn monitor_and_doctor_see_what_is_there() {
-    let mut sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
-    let view = sim.ucom(&["--json", "monitor", "--count", "1"]).ends(0).json();
+    let mut sim = Sim::numbered(&["--boards", "3"]);
+    let view = sim.json(&["monitor", "--count", "1"], 0);
     assert_eq!(view["boards"].as_array().unwrap().len(), 3, "{view}");
     assert_eq!(view["boards"][2]["description"], "UCoM2 neck roll");
-    let doctor = sim.ucom(&["--json", "doctor"]).ends(0).json();
+    let doctor = sim.json(&["doctor"], 0);
     assert_eq!(doctor["healthy"], true, "{doctor}");
     sim.fault("foreign-frames for_s=10");
-    let view = sim.ucom(&["--json", "monitor", "--count", "1", "--listen-only"]).ends(0).json();
+    let view = sim.json(&["monitor", "--count", "1", "--listen-only"], 0);
     assert!(view["foreign_frames"].as_u64().unwrap() > 10, "{view}");
 }
 
@@ -223,7 +215,7 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
         assert_eq!(decoded.out.lines().count() as u64, frames, "{name}");
         assert!(decoded.out.contains("PC_RESET") && decoded.out.contains("UCoM2 neck pitch"), "{name}");
         let mut peer = sim.peer();
-        let replay = sim.ucom(&["--json", "replay", &sim.path(name), "--speed", "4"]).ends(0).json();
+        let replay = sim.json(&["replay", &sim.path(name), "--speed", "4"], 0);
         assert!(replay["left_out"].as_u64().unwrap() > 5, "{replay}");
         let received = peer.all(300);
         assert!(
@@ -241,18 +233,17 @@ fn p20_probe_finds_big_endian_boards() {
     let text = "[[board]]\nflash_id = 0x21\ndescription = 'big'\n[board.profile]\nendian = 'big'\nchain.auto_opinit = true\n";
     std::fs::write(&file, text).unwrap();
     let sim = Sim::start(&["--chain", file.to_str().unwrap()]);
-    let probe = sim.ucom(&["--json", "probe", "--init", "--out", &sim.path("found.toml")]).ends(0).json();
+    let probe = sim.json(&["probe", "--init", "--out", &sim.path("found.toml")], 0);
     assert!(probe["profile"].as_str().unwrap().contains("endian = \"big\""), "{probe}");
     assert!(probe["profile"].as_str().unwrap().contains("chain.auto_opinit = true"), "{probe}");
-    let init = sim.ucom(&["--json", "init", "--profile", &sim.path("found.toml")]).ends(0).json();
+    let init = sim.json(&["init", "--profile", &sim.path("found.toml")], 0);
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
 
 /// Ctrl-C while a board moves stops it at once; its own supervision is only for a PC that has died.
 #[test]
 fn an_interrupted_motion_is_stopped() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let mut peer = sim.peer();
     let moving = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
     peer.wait("601#01010000");
@@ -269,8 +260,7 @@ fn an_interrupted_motion_is_stopped() {
 /// D-15, D-34: an input that is set without a running loop of ours goes alone; those beside it are not written.
 #[test]
 fn d34_an_input_leaves_its_neighbours_alone() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     sim.ucom(&["start", "1"]).ends(0);
     let mut peer = sim.peer();
     sim.ucom(&["ci", "1", "set_position=1500"]).ends(0);
@@ -280,8 +270,7 @@ fn d34_an_input_leaves_its_neighbours_alone() {
 /// D-36: boards with one image, and so one Program ID and date, are not moved by each other's names.
 #[test]
 fn d36_one_image_on_boards_that_differ() {
-    let sim = Sim::start(&[]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&[]);
     let image = sim.file("same.bin", &common::image(500, 3));
     sim.ucom(&["update", "1,7", &image, "--group"]).ends(0);
     sim.ucom(&["start", "1,7"]).ends(0);
@@ -292,7 +281,7 @@ fn d36_one_image_on_boards_that_differ() {
     assert_eq!(other, io(&["--json", "io", "7", "--fresh"]));
     // What another chain has left under the same program, date and board.
     let kept = |board: &str| {
-        let info = sim.ucom(&["--json", "info", board]).ends(0).json()["boards"][0].clone();
+        let info = sim.json(&["info", board], 0)["boards"][0].clone();
         let end = format!("-{:04X}.json", info["flash_number"].as_u64().unwrap());
         let start = format!("io-{:04X}-", info["program_id"].as_u64().unwrap());
         let mut files = std::fs::read_dir(sim.path("cache")).unwrap().map(|f| f.unwrap().path());
@@ -309,8 +298,7 @@ fn d36_one_image_on_boards_that_differ() {
 /// Nothing is half done because one of several boards is not there, and what was done is reported.
 #[test]
 fn several_boards_are_changed_only_when_all_answer() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let mut peer = sim.peer();
     for words in [
         &["status", "1,31", "--set", "ASTART"][..],
@@ -326,10 +314,10 @@ fn several_boards_are_changed_only_when_all_answer() {
     let output = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
     assert!(output.out.contains("forgotten its number") && !output.out.contains("0x"), "{}", output.out);
     sim.ucom(&["init"]).ends(0);
-    let output = sim.ucom(&["--json", "status", "1", "--clear", "INIT"]).ends(0).json();
+    let output = sim.json(&["status", "1", "--clear", "INIT"], 0);
     assert_eq!(output["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
     // The next board has lost its start signal by that.
-    let output = sim.ucom(&["--json", "io", "all"]).ends(4).json();
+    let output = sim.json(&["io", "all"], 4);
     assert!(output["error"]["hint"].as_str().unwrap().contains("start all"), "{output}");
 }
 
@@ -351,15 +339,14 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
 /// Single frames leave as they are; what changes boards only when that is reported, and then all or none.
 #[test]
 fn single_frames_can_be_sent() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let mut peer = sim.peer();
-    let sent = sim.ucom(&["--json", "send", "201#", "12345678#11"]).ends(0).json();
+    let sent = sim.json(&["send", "201#", "12345678#11"], 0);
     assert_eq!(sent["sent"], json!(["201#", "12345678#11"]));
     peer.wait("201#");
     peer.wait("12345678#11");
     peer.all(300);
-    let refused = sim.ucom(&["--json", "send", "201#", "000#"]).ends(4).json();
+    let refused = sim.json(&["send", "201#", "000#"], 4);
     assert_eq!(refused["error"]["code"], "intrusive");
     assert!(peer.all(100).iter().all(|f| f != "000#" && f != "201#"));
     sim.ucom(&["send", "000#", "--intrusive"]).ends(0);
@@ -370,8 +357,7 @@ fn single_frames_can_be_sent() {
 /// A name that is given twice is a mistake: which of the two is meant is open.
 #[test]
 fn a_name_given_twice_is_refused() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     sim.ucom(&["start", "1"]).ends(0);
     let mut peer = sim.peer();
     for words in [["par", "1", "kp=5", "KP=6"], ["ci", "1", "set_position=5", "0=6"]] {

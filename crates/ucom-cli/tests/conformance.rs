@@ -3,8 +3,7 @@
 
 mod common;
 
-use cli_kit::trial::{ended, signal};
-use common::Sim;
+use common::{Sim, ended_by};
 use serde_json::json;
 
 /// D-T2, D-T5, D-T10, D-T11: what only asks passes on simulated boards, of either byte order.
@@ -45,24 +44,21 @@ fn simulated_boards_conform() {
 /// What changes boards is refused while a control loop runs, and no option covers it.
 #[test]
 fn running_loops_are_stopped_first() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let run = sim.spawn(&["run", "1"]);
     sim.peer().wait("381#");
-    let output = sim.ucom(&["--json", "conformance", "1", "--run", "--force"]).ends(4).json();
+    let output = sim.json(&["conformance", "1", "--run", "--force"], 4);
     assert_eq!(output["error"]["code"], "running", "{output}");
     assert_eq!(output["error"]["hint"], "`ucom stop all` first; --force does not cover this", "{output}");
-    signal(&run, "-INT");
-    ended(run).ends(0);
+    ended_by(run, "-INT").ends(0);
 }
 
 /// D-22: the formula, literally; what the rules make of it stands beside what came.
 #[test]
 fn d22_raw_status_sets_bits_outside_the_mask() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let mut peer = sim.peer();
-    let output = sim.ucom(&["--json", "status", "1", "--raw", "00:40"]).ends(0).json();
+    let output = sim.json(&["status", "1", "--raw", "00:40"], 0);
     assert_eq!(
         output["boards"],
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
@@ -73,7 +69,7 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);
     // Without INIT the number is gone, as expected.
-    let output = sim.ucom(&["--json", "status", "2", "--raw", "0x08:0x00"]).ends(0).json();
+    let output = sim.json(&["status", "2", "--raw", "0x08:0x00"], 0);
     assert_eq!(
         (&output["boards"][0]["after"], &output["boards"][0]["as_expected"]),
         (&json!(null), &json!(true))

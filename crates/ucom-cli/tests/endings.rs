@@ -8,15 +8,14 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use cli_kit::trial::{ended, signal};
-use common::Sim;
+use common::{Sim, ended_by};
 use serde_json::json;
 
 /// D-50: nobody reads stdout, whose pipe is full from the start: heartbeats go out, boards keep running and are stopped at
 /// the end, and what was not printed is reported.
 #[test]
 fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let (reader, mut writer) = std::io::pipe().unwrap();
     // What a pipe holds.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
@@ -41,15 +40,13 @@ fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     let output = ended(child).ends(0);
     assert!(output.err.contains("lines were dropped"), "{}", output.err);
     drop(reader);
-    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
-    assert_eq!(status["boards"][0]["status_byte"], 0x1B);
+    assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
 /// A reader that takes nothing does not keep `so` from receiving Ctrl-C; one that has gone ends it.
 #[test]
 fn outputs_that_nobody_reads() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let run = sim.spawn(&["run", "1"]);
     sim.peer().wait("381#");
     for reads in [false, true] {
@@ -71,15 +68,13 @@ fn outputs_that_nobody_reads() {
         }
         ended(child).ends(0);
     }
-    signal(&run, "-INT");
-    ended(run).ends(0);
+    ended_by(run, "-INT").ends(0);
 }
 
 /// The first Ctrl-C cancels; the second one ends at once with 5 and shows what is left undone and what to do.
 #[test]
 fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let image = sim.file("image.bin", &vec![7; 60_000]);
     for (words, wait_for, what, next) in [
         (&["update", "1", &image, "--force"][..], "2C1#", "board 1 may be", "ucom update"),
@@ -107,22 +102,18 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
 /// Signals that come almost together are one, and one cancels in order.
 #[test]
 fn ctrl_c_and_a_wrapper_s_signal_are_one() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let child = sim.spawn(&["run", "1", "--active"]);
     sim.peer().wait("601#01010000");
     signal(&child, "-INT");
-    signal(&child, "-TERM");
-    ended(child).ends(0);
-    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
-    assert_eq!(status["boards"][0]["status_byte"], 0x1B);
+    ended_by(child, "-TERM").ends(0);
+    assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
 /// D-51: a board that is lost while others are still being started is one that was lost.
 #[test]
 fn d51_losses_during_the_start_count() {
-    let sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "3"]);
     // Boards send a heartbeat a second; this PC is less patient.
     let profile = sim.file("p.toml", b"alive.dsp_period = 20\nalive.dsp_lost = 40\n");
     let words = ["--json", "--profile", &profile, "run", "all", "--on-lost", "report", "--for", "0.01"];
@@ -133,11 +124,10 @@ fn d51_losses_during_the_start_count() {
 /// P-19: a refusal or a failure leaves applications as they were found.
 #[test]
 fn p19_a_refused_run_leaves_nothing_started() {
-    let sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "3"]);
     sim.ucom(&["start", "2"]).ends(0);
     let bytes = || {
-        let status = sim.ucom(&["--json", "status"]).ends(0).json();
+        let status = sim.json(&["status"], 0);
         [0, 1, 2].map(|i| status["boards"][i]["status_byte"].as_u64().unwrap())
     };
     let before = bytes();
@@ -155,13 +145,12 @@ fn p19_a_refused_run_leaves_nothing_started() {
 /// The reset of one board asks first whether it is there.
 #[test]
 fn a_reset_of_nobody_is_refused() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let mut peer = sim.peer();
     let output = sim.ucom(&["--json", "reset", "5"]).ends(3);
     assert!(output.json()["error"]["hint"].as_str().unwrap().contains("ucom scan"), "{}", output.out);
     assert!(peer.all(100).iter().all(|f| f != "005#"));
-    assert_eq!(sim.ucom(&["--json", "reset", "2"]).ends(0).json()["reports"], json!([0x22]));
+    assert_eq!(sim.json(&["reset", "2"], 0)["reports"], json!([0x22]));
     sim.ucom(&["info", "2"]).ends(3);
     sim.ucom(&["info", "1"]).ends(0);
 }
@@ -169,46 +158,40 @@ fn a_reset_of_nobody_is_refused() {
 /// D-26, D-51: a board that has rebooted under way is one that was lost, and is not reported to be stopped: 5, and its number.
 #[test]
 fn d26_a_board_that_reboots_under_way_fails_the_run() {
-    let mut sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "2"]);
     let child = sim.spawn(&["--json", "run", "1,2", "--active", "--on-lost", "report"]);
     sim.peer().wait("602#01010000");
     // Until the start is over.
     std::thread::sleep(Duration::from_millis(700));
     sim.fault("crash board=2");
     std::thread::sleep(Duration::from_millis(500));
-    signal(&child, "-INT");
-    let output = ended(child).ends(5);
+    let output = ended_by(child, "-INT").ends(5);
     let events: Vec<serde_json::Value> =
         output.out.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     let stopped = events.iter().find(|e| e["event"] == "stopped").unwrap();
     assert_eq!(stopped["not_stopped"], json!([2]), "{}", output.out);
     assert!(output.err.contains("has rebooted"), "{}", output.err);
-    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
-    assert_eq!(status["boards"][0]["status_byte"], 0x1B);
+    assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
 /// The same where every board answers in the end: a report that nobody asked for is no success.
 #[test]
 fn d26_a_reboot_counts_even_if_the_board_answers() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let child = sim.spawn(&["--json", "run", "1,2", "--on-lost", "report"]);
     let mut peer = sim.peer();
     peer.wait("382#");
     // DSP_REPORT1 with the UCoM id of board 2.
     peer.send("442#22");
     std::thread::sleep(Duration::from_millis(300));
-    signal(&child, "-INT");
-    let output = ended(child).ends(5);
+    let output = ended_by(child, "-INT").ends(5);
     assert!(output.err.contains("a board has rebooted"), "{}", output.err);
 }
 
 /// A board that does not answer keeps no other one from being stopped: the stop is broadcast before any question.
 #[test]
 fn a_stop_of_all_does_not_hang_on_one_board() {
-    let mut sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "3"]);
     let run = sim.spawn(&["run", "1,2,3", "--active", "--on-lost", "report"]);
     sim.peer().wait("603#01010000");
     let mut peer = sim.peer();
@@ -231,23 +214,20 @@ fn a_stop_of_all_does_not_hang_on_one_board() {
     assert_eq!(received.iter().filter(|f| *f == "600#00000000").count(), 3);
     let stopped = received.iter().position(|f| f == "600#00000000").unwrap();
     assert!(received.iter().position(|f| f == "240#").unwrap() > stopped, "before it asks who is there");
-    signal(&run, "-INT");
-    ended(run).ends(5);
+    ended_by(run, "-INT").ends(5);
 }
 
 /// Ctrl-C while a board is started only to be asked for its names: it is not left started.
 #[test]
 fn a_start_for_names_that_is_cancelled_is_undone() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     for words in [&["run", "1,2"][..], &["ci", "1", "--for", "1"]] {
         let mut peer = sim.peer();
         let child = sim.spawn(words);
         peer.wait("301#");
-        signal(&child, "-INT");
-        let output = ended(child);
+        let output = ended_by(child, "-INT");
         assert_ne!(output.code, 0);
-        let status = sim.ucom(&["--json", "status", "1,2"]).ends(0).json();
+        let status = sim.json(&["status", "1,2"], 0);
         let bytes = [0, 1].map(|i| status["boards"][i]["status_byte"].as_u64());
         assert_eq!(bytes, [Some(0x1B); 2], "{words:?}: {}", output.err);
     }
@@ -256,8 +236,7 @@ fn a_start_for_names_that_is_cancelled_is_undone() {
 /// Nobody reads stderr, whose pipe is full: the second Ctrl-C ends the process all the same, and so does a failure.
 #[test]
 fn a_blocked_stderr_does_not_keep_the_process() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     for (words, signals) in [(&["run", "1"][..], 2), (&["--json", "info", "9"], 0)] {
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
@@ -288,8 +267,7 @@ fn a_blocked_stderr_does_not_keep_the_process() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_lost_result_of_what_acts_is_a_fault() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let mut peer = sim.peer();
     let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     for (words, code) in [
@@ -309,8 +287,7 @@ fn a_lost_result_of_what_acts_is_a_fault() {
         let output = ended(child).ends(code);
         assert!(output.err.contains("No space left"), "{words:?}: {}", output.err);
     }
-    let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
-    assert_eq!(status["boards"][0]["status_byte"], 0x1B, "stopped all the same");
+    assert_eq!(sim.status_byte("1"), 0x1B, "stopped all the same");
     // A reader that has gone is no error.
     for words in [&["decode", "--live"][..], &["record", "-"], &["--json", "monitor"]] {
         let (reader, writer) = std::io::pipe().unwrap();
@@ -328,8 +305,7 @@ fn a_lost_result_of_what_acts_is_a_fault() {
 /// The second Ctrl-C ends every command alike: 5, and what is left undone.
 #[test]
 fn a_second_ctrl_c_is_the_same_everywhere() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let log = sim.file("bus.log", b"(0.0) can0 240#\n(90.0) can0 240#\n");
     let big = sim.file("big.log", "(0.0) can0 240#\n".repeat(10_000).as_bytes());
     for words in [
@@ -351,8 +327,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         std::thread::sleep(Duration::from_millis(200));
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
-        signal(&child, "-INT");
-        let output = ended(child);
+        let output = ended_by(child, "-INT");
         // Who could obey the first one at once has ended by itself.
         let alike = output.code == 5 && output.err.contains("ended at once; nothing was changed");
         assert!(

@@ -6,33 +6,29 @@ mod common;
 use std::time::Duration;
 
 use cli_kit::trial::{ended, signal};
-use common::Sim;
+use common::{Sim, ended_by};
 
 /// A terminal that is closed ends what runs and what is programmed, as Ctrl-C does.
 #[test]
 fn a_hangup_stops_in_order() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let child = sim.spawn(&["run", "1,2", "--active"]);
     sim.peer().wait("602#01010000");
     std::thread::sleep(Duration::from_millis(300));
-    signal(&child, "-HUP");
-    ended(child).ends(0);
+    ended_by(child, "-HUP").ends(0);
     let image = sim.file("image.bin", &vec![7; 60_000]);
     let child = sim.spawn(&["update", "1", &image]);
     sim.peer().wait("2C1#");
-    signal(&child, "-HUP");
-    let output = ended(child);
+    let output = ended_by(child, "-HUP");
     assert!([4, 5].contains(&output.code), "{}: {}", output.code, output.err);
-    let status = sim.ucom(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2]);
 }
 
 /// `ci --for` stops the board, `monitor` ends, and a recording is whole.
 #[test]
 fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     for name in ["-HUP", "-TERM"] {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
@@ -41,7 +37,7 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         signal(&child, name);
         peer.wait("601#00000000");
         ended(child).ends(0);
-        let status = sim.ucom(&["--json", "status", "1"]).ends(0).json();
+        let status = sim.json(&["status", "1"], 0);
         assert_eq!(status["boards"][0]["state"], "started", "{name}: the loop was stopped");
 
         let view = sim.spawn(&["--json", "monitor"]);
@@ -62,8 +58,7 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
             );
             assert!(output.err.is_empty(), "{name} {ending}: {}", output.err);
         }
-        signal(&view, name);
-        ended(view).ends(0);
+        ended_by(view, name).ends(0);
     }
 }
 
@@ -71,22 +66,19 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
 /// shows it.
 #[test]
 fn a_killed_recorder_leaves_what_was_recorded() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     let run = sim.spawn(&["run", "1"]);
     sim.peer().wait("381#");
     for ending in ["log", "fzi", "mcap"] {
         let file = sim.path(&format!("killed.{ending}"));
         let child = sim.spawn(&["record", &file]);
         std::thread::sleep(Duration::from_millis(3_300));
-        signal(&child, "-KILL");
-        ended(child);
+        ended_by(child, "-KILL");
         let output = sim.ucom(&["decode", &file]).ends(0);
         // Two packages every 10 ms and more, for more than a second.
         let frames = output.out.lines().count();
         assert!(frames > 200, "{ending}: {frames} frames; {}", output.err);
         assert!(ending != "mcap" || output.err.contains("broken off"), "{ending}: {}", output.err);
     }
-    signal(&run, "-INT");
-    ended(run).ends(0);
+    ended_by(run, "-INT").ends(0);
 }

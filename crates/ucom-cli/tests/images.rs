@@ -8,8 +8,7 @@ use common::{Sim, image};
 /// A text is refused with its place before anything is sent, and what goes where is shown.
 #[test]
 fn d40_a_text_is_never_flashed() {
-    let sim = Sim::start(&["--boards", "1", "--flash-ids", "0x21"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
     let hex = ":0400000001020304F2\n:00000001FF\n";
     let files = [
         ("comment.hex", format!("; made by hand\n{hex}"), "line 1, column 1"),
@@ -41,8 +40,7 @@ fn d40_a_text_is_never_flashed() {
 /// S-records of the boards' tool chain count words, those of other tools bytes: the records show which, or `--addresses` does.
 #[test]
 fn s_records_count_words_or_bytes() {
-    let sim = Sim::start(&["--boards", "1", "--flash-ids", "0x21"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
     let line = |address: u16, data: &[u8]| {
         let mut bytes = vec![data.len() as u8 + 3, (address >> 8) as u8, address as u8];
         bytes.extend(data);

@@ -63,8 +63,7 @@ fn of(board: u8, name: &str) -> impl Fn(&Value) -> bool {
 /// The board misses the PC's heartbeats (D-50) and is in its loop no more, while the other one goes on.
 #[test]
 fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
-    let mut sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "2"]);
     let mut run = Running::start(&sim, &["1,2", "--active"]);
     sim.fault("deaf board=1 for_s=3");
     let left = run.until(|event| event["event"] == "left-loop");
@@ -81,15 +80,14 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     let (code, err) = run.end();
     assert_eq!(code, 5, "{err}");
     assert!(err.contains("board 1 has left its control loop by itself"), "{err}");
-    let status = sim.ucom(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2], "stopped");
 }
 
 /// Another PC stops all boards: each is named, without `--json` in words.
 #[test]
 fn d37_boards_that_another_pc_stops_are_named() {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     let mut run = Running::start(&sim, &["all"]);
     sim.peer().send("600#00000000");
     let both = [run.until(|e| e["event"] == "left-loop"), run.until(|e| e["event"] == "left-loop")];
@@ -115,8 +113,7 @@ fn d37_boards_that_another_pc_stops_are_named() {
 /// Boards that fall silent for good are stopped by policy, and nothing is left to supervise: the run ends by itself.
 #[test]
 fn d51_a_run_without_boards_ends_by_itself() {
-    let mut sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "2"]);
     let mut run = Running::start(&sim, &["all"]);
     sim.fault("silent board=2 for_s=60");
     sim.fault("silent board=1 for_s=60");
@@ -129,8 +126,7 @@ fn d51_a_run_without_boards_ends_by_itself() {
 /// Section 8: a board whose heartbeats are late, lost and back again makes an event each.
 #[test]
 fn p15_late_lost_and_back_are_events() {
-    let mut sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "2"]);
     let mut run = Running::start(&sim, &["1,2", "--on-lost", "report"]);
     sim.fault("silent board=2 for_s=4");
     for name in ["late", "lost", "back"] {

@@ -18,8 +18,7 @@ fn monitor(sim: &Sim) -> std::process::Command {
 /// At 80 columns flash number, program and status bits are there, at 40 state, bits and keys; `s` stops all control loops.
 #[test]
 fn the_view_shows_boards_and_its_stop_key_stops() {
-    let sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "3"]);
     for (columns, rows) in [(80, 24), (40, 12)] {
         let mut terminal = Terminal::new(columns, rows);
         let mut child = terminal.start(&monitor(&sim));
@@ -51,8 +50,7 @@ fn the_view_shows_boards_and_its_stop_key_stops() {
 /// A board that falls silent while it runs is named before anything else.
 #[test]
 fn d51_a_board_that_falls_silent_leads_the_view() {
-    let mut sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "all"]).ends(0);
     let mut terminal = Terminal::new(60, 20);
     let mut child = terminal.start(&monitor(&sim));
@@ -71,8 +69,7 @@ fn d51_a_board_that_falls_silent_leads_the_view() {
 /// The view ends with its terminal, lines end with their reader.
 #[test]
 fn it_ends_when_nobody_looks_any_more() {
-    let sim = Sim::start(&["--boards", "1"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "1"]);
     for nohup in [false, true] {
         let mut terminal = Terminal::new(60, 20);
         let own = monitor(&sim);

@@ -12,10 +12,9 @@ const TABLE: &str = "[program.ci]\nset_position = { scale = 0.01, unit = \"deg\"
 
 /// A chain with numbers, a signal table of the first board, and all applications up.
 fn started() -> (Sim, String) {
-    let sim = Sim::start(&["--boards", "2"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "all"]).ends(0);
-    let info = sim.ucom(&["--json", "info", "1"]).ends(0).json();
+    let info = sim.json(&["info", "1"], 0);
     let table = format!("[[program]]\nprogram_id = {}\n{TABLE}", info["boards"][0]["program_id"]);
     let table = sim.file("edges.toml", table.as_bytes());
     (sim, table)
@@ -138,7 +137,7 @@ fn outputs_are_opened_before_anything_is_sent() {
 fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     let (mut sim, _) = started();
     sim.fault("crash board=2 on_id=0x3C2 on_count=1");
-    let output = sim.ucom(&["--json", "par", "all", "kp=3"]).ends(5).json();
+    let output = sim.json(&["par", "all", "kp=3"], 5);
     let message = output["error"]["message"].as_str().unwrap_or_default();
     assert!(message.contains("board 2") && message.contains("unknown"), "{output}");
     assert!(message.contains("written before: board 1"), "{output}");
@@ -166,7 +165,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     sim.ucom(&["par", "all", "--save", &file]).ends(0);
     let good = std::fs::read_to_string(&file).unwrap();
     let mut peer = sim.peer();
-    let checked = sim.ucom(&["--json", "par", "--apply", &file, "--dry-run"]).ends(0).json();
+    let checked = sim.json(&["par", "--apply", &file, "--dry-run"], 0);
     assert_eq!(checked["written"], false);
     let apply = |text: &str| sim.ucom(&["par", "--apply", &sim.file("bad.yaml", text.as_bytes())]);
     // The mistake is in the second board: the first gets nothing either.
@@ -199,7 +198,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     sim.ucom(&["par", "1", "--dry-run"]).ends(2);
     let received = peer.all(100);
     assert!(!received.iter().any(|f| f.starts_with("3C")), "{received:?}");
-    let output = sim.ucom(&["--json", "par", "--apply", &file]).ends(0).json();
+    let output = sim.json(&["par", "--apply", &file], 0);
     assert_eq!((&output["written"], &output["boards"][1]["par"][0]["word"]), (&json!(true), &json!(120)));
     let received = peer.all(100);
     let written: Vec<&String> = received.iter().filter(|f| f.starts_with("3C")).collect();
@@ -228,7 +227,7 @@ fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     let words = ["--json", "run", "1", "--fresh", "--params", &file("70000"), "--for", "1"];
     assert_eq!(sim.ucom(&words).ends(4).json()["error"]["code"], "params");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
-    assert_eq!(sim.ucom(&["--json", "status", "1"]).ends(0).json()["boards"][0]["status_byte"], 0x1B);
+    assert_eq!(sim.json(&["status", "1"], 0)["boards"][0]["status_byte"], 0x1B);
     peer.all(100);
     sim.ucom(&["run", "1", "--params", &file("1500"), "--par", "1.kd=6", "--for", "1"]).ends(0);
     let received = peer.all(100);
@@ -247,7 +246,7 @@ fn pages_and_templates() {
     assert!(sim.ucom(&["help", "edges"]).ends(0).out.contains("program_id"));
     let table = sim.path("template.toml");
     sim.ucom(&["io", "all", "--template", &table]).ends(0);
-    let io = sim.ucom(&["--json", "--edges", &table, "io", "2"]).ends(0).json();
+    let io = sim.json(&["--edges", &table, "io", "2"], 0);
     assert_eq!(io["boards"][0]["edges"]["so"][0]["scale"], 0.01);
 }
 
@@ -260,7 +259,7 @@ fn a_run_of_all_boards_misses_those_of_the_file() {
     };
     let file = sim.file("absent.yaml", format!("boards:\n{}{}", board(1), board(31)).as_bytes());
     let mut peer = sim.peer();
-    let output = sim.ucom(&["--json", "run", "all", "--params", &file, "--for", "0.2"]).ends(4).json();
+    let output = sim.json(&["run", "all", "--params", &file, "--for", "0.2"], 4);
     assert!(output["error"]["message"].as_str().unwrap().contains("31"), "{output}");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
     // Named boards are those of the command line.

@@ -9,12 +9,11 @@ use common::Sim;
 
 /// A chain of three, and the second board has lost its number.
 fn rebooted() -> Sim {
-    let mut sim = Sim::start(&["--boards", "3"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "3"]);
     sim.fault("power-loss board=2 for_s=0.2");
     let end = Instant::now() + Duration::from_secs(20);
     loop {
-        let there = sim.ucom(&["--json", "scan"]).ends(0).json();
+        let there = sim.json(&["scan"], 0);
         let (boards, reports) =
             (there["boards"].as_array().unwrap().len(), there["reports"].as_array().unwrap().len());
         if (boards, reports) == (2, 3) {
@@ -29,34 +28,34 @@ fn rebooted() -> Sim {
 fn d21_a_board_gets_its_number_back() {
     let sim = rebooted();
     let mut peer = sim.peer();
-    let output = sim.ucom(&["--json", "repair", "2"]).ends(0).json();
+    let output = sim.json(&["repair", "2"], 0);
     assert_eq!((&output["repaired"], &output["board"]["number"]), (&true.into(), &2.into()), "{output}");
     let sent: Vec<String> =
         peer.all(100).into_iter().filter(|f| ["1C2#", "282#"].iter().any(|s| f.starts_with(s))).collect();
     assert_eq!(sent, ["1C2#0200", "1C2#0200", "1C2#0200", "282#", "1C2#0202"]);
-    let all = sim.ucom(&["--json", "scan"]).ends(0).json();
+    let all = sim.json(&["scan"], 0);
     assert_eq!(all["boards"].as_array().unwrap().len(), 3, "{all}");
     // A board that is well stays so, and so do its neighbours.
     let output = sim.ucom(&["repair", "2"]).ends(0);
     assert!(output.out.contains("board 2 has its number"), "{}", output.out);
-    assert_eq!(sim.ucom(&["--json", "scan"]).ends(0).json()["boards"], all["boards"]);
+    assert_eq!(sim.json(&["scan"], 0)["boards"], all["boards"]);
 }
 
 /// The exit codes: 4 another board stands there, 3 no answer, 2 nobody knows which board is meant.
 #[test]
 fn repairs_that_are_refused() {
     let sim = rebooted();
-    let output = sim.ucom(&["--json", "repair", "1", "--flash-id", "0x77"]).ends(4).json();
+    let output = sim.json(&["repair", "1", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     // The board that would take the number is not the one that is meant: it does not keep it.
-    let output = sim.ucom(&["--json", "repair", "2", "--flash-id", "0x77"]).ends(4).json();
+    let output = sim.json(&["repair", "2", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
-    assert_eq!(sim.ucom(&["--json", "scan"]).ends(0).json()["boards"].as_array().unwrap().len(), 2);
+    assert_eq!(sim.json(&["scan"], 0)["boards"].as_array().unwrap().len(), 2);
     let output = sim.ucom(&["repair", "9"]).ends(2);
     assert!(output.err.contains("--flash-id"), "{}", output.err);
     sim.ucom(&["repair", "2", "--inventory", "/nowhere.toml"]).ends(2);
     sim.ucom(&["repair", "2"]).ends(0);
     // All have their numbers: nobody takes this one.
-    let output = sim.ucom(&["--json", "repair", "9", "--flash-id", "0x77"]).ends(3).json();
+    let output = sim.json(&["repair", "9", "--flash-id", "0x77"], 3);
     assert_eq!(output["error"]["code"], "no-answer", "{output}");
 }

@@ -7,8 +7,7 @@ use common::{Sim, image};
 
 /// Board 2 of three has number 1 as well.
 fn sharing() -> Sim {
-    let mut sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x42,0x63"]);
-    sim.ucom(&["init"]).ends(0);
+    let mut sim = Sim::numbered(&["--boards", "3", "--flash-ids", "0x21,0x42,0x63"]);
     sim.fault("same-number board=2");
     sim
 }

@@ -98,8 +98,7 @@ fn of_a_moment(printed: Printed) -> Printed {
 
 /// Boards with their numbers.
 fn numbered(options: &[&str]) -> Sim {
-    let sim = Sim::start(options);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(options);
     sim.file("image.bin", &common::image(60_000, 7));
     sim.file("notes.bin", b"this is no firmware\n");
     sim

@@ -4,16 +4,14 @@
 mod common;
 
 use cli_kit::trial::{ended, signal};
-use common::{Sim, image};
+use common::{Sim, ended_by, golden, image, outcomes};
 
 fn chain(boards: &str) -> Sim {
-    let sim = Sim::start(&["--boards", boards]);
-    sim.ucom(&["init"]).ends(0);
-    sim
+    Sim::numbered(&["--boards", boards])
 }
 
 fn program_id(sim: &Sim, board: &str) -> serde_json::Value {
-    sim.ucom(&["--json", "info", board]).ends(0).json()["boards"][0]["program_id"].clone()
+    sim.json(&["info", board], 0)["boards"][0]["program_id"].clone()
 }
 
 /// U-1 to U-10 on 60 KiB: verified, then up to date; the golden Program ID of 13.3.
@@ -21,27 +19,26 @@ fn program_id(sim: &Sim, board: &str) -> serde_json::Value {
 fn d46_update_is_verified_and_then_up_to_date() {
     let sim = chain("2");
     let file = sim.file("app.bin", &image(60 * 1024, 1));
-    let update = sim.ucom(&["--json", "update", "2", &file, "--date", "2009-06-01"]).ends(0).json();
+    let update = sim.json(&["update", "2", &file, "--date", "2009-06-01"], 0);
     assert_eq!(update["outcome"], "verified", "{update}");
     assert_eq!(update["flash_date"], "2009-06-01");
     assert_eq!(program_id(&sim, "2"), update["program_id"]);
-    let update = sim.ucom(&["--json", "update", "2", &file, "--date", "2009-06-01"]).ends(0).json();
+    let update = sim.json(&["update", "2", &file, "--date", "2009-06-01"], 0);
     assert_eq!(
         (update["outcome"].as_str(), update["boards"][0]["attempts"].as_u64()),
         (Some("up-to-date"), Some(0))
     );
 
-    let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
+    let golden = golden();
     let file = sim.file("golden.bin", &golden);
-    let update = sim.ucom(&["--json", "update", "1", &file, "--start", "--flash-id", "0x21"]).ends(0).json();
+    let update = sim.json(&["update", "1", &file, "--start", "--flash-id", "0x21"], 0);
     assert_eq!((update["outcome"].as_str(), update["program_id"].as_u64()), (Some("running"), Some(0x4B3F)));
 }
 
 /// D-41: with `--name-target` the header names the board, else it is for any.
 #[test]
 fn d41_the_header_names_the_board_if_wanted() {
-    let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x42"]);
-    sim.ucom(&["init"]).ends(0);
+    let sim = Sim::numbered(&["--boards", "2", "--flash-ids", "0x21,0x42"]);
     let file = sim.file("app.bin", &image(500, 1));
     for (option, expected) in [("--name-target", "4200"), ("--start", "FFFF")] {
         let mut peer = sim.peer();
@@ -62,7 +59,7 @@ fn d46_refusals_change_nothing() {
     let file = sim.file("app.bin", &image(2000, 2));
     let before = program_id(&sim, "1");
     // Another board than the one that is meant.
-    let update = sim.ucom(&["--json", "update", "1", &file, "--flash-id", "0x77"]).ends(4).json();
+    let update = sim.json(&["update", "1", &file, "--flash-id", "0x77"], 4);
     assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
     assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
     sim.ucom(&["update", "1-2", &file, "--flash-id", "0x21"]).ends(2);
@@ -71,14 +68,13 @@ fn d46_refusals_change_nothing() {
     // A list needs to know who is who.
     let output = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "no-inventory");
-    let dry = sim.ucom(&["--json", "update", "all", &file, "--dry-run"]).ends(0).json();
+    let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
     assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
     // While a board runs.
     let run = sim.spawn(&["--json", "run", "3"]);
     sim.peer().wait("603#01000000");
     sim.ucom(&["update", "1", &file]).ends(4);
-    signal(&run, "-INT");
-    ended(run).ends(0);
+    ended_by(run, "-INT").ends(0);
     assert_eq!(program_id(&sim, "1"), before);
     // Nobody there.
     sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
@@ -91,12 +87,12 @@ fn d46_errors_before_and_after_the_erase() {
     // An image beyond the application area.
     let file = sim.file("large.bin", &image(100 * 1024, 3));
     let before = program_id(&sim, "1");
-    let update = sim.ucom(&["--json", "update", "1", &file]).ends(1).json();
+    let update = sim.json(&["update", "1", &file], 1);
     assert_eq!(update["boards"][0]["attempts"], 1, "P-11: exactly one attempt: {update}");
     assert_eq!(program_id(&sim, "1"), before);
     sim.fault("flash-broken board=1");
     let file = sim.file("app.bin", &image(2000, 4));
-    let update = sim.ucom(&["--json", "update", "1", &file]).ends(5).json();
+    let update = sim.json(&["update", "1", &file], 5);
     assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
 }
 
@@ -107,17 +103,15 @@ fn an_update_session_goes_on_and_is_resumed() {
     let file = sim.file("app.bin", &image(4000, 5));
     sim.fault("silent board=2");
     sim.ucom(&["update", "1-3", &file]).ends(3);
-    let infos = sim.ucom(&["--json", "scan"]).ends(0).json();
+    let infos = sim.json(&["scan"], 0);
     assert_eq!(infos["boards"].as_array().unwrap().len(), 2);
     // Board 2 comes back with power off and on: without a number, and repaired by the update itself or by an init.
     drop(sim);
     let sim = chain("3");
-    let first = sim.ucom(&["--json", "update", "1,3", &file_in(&sim)]).ends(0).json();
+    let first = sim.json(&["update", "1,3", &file_in(&sim)], 0);
     assert_eq!(first["boards"][1]["outcome"], "verified");
-    let all = sim.ucom(&["--json", "update", "all", &file_in(&sim)]).ends(0).json();
-    let outcomes: Vec<&str> =
-        all["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
-    assert_eq!(outcomes, ["up-to-date", "verified", "up-to-date"]);
+    let all = sim.json(&["update", "all", &file_in(&sim)], 0);
+    assert_eq!(outcomes(&all), ["up-to-date", "verified", "up-to-date"]);
 }
 
 fn file_in(sim: &Sim) -> String {
@@ -132,14 +126,12 @@ fn p12_cancel_leaves_the_board_usable() {
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &file]);
     // Well into the second cycle: 961 blocks with their READY each are the first.
-    for _ in 0..1200 {
-        peer.wait("181#");
-    }
+    peer.wait_for(1200, "181#");
     signal(&update, "-INT");
     peer.wait("1C1#0400");
     let output = ended(update).ends(5);
     assert_eq!(output.json()["boards"][0]["outcome"], "incomplete", "{}", output.out);
-    let info = sim.ucom(&["--json", "info", "1"]).ends(0).json();
+    let info = sim.json(&["info", "1"], 0);
     assert_eq!(info["boards"][0]["application"], false);
     sim.ucom(&["update", "1", &sim.file("small.bin", &image(2000, 8))]).ends(0);
 }
@@ -151,14 +143,11 @@ fn p13_a_killed_update_is_recovered_by_the_next() {
     let file = sim.file("app.bin", &image(60 * 1024, 9));
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &file]);
-    for _ in 0..1100 {
-        peer.wait("181#");
-    }
-    signal(&update, "-KILL");
-    ended(update);
+    peer.wait_for(1100, "181#");
+    ended_by(update, "-KILL");
     // What the killed one had handed to its adapter still leaves, on a busy machine for some time: until then it is on the bus.
     while !peer.all(1000).is_empty() {}
-    let update = sim.ucom(&["--json", "update", "1", &file]).ends(0).json();
+    let update = sim.json(&["update", "1", &file], 0);
     assert_eq!(update["outcome"], "verified", "{update}");
 }
 
@@ -171,7 +160,7 @@ fn d46_power_loss_in_mid_update() {
     let first = sim.ucom(&["--json", "update", "1", &file]);
     assert!([0, 5].contains(&first.code), "{}", first.out);
     sim.ucom(&["init"]).ends(0);
-    let update = sim.ucom(&["--json", "update", "1", &file]).ends(0).json();
+    let update = sim.json(&["update", "1", &file], 0);
     assert!(["verified", "up-to-date"].contains(&update["outcome"].as_str().unwrap()), "{update}");
 }
 
@@ -185,9 +174,7 @@ fn d46_a_bus_that_fails_leaves_the_report() {
         let mut peer = sim.peer();
         let update = sim.spawn(&["--json", "update", "1,2", &file]);
         peer.wait("101#");
-        for _ in 0..blocks {
-            peer.wait("182#");
-        }
+        peer.wait_for(blocks, "182#");
         let dir = sim.kill();
         let output = ended(update).ends(code);
         let report = output.json();
@@ -206,9 +193,7 @@ fn d46_a_bus_that_fails_is_told_in_words() {
     let file = sim.file("app.bin", &image(60 * 1024, 12));
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &file]);
-    for _ in 0..1200 {
-        peer.wait("181#");
-    }
+    peer.wait_for(1200, "181#");
     let dir = sim.kill();
     let output = ended(update).ends(5);
     for word in ["incomplete", "the bus failed", "run the update again"] {
@@ -225,9 +210,7 @@ fn p12_cancelled_before_the_erase() {
     let file = sim.file("app.bin", &image(60 * 1024, 13));
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &file]);
-    for _ in 0..100 {
-        peer.wait("181#");
-    }
+    peer.wait_for(100, "181#");
     signal(&update, "-INT");
     peer.wait("1C1#0400");
     let report = ended(update).ends(4).json();
@@ -245,7 +228,7 @@ fn d08_a_dry_run_sees_another_pc() {
     let file = sim.file("app.bin", &image(2000, 14));
     sim.ucom(&["update", "1", &file, "--dry-run"]).ends(0);
     sim.fault("foreign-master for_s=20");
-    let report = sim.ucom(&["--json", "update", "1", &file, "--dry-run"]).ends(4).json();
+    let report = sim.json(&["update", "1", &file, "--dry-run"], 4);
     assert_eq!(report["boards"][0]["error"]["code"], "foreign-master", "{report}");
 }
 
@@ -260,9 +243,7 @@ fn d46_a_group_is_one_transfer() {
     let update = sim.spawn(&["--json", "update", "1,2,4", &file, "--group"]);
     peer.wait("2C0#");
     let report = ended(update).ends(0).json();
-    let outcomes: Vec<&str> =
-        report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
-    assert_eq!(outcomes, ["verified"; 3], "{report}");
+    assert_eq!(outcomes(&report), ["verified"; 3], "{report}");
     assert!(peer.all(100).iter().all(|f| !f.starts_with("2C1#")), "one transfer only");
     assert_eq!(program_id(&sim, "3"), before);
 }
@@ -325,7 +306,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let sim = Sim::start(&["--boards", "1", "--profile", profile]);
     sim.ucom(&["--profile", profile, "init"]).ends(0);
     // What a tool chain makes: header and data of each cycle in a file of its own.
-    let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
+    let golden = golden();
     let cycle = |cycle, date| {
         let header = ucom::Header {
             cycle,
@@ -372,9 +353,7 @@ fn all_is_the_inventory_too() {
     }
     let output = sim.ucom(&["--json", "update", "all", &file_in(&sim)]).ends(3);
     let report = output.json();
-    let outcomes: Vec<&str> =
-        report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect();
-    assert_eq!(outcomes, ["verified", "not-started", "verified", "not-started"], "{report}");
+    assert_eq!(outcomes(&report), ["verified", "not-started", "verified", "not-started"], "{report}");
     assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
     assert!(output.err.contains("has no number"), "{}", output.err);
     // Commands that act on the boards that are there name those that are not.
@@ -406,7 +385,7 @@ fn p12_cancelled_while_it_scans() {
 #[test]
 fn a_named_program_id_is_compared_with_the_image() {
     let sim = chain("1");
-    let golden: Vec<u8> = (0..1000_usize).map(|i| (37 * i + 11) as u8).collect();
+    let golden = golden();
     let file = sim.file("golden.bin", &golden);
     let output = sim.ucom(&["update", "1", &file, "--expect-program-id", "0x4B40"]).ends(4);
     assert!(output.err.contains("0x4B3F") && output.err.contains("0x4B40"), "{}", output.err);

@@ -6,7 +6,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use can_link::{CanBus, CanFrame, Id};
-use cli_kit::trial::{CommandOutput, program, run, signal};
+use cli_kit::trial::{CommandOutput, ended, program, run, signal};
+use serde_json::Value;
 
 fn command() -> Command {
     program(env!("CARGO_BIN_EXE_ucom"), "UCOM_")
@@ -50,6 +51,13 @@ impl Sim {
         Self { child, url: url.to_owned(), dir: tempfile::tempdir().expect("a directory") }
     }
 
+    /// The same, and its boards have their numbers.
+    pub fn numbered(options: &[&str]) -> Self {
+        let sim = Self::start(options);
+        sim.ucom(&["init"]).ends(0);
+        sim
+    }
+
     /// `ucom` on its bus.
     pub fn command(&self) -> Command {
         let mut command = command();
@@ -61,6 +69,16 @@ impl Sim {
     /// Runs `ucom` on its bus, with an inventory and a cache of its own.
     pub fn ucom(&self, words: &[&str]) -> CommandOutput {
         run(self.command(), words, "")
+    }
+
+    /// What `ucom --json` with these words answers; panics if it ends with another code.
+    pub fn json(&self, words: &[&str], code: i32) -> Value {
+        self.ucom(&[&["--json"], words].concat()).ends(code).json()
+    }
+
+    /// The status byte of a board.
+    pub fn status_byte(&self, board: &str) -> Value {
+        self.json(&["status", board], 0)["boards"][0]["status_byte"].clone()
     }
 
     /// Starts `ucom` on its bus; it goes on while the test does.
@@ -120,6 +138,17 @@ impl Drop for Sim {
     }
 }
 
+/// Sends a signal to a command and waits for its end.
+pub fn ended_by(child: Child, name: &str) -> CommandOutput {
+    signal(&child, name);
+    ended(child)
+}
+
+/// What became of each board of an update.
+pub fn outcomes(report: &Value) -> Vec<&str> {
+    report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect()
+}
+
 /// A device on the bus that sends and receives raw frames.
 pub struct Peer {
     bus: Box<dyn CanBus + Send>,
@@ -169,9 +198,19 @@ impl Peer {
         }
         panic!("no frame {start} within 120 s");
     }
+
+    /// Waits for so many frames that begin so.
+    pub fn wait_for(&mut self, count: usize, start: &str) {
+        (0..count).for_each(|_| drop(self.wait(start)));
+    }
 }
 
 /// An image of so many bytes, different for each seed.
 pub fn image(bytes: usize, seed: u8) -> Vec<u8> {
     (0..bytes).map(|i| (i * 37 + 11) as u8 ^ seed).collect()
+}
+
+/// The image of the protocol's example, whose Program ID is 0x4B3F.
+pub fn golden() -> Vec<u8> {
+    (0..1000_usize).map(|i| (37 * i + 11) as u8).collect()
 }

@@ -1,23 +1,20 @@
 //! Only what passed the check runs, and only what was uploaded.
 
-use jtc_wire::{ControllerState, NodeState};
+use jtc_wire::NodeState;
 use std::time::Duration;
 
-use jtc_core::Config;
-use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{
     Arm, CheckError, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, MotionError,
-    Session, Trajectory, plan,
+    Trajectory,
 };
-use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
+use jtc_sim::FaultKind;
 
-type Sim = Session<SimPort>;
+use crate::{Sim, fail, session};
 
 /// In HoldPos at the zero pose, with the default parameters.
 fn ready() -> Sim {
-    let world = World::new(SimConfig { baud: None, ..SimConfig::default() });
-    let mut session = Session::new(SimPort::new(world));
+    let mut session = session(None);
     session.push(&Arm::avena().parameter_set(), |_| {}).unwrap();
     let status = session.wait_ready(Duration::from_secs(15)).unwrap();
     assert!(status.joints.iter().all(|j| j.state == NodeState::ENABLED), "every drive is enabled");
@@ -25,8 +22,7 @@ fn ready() -> Sim {
 }
 
 fn motion(to: f64) -> Trajectory {
-    let target = [to, 0.0, 0.0, 0.0, 0.0, 0.0];
-    plan::joint_move(&[0.0; 6], &target, &Config::avena(), 60.0).unwrap()
+    crate::motion(to, 60.0)
 }
 
 fn check(trajectory: &Trajectory) -> Result<CheckedTrajectory, CheckError> {
@@ -126,12 +122,7 @@ fn only_what_was_uploaded_is_executed() {
     refused(&mut s, &second);
     // Nor does an error, which makes the controller forget what it held.
     s.upload(&first, |_| Flow::Continue).unwrap();
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::SafetyInput,
-        trigger: Trigger::At(0),
-        duration_ms: Some(200),
-    });
-    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    fail(&mut s, FaultKind::SafetyInput, 200);
     refused(&mut s, &first);
 }
 

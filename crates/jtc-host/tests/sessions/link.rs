@@ -13,21 +13,9 @@ use jtc_host::{
     CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, MotionError, Session, Trajectory,
     UploadError, plan,
 };
-use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
+use jtc_sim::{Fault, FaultKind, Trigger};
 
-type Sim = Session<SimPort>;
-
-fn session(baud: Option<u32>) -> Sim {
-    Session::new(SimPort::new(World::new(SimConfig { baud, ..SimConfig::default() })))
-}
-
-/// In HoldPos with the default parameters.
-fn ready(baud: Option<u32>) -> Sim {
-    let mut s = session(baud);
-    s.use_defaults().unwrap();
-    s.wait_hold(Duration::from_secs(15)).unwrap();
-    s
-}
+use crate::{Sim, inject, motion, ready, session};
 
 /// There and back between two poses and then at rest, `points` in all.
 fn trajectory(points: usize) -> Trajectory {
@@ -182,8 +170,7 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
 #[test]
 fn pause_resume_and_stop() {
     let mut s = ready(Some(921_600));
-    let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
-    let (t, _) = upload(&mut s, &t).unwrap();
+    let (t, _) = upload(&mut s, &motion(1.0, 50.0)).unwrap();
     s.execute(&t).unwrap();
     let (mut paused, mut resumed, mut stopped) = (false, false, false);
     let outcome = s
@@ -209,13 +196,8 @@ fn pause_resume_and_stop() {
 #[test]
 fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     let mut s = ready(Some(921_600));
-    let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
-    let (t, _) = upload(&mut s, &t).unwrap();
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::MotorFault { joint: Joint::ALL[2], bits: 2 },
-        trigger: Trigger::AtPoint(500),
-        duration_ms: Some(300),
-    });
+    let (t, _) = upload(&mut s, &motion(1.0, 50.0)).unwrap();
+    inject(&mut s, FaultKind::MotorFault { joint: Joint::ALL[2], bits: 2 }, Trigger::AtPoint(500), 300);
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     let Error::Motion(MotionError::RunFault { point, .. }) = &error else { panic!("{error}") };
@@ -263,11 +245,7 @@ fn j66_a_motion_that_the_controller_paused_is_no_success() {
     s.push(&arm.parameter_set(), |_| {}).unwrap();
     s.wait_hold(Duration::from_secs(15)).unwrap();
     let (t, _) = upload(&mut s, &trajectory(2_000)).unwrap();
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::Push { joint: Joint::ALL[4], torque: 38.0 },
-        trigger: Trigger::AtPoint(500),
-        duration_ms: Some(400),
-    });
+    inject(&mut s, FaultKind::Push { joint: Joint::ALL[4], torque: 38.0 }, Trigger::AtPoint(500), 400);
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     assert_eq!((error.code(), error.kind()), ("paused-by-controller", ErrorKind::Fault));

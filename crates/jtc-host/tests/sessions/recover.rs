@@ -4,28 +4,16 @@ use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
 
 use jtc_bus::Joint;
-use jtc_core::Config;
-use jtc_host::port::sim::SimPort;
 use jtc_host::session::{Flow, ParameterSource, RecoverStep};
-use jtc_host::{
-    Arm, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, ParametersError, Session, plan,
-};
-use jtc_sim::{Fault, FaultKind, SimConfig, Trigger, World};
+use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, ParametersError};
+use jtc_sim::FaultKind;
 
-type Sim = Session<SimPort>;
-
-fn session() -> Sim {
-    session_at(None)
-}
-
-fn session_at(baud: Option<u32>) -> Sim {
-    Session::new(SimPort::new(World::new(SimConfig { baud, ..SimConfig::default() })))
-}
+use crate::{Sim, fail, motion, ready, session};
 
 /// On a path of some seconds, from HoldPos.
 fn move_arm(s: &mut Sim) {
-    let t = plan::joint_move(&[0.0; 6], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), 50.0).unwrap();
-    let t = CheckedTrajectory::check(&t, &Arm::avena(), &[0.0; 6], &CheckOptions::default()).unwrap();
+    let t = CheckedTrajectory::check(&motion(1.0, 50.0), &Arm::avena(), &[0.0; 6], &CheckOptions::default())
+        .unwrap();
     s.upload(&t, |_| Flow::Continue).unwrap();
     s.execute(&t).unwrap();
     s.wait_for("motion", Duration::from_secs(10), |s| s.state == ControllerState::Operate && s.point > 100)
@@ -47,7 +35,7 @@ fn recover_says_each_step_of_each_state() {
     }
     let kept = "friction, gains and arm model: those that the controller was given before";
     let done = "HoldPos, no errors";
-    let mut s = session();
+    let mut s = session(None);
     let fresh = words(&mut s, ParameterSource::ControllerDefaults);
     assert!(fresh[0].starts_with("found: state ") && fresh[0].contains("friction not given"), "{fresh:?}");
     assert!(
@@ -70,12 +58,7 @@ fn recover_says_each_step_of_each_state() {
         words(&mut s, ParameterSource::None),
         ["found: state Operate, trajectory Execute", kept, "stopping the motion", done]
     );
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::SafetyInput,
-        trigger: Trigger::At(0),
-        duration_ms: Some(3_000),
-    });
-    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    fail(&mut s, FaultKind::SafetyInput, 3_000);
     let stopped = words(&mut s, ParameterSource::None);
     assert!(
         stopped[0].starts_with("found: state Error, trajectory Null; ")
@@ -86,12 +69,7 @@ fn recover_says_each_step_of_each_state() {
     let waiting = "the safety input is low: release the emergency stop (waiting)";
     assert_eq!(stopped.iter().filter(|s| *s == waiting).count(), 1, "{stopped:?}");
     assert_eq!(stopped.last().unwrap(), done);
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::MotorFault { joint: Joint::ALL[2], bits: 2 },
-        trigger: Trigger::At(0),
-        duration_ms: Some(300),
-    });
-    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    fail(&mut s, FaultKind::MotorFault { joint: Joint::ALL[2], bits: 2 }, 300);
     let faulty = words(&mut s, ParameterSource::None);
     assert!(faulty.iter().any(|s| s == "clearing the errors of the controller and of joint 3"), "{faulty:?}");
 }
@@ -99,7 +77,7 @@ fn recover_says_each_step_of_each_state() {
 /// A person who wants it to end ends it; what moves is brought to a stand first, and nothing else is sent.
 #[test]
 fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
-    let mut s = session();
+    let mut s = session(None);
     s.recover(ParameterSource::ControllerDefaults, |_| {}).unwrap();
     move_arm(&mut s);
     let error = s.recover_until(ParameterSource::None, || true, |_| {}).unwrap_err();
@@ -123,15 +101,10 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
 
 #[test]
 fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
-    let mut s = session_at(Some(921_600));
+    let mut s = session(Some(921_600));
     let status = s.recover(ParameterSource::ControllerDefaults, |_| {}).unwrap();
     assert_eq!(status.state, ControllerState::HoldPos);
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::SafetyInput,
-        trigger: Trigger::At(0),
-        duration_ms: Some(5_000),
-    });
-    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    fail(&mut s, FaultKind::SafetyInput, 5_000);
     let mut steps = Vec::new();
     let status = s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0));
@@ -141,7 +114,7 @@ fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
 /// J-55: a controller without parameters is not given a stranger's, and no part of an arm is filled in.
 #[test]
 fn j55_recover_gives_no_numbers_that_nobody_named() {
-    let mut s = session_at(Some(921_600));
+    let mut s = session(Some(921_600));
     let (sent, mut steps) = (s.statistics().frames_sent, 0);
     let error = s.recover(ParameterSource::None, |_| steps += 1).unwrap_err();
     assert!(
@@ -183,15 +156,8 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
 /// After an error, an arm that is named is the one that is powered again.
 #[test]
 fn j55_after_an_error_the_named_arm_is_powered() {
-    let mut s = session_at(Some(921_600));
-    s.use_defaults().unwrap();
-    s.wait_hold(Duration::from_secs(15)).unwrap();
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::SafetyInput,
-        trigger: Trigger::At(0),
-        duration_ms: Some(500),
-    });
-    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    let mut s = ready(Some(921_600));
+    fail(&mut s, FaultKind::SafetyInput, 500);
     let set = Arm::avena().parameter_set();
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.clone()))
@@ -200,12 +166,7 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
     assert!(give < clear, "{steps:?}");
     // Without one the controller keeps what it has, and the step reports it.
-    s.port_mut().world_mut().inject(Fault {
-        kind: FaultKind::SafetyInput,
-        trigger: Trigger::At(0),
-        duration_ms: Some(500),
-    });
-    s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();
+    fail(&mut s, FaultKind::SafetyInput, 500);
     let mut steps = Vec::new();
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");

@@ -7,7 +7,7 @@ use jtc_host::session::Flow;
 use jtc_host::{Diagnose, Error, ErrorKind, MotionError};
 
 /// What the session wrote, while a controller behind a scripted port sends nothing or the same status again and again.
-mod scripted {
+mod answers {
     use std::cell::RefCell;
     use std::rc::Rc;
     use std::time::Duration;
@@ -54,7 +54,7 @@ mod scripted {
 fn j34_resume_only_after_a_pause() {
     use TrajectoryState::{Execute, Finish, Null, Stop};
     for trajectory in [Null, Stop, Execute, Finish] {
-        let (mut s, written) = scripted::session(
+        let (mut s, written) = answers::session(
             jtc_wire::Status {
                 state: ControllerState::HoldPos.into(),
                 trajectory: trajectory.into(),
@@ -71,7 +71,7 @@ fn j34_resume_only_after_a_pause() {
         // Only a motion that may be slowing down can be resumed by the same command a little later.
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
-    let (mut s, written) = scripted::session(
+    let (mut s, written) = answers::session(
         jtc_wire::Status {
             state: ControllerState::HoldPos.into(),
             trajectory: TrajectoryState::Pause.into(),
@@ -92,7 +92,7 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
         point: 1234,
         ..Default::default()
     };
-    let (mut s, written) = scripted::session(moving, Duration::from_millis(500));
+    let (mut s, written) = answers::session(moving, Duration::from_millis(500));
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     assert_eq!((error.kind(), error.code()), (ErrorKind::NoLink, "link-lost"));
     let text = error.to_string();
@@ -101,7 +101,7 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert!(error.hint().contains("emergency stop"), "{}", error.hint());
     assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Stop));
 
-    let (mut s, _) = scripted::session(moving, Duration::ZERO);
+    let (mut s, _) = answers::session(moving, Duration::ZERO);
     let text = s.stop().unwrap_err().to_string();
     assert!(text.contains("THE ARM MAY BE MOVING"), "{text}");
 
@@ -111,7 +111,7 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
         point: 700,
         ..Default::default()
     };
-    let (mut s, written) = scripted::session(paused, Duration::from_millis(500));
+    let (mut s, written) = answers::session(paused, Duration::from_millis(500));
     let text = s.follow(|_| Flow::Continue).unwrap_err().to_string();
     assert!(text.contains("paused at point 700") && !text.contains("MAY BE MOVING"), "{text}");
     assert_eq!(written.borrow().len(), 0);

@@ -3,7 +3,7 @@ mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
-use rig::{Rig, floats, segment_body};
+use rig::{Rig, floats, model_body, segment_body};
 
 /// A motion at 0.1 rad/s at most, at rest at both ends.
 fn points() -> Vec<RawPoint> {
@@ -69,8 +69,7 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
         table.extend([0.0; 400]);
     }
     assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table)), DataStatus::NoError);
-    rig.upload(&points(), 10);
-    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.execute(&points());
     rig.until(5_000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }
@@ -92,8 +91,7 @@ fn j43_an_arm_beyond_a_limit_can_go_to_a_path_inside() {
         p
     };
     let points: Vec<_> = points().into_iter().map(down).collect();
-    rig.upload(&points, 10);
-    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.execute(&points);
     rig.until(5_000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.status().joints[1].internal_occurred & joint_error::POSITION, 0);
 }
@@ -139,19 +137,10 @@ fn j16_an_execute_does_not_wait_for_ever() {
 #[test]
 fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     let mut rig = Rig::new(Config::avena());
-    let model = Parameters::avena().model;
-    let single =
-        |values: &[f64], factor: f64| -> Vec<f32> { values.iter().map(|x| (x * factor) as f32).collect() };
+    let mut model = Parameters::avena().model;
     // Millimetres in place of metres.
-    let mut body = Vec::new();
-    for joint in &model.joints {
-        body.extend(single(&joint.xyz, 1000.0));
-        body.extend(single(&joint.rpy, 1.0));
-    }
-    for link in &model.links {
-        for values in [&link.origin.xyz[..], &link.origin.rpy, &link.inertia, &[link.mass]] {
-            body.extend(single(values, 1.0));
-        }
+    for joint in &mut model.joints {
+        joint.xyz = joint.xyz.map(|x| 1000.0 * x);
     }
     for node in &mut rig.nodes[..6] {
         node.report.position = 0.6;
@@ -160,7 +149,7 @@ fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     rig.tick();
     rig.send(FrameType::FrictionPolynomialUseDefault, &[]);
     rig.send(FrameType::PidParamUseDefault, &[]);
-    assert_eq!(rig.ask(FrameType::ArmModel, &floats(body)), DataStatus::NoError);
+    assert_eq!(rig.ask(FrameType::ArmModel, &model_body(&model)), DataStatus::NoError);
     for _ in 0..1_000 {
         rig.tick();
         assert_eq!((rig.state(), rig.torque), (ControllerState::Init, [0.0; 6]));

@@ -93,9 +93,7 @@ fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
 fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     let mut rig = Rig::holding();
     rig.nodes[JOINT].stays_enabled = true;
-    rig.safety_input = false;
-    rig.run(50);
-    rig.safety_input = true;
+    rig.press_stop(50);
     rig.clear(true, 0x7F);
     for _ in 0..200 {
         rig.tick();

@@ -6,28 +6,14 @@ use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{ExecCommand, RawPoint};
-use plant::{LuGre, Plant, loaded};
+use plant::{LuGre, POSES, Plant, loaded};
 use rig::Rig;
-
-const POSES: [[f64; 6]; 4] = [
-    [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
-    // Stretched out: 4 kg are more than joint 2 can hold.
-    [0.0, 1.4, 0.2, 0.0, 0.0, 0.0],
-    [-1.0, -0.7, 1.2, -0.5, 1.0, 2.0],
-    [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
-];
 
 /// Friction from none, which damps no swing, to that of the default arm.
 const FRICTIONS: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
 
 fn friction(factor: f64) -> [LuGre; 6] {
-    core::array::from_fn(|j| {
-        let f = LuGre::avena(j, 1.2);
-        if factor == 0.0 {
-            return LuGre::NONE;
-        }
-        LuGre { coulomb: factor * f.coulomb, stiction: factor * f.stiction, viscous: factor * f.viscous, ..f }
-    })
+    if factor == 0.0 { [LuGre::NONE; 6] } else { LuGre::of_avena_times(factor) }
 }
 
 /// Share of its torque limit that the most loaded joint needs to hold `mass` kg.

@@ -3,7 +3,7 @@ mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_dynamics::Dynamics;
-use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use jtc_wire::{DataStatus, FrameType, RawPoint};
 use rig::{Rig, floats, rest};
 
 fn torques(rig: &Rig) -> [f64; 6] {
@@ -47,9 +47,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
         })
         .collect();
     let mut rig = Rig::holding();
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(500, |r| r.controller.telemetry().point == 105);
+    rig.move_along(&points, 105);
     let t = *rig.controller.telemetry();
     let (q, qd, qdd) = (
         t.joints.map(|j| j.position),
@@ -143,9 +141,7 @@ fn j42_polynomial_order_and_lengths() {
     let speed = |i: i16| if i == 0 || i == 99 { 0 } else { 150 };
     let points: Vec<_> =
         (0..100).map(|i| RawPoint { position: [i * 3; 6], velocity: [speed(i); 6], ..rest(0) }).collect();
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(900, |r| r.controller.telemetry().point == 500);
+    rig.move_along(&points, 500);
     for j in &rig.controller.telemetry().joints {
         assert!((j.torque_friction - 5.0).abs() < 1e-9, "Coulomb friction only: {}", j.torque_friction);
     }
@@ -153,9 +149,7 @@ fn j42_polynomial_order_and_lengths() {
     let mut rig = Rig::holding();
     let six = floats((0..6).flat_map(|_| [25.0, -0.02, 0.0, 0.0, 10.0, 2.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &six), DataStatus::NoError);
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(900, |r| r.controller.telemetry().point == 500);
+    rig.move_along(&points, 500);
     let v = 150.0 * 6.283185 / 32767.0;
     for j in &rig.controller.telemetry().joints {
         assert!((j.torque_friction - (2.0 + 10.0 * v)).abs() < 1e-6);

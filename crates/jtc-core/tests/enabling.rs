@@ -39,9 +39,7 @@ fn stopped(config: Config) -> Rig {
     rig.until(500, |r| r.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
     rig.run(3);
     rig.follow = false;
-    rig.safety_input = false;
-    rig.run(100);
-    rig.safety_input = true;
+    rig.press_stop(100);
     rig
 }
 
@@ -143,9 +141,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
 #[test]
 fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     let mut rig = Rig::holding();
-    rig.safety_input = false;
-    rig.tick();
-    rig.safety_input = true;
+    rig.press_stop(1);
     let from = rig.sent.len();
     rig.clear(true, 0x7F);
     rig.until(600, |r| asked_to_enable(&r.sent[from..]));

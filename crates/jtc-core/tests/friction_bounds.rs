@@ -2,7 +2,7 @@
 mod rig;
 
 use jtc_core::{Config, Friction, Parameters, TableOf};
-use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use jtc_wire::{DataStatus, FrameType, RawPoint};
 use rig::{Rig, floats};
 
 type Table = TableOf<f32>;
@@ -46,8 +46,7 @@ fn friction_on_a_path(rig: &mut Rig) -> Vec<[u64; 6]> {
             RawPoint { position: [i * 3; 6], velocity: [velocity; 6], ..RawPoint::default() }
         })
         .collect();
-    rig.upload(&points, 10);
-    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.execute(&points);
     let mut torques = Vec::new();
     // From the first torque on: the ticks until a record comes differ.
     while torques.len() < 500 {
@@ -83,6 +82,14 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     }
 }
 
+/// The frame is refused, and the friction on a path is the same as if it had never come.
+fn refused_whole(what: &str, frame_type: FrameType, body: &[u8]) {
+    let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
+    assert_eq!(asked.ask(frame_type, body), DataStatus::IncorrectValue, "{what}");
+    quiet.ask(FrameType::ClearCurrentErrors, &[1, 0, 0, 0]);
+    assert!(friction_on_a_path(&mut asked) == friction_on_a_path(&mut quiet), "{what}: something changed");
+}
+
 #[test]
 fn j06_a_polynomial_that_would_throw_the_arm_is_refused_whole() {
     let good = polynomials();
@@ -101,14 +108,7 @@ fn j06_a_polynomial_that_would_throw_the_arm_is_refused_whole() {
         let mut body = good.map(|c| c.map(|c| 0.5 * c));
         body[5] = good[5];
         body[5][place] = value;
-        let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
-        let record = asked.ask(FrameType::FrictionPolynomial, &wire(&body));
-        assert_eq!(record, DataStatus::IncorrectValue, "{what}");
-        quiet.ask(FrameType::ClearCurrentErrors, &[1, 0, 0, 0]);
-        assert!(
-            friction_on_a_path(&mut asked) == friction_on_a_path(&mut quiet),
-            "{what}: something changed"
-        );
+        refused_whole(what, FrameType::FrictionPolynomial, &wire(&body));
     }
 }
 
@@ -126,14 +126,7 @@ fn j06_a_table_that_would_throw_the_arm_is_refused_whole() {
     ] {
         let mut tables = [good; 6];
         tables[5] = bad;
-        let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
-        let record = asked.ask(FrameType::FrictionTable, &table_wire(&tables));
-        assert_eq!(record, DataStatus::IncorrectValue, "{what}");
-        quiet.ask(FrameType::ClearCurrentErrors, &[1, 0, 0, 0]);
-        assert!(
-            friction_on_a_path(&mut asked) == friction_on_a_path(&mut quiet),
-            "{what}: something changed"
-        );
+        refused_whole(what, FrameType::FrictionTable, &table_wire(&tables));
     }
 }
 
@@ -170,8 +163,7 @@ fn j44_the_friction_of_a_table_at_standstill_makes_no_step() {
     let mut rig = Rig::holding();
     assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables)), DataStatus::NoError);
     rig.run(300);
-    rig.upload(&[RawPoint::default(); 30], 10);
-    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.execute(&[RawPoint::default(); 30]);
     let correction = |rig: &Rig| rig.controller.telemetry().joints.map(|j| j.torque - j.torque_model);
     let (mut last, mut most) = (correction(&rig), 0.0_f64);
     for _ in 0..700 {

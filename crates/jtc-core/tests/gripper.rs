@@ -3,7 +3,7 @@ mod rig;
 
 use jtc_bus::{NodeState, Request};
 use jtc_core::{Config, ControllerState, TrajectoryState};
-use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
+use jtc_wire::{DataStatus, FrameType, RawPoint};
 use rig::{Rig, rest};
 
 const GRIPPER: usize = 6;
@@ -22,9 +22,7 @@ fn powered_with(config: Config, state: ControllerState) -> Rig {
     match state {
         ControllerState::Operate => {
             let points: Vec<RawPoint> = (0..400).map(|_| rest(0)).collect();
-            rig.upload(&points, 10);
-            rig.exec(ExecCommand::Execute);
-            rig.until(500, |r| r.controller.telemetry().point > 5);
+            rig.move_along(&points, 6);
         }
         ControllerState::Teaching => {
             rig.ask(FrameType::TeachingModeEnable, &[]);

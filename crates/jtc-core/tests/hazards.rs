@@ -4,7 +4,7 @@ mod rig;
 use jtc_bus::{NodeState, Request, warning};
 use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
-use rig::{Rig, floats, pieces, rad, rest, segment_body};
+use rig::{Rig, floats, model_body, pieces, rad, rest, segment_body};
 
 /// No limits but those under test.
 fn roomy(mut config: Config, acceleration_max: f64) -> Config {
@@ -122,8 +122,7 @@ fn j33_a_pause_during_a_resume_slows_down() {
 fn j33_a_pause_on_the_way_to_point_0_has_no_step_of_velocity() {
     let mut rig = Rig::holding();
     let points: Vec<_> = (0..10).map(|_| rest(200)).collect();
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
+    rig.execute(&points);
     rig.run(98);
     rig.send(FrameType::TrajSetExecStatus, &[2]);
     let mut last = rig.controller.telemetry().joints[0].set_velocity;
@@ -204,10 +203,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
 #[test]
 fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
     // While the others come to rest after teaching, one joint that has sagged is enabled.
-    let mut rig = Rig::new(roomy(Config::avena(), 100.0));
-    rig.nodes[2].slow_enable = true;
-    rig.defaults();
-    rig.until(300, |r| r.state() == ControllerState::HoldPos);
+    let mut rig = Rig::with_a_slow_drive(roomy(Config::avena(), 100.0));
     rig.run(50);
     rig.ask(FrameType::TeachingModeEnable, &[]);
     rig.run(150);
@@ -327,9 +323,7 @@ fn j42_drives_send_temperatures_below_zero_modulo_256() {
         point.velocity[1] = 1000;
         let mut points = [point; 50];
         (points[0], points[49]) = (rest(0), rest(0));
-        rig.upload(&points, 10);
-        rig.exec(ExecCommand::Execute);
-        rig.until(500, |r| r.controller.telemetry().point == 20);
+        rig.move_along(&points, 20);
         rig.controller.telemetry().joints[1].torque_friction
     };
     assert!(run(251) > run(0), "cold grease is stiffer");
@@ -348,17 +342,10 @@ fn j14_a_silent_node_is_seen_within_seven_frames() {
 fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
     // The same arm with heavier links, on a wall so that gravity matters.
     let mut rig = Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() });
-    let model = jtc_core::Parameters::avena().model;
-    let mut body = Vec::new();
-    for j in &model.joints {
-        body.extend(j.xyz.iter().chain(&j.rpy).map(|x| *x as f32));
-    }
-    for l in &model.links {
-        body.extend(l.origin.xyz.iter().chain(&l.origin.rpy).chain(&l.inertia).map(|x| *x as f32));
-        body.push(1.2 * l.mass as f32);
-    }
+    let mut model = jtc_core::Parameters::avena().model;
+    model.links.iter_mut().for_each(|link| link.mass *= 1.2);
     let before = rig.controller.telemetry().joints[1].torque;
-    rig.send(FrameType::ArmModel, &floats(body));
+    rig.send(FrameType::ArmModel, &model_body(&model));
     let mut last = before;
     for _ in 0..200 {
         rig.tick();

@@ -12,10 +12,7 @@ const POSE: [f64; 6] = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
 
 /// An arm with `mass` kg that its model lacks, and its controller before the joints are enabled.
 fn carrying(mass: f64, factor: f64) -> (Plant, Rig) {
-    let friction = core::array::from_fn(|j| {
-        let f = LuGre::avena(j, 1.2);
-        LuGre { coulomb: factor * f.coulomb, stiction: factor * f.stiction, viscous: factor * f.viscous, ..f }
-    });
+    let friction = LuGre::of_avena_times(factor);
     let arm = Plant::new(&loaded(Parameters::avena().model, mass), friction, POSE);
     let mut rig = Rig::new(Config::avena());
     rig.follow = false;
@@ -52,9 +49,7 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     let waiting = |rig: &mut Rig| {
         rig.nodes[2].slow_enable = true;
         rig.nodes[2].report.state = NodeState::READY;
-        rig.safety_input = false;
-        rig.run(50);
-        rig.safety_input = true;
+        rig.press_stop(50);
         rig.clear(true, 0x7F);
         rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
     };

@@ -50,8 +50,7 @@ impl Loss {
 }
 
 fn arm(mass: f64, q: [f64; 6]) -> Plant {
-    let friction = core::array::from_fn(|j| LuGre::avena(j, 1.2));
-    Plant::new(&loaded(Parameters::avena().model, mass), friction, q)
+    Plant::new(&loaded(Parameters::avena().model, mass), LuGre::of_avena_times(1.0), q)
 }
 
 /// 0.2 s up to 0.25 rad/s, 2 s at it, 0.2 s down. Without accelerations: the loop has an error to correct.

@@ -2,15 +2,14 @@
 mod rig;
 
 use jtc_core::{Config, ConfigError, ControllerState, joint_error};
-use jtc_wire::{ExecCommand, FrameType};
+use jtc_wire::FrameType;
 use rig::{Rig, rest};
 
 /// A rig in each of the states with torque.
 fn powered() -> [Rig; 3] {
     let holding = Rig::holding();
     let mut operating = Rig::holding();
-    operating.upload(&[rest(0); 200], 10);
-    operating.exec(ExecCommand::Execute);
+    operating.execute(&[rest(0); 200]);
     operating.run(300);
     assert_eq!(operating.state(), ControllerState::Operate);
     let mut teaching = Rig::holding();
@@ -79,10 +78,7 @@ fn j35_answers_that_are_missing_neither_count_nor_excuse() {
 
 #[test]
 fn j35_a_joint_that_is_not_enabled_may_move() {
-    let mut rig = Rig::new(Config::avena());
-    rig.nodes[2].slow_enable = true;
-    rig.defaults();
-    rig.until(300, |r| r.state() == ControllerState::HoldPos);
+    let mut rig = Rig::with_a_slow_drive(Config::avena());
     rig.run(30);
     rig.nodes[2].report.velocity = 1.9;
     rig.run(100);

@@ -5,23 +5,11 @@ use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_dynamics::ArmModel;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use proptest::prelude::*;
-use rig::{Rig, floats, rest, segment_body};
+use rig::{Rig, floats, model_body, rest, segment_body};
 
 /// Gravity along y: the arm in its zero position has much to carry.
 fn on_a_wall() -> Rig {
     Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() })
-}
-
-fn model_body(model: &ArmModel) -> Vec<u8> {
-    let mut body = Vec::new();
-    for j in &model.joints {
-        body.extend(j.xyz.iter().chain(&j.rpy).map(|x| *x as f32));
-    }
-    for l in &model.links {
-        body.extend(l.origin.xyz.iter().chain(&l.origin.rpy).chain(&l.inertia).map(|x| *x as f32));
-        body.push(l.mass as f32);
-    }
-    floats(body)
 }
 
 fn gains_body(gains: [f32; 5]) -> Vec<u8> {
@@ -164,8 +152,7 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
     check(&mut rig, ControllerState::Teaching, DataStatus::NotAllowed);
     rig.ask(FrameType::TeachingModeDisable, &[]);
     rig.run(300);
-    rig.upload(&[rest(0); 200], 10);
-    rig.exec(ExecCommand::Execute);
+    rig.execute(&[rest(0); 200]);
     rig.run(10);
     check(&mut rig, ControllerState::Operate, DataStatus::NotAllowed);
     rig.safety_input = false;
@@ -202,9 +189,7 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
             let first = segment_body(7, 0, segments, 10, &[rest(0); 50]);
             assert_eq!(rig.ask(FrameType::Trajectory, &first), DataStatus::NoError);
             if error {
-                rig.safety_input = false;
-                rig.run(5);
-                rig.safety_input = true;
+                rig.press_stop(5);
                 rig.clear(true, 0);
             } else {
                 rig.nodes[2].configured = false;
@@ -224,10 +209,7 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
 
 /// An arm of which one drive takes its time; Execute was given.
 fn waiting_for_a_drive() -> Rig {
-    let mut rig = Rig::new(Config::avena());
-    rig.nodes[2].slow_enable = true;
-    rig.defaults();
-    rig.until(300, |r| r.state() == ControllerState::HoldPos);
+    let mut rig = Rig::with_a_slow_drive(Config::avena());
     rig.run(50);
     let there_and_back = |n: i16| rest(if n < 25 { n } else { 50 - n });
     rig.upload(&(0..51).map(there_and_back).collect::<Vec<_>>(), 20);

@@ -12,9 +12,7 @@ const NOISE: Response = Response::bad(0, FrameStatus::IncorrectHeader, 0);
 fn moving() -> Rig {
     let mut rig = Rig::holding();
     let points: Vec<RawPoint> = (0..400).map(|_| rest(0)).collect();
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(700, |r| r.controller.telemetry().point > 300);
+    rig.move_along(&points, 301);
     rig.statuses.clear();
     rig
 }

@@ -8,10 +8,7 @@ use rig::{Rig, pieces, rest};
 
 #[test]
 fn j16_an_execute_after_a_pause_waits_for_drives_as_well() {
-    let mut rig = Rig::new(Config::avena());
-    rig.nodes[2].slow_enable = true;
-    rig.defaults();
-    rig.until(300, |r| r.state() == ControllerState::HoldPos);
+    let mut rig = Rig::with_a_slow_drive(Config::avena());
     rig.run(50);
     let there_and_back = |n: i16| rest(if n < 25 { n } else { 50 - n });
     rig.upload(&(0..51).map(there_and_back).collect::<Vec<_>>(), 20);
@@ -61,8 +58,7 @@ fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     // A load that the model lacks: after each motion it has to be found anew.
     rig.push(1, 0.004);
     rig.run(1_000);
-    rig.upload(&[rest(0); 20], 10);
-    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.execute(&[rest(0); 20]);
     rig.until(1_000, |r| r.trajectory() == TrajectoryState::Finish);
     rig.run(2);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);

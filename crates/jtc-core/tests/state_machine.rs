@@ -108,9 +108,7 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     // The safety input is low for this tick only.
     let mut rig = Rig::holding();
     rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
-    rig.safety_input = false;
-    rig.tick();
-    rig.safety_input = true;
+    rig.press_stop(1);
     rig.run(100);
     assert_eq!(
         (rig.state(), rig.errors()),

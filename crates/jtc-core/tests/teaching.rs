@@ -5,29 +5,14 @@ mod rig;
 use jtc_core::{Config, ControllerState, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics};
 use jtc_wire::FrameType;
-use plant::{LuGre, Plant, heavier, loaded};
+use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
-
-const POSES: [[f64; 6]; 4] = [
-    [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
-    [0.0, 1.4, 0.2, 0.0, 0.0, 0.0],
-    [-1.0, -0.7, 1.2, -0.5, 1.0, 2.0],
-    [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
-];
 
 /// How far a hand leads each joint, rad.
 const LED: [f64; 6] = [0.1, 0.3, -0.3, 0.2, 0.3, 0.3];
 
 fn model() -> ArmModel {
     Parameters::avena().model
-}
-
-/// The default arm's friction times `factor`; its stiction is a fifth more.
-fn friction(factor: f64) -> [LuGre; 6] {
-    core::array::from_fn(|j| {
-        let f = LuGre::avena(j, 1.2);
-        LuGre { coulomb: factor * f.coulomb, stiction: factor * f.stiction, viscous: factor * f.viscous, ..f }
-    })
 }
 
 /// Held for 4 s, then taught; no correction of the model's torque steps.
@@ -82,7 +67,7 @@ fn lead(arm: &mut Plant, rig: &mut Rig, way: [f64; 6]) {
 fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
     for factor in [1.0, 0.3] {
         for pose in POSES {
-            let mut arm = Plant::new(&loaded(model(), 2.0), friction(factor), pose);
+            let mut arm = Plant::new(&loaded(model(), 2.0), LuGre::of_avena_times(factor), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
             assert!(still < 0.002, "{still} rad at {pose:?}");
@@ -98,14 +83,14 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
 fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
     for mass in [0.9, 1.1] {
         for pose in POSES {
-            let mut arm = Plant::new(&heavier(model(), mass), friction(1.0), pose);
+            let mut arm = Plant::new(&heavier(model(), mass), LuGre::of_avena_times(1.0), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
             lead(&mut arm, &mut rig, LED);
             let led = drift(&mut arm, &mut rig, 3000);
             assert!(still < 0.002 && led < 0.005, "masses times {mass}: {still}, {led} rad from {pose:?}");
             // A third of that friction still holds it where it was; elsewhere it may creep.
-            let mut arm = Plant::new(&heavier(model(), mass), friction(0.3), pose);
+            let mut arm = Plant::new(&heavier(model(), mass), LuGre::of_avena_times(0.3), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
             assert!(still < 0.02, "masses times {mass}: {still} rad at {pose:?}");
@@ -115,7 +100,7 @@ fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
 
 #[test]
 fn j25_a_payload_that_is_not_attributed_falls() {
-    let mut arm = Plant::new(&loaded(model(), 2.0), friction(0.3), POSES[0]);
+    let mut arm = Plant::new(&loaded(model(), 2.0), LuGre::of_avena_times(0.3), POSES[0]);
     let mut rig = taught(&mut arm, Config { teach_payload_max: 0.0, ..Config::avena() });
     let fallen = drift(&mut arm, &mut rig, 3000);
     assert!(fallen > 0.3, "{fallen} rad: the tests above would not see a payload");
@@ -124,7 +109,7 @@ fn j25_a_payload_that_is_not_attributed_falls() {
 #[test]
 fn j25_teaching_is_left_without_a_step_and_without_sag() {
     for pose in POSES {
-        let mut arm = Plant::new(&loaded(model(), 2.0), friction(0.3), pose);
+        let mut arm = Plant::new(&loaded(model(), 2.0), LuGre::of_avena_times(0.3), pose);
         let mut rig = taught(&mut arm, Config::avena());
         lead(&mut arm, &mut rig, LED);
         arm.run(&mut rig, 1000);
@@ -143,7 +128,7 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
 /// Largest speed of a joint after a contact has gone that HoldPos had found, rad/s: it had borne `mass` kg at the flange, or
 /// had pushed against the first joint.
 fn fastest_after_contact(config: Config, pose: [f64; 6], factor: f64, mass: f64) -> f64 {
-    let mut arm = Plant::new(&model(), friction(factor), pose);
+    let mut arm = Plant::new(&model(), LuGre::of_avena_times(factor), pose);
     let mut rig = arm.holding(config);
     let unit = Dynamics::new(&model(), Config::avena().gravity).flange_torque(&pose);
     let push = if mass == 0.0 { [30.0, 0.0, 0.0, 5.0, 0.0, 0.0] } else { unit.map(|u| mass * u) };

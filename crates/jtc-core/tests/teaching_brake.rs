@@ -7,7 +7,7 @@ use jtc_core::{Config, ControllerState, Parameters};
 use jtc_dynamics::ArmModel;
 use jtc_wire::{DataStatus, FrameType};
 use plant::{LuGre, Plant};
-use rig::{Rig, floats};
+use rig::{Rig, floats, model_body};
 
 const POSE: [f64; 6] = [0.1, 0.5, -0.9, 0.4, 0.7, 0.2];
 
@@ -23,15 +23,6 @@ fn scaled(mass: f64, length: f64) -> ArmModel {
         link.origin.xyz = link.origin.xyz.map(|x| x * length);
     }
     model
-}
-
-fn model_body(model: &ArmModel) -> Vec<u8> {
-    let joints = model.joints.iter().flat_map(|j| j.xyz.into_iter().chain(j.rpy));
-    let links = model.links.iter().flat_map(|l| {
-        let origin = l.origin.xyz.into_iter().chain(l.origin.rpy);
-        origin.chain(l.inertia).chain([l.mass])
-    });
-    floats(joints.chain(links).map(|x| x as f32))
 }
 
 /// A hand turns `joint` with `push` N·m for 0.6 s, against grease only, and holds the others back: how the brake acts in the

@@ -98,8 +98,7 @@ fn j30_segments_are_accepted_in_holdpos_only() {
     rig.run(200);
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &[rest(0)]), DataStatus::NotAllowed);
     let mut rig = Rig::holding();
-    rig.upload(&motion(100, 10), 10);
-    rig.exec(ExecCommand::Execute);
+    rig.execute(&motion(100, 10));
     rig.run(300);
     assert_eq!(rig.state(), ControllerState::Operate);
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &[rest(0)]), DataStatus::NotAllowed);
@@ -112,8 +111,7 @@ fn j30_segments_are_accepted_in_holdpos_only() {
 #[test]
 fn j06_parameters_are_not_changed_under_a_moving_arm() {
     let mut rig = Rig::holding();
-    rig.upload(&motion(100, 10), 10);
-    rig.exec(ExecCommand::Execute);
+    rig.execute(&motion(100, 10));
     rig.run(300);
     for t in
         [FrameType::PidParamUseDefault, FrameType::ArmModelUseDefault, FrameType::FrictionTableUseDefault]
@@ -153,8 +151,7 @@ fn j31_first_and_last_point_are_commanded_exactly_and_the_index_counts_milliseco
 fn j31_point_0_is_commanded() {
     let mut rig = Rig::holding();
     let points: Vec<_> = (0..20).map(|i| rest(100 + i)).collect();
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
+    rig.execute(&points);
     let mut seen = false;
     for _ in 0..400 {
         rig.tick();
@@ -182,9 +179,7 @@ fn j33_pause_and_resume_follow_the_path() {
     }
     // The same with a pause.
     let mut rig = Rig::holding();
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(3000, |r| r.controller.telemetry().point == 1400);
+    rig.move_along(&points, 1400);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
     let mut last = *rig.controller.telemetry();
     let mut ticks_to_stand = 0;
@@ -230,9 +225,7 @@ fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
     {
         for before_the_end in [1, 2, 5, 20, 50, 99, 150, 199, 250] {
             let mut rig = Rig::holding();
-            rig.upload(&points, 10);
-            rig.exec(ExecCommand::Execute);
-            rig.until(3000, |r| r.controller.telemetry().point == 1000 - before_the_end);
+            rig.move_along(&points, 1000 - before_the_end);
             rig.send(FrameType::TrajSetExecStatus, &[command as u8]);
             rig.tick();
             let ticks = rig.until(500, |r| r.trajectory() != TrajectoryState::Execute);
@@ -274,9 +267,7 @@ fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
         joint.acceleration_max = 4.0;
     }
     let mut rig = Rig::holding_with(config);
-    rig.upload(&points, 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(1000, |r| r.controller.telemetry().point == 300);
+    rig.move_along(&points, 300);
     rig.exec(ExecCommand::Stop);
     let ticks = rig.until(1000, |r| r.trajectory() != TrajectoryState::Execute);
     assert!((256..330).contains(&ticks), "{ticks}");
@@ -367,9 +358,7 @@ fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
     let mut config = Config::avena();
     config.joints[4].torque_max = 1000.0;
     let mut rig = Rig::holding_with(config);
-    rig.upload(&motion(100, 10), 10);
-    rig.exec(ExecCommand::Execute);
-    rig.until(1000, |r| r.controller.telemetry().point > 300);
+    rig.move_along(&motion(100, 10), 301);
     rig.exec(ExecCommand::Pause);
     rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
     // Somebody leans on it: a little, then too much.
@@ -394,8 +383,7 @@ fn j34_execute_needs_the_arm_at_the_first_point() {
     assert_eq!((rig.trajectory(), rig.state()), (TrajectoryState::Stop, ControllerState::HoldPos));
     assert_eq!(rig.controller.telemetry().joints[0].set_position, 0.0, "nothing moves");
     let points: Vec<_> = (0..10).map(|_| rest(190)).collect(); // 0.018 rad
-    rig.upload(&points, 10);
-    assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
+    rig.execute(&points);
     rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);
 }

@@ -51,6 +51,15 @@ impl LuGre {
         }
     }
 
+    /// The default arm's friction times `factor`; its stiction is a fifth more than its Coulomb friction.
+    pub fn of_avena_times(factor: f64) -> [Self; 6] {
+        core::array::from_fn(|j| {
+            let f = Self::avena(j, 1.2);
+            let Self { coulomb, stiction, viscous, .. } = f;
+            Self { coulomb: factor * coulomb, stiction: factor * stiction, viscous: factor * viscous, ..f }
+        })
+    }
+
     /// Torque against the motion at speed `v`; moves the bristles `z` on by `dt`.
     fn step(&self, z: &mut f64, v: f64, dt: f64) -> f64 {
         if self.stiffness == 0.0 {
@@ -66,6 +75,14 @@ impl LuGre {
         self.stiffness * next + self.damping * slope + self.viscous * v
     }
 }
+
+/// Poses of the arm, rad: bent, and stretched out, where 4 kg are more than joint 2 can hold, and two more.
+pub const POSES: [[f64; 6]; 4] = [
+    [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
+    [0.0, 1.4, 0.2, 0.0, 0.0, 0.0],
+    [-1.0, -0.7, 1.2, -0.5, 1.0, 2.0],
+    [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
+];
 
 /// The arm as it really is.
 pub struct Plant {

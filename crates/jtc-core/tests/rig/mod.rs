@@ -8,12 +8,14 @@ use jtc_core::{
 };
 use jtc_wire::{
     DataStatus, EVENTS_MAX, ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Response, Status,
-    UrgentCommand, UrgentCommands, crc16,
+    UrgentCommand, UrgentCommands,
 };
 
+mod bodies;
 mod paths;
 
-pub use paths::{pieces, rad, rest, segment_body};
+pub use bodies::{floats, frame, model_body, segment_body};
+pub use paths::{pieces, rad, rest};
 
 pub const SCALE: Scale = Scale { velocity: 2.0 };
 
@@ -91,19 +93,6 @@ impl Sent {
     }
 }
 
-/// A frame with length and CRC.
-pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
-    let n = body.len() + 6;
-    let mut bytes = vec![0x9B, frame_type as u8, (n >> 8) as u8, n as u8];
-    bytes.extend_from_slice(body);
-    bytes.extend_from_slice(&crc16(&bytes).to_be_bytes());
-    bytes
-}
-
-pub fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
-    values.into_iter().flat_map(f32::to_be_bytes).collect()
-}
-
 impl Rig {
     pub fn new(config: Config) -> Self {
         let node = Node {
@@ -154,6 +143,15 @@ impl Rig {
         rig.run(700);
         assert_eq!(rig.state(), ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
         assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
+        rig
+    }
+
+    /// In HoldPos while the drive of joint 3 takes its time to be enabled.
+    pub fn with_a_slow_drive(config: Config) -> Self {
+        let mut rig = Self::new(config);
+        rig.nodes[2].slow_enable = true;
+        rig.defaults();
+        rig.until(300, |r| r.state() == ControllerState::HoldPos);
         rig
     }
 
@@ -250,6 +248,13 @@ impl Rig {
         for _ in 0..ticks {
             self.tick();
         }
+    }
+
+    /// The emergency stop is pressed for so many ticks.
+    pub fn press_stop(&mut self, ticks: usize) {
+        self.safety_input = false;
+        self.run(ticks);
+        self.safety_input = true;
     }
 
     /// Moves a joint to where it has to be, as fast as a joint may without its position being implausible (J-35).

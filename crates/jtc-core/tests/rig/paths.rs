@@ -2,7 +2,7 @@
 use jtc_core::TrajectoryState;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 
-use super::Rig;
+use super::{Rig, segment_body};
 
 /// A motion of a joint (0..5) in pieces of constant acceleration (rad/s², number of points 10 ms apart).
 pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
@@ -21,17 +21,6 @@ pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
         }
     }
     points
-}
-
-/// A Trajectory body.
-pub fn segment_body(number: u16, segment: u16, segments: u16, step: u16, points: &[RawPoint]) -> Vec<u8> {
-    let mut body: Vec<u8> = [number, segment, segments, step].iter().flat_map(|x| x.to_be_bytes()).collect();
-    for p in points {
-        for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
-            body.extend_from_slice(&v.to_be_bytes());
-        }
-    }
-    body
 }
 
 /// A point at rest: `raw` in every joint.
@@ -55,10 +44,15 @@ impl Rig {
         assert_eq!(self.trajectory(), TrajectoryState::Stop);
     }
 
-    /// Uploads points 10 ms apart, executes them and runs on until `point` ms of the path are done.
-    pub fn move_along(&mut self, points: &[RawPoint], point: u32) {
+    /// Uploads points 10 ms apart and executes them.
+    pub fn execute(&mut self, points: &[RawPoint]) {
         self.upload(points, 10);
         assert_eq!(self.exec(ExecCommand::Execute), DataStatus::NoError);
+    }
+
+    /// The same, and runs on until `point` ms of the path are done.
+    pub fn move_along(&mut self, points: &[RawPoint], point: u32) {
+        self.execute(points);
         self.until(4_000, |rig| rig.controller.telemetry().point >= point);
     }
 }

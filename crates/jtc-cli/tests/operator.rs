@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::OwnedFd;
 use std::process::{Child, ChildStderr, Stdio};
 
-use common::{Sim, command, jtc};
+use common::{Sim, jtc, slow_motion};
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
@@ -23,14 +23,14 @@ fn terminal() -> (File, OwnedFd) {
     (File::from(master), slave)
 }
 
-/// 20 s of a slow motion of all joints.
-fn slow_motion() -> String {
-    let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
-    for i in 0..=200 {
-        let q = 0.2 * (std::f64::consts::PI * f64::from(i) / 200.0).sin().powi(4);
-        text += &format!("{:.1},{q},{q},{q},{q},{q},{q}\n", f64::from(i) * 0.1);
+/// Reads what a command prints until these words have come.
+fn until(err: &mut impl BufRead, words: &str) {
+    let (mut line, mut all) = (String::new(), String::new());
+    while !line.contains(words) {
+        line.clear();
+        assert!(err.read_line(&mut line).unwrap() > 0, "it ended before {words:?}: {all}");
+        all += &line;
     }
-    text
 }
 
 /// A command at work in real time, with a person at its terminal.
@@ -46,10 +46,8 @@ impl Session {
     /// Starts `jtc --json` with these words, and waits until it has printed `ready`.
     fn start(sim: Sim, words: &[&str], ready: &str) -> Self {
         let (person, slave) = terminal();
-        let mut child = command()
-            .arg("--json")
-            .args(words)
-            .args(["--port", sim.port.to_str().unwrap()])
+        let mut child = sim
+            .command(&[&["--json"], words].concat())
             .stdin(Stdio::from(slave.try_clone().unwrap()))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -63,17 +61,15 @@ impl Session {
 
     /// A run that is just about to move.
     fn run() -> Self {
-        let sim = Sim::start(&["--no-throttle"]);
-        sim.jtc(&["params", "use-defaults"]).ends(0);
+        let sim = Sim::start(&["--no-throttle"]).with_parameters();
         let (file, record) = (sim.path("motion.csv"), sim.path("run.csv"));
-        std::fs::write(&file, slow_motion()).unwrap();
+        std::fs::write(&file, slow_motion(200)).unwrap();
         Self::start(sim, &["traj", "run", &file, "--record", &record], "space pauses")
     }
 
     /// A recording of a taught arm.
     fn teaching() -> Self {
-        let sim = Sim::start(&["--no-throttle"]);
-        sim.jtc(&["recover", "--defaults"]).ends(0);
+        let sim = Sim::start(&["--no-throttle"]).held();
         let file = sim.path("taught.csv");
         Self::start(sim, &["teach", "record", &file], "Ctrl-C ends")
     }
@@ -84,12 +80,7 @@ impl Session {
 
     /// Waits until it has printed `words`.
     fn until(&mut self, words: &str) {
-        let mut line = String::new();
-        while !line.contains(words) {
-            line.clear();
-            let err = self.err.as_mut().expect("somebody listens");
-            assert!(err.read_line(&mut line).unwrap() > 0, "it ended before: {words}");
-        }
+        until(self.err.as_mut().expect("somebody listens"), words);
     }
 
     /// Waits for the end.
@@ -115,7 +106,7 @@ struct Ended {
 }
 
 fn stands(sim: &Sim) {
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!(
         (status["state"].as_str(), status["trajectory"].as_str()),
         (Some("HoldPos"), Some("Stop")),
@@ -195,7 +186,7 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
         teaching.signal("-INT");
         let Ended { code, value, sim, .. } = teaching.end();
         assert!(!std::path::Path::new(&sim.path("taught.csv")).exists(), "an empty file is left");
-        let state = sim.jtc(&["--json", "status"]).ends(0).json()["state"].clone();
+        let state = sim.json(&["status"], 0)["state"].clone();
         if value["error"]["code"] == "ended-at-once" {
             assert!(!close && code == 5, "{code} {value}");
             assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
@@ -208,22 +199,15 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
 
 /// A command at a simulated controller that was interrupted at the words that are waited for on its stderr: its exit code and answer.
 fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) {
-    let mut child = command()
-        .arg("--json")
-        .args(words)
-        .args(["--port", sim.port.to_str().unwrap()])
+    let mut child = sim
+        .command(&[&["--json"], words].concat())
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let mut err = BufReader::new(child.stderr.take().unwrap());
-    let (mut line, mut all) = (String::new(), String::new());
-    while !line.contains(at) {
-        line.clear();
-        assert!(err.read_line(&mut line).unwrap() > 0, "it ended before {at:?}: {all}");
-        all += &line;
-    }
+    until(&mut err, at);
     cli_kit::trial::signal(&child, "-INT");
     // Nobody reads on: a full pipe must not hold it either.
     let mut out = String::new();
@@ -236,8 +220,7 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
 #[test]
 fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     let sim = Sim::start(&[]);
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, slow_motion()).unwrap();
+    let file = sim.file("motion.csv", &slow_motion(200));
     let run = ["traj", "run", &file];
     // Parameters first: the drives need some seconds from here.
     sim.jtc(&["params", "use-defaults"]).ends(0);
@@ -250,7 +233,7 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
             message.contains(&format!("during the {during}")) && message.contains("not started"),
             "{value}"
         );
-        let status = sim.jtc(&["--json", "status"]).ends(0).json();
+        let status = sim.json(&["status"], 0);
         assert_ne!(status["trajectory"], "Execute", "{status}");
         assert_eq!(status["point"], 0, "{status}");
     }
@@ -259,26 +242,20 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
 /// Ctrl-C on the way to the first point stops there, and the motion is not begun.
 #[test]
 fn j33_an_interrupt_on_the_approach_stops_on_it() {
-    let sim = Sim::start(&["--no-throttle"]);
-    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let sim = Sim::start(&["--no-throttle"]).held();
     let file = sim.path("away.csv");
     let away: String = (0..=10).map(|i| format!("{:.1},0.8,0,0,0,0,0\n", f64::from(i) * 0.1)).collect();
     std::fs::write(&file, format!("t,q1,q2,q3,q4,q5,q6\n{away}")).unwrap();
     let (_person, slave) = terminal();
-    let mut child = command()
-        .args(["--json", "traj", "run", &file, "--approach", "--speed", "5"])
-        .args(["--port", sim.port.to_str().unwrap()])
+    let mut child = sim
+        .command(&["--json", "traj", "run", &file, "--approach", "--speed", "5"])
         .stdin(Stdio::from(slave.try_clone().unwrap()))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let mut err = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.contains("moving") {
-        line.clear();
-        assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it moved");
-    }
+    until(&mut err, "moving");
     cli_kit::trial::signal(&child, "-INT");
     let output = cli_kit::trial::ended(child).ends(5);
     let value = output.json();
@@ -288,18 +265,15 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
         "{value}"
     );
     stands(&sim);
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert!(status["joints"][0]["position_rad"].as_f64().unwrap() < 0.7, "{status}");
 }
 
 /// Ctrl-C in the waits of recover: it sends nothing more, but stops what moves; and what it prints in each state.
 #[test]
 fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
-    let dir = tempfile::tempdir().unwrap();
-    let faults = dir.path().join("faults.toml");
     let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 0\n";
-    std::fs::write(&faults, fault).unwrap();
-    let sim = Sim::start(&["--no-throttle", "--faults", faults.to_str().unwrap()]);
+    let sim = Sim::with_faults(&["--no-throttle"], fault);
     let cancelled = |words: &[&str], at: &str| {
         let (code, value) = interrupted(&sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
@@ -308,21 +282,15 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     cancelled(&["recover", "--defaults"], "waiting for joint 1");
     sim.jtc(&["recover"]).ends(0);
     // In motion, of which nobody takes care any more.
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, slow_motion()).unwrap();
+    let file = sim.file("motion.csv", &slow_motion(200));
     let (_person, slave) = terminal();
-    let mut run = command()
-        .args(["traj", "run", &file, "--port", sim.port.to_str().unwrap()])
+    let mut run = sim
+        .command(&["traj", "run", &file])
         .stdin(Stdio::from(slave))
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut err = BufReader::new(run.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.contains("moving") {
-        line.clear();
-        assert!(err.read_line(&mut line).unwrap() > 0, "it ended before it moved");
-    }
+    until(&mut BufReader::new(run.stderr.take().unwrap()), "moving");
     run.kill().unwrap();
     run.wait().unwrap();
     cancelled(&["recover"], "stopping the motion");
@@ -330,6 +298,6 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     // The emergency stop is pressed, and nobody releases it.
     sim.jtc(&["teach", "on"]).ends(0);
     cancelled(&["recover"], "release the emergency stop (waiting)");
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!(status["state"], "Error", "{status}");
 }

@@ -3,20 +3,16 @@
 
 mod common;
 
-use common::{Sim, command, jtc, motion};
+use common::{Sim, jtc, motion};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 fn ready(options: &[&str]) -> Sim {
-    let sim = Sim::start(options);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
-    sim
+    Sim::start(options).with_parameters()
 }
 
 fn json(words: &[&str]) -> serde_json::Value {
-    let mut all = vec!["--json"];
-    all.extend(words);
-    jtc(&all).ends(0).json()
+    jtc(&[&["--json"], words].concat()).ends(0).json()
 }
 
 /// Each millisecond of a motion that ran over the serial port, readable while the simulator runs, after `kill -9`, and run again.
@@ -27,8 +23,7 @@ fn the_simulator_records_each_millisecond() {
         let record = dir.path().join(name).to_str().unwrap().to_owned();
         // In real time, or the file would grow by many megabytes a second.
         let sim = ready(&["--no-throttle", "--record", &record]);
-        let file = sim.path("motion.csv");
-        std::fs::write(&file, motion(0.2)).unwrap();
+        let file = sim.file("motion.csv", &motion(0.2));
         sim.jtc(&["traj", "run", &file]).ends(0);
         // It was ready before, so the file is there, and not written over.
         let output = jtc(&["sim", "--record", &record]).ends(4);
@@ -63,8 +58,7 @@ fn a_simulator_that_is_ended_completes_its_recording() {
     let dir = tempfile::tempdir().unwrap();
     let record = dir.path().join("sim.mcap").to_str().unwrap().to_owned();
     let sim = ready(&["--no-throttle", "--record", &record]);
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, motion(0.2)).unwrap();
+    let file = sim.file("motion.csv", &motion(0.2));
     sim.jtc(&["traj", "run", &file]).ends(0);
     assert_eq!(sim.end("-TERM").0, 0);
     let info = json(&["traj", "info", &record]);
@@ -78,18 +72,8 @@ fn a_run_that_is_killed_leaves_its_recording() {
         let sim = ready(&["--no-throttle"]);
         let (file, record) = (sim.path("motion.csv"), sim.path(name));
         jtc(&["example", "motion", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
-        let mut run = command()
-            .args([
-                "traj",
-                "run",
-                &file,
-                "--speed",
-                "20",
-                "--record",
-                &record,
-                "--port",
-                sim.port.to_str().unwrap(),
-            ])
+        let mut run = sim
+            .command(&["traj", "run", &file, "--speed", "20", "--record", &record])
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .stdout(Stdio::null())
@@ -135,7 +119,7 @@ fn a_full_disk_is_found_before_anything_moves() {
         output.err
     );
     assert!(!std::path::Path::new(&page).exists());
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!((status["state"].as_str(), status["point"].as_u64()), (Some("HoldPos"), Some(0)), "{status}");
     let output = jtc(&["sim", "--record", &full]).ends(2);
     assert!(output.err.contains("No space left") && output.out.is_empty(), "{}", output.err);

@@ -53,18 +53,17 @@ fn a_port_that_is_served_is_not_taken_over() {
 #[test]
 fn from_power_up_to_a_recorded_motion() {
     let sim = Sim::start(&["--speed", "max", "--seed", "3"]);
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!(status["joints"].as_array().unwrap().len(), 6);
     assert!(status["missing_parameters"].as_array().unwrap().len() == 3, "{status}");
 
     // Nothing can run yet, and the output names what to do.
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, motion(0.25)).unwrap();
+    let file = sim.file("motion.csv", &motion(0.25));
     let output = sim.jtc(&["--json", "traj", "run", &file]).ends(1);
     assert!(output.json()["error"]["hint"].as_str().unwrap().contains("params"), "{}", output.out);
 
     let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
-    let pushed = sim.jtc(&["--json", "params", "push", arm]).ends(0).json();
+    let pushed = sim.json(&["params", "push", arm], 0);
     assert_eq!(pushed["missing_parameters"].as_array().unwrap().len(), 0, "{pushed}");
 
     let (record, page) = (sim.path("run.mcap"), sim.path("run.html"));
@@ -90,7 +89,7 @@ fn from_power_up_to_a_recorded_motion() {
     assert!(std::fs::metadata(&record).unwrap().len() > 1000);
     assert!(std::fs::read_to_string(&page).unwrap().contains("</html>"));
 
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!((status["state"].as_str(), status["trajectory"].as_str()), (Some("HoldPos"), Some("Finish")));
     // J-34: nothing is paused, so there is nothing to go on with.
     let output = sim.jtc(&["traj", "resume"]).ends(4);
@@ -110,7 +109,7 @@ fn from_power_up_to_a_recorded_motion() {
     sim.jtc(&["teach", "on"]).ends(0);
     sim.jtc(&["reset", "--joints", "2", "--yes"]).ends(4);
     sim.jtc(&["teach", "off"]).ends(0);
-    let doctor = sim.jtc(&["--json", "doctor"]).ends(0).json();
+    let doctor = sim.json(&["doctor"], 0);
     assert_eq!(doctor["healthy"], true, "{doctor}");
     let lines = sim.jtc(&["--json", "monitor", "--count", "5"]).ends(0);
     assert_eq!(lines.out.lines().count(), 5);
@@ -123,11 +122,7 @@ fn from_power_up_to_a_recorded_motion() {
 fn monitor_ends_with_its_reader() {
     use std::io::BufRead;
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
-    let mut child = common::command()
-        .args(["monitor", "--port", sim.port.to_str().unwrap()])
-        .stdout(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = sim.command(&["monitor"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
     let mut line = String::new();
     std::io::BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
     assert!(line.contains("Init"), "{line}");
@@ -140,7 +135,7 @@ fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
     let output = sim.jtc(&["--json", "recover"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "no-parameters");
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!(status["missing_parameters"].as_array().unwrap().len(), 3, "{status}");
     let output = sim.jtc(&["--json", "recover", "--defaults"]).ends(0);
     assert!(output.err.contains("the controller's own defaults"), "{}", output.err);
@@ -151,8 +146,7 @@ fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
 
 #[test]
 fn a_start_elsewhere_is_refused_until_it_is_approached() {
-    let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let sim = Sim::start(&["--speed", "max", "--no-throttle"]).with_parameters();
     let file = sim.path("away.csv");
     let shifted: String = motion(0.2)
         .lines()
@@ -174,13 +168,8 @@ fn a_start_elsewhere_is_refused_until_it_is_approached() {
 
 #[test]
 fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
-    let dir = tempfile::tempdir().unwrap();
-    let faults = dir.path().join("faults.toml");
-    std::fs::write(&faults, FAULT).unwrap();
-    let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, motion(0.25)).unwrap();
+    let sim = Sim::with_faults(&["--speed", "max"], FAULT).with_parameters();
+    let file = sim.file("motion.csv", &motion(0.25));
     let (record, page) = (sim.path("run.mcap"), sim.path("run.html"));
     let output = sim.jtc(&["--json", "traj", "run", &file, "--record", &record, "--report", &page]).ends(5);
     let value = output.json();
@@ -209,11 +198,8 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
 /// A fault on the way to the first point is recorded and reported like any other, and named.
 #[test]
 fn a_fault_on_the_approach_is_recorded_and_named() {
-    let dir = tempfile::tempdir().unwrap();
-    let faults = dir.path().join("faults.toml");
-    std::fs::write(&faults, FAULT.replace("at_point = 500", "at_point = 200")).unwrap();
-    let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let sim = Sim::with_faults(&["--speed", "max"], &FAULT.replace("at_point = 500", "at_point = 200"))
+        .with_parameters();
     let (file, record, page) = (sim.path("away.csv"), sim.path("run.csv"), sim.path("run.html"));
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=120 {
@@ -272,8 +258,7 @@ fn typed_events_happen_and_mistakes_are_named() {
 
 #[test]
 fn the_arm_can_be_taught_by_hand() {
-    let mut sim = Sim::start(&["--speed", "max"]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let mut sim = Sim::start(&["--speed", "max"]).with_parameters();
     // To 0.3 rad in 2 s. Joint 1 turns about the vertical: let go, it stays.
     let rows = (0..=200).map(|i| {
         let q = 0.15 - 0.15 * (std::f64::consts::PI * f64::from(i) / 200.0).cos();
@@ -283,9 +268,7 @@ fn the_arm_can_be_taught_by_hand() {
     std::fs::write(&lead, "t,q1,q2,q3,q4,q5,q6\n".to_owned() + &rows.collect::<String>()).unwrap();
     sim.write_line(&format!("hand {lead}"));
     sim.jtc(&["teach", "on"]).ends(0);
-    let position = |sim: &Sim| {
-        sim.jtc(&["--json", "status"]).ends(0).json()["joints"][0]["position_rad"].as_f64().unwrap()
-    };
+    let position = |sim: &Sim| sim.json(&["status"], 0)["joints"][0]["position_rad"].as_f64().unwrap();
     let led = (0..100).any(|_| position(&sim) > 0.25);
     assert!(led, "joint 1 is at {} rad", position(&sim));
     sim.jtc(&["teach", "off"]).ends(0);
@@ -326,11 +309,9 @@ fn the_examples_run_in_the_simulator() {
     }
     let (motion, faults) = (dir.path().join("motion.csv"), dir.path().join("faults.toml"));
     let motion = motion.to_str().unwrap();
-    let sim = Sim::start(&["--speed", "max"]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let sim = Sim::start(&["--speed", "max"]).with_parameters();
     sim.jtc(&["traj", "run", motion]).ends(0);
-    let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let sim = Sim::start(&["--speed", "max", "--faults", faults.to_str().unwrap()]).with_parameters();
     let output = sim.jtc(&["traj", "run", motion]).ends(5);
     assert!(output.err.contains("joint 2"), "{}", output.err);
     let point = output.err.split("point ").nth(1).and_then(|t| t.split(|c: char| !c.is_ascii_digit()).next());
@@ -341,8 +322,7 @@ fn the_examples_run_in_the_simulator() {
 /// What was recorded runs again, and is the same motion.
 #[test]
 fn a_recording_is_looked_at_checked_and_run_again() {
-    let sim = Sim::start(&["--speed", "max"]);
-    sim.jtc(&["params", "use-defaults"]).ends(0);
+    let sim = Sim::start(&["--speed", "max"]).with_parameters();
     jtc(&["example", "motion", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
     let motion = sim.path("motion.csv");
     for name in ["run.mcap", "run.csv"] {

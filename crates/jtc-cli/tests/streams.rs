@@ -8,7 +8,7 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use cli_kit::trial::CommandOutput;
-use common::{Sim, command, jtc, motion};
+use common::{Sim, jtc, motion};
 use serde_json::Value;
 
 /// The events of a command, and its result.
@@ -44,8 +44,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert!(result["steps"].is_array());
     assert_eq!(result["status"]["state"], "HoldPos");
 
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, motion(0.2)).unwrap();
+    let file = sim.file("motion.csv", &motion(0.2));
     let output = sim.jtc(&["--json", "traj", "run", &file, "--speed", "50"]).ends(0);
     let (events, report) = stream(&output);
     let order = ["connected", "checked", "uploading", "uploaded", "executing", "sample"];
@@ -92,15 +91,10 @@ fn a_command_reports_what_happens_and_then_its_result() {
 /// What breaks in motion is reported at once, the first cause first.
 #[test]
 fn what_breaks_in_motion_is_reported_at_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let faults = dir.path().join("faults.toml");
     let fault =
         "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nin_state = \"operate\"\nafter_s = 0.5\n";
-    std::fs::write(&faults, fault).unwrap();
-    let sim = Sim::start(&["--no-throttle", "--faults", faults.to_str().unwrap()]);
-    sim.jtc(&["recover", "--defaults"]).ends(0);
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, motion(0.2)).unwrap();
+    let sim = Sim::with_faults(&["--no-throttle"], fault).held();
+    let file = sim.file("motion.csv", &motion(0.2));
     let (events, result) = stream(&sim.jtc(&["--json", "traj", "run", &file]).ends(5));
     let error = events.iter().find(|e| name(e) == "state" && e["state"] == "Error").expect("the error");
     assert!(error["errors"].to_string().contains("joint 3 does not answer"), "{error}");
@@ -126,16 +120,13 @@ fn the_demo_has_events_and_all_events_are_documented() {
 /// A reader that takes nothing of the events (`2>&1 >report.json | less`) does not keep a run from moving or hearing Ctrl-C.
 #[test]
 fn j33_a_reader_that_does_not_read_holds_no_run() {
-    let sim = Sim::start(&["--no-throttle"]);
-    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let sim = Sim::start(&["--no-throttle"]).held();
     let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
     // What a pipe holds.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
-    let mut run = command();
-    run.args(["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
-    run.args(["--port", sim.port.to_str().unwrap()]);
+    let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();
     let wait = |until: &mut dyn FnMut() -> bool| {
         let begin = Instant::now();
@@ -152,6 +143,6 @@ fn j33_a_reader_that_does_not_read_holds_no_run() {
     assert_eq!(output.status.code(), Some(5));
     let result: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(result["outcome"], "stopped", "{result}");
-    let status = sim.jtc(&["--json", "status"]).ends(0).json();
+    let status = sim.json(&["status"], 0);
     assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()), "{status}");
 }

@@ -7,25 +7,12 @@ use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 use cli_kit::trial::{Terminal, signal};
-use common::{Sim, command, motion};
-
-/// `jtc` at a simulated controller.
-fn at(sim: &Sim, words: &[&str]) -> std::process::Command {
-    let mut command = command();
-    command.args(words).args(["--port", sim.port.to_str().unwrap()]);
-    command
-}
+use common::{Sim, motion, slow_motion};
 
 /// The arm moves slowly, and the command that began it is gone.
 fn moving(sim: &Sim) {
-    let file = sim.path("slow.csv");
-    let row = |i: i32| {
-        let q = 0.2 * (std::f64::consts::PI * f64::from(i) / 300.0).sin().powi(4);
-        format!("{:.1},{q},{q},{q},{q},{q},{q}\n", f64::from(i) * 0.1)
-    };
-    let text: String = (0..=300).map(row).collect();
-    std::fs::write(&file, format!("t,q1,q2,q3,q4,q5,q6\n{text}")).unwrap();
-    let mut run = at(sim, &["--json", "traj", "run", &file]);
+    let file = sim.file("slow.csv", &slow_motion(300));
+    let mut run = sim.command(&["--json", "traj", "run", &file]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line.contains("\"sample\"")), "it does not move");
@@ -36,11 +23,10 @@ fn moving(sim: &Sim) {
 /// The view stops a motion whose own command has gone, shows it, and leaves the terminal as it was.
 #[test]
 fn j33_the_stop_key_of_the_view_stops() {
-    let sim = Sim::start(&["--no-throttle"]);
-    sim.jtc(&["recover", "--defaults"]).ends(0);
+    let sim = Sim::start(&["--no-throttle"]).held();
     moving(&sim);
     let mut terminal = Terminal::new(40, 12);
-    let mut child = terminal.start(&at(&sim, &["monitor"]));
+    let mut child = terminal.start(&sim.command(&["monitor"]));
     terminal.until_it_shows(" Operate ");
     terminal.until_it_shows("s stops   q ends");
     terminal.press("s");
@@ -57,7 +43,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     let sim = Sim::start(&["--no-throttle"]);
     for name in ["-INT", "-TERM"] {
         let mut terminal = Terminal::new(80, 24);
-        let mut child = terminal.start(&at(&sim, &["monitor"]));
+        let mut child = terminal.start(&sim.command(&["monitor"]));
         terminal.until_it_shows("joint 6");
         signal(&child, name);
         assert_eq!(terminal.ends(&mut child), 0, "{name}");
@@ -68,7 +54,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     // The window is closed, for a session of its own and for one that receives nothing of it.
     for nohup in [false, true] {
         let mut terminal = Terminal::new(60, 20);
-        let mut monitor = at(&sim, &["monitor"]);
+        let mut monitor = sim.command(&["monitor"]);
         if nohup {
             let mut shell = std::process::Command::new("sh");
             shell
@@ -83,7 +69,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         assert_eq!(terminal.ends(&mut child), 0, "nohup: {nohup}");
     }
     // Lines for whoever is no terminal, until it has read enough.
-    let mut child = at(&sim, &["monitor"]);
+    let mut child = sim.command(&["monitor"]);
     let mut child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut line = String::new();
     let mut out = BufReader::new(child.stdout.take().unwrap());
@@ -98,7 +84,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
 fn a_small_terminal_says_so_and_its_keys_work() {
     let sim = Sim::start(&["--no-throttle"]);
     let mut terminal = Terminal::new(30, 8);
-    let mut child = terminal.start(&at(&sim, &["monitor"]));
+    let mut child = terminal.start(&sim.command(&["monitor"]));
     terminal.until_it_shows("needs 40 columns");
     assert!(terminal.picture.rows()[0].starts_with("s stops"), "{}", terminal.picture.text());
     terminal.press("s");
@@ -109,12 +95,10 @@ fn a_small_terminal_says_so_and_its_keys_work() {
 /// What is printed while a bar is drawn stands above it, and no piece of the bar is left; keys that cannot do anything report it.
 #[test]
 fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
-    let sim = Sim::start(&["--no-throttle"]);
-    sim.jtc(&["recover", "--defaults"]).ends(0);
-    let file = sim.path("motion.csv");
-    std::fs::write(&file, motion(0.2)).unwrap();
+    let sim = Sim::start(&["--no-throttle"]).held();
+    let file = sim.file("motion.csv", &motion(0.2));
     let mut terminal = Terminal::new(40, 40);
-    let mut child = terminal.start(&at(&sim, &["traj", "run", &file, "--speed", "10"]));
+    let mut child = terminal.start(&sim.command(&["traj", "run", &file, "--speed", "10"]));
     terminal.until("the bar", |p| p.text().contains("% of 12.0 s") && p.text().contains("space pauses"));
     // Ctrl-S holds no command whose stop key counts.
     terminal.press("\u{13} ");
@@ -136,7 +120,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     assert!(terminal.is_as_before());
 
     let mut terminal = Terminal::new(30, 60);
-    let mut child = terminal.start(&at(&sim, &["traj", "run", &file, "--approach", "--speed", "10"]));
+    let mut child = terminal.start(&sim.command(&["traj", "run", &file, "--approach", "--speed", "10"]));
     terminal.until("the size that is needed", |p| {
         p.text().replace('\n', "").contains("needs 40 columns and 12 rows")
     });

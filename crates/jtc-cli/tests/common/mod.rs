@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use cli_kit::trial::{CommandOutput, program, run};
+use serde_json::Value;
 
 /// `jtc`, without variables of the surroundings.
 pub fn command() -> Command {
@@ -58,11 +59,47 @@ impl Sim {
         Self { child, stderr, port, dir }
     }
 
+    /// The same with a fault file.
+    pub fn with_faults(options: &[&str], faults: &str) -> Self {
+        let dir = tempfile::tempdir().expect("a directory");
+        let file = dir.path().join("faults.toml");
+        std::fs::write(&file, faults).expect("a file");
+        Self::start_in(dir, &[options, &["--faults", file.to_str().unwrap()]].concat())
+    }
+
+    /// The controller has its parameters.
+    pub fn with_parameters(self) -> Self {
+        self.jtc(&["params", "use-defaults"]).ends(0);
+        self
+    }
+
+    /// The controller has its parameters and holds the arm.
+    pub fn held(self) -> Self {
+        self.jtc(&["recover", "--defaults"]).ends(0);
+        self
+    }
+
+    /// `jtc` at its port.
+    pub fn command(&self, words: &[&str]) -> Command {
+        let mut command = command();
+        command.args(words).args(["--port", self.port.to_str().unwrap()]);
+        command
+    }
+
     /// Runs `jtc` at its port.
     pub fn jtc(&self, words: &[&str]) -> CommandOutput {
-        let mut all = words.to_vec();
-        all.extend(["--port", self.port.to_str().unwrap()]);
-        jtc(&all)
+        run(self.command(words), &[], "")
+    }
+
+    /// What `jtc --json` with these words answers; panics if it ends with another code.
+    pub fn json(&self, words: &[&str], code: i32) -> Value {
+        self.jtc(&[&["--json"], words].concat()).ends(code).json()
+    }
+
+    /// A file in its directory.
+    pub fn file(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.path(name), text).expect("a file");
+        self.path(name)
     }
 
     /// Types a line on its standard input.
@@ -110,6 +147,16 @@ pub fn motion(amplitude: f64) -> String {
         let s = f64::from(i) / 120.0;
         let q = amplitude * (std::f64::consts::PI * s).sin().powi(4);
         text += &format!("{:.3},{q},{},{q},{q},{},{q}\n", f64::from(i) * 0.01, -0.5 * q, -q);
+    }
+    text
+}
+
+/// A slow motion of all joints, up to 0.2 rad and back, in so many tenths of a second.
+pub fn slow_motion(tenths: i32) -> String {
+    let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
+    for i in 0..=tenths {
+        let q = 0.2 * (std::f64::consts::PI * f64::from(i) / f64::from(tenths)).sin().powi(4);
+        text += &format!("{:.1},{q},{q},{q},{q},{q},{q}\n", f64::from(i) * 0.1);
     }
     text
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_host::session::{Flow, Outcome};
 use jtc_host::{
     Arm, CheckError, CheckOptions, CheckedTrajectory, Diagnose, Error, ErrorKind, LinkError, MotionError,
-    Trajectory,
+    Trajectory, plan,
 };
 use jtc_sim::FaultKind;
 

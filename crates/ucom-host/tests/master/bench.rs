@@ -1,15 +1,12 @@
 //! A bus in memory and in virtual time: the master on one side, boards or a script on the other, faults in between.
 
-use std::collections::BTreeMap;
-
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Frame, Profile};
-use ucom_host::master::conformance::ConformanceReport;
-use ucom_host::master::update::UpdateReport;
-use ucom_host::master::{
-    Diagnose, Error, ErrorKind, Event, InitReport, Master, Outcome, ProcedureId, Request, frame_bits,
-};
+use ucom_host::master::{Event, Master, Outcome, ProcedureId, Request, frame_bits};
 use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
+
+pub use crate::exit::Exit;
+pub use crate::script::Script;
 
 /// Microseconds of a millisecond.
 pub const MS: u64 = 1000;
@@ -46,89 +43,8 @@ impl Member for TestNode {
     }
 }
 
-/// A peer that knows nothing but a table of frames.
-#[derive(Default)]
-pub struct Script {
-    /// What is answered, and after how many ms.
-    rules: Vec<Rule>,
-    due: BTreeMap<(u64, u64), Frame>,
-    serial: u64,
-    waiting: Option<Frame>,
-}
-
-struct Rule {
-    ask: Frame,
-    /// How often it still applies.
-    uses: u32,
-    /// Requests that are let pass before.
-    skip: u32,
-    answers: Vec<(u64, Frame)>,
-}
-
 pub fn frame(text: &str) -> Frame {
     text.parse().unwrap_or_else(|e| panic!("{text}: {e}"))
-}
-
-impl Script {
-    /// `answers`: `"ms frame"` or `"frame"`, separated by blanks between entries, e.g. `["441#21", "5:482#42"]`.
-    pub fn on(self, ask: &str, answers: &[&str]) -> Self {
-        self.rule(ask, 0, u32::MAX, answers)
-    }
-
-    /// Only the first time.
-    pub fn once(self, ask: &str, answers: &[&str]) -> Self {
-        self.rule(ask, 0, 1, answers)
-    }
-
-    pub fn rule(mut self, ask: &str, skip: u32, uses: u32, answers: &[&str]) -> Self {
-        let answer = |text: &&str| match text.split_once(':') {
-            Some((ms, text)) => (ms.parse::<u64>().unwrap() * MS, frame(text)),
-            None => (300, frame(text)),
-        };
-        self.rules.push(Rule { ask: frame(ask), uses, skip, answers: answers.iter().map(answer).collect() });
-        self
-    }
-
-    /// Sends by itself at a time, ms.
-    pub fn at(mut self, ms: u64, text: &str) -> Self {
-        self.serial += 1;
-        self.due.insert((ms * MS, self.serial), frame(text));
-        self
-    }
-}
-
-impl Member for Script {
-    fn poll(&mut self, now: u64) -> Option<Frame> {
-        if self.waiting.is_none()
-            && let Some((&key, &frame)) = self.due.first_key_value()
-            && key.0 <= now
-        {
-            self.due.remove(&key);
-            self.waiting = Some(frame);
-            return Some(frame);
-        }
-        None
-    }
-    fn sent(&mut self, _: u64, _: &Frame) {
-        self.waiting = None;
-    }
-    fn receive(&mut self, now: u64, frame: &Frame) {
-        for rule in self.rules.iter_mut().filter(|r| r.ask == *frame && r.uses > 0) {
-            if rule.skip > 0 {
-                rule.skip -= 1;
-                continue;
-            }
-            rule.uses -= 1;
-            for (after, frame) in &rule.answers {
-                self.serial += 1;
-                self.due.insert((now + after, self.serial), *frame);
-            }
-            break;
-        }
-    }
-    fn deadline(&self) -> u64 {
-        self.due.first_key_value().map_or(u64::MAX, |((at, _), _)| *at)
-    }
 }
 
 /// What happens to one frame on its way.
@@ -312,6 +228,13 @@ impl Bench {
         while self.now < until && self.step(until) {}
     }
 
+    /// Lets time pass until this is so.
+    pub fn until(&mut self, done: impl Fn(&Self) -> bool) {
+        while !done(self) {
+            self.run(1);
+        }
+    }
+
     /// Starts a procedure and waits for its end; panics when it takes more than `limit_s` of virtual time.
     pub fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
         let id = self.master.start(self.now, request).expect("nothing else is under way");
@@ -356,6 +279,11 @@ impl Bench {
         self.times_of(text).len()
     }
 
+    /// How many frames that begin so were on the bus, whoever sent them.
+    pub fn beginning(&self, start: &str) -> usize {
+        self.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
+    }
+
     pub fn board(&mut self, i: usize) -> &mut TestNode {
         self.members[i].board().expect("a board")
     }
@@ -394,44 +322,4 @@ pub fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {
 /// The golden image: byte i is (37·i + 11) mod 256.
 pub fn image(len: usize) -> Vec<u8> {
     (0..len).map(|i| (37 * i + 11) as u8).collect()
-}
-
-/// The exit code of the command, as its contract has it.
-pub trait Exit {
-    fn exit(&self) -> u8;
-}
-
-fn code(kind: Option<ErrorKind>) -> u8 {
-    match kind {
-        None => 0,
-        Some(ErrorKind::Device) => 1,
-        Some(ErrorKind::Usage) => 2,
-        Some(ErrorKind::NoLink) => 3,
-        Some(ErrorKind::Refused) => 4,
-        Some(ErrorKind::Fault) => 5,
-    }
-}
-
-impl Exit for Error {
-    fn exit(&self) -> u8 {
-        code(Some(self.kind()))
-    }
-}
-
-impl Exit for InitReport {
-    fn exit(&self) -> u8 {
-        code(self.failure())
-    }
-}
-
-impl Exit for UpdateReport {
-    fn exit(&self) -> u8 {
-        code(self.failure())
-    }
-}
-
-impl Exit for ConformanceReport {
-    fn exit(&self) -> u8 {
-        code(self.failure())
-    }
 }

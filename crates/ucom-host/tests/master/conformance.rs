@@ -15,7 +15,7 @@ use ucom_sim::memory::WirePins;
 use crate::bench::{Bench, From, Member, TestNode, frame, image, node};
 
 /// Everything that is allowed.
-fn all() -> ConformanceOptions {
+pub fn all() -> ConformanceOptions {
     let program = ConformanceProgram {
         board: 1,
         flash_number: 0x21,

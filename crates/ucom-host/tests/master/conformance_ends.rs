@@ -11,18 +11,9 @@ use ucom_host::master::{
 };
 
 use crate::bench::{Bench, From, image};
+use crate::conformance::all;
 
 const FLASH: [u16; 3] = [0x21, 0x42, 0x63];
-
-fn all() -> ConformanceOptions {
-    let program = ConformanceProgram {
-        board: 1,
-        flash_number: 0x21,
-        image: UpdateImage { bytes: image(1000).into(), address_words: 0 },
-        date: 0x5C21,
-    };
-    ConformanceOptions { init: true, run: true, program: Some(program), ..Default::default() }
-}
 
 fn info(bench: &mut Bench, board: u8) -> BoardSeen {
     match bench.go(Request::Info { board }, 20) {

@@ -1,21 +1,23 @@
 //! The master on a bus in memory, in virtual time: against tables of frames (the rows P-1 to P-21 of the acceptance
 //! tests) and against the boards of this crate, with faults on every single frame.
 
+mod answering;
 mod bench;
 mod chain;
 mod competing_master;
 mod conformance;
 mod conformance_ends;
+mod exit;
 mod faults;
 mod kept;
 mod loader;
 mod losses;
-mod outgoing;
 mod overload;
 mod probing;
 mod repairing;
 mod robust;
 mod running;
+mod script;
 mod scripted;
 mod shared_numbers;
 mod starting;

@@ -124,9 +124,7 @@ fn d21_no_losses_give_a_number_twice() {
 fn u4_an_update_gives_a_number_to_one_board_only() {
     let mut bench = rebooted(&[4]);
     let id = bench.master.start(bench.now, Request::Update(options(&[2], 128))).unwrap();
-    while bench.count("042#") == 0 {
-        bench.run(1);
-    }
+    bench.until(|b| b.count("042#") > 0);
     // It reboots in the moment of XRESET.
     let reset = crate::bench::frame("002#");
     let now = bench.now;

@@ -313,9 +313,7 @@ fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
     // From a heartbeat on.
     let alive = bench.count("680#");
-    while bench.count("680#") == alive {
-        bench.run(1);
-    }
+    bench.until(|b| b.count("680#") != alive);
     bench.master.end_session();
     let sent = bench.sent().len();
     bench.run(1_400);

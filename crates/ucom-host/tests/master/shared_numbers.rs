@@ -175,9 +175,7 @@ fn d24_it_is_named_when_it_shows_in_an_update() {
                     format!("flash number {flash:#x}, programming {programming}, after {after} frames");
                 let mut bench = crate::chain::initialised(&[0x21]);
                 let id = bench.master.start(bench.now, Request::Update(options())).unwrap();
-                while program_frames(&bench) < after {
-                    bench.run(1);
-                }
+                bench.until(|b| program_frames(b) >= after);
                 let now = bench.now / 1000;
                 let other = Script::default().at(now, "281#");
                 let other = if programming { other.at(now + 1, "1C1#0404") } else { other };

@@ -27,6 +27,10 @@ pub fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport {
     }
 }
 
+pub fn outcomes(report: &UpdateReport) -> Vec<&str> {
+    report.boards.iter().map(|b| b.outcome.name()).collect()
+}
+
 /// What a board holds must be the old program, the new one, or none: never half of one.
 pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) {
     let record = bench.board(board).record();
@@ -224,9 +228,7 @@ fn p12_cancel() {
     for (frames, erased) in [(3, false), (12, false), (3 * 8 + 11, true)] {
         let mut bench = initialised(&[0x21]);
         let id = bench.master.start(bench.now, Request::Update(options(&[1], 128))).unwrap();
-        while bench.log.iter().filter(|(.., f)| f.id() == 0x2C1).count() < frames {
-            bench.run(1);
-        }
+        bench.until(|b| b.beginning("2C1#") >= frames);
         bench.master.cancel(id);
         let Ok(Outcome::Update(report)) = bench.wait(id, 10) else { panic!() };
         let erased = erased || bench.board(0).record().is_none();
@@ -251,9 +253,7 @@ fn p13_killed_tool() {
     for at in total.0..total.1 {
         let mut bench = initialised(&[0x21, 0x42]);
         bench.master.start(bench.now, Request::Update(options(&[1], 128))).unwrap();
-        while bench.log.len() < at {
-            bench.run(1);
-        }
+        bench.until(|b| b.log.len() >= at);
         bench.master = ucom_host::master::Master::new(Default::default());
         bench.run(300);
         check_program(&mut bench, 0, 128);
@@ -285,8 +285,7 @@ fn update_session_skips_and_starts() {
     assert_eq!(update(&mut bench, options(&[2], 128)).boards[0].outcome, UpdateOutcome::Verified);
     let all = UpdateOptions { start: true, ..options(&[1, 2, 3], 128) };
     let report = update(&mut bench, all);
-    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
-    assert_eq!(outcomes, ["running", "running", "running"]);
+    assert_eq!(outcomes(&report), ["running", "running", "running"]);
     assert_eq!(report.exit(), 0);
 }
 

@@ -7,11 +7,11 @@ use ucom_host::master::{
     Diagnose, Error, Event, IdentityError, Master, MasterError, Outcome, Request, StatusError,
 };
 
+use crate::answering::Answering;
 use crate::bench::{Bench, From, Member, OLD, Script};
 use crate::chain::initialised;
 use crate::loader::{Loader, loader};
-use crate::outgoing::Outgoing;
-use crate::update::{check_program, options, update};
+use crate::update::{check_program, options, outcomes, update};
 
 const DATE: u16 = 0x3AC1;
 
@@ -23,9 +23,7 @@ fn ended(
     end: fn(&mut Bench, ucom_host::master::ProcedureId),
 ) -> UpdateReport {
     let id = bench.master.start(bench.now, Request::Update(options)).unwrap();
-    while !stop(bench) {
-        bench.run(1);
-    }
+    bench.until(stop);
     end(bench, id);
     bench.run(10_000);
     let report = bench.events.iter().find_map(|(_, event)| match event {
@@ -39,10 +37,6 @@ fn ended(
 
 fn unplugged(bench: &mut Bench, id: ucom_host::master::ProcedureId) {
     bench.master.abandon(id, "the adapter is gone");
-}
-
-fn count(bench: &Bench, start: &str) -> usize {
-    bench.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
 }
 
 /// D-46: the bus fails at any frame of an update of two boards. The report comes at once, reports of no board more or less
@@ -101,11 +95,8 @@ fn d46_a_bus_that_fails_leaves_a_report() {
 fn an_abandoned_update_sends_nothing() {
     for cancel_first in [false, true] {
         let mut bench = initialised(&[0x21]);
-        let before = |b: &Bench| count(b, "2C1#") >= 3 * 8 + 11;
         let id = bench.master.start(bench.now, Request::Update(options(&[1], 128))).unwrap();
-        while !before(&bench) {
-            bench.run(1);
-        }
+        bench.until(|b| b.beginning("2C1#") >= 3 * 8 + 11);
         if cancel_first {
             bench.master.cancel(id);
         }
@@ -130,10 +121,9 @@ fn an_abandoned_update_sends_nothing() {
 #[test]
 fn p12_a_cancelled_update_session() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
-    let begun = |b: &Bench| count(b, "2C2#") >= 3;
+    let begun = |b: &Bench| b.beginning("2C2#") >= 3;
     let report = ended(&mut bench, options(&[1, 2, 3], 128), begun, |b, id| b.master.cancel(id));
-    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
-    assert_eq!((outcomes, report.exit()), (vec!["verified", "cancelled", "cancelled"], 4));
+    assert_eq!((outcomes(&report), report.exit()), (vec!["verified", "cancelled", "cancelled"], 4));
     assert!(report.boards[1].failure.as_ref().unwrap().to_string().contains("nothing was erased"));
     assert_eq!((check_program(&mut bench, 1, 128), check_program(&mut bench, 2, 128)), (OLD, OLD));
 }
@@ -143,7 +133,7 @@ fn p12_a_cancelled_update_session() {
 fn p12_cancelled_while_it_starts() {
     let mut bench = initialised(&[0x21]);
     let start = UpdateOptions { start: true, ..options(&[1], 128) };
-    let report = ended(&mut bench, start, |b| count(b, "301#") >= 1, |b, id| b.master.cancel(id));
+    let report = ended(&mut bench, start, |b| b.beginning("301#") >= 1, |b, id| b.master.cancel(id));
     let left = UpdateOutcome::Verified;
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
     assert_eq!((report.boards[0].outcome, report.exit()), (left, 5));
@@ -152,7 +142,7 @@ fn p12_cancelled_while_it_starts() {
     assert!(!bench.board(0).status().has(ucom::Status::MSTART));
     let mut bench = initialised(&[0x21]);
     let start = UpdateOptions { start: true, ..options(&[1], 128) };
-    let begun = |b: &Bench| count(b, "301#") >= 1;
+    let begun = |b: &Bench| b.beginning("301#") >= 1;
     let report = ended(&mut bench, start, begun, |b, id| {
         b.lose = vec![("> 141#", u32::MAX)];
         b.master.cancel(id);
@@ -171,19 +161,18 @@ fn a_board_that_is_up_to_date_is_started() {
     let start = UpdateOptions { start: true, keep_going: true, ..options(&[1, 2], 128) };
     let mut cancelled = initialised(&[0x21, 0x42]);
     update(&mut cancelled, options(&[1], 128));
-    let begun = |b: &Bench| count(b, "2C2#") >= 3;
+    let begun = |b: &Bench| b.beginning("2C2#") >= 3;
     let report = ended(&mut cancelled, start.clone(), begun, |b, id| b.master.cancel(id));
     let left = UpdateOutcome::UpToDate;
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
-    assert_eq!((report.exit(), count(&cancelled, "301#")), (4, 0));
-    let blocks = count(&bench, "2C1#");
+    assert_eq!((report.exit(), cancelled.beginning("301#")), (4, 0));
+    let blocks = bench.beginning("2C1#");
     let report = update(&mut bench, start.clone());
-    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
-    assert_eq!((outcomes, report.exit()), (vec!["running", "running"], 0), "{report:?}");
-    assert_eq!(count(&bench, "2C1#"), blocks);
+    assert_eq!((outcomes(&report), report.exit()), (vec!["running", "running"], 0), "{report:?}");
+    assert_eq!(bench.beginning("2C1#"), blocks);
     // All are up to date and run: nothing is left to do.
-    let sent = count(&bench, "301#");
-    assert_eq!((update(&mut bench, start).exit(), count(&bench, "301#")), (0, sent));
+    let sent = bench.beginning("301#");
+    assert_eq!((update(&mut bench, start).exit(), bench.beginning("301#")), (0, sent));
 }
 
 /// A board that answers and does not enable programming has reported, not gone silent: exit code 1.
@@ -211,7 +200,7 @@ fn u1_a_board_that_is_swapped_between_attempts() {
     let mut bench = loader(Loader { flash: |n, _| if n == 0 { "2100" } else { "4200" }, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
-    assert_eq!((count(&bench, "2C1#"), bench.count("1C1#0400"), report.exit()), (0, 1, 4));
+    assert_eq!((bench.beginning("2C1#"), bench.count("1C1#0400"), report.exit()), (0, 1, 4));
 }
 
 /// One damaged answer is not another board.
@@ -234,53 +223,35 @@ fn one_damaged_answer_is_no_swapped_board() {
 }
 
 /// A board that goes silent at XRESET, and another one that takes its number when it is given back (5.4).
-#[derive(Default)]
-struct Impostor {
-    silent: bool,
-    other: bool,
-    out: Outgoing,
-}
-
-impl Member for Impostor {
-    fn poll(&mut self, now: u64) -> Option<Frame> {
-        self.out.due(now)
-    }
-    fn sent(&mut self, _: u64, _: &Frame) {
-        self.out.sent();
-    }
-    fn deadline(&self) -> u64 {
-        self.out.deadline()
-    }
-    fn receive(&mut self, now: u64, frame: &Frame) {
-        let mut answer = |text: &str| self.out.add(now + 300, text);
-        match frame.to_string().as_str() {
-            "041#" => self.silent = true,
-            "1C1#0800" => self.other = false,
-            "281#" => {
-                self.other = true;
-                answer("0C1#01");
-            }
-            "201#" if self.other => {
-                answer("141#4200011934126E38");
-                answer("141#0000");
-            }
-            "201#" if !self.silent => {
-                answer("141#2100011B34126E38");
-                answer("141#0000");
-            }
-            _ => {}
+fn impostor() -> impl Member {
+    let (mut silent, mut other) = (false, false);
+    Answering::new(move |frame| match frame {
+        "041#" => {
+            silent = true;
+            &[]
         }
-    }
+        "1C1#0800" => {
+            other = false;
+            &[]
+        }
+        "281#" => {
+            other = true;
+            &["0C1#01"]
+        }
+        "201#" if other => &["141#4200011934126E38", "141#0000"],
+        "201#" if !silent => &["141#2100011B34126E38", "141#0000"],
+        _ => &[],
+    })
 }
 
 /// 5.4: another board took the number: refused with exit code 4, nothing is written, and it does not keep the number.
 #[test]
 fn u4_repair_that_finds_another_board_is_refused() {
-    let mut bench = Bench::new(Default::default(), vec![Box::new(Impostor::default())]);
+    let mut bench = Bench::new(Default::default(), vec![Box::new(impostor())]);
     let report = update(&mut bench, options(&[1], 1000));
     let wrong = Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x21, found: 0x42 });
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
-    assert_eq!((report.exit(), count(&bench, "2C1#")), (4, 0));
+    assert_eq!((report.exit(), bench.beginning("2C1#")), (4, 0));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
     assert_eq!(bench.count("1C1#0800"), 3);
     // Pin off before the number is given (5.4).

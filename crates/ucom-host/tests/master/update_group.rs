@@ -5,10 +5,10 @@ use ucom::{Frame, Profile};
 use ucom_host::master::update::{UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome};
 use ucom_host::master::{Error, Request, StatusError};
 
+use crate::answering::Answering;
 use crate::bench::{Bench, From, Member, OLD};
 use crate::chain::initialised;
-use crate::outgoing::Outgoing;
-use crate::update::{check_program, options, update};
+use crate::update::{check_program, options, outcomes, update};
 
 const DATE: u16 = 0x3AC1;
 
@@ -18,7 +18,7 @@ fn group(boards: &[u8]) -> UpdateOptions {
 
 /// Broadcast frames of PC_PROG.
 fn broadcasts(bench: &Bench) -> usize {
-    bench.log.iter().filter(|(.., f)| f.id() == 0x2C0).count()
+    bench.beginning("2C0#")
 }
 
 /// D-46: every number that is not selected is commanded to leave programming and asked whether it did: the answers to one
@@ -45,36 +45,16 @@ fn d46_a_group_leaves_other_boards_alone() {
     }
 }
 
-/// A board that keeps PROG = 1 whatever is sent to it.
-#[derive(Default)]
-struct Stubborn {
-    out: Outgoing,
-}
-
-impl Member for Stubborn {
-    fn poll(&mut self, now: u64) -> Option<Frame> {
-        self.out.due(now)
-    }
-    fn sent(&mut self, _: u64, _: &Frame) {
-        self.out.sent();
-    }
-    fn deadline(&self) -> u64 {
-        self.out.deadline()
-    }
-    fn receive(&mut self, now: u64, frame: &Frame) {
-        // It does not answer broadcast questions.
-        if frame.to_string() == "209#" {
-            self.out.add(now + 300, "149#7700091F34126E38");
-            self.out.add(now + 301, "149#0000");
-        }
-    }
+/// A board that keeps PROG = 1 whatever is sent to it. It does not answer broadcast questions.
+fn stubborn() -> impl Member {
+    Answering::new(|frame| if frame == "209#" { &["149#7700091F34126E38", "149#0000"] } else { &[] })
 }
 
 /// D-46: a board outside the group that stays in programming: refused before anything is sent to the group.
 #[test]
 fn d46_a_group_is_refused_while_another_board_listens() {
     let mut bench = initialised(&[0x21, 0x42]);
-    bench.join(Box::new(Stubborn::default()));
+    bench.join(Box::new(stubborn()));
     let report = update(&mut bench, group(&[1, 2]));
     for result in &report.boards {
         let Some(UpdateFailure::Refused(e)) = &result.failure else { panic!("{report:?}") };
@@ -117,13 +97,10 @@ fn d42_a_group_waits_for_every_board() {
 fn a_silent_board_that_may_listen_ends_the_broadcast() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
-    while bench.count("043#") == 0 {
-        bench.run(1);
-    }
+    bench.until(|b| b.count("043#") > 0);
     bench.lose = vec![("> 143#", u32::MAX)];
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
-    let outcomes: Vec<_> = report.boards.iter().map(|b| b.outcome.name()).collect();
-    assert_eq!(outcomes, ["verified", "verified", "not-started"], "{report:?}");
+    assert_eq!(outcomes(&report), ["verified", "verified", "not-started"], "{report:?}");
     assert_eq!((report.exit(), broadcasts(&bench)), (3, 0));
     assert_eq!(check_program(&mut bench, 2, 128), OLD);
 }
@@ -135,9 +112,7 @@ fn a_board_that_fell_behind_is_asked() {
     for block in [0, 2, 3, 5] {
         let mut bench = initialised(&[0x21, 0x42]);
         let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
-        while bench.log.iter().filter(|(.., f)| f.to_string().starts_with("182#")).count() < block {
-            bench.run(1);
-        }
+        bench.until(|b| b.beginning("182#") >= block);
         bench.lose = vec![("> 182#", 1), ("> 102#", 1)];
         let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
         assert_eq!(report.exit(), 0, "block {block}: {report:?}");
@@ -150,9 +125,7 @@ fn a_board_that_fell_behind_is_asked() {
 fn a_board_that_was_lost_in_a_group_may_be_erased() {
     let mut bench = initialised(&[0x21, 0x42]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
-    while broadcasts(&bench) < 4 {
-        bench.run(1);
-    }
+    bench.until(|b| broadcasts(b) >= 4);
     bench.lose = vec![("> 182#", u32::MAX), ("> 142#", u32::MAX), ("> 102#", u32::MAX), ("> 0C2#", u32::MAX)];
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
     assert_eq!(report.boards[0].outcome, UpdateOutcome::Verified, "{report:?}");
@@ -164,13 +137,9 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     // It dropped out for good before that: what it shows is what it had, so nothing was erased.
     let mut bench = initialised(&[0x21, 0x42]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
-    while broadcasts(&bench) < 4 {
-        bench.run(1);
-    }
+    bench.until(|b| broadcasts(b) >= 4);
     bench.cut = vec![1];
-    while broadcasts(&bench) < 48 {
-        bench.run(1);
-    }
+    bench.until(|b| broadcasts(b) >= 48);
     bench.cut.clear();
     bench.lose = vec![("> 182#", u32::MAX)];
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
@@ -186,9 +155,7 @@ fn d43_not_every_error_ends_a_transfer() {
         for received in [true, false] {
             let mut bench = initialised(&[0x21, 0x42]);
             let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
-            while broadcasts(&bench) < 10 {
-                bench.run(1);
-            }
+            bench.until(|b| broadcasts(b) >= 10);
             let now = bench.now;
             bench.master.handle(now, Ok(crate::bench::frame(&format!("082#{code}"))));
             if !received {
@@ -210,13 +177,9 @@ fn u3_what_was_there_before_proves_nothing() {
     let forced = UpdateOptions { force: true, ..group(&[1, 2]) };
     let start = bench.log.len();
     let id = bench.master.start(bench.now, Request::Update(forced)).unwrap();
-    while broadcasts(&bench) < 48 + 4 {
-        bench.run(1);
-    }
+    bench.until(|b| broadcasts(b) >= 48 + 4);
     bench.cut = vec![1];
-    while broadcasts(&bench) < 2 * 48 {
-        bench.run(1);
-    }
+    bench.until(|b| broadcasts(b) >= 2 * 48);
     bench.cut.clear();
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 120) else { panic!() };
     assert_eq!(
@@ -233,14 +196,10 @@ fn u3_what_was_there_before_proves_nothing() {
 fn p12_a_cancel_reaches_every_board_of_the_group() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
-    while bench.count("043#") == 0 {
-        bench.run(1);
-    }
+    bench.until(|b| b.count("043#") > 0);
     // Board 3 listens and sends nothing: no broadcast, one by one; board 2 waits with PROG = 1.
     bench.lose = vec![("> 143#", u32::MAX)];
-    while bench.log.iter().filter(|(.., f)| f.id() == 0x2C1).count() < 4 {
-        bench.run(1);
-    }
+    bench.until(|b| b.beginning("2C1#") >= 4);
     assert!(bench.board(1).status().has(ucom::Status::PROG));
     bench.master.cancel(id);
     let Ok(ucom_host::master::Outcome::Update(report)) = bench.wait(id, 60) else { panic!() };

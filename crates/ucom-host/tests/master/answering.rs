@@ -1,0 +1,33 @@
+//! A member that is made for one test and answers by a rule of its own.
+
+use ucom::Frame;
+
+use crate::bench::{Member, frame};
+
+/// Gives the answers to a frame. They are due 300 µs after it, each 1 µs after the one before.
+pub struct Answering<A> {
+    answers: A,
+    out: Vec<(u64, Frame)>,
+}
+
+impl<A: FnMut(&str) -> &'static [&'static str]> Answering<A> {
+    pub fn new(answers: A) -> Self {
+        Self { answers, out: Vec::new() }
+    }
+}
+
+impl<A: FnMut(&str) -> &'static [&'static str]> Member for Answering<A> {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        self.out.first().filter(|(at, _)| *at <= now).map(|(_, frame)| *frame)
+    }
+    fn sent(&mut self, _: u64, _: &Frame) {
+        self.out.remove(0);
+    }
+    fn deadline(&self) -> u64 {
+        self.out.first().map_or(u64::MAX, |(at, _)| *at)
+    }
+    fn receive(&mut self, now: u64, received: &Frame) {
+        let answers = (self.answers)(&received.to_string());
+        self.out.extend((now + 300..).zip(answers.iter().map(|text| frame(text))));
+    }
+}

@@ -1,0 +1,45 @@
+//! The exit code that the command `ucom` makes of what the master reports.
+
+use ucom_host::master::conformance::ConformanceReport;
+use ucom_host::master::update::UpdateReport;
+use ucom_host::master::{Diagnose, Error, ErrorKind, InitReport};
+
+/// The exit code of the command, as its contract has it.
+pub trait Exit {
+    fn exit(&self) -> u8;
+}
+
+fn code(kind: Option<ErrorKind>) -> u8 {
+    match kind {
+        None => 0,
+        Some(ErrorKind::Device) => 1,
+        Some(ErrorKind::Usage) => 2,
+        Some(ErrorKind::NoLink) => 3,
+        Some(ErrorKind::Refused) => 4,
+        Some(ErrorKind::Fault) => 5,
+    }
+}
+
+impl Exit for Error {
+    fn exit(&self) -> u8 {
+        code(Some(self.kind()))
+    }
+}
+
+impl Exit for InitReport {
+    fn exit(&self) -> u8 {
+        code(self.failure())
+    }
+}
+
+impl Exit for UpdateReport {
+    fn exit(&self) -> u8 {
+        code(self.failure())
+    }
+}
+
+impl Exit for ConformanceReport {
+    fn exit(&self) -> u8 {
+        code(self.failure())
+    }
+}

@@ -1,0 +1,88 @@
+//! A peer as a table of frames.
+
+use std::collections::BTreeMap;
+
+use ucom::Frame;
+
+use crate::bench::{MS, Member, frame};
+
+/// A peer that knows nothing but a table of frames.
+#[derive(Default)]
+pub struct Script {
+    /// What is answered, and after how many ms.
+    rules: Vec<Rule>,
+    due: BTreeMap<(u64, u64), Frame>,
+    serial: u64,
+    waiting: Option<Frame>,
+}
+
+struct Rule {
+    ask: Frame,
+    /// How often it still applies.
+    uses: u32,
+    /// Requests that are let pass before.
+    skip: u32,
+    answers: Vec<(u64, Frame)>,
+}
+
+impl Script {
+    /// `answers`: `"ms frame"` or `"frame"`, separated by blanks between entries, e.g. `["441#21", "5:482#42"]`.
+    pub fn on(self, ask: &str, answers: &[&str]) -> Self {
+        self.rule(ask, 0, u32::MAX, answers)
+    }
+
+    /// Only the first time.
+    pub fn once(self, ask: &str, answers: &[&str]) -> Self {
+        self.rule(ask, 0, 1, answers)
+    }
+
+    pub fn rule(mut self, ask: &str, skip: u32, uses: u32, answers: &[&str]) -> Self {
+        let answer = |text: &&str| match text.split_once(':') {
+            Some((ms, text)) => (ms.parse::<u64>().unwrap() * MS, frame(text)),
+            None => (300, frame(text)),
+        };
+        self.rules.push(Rule { ask: frame(ask), uses, skip, answers: answers.iter().map(answer).collect() });
+        self
+    }
+
+    /// Sends by itself at a time, ms.
+    pub fn at(mut self, ms: u64, text: &str) -> Self {
+        self.serial += 1;
+        self.due.insert((ms * MS, self.serial), frame(text));
+        self
+    }
+}
+
+impl Member for Script {
+    fn poll(&mut self, now: u64) -> Option<Frame> {
+        if self.waiting.is_none()
+            && let Some((&key, &frame)) = self.due.first_key_value()
+            && key.0 <= now
+        {
+            self.due.remove(&key);
+            self.waiting = Some(frame);
+            return Some(frame);
+        }
+        None
+    }
+    fn sent(&mut self, _: u64, _: &Frame) {
+        self.waiting = None;
+    }
+    fn receive(&mut self, now: u64, frame: &Frame) {
+        for rule in self.rules.iter_mut().filter(|r| r.ask == *frame && r.uses > 0) {
+            if rule.skip > 0 {
+                rule.skip -= 1;
+                continue;
+            }
+            rule.uses -= 1;
+            for (after, frame) in &rule.answers {
+                self.serial += 1;
+                self.due.insert((now + after, self.serial), *frame);
+            }
+            break;
+        }
+    }
+    fn deadline(&self) -> u64 {
+        self.due.first_key_value().map_or(u64::MAX, |((at, _), _)| *at)
+    }
+}

@@ -1,47 +1,17 @@
 //! USART2 and USART3 (RM0399 chapter 51): asynchronous 8N1 with FIFOs, DMA requests, idle line and receiver timeout; every
 //! byte takes its time on the wire.
+mod next;
+mod registers;
+
 use std::collections::VecDeque;
 
 use crate::clock::{NEVER, SECOND, Time};
 use crate::dma::{Dma, Memory};
-
-/// Bits of CR1.
-mod cr1 {
-    pub const UE: u32 = 1;
-    pub const RE: u32 = 4;
-    pub const TE: u32 = 8;
-    pub const IDLEIE: u32 = 0x10;
-    pub const RXNEIE: u32 = 0x20;
-    pub const TCIE: u32 = 0x40;
-    pub const TXEIE: u32 = 0x80;
-    pub const OVER8: u32 = 0x8000;
-    pub const RTOIE: u32 = 1 << 26;
-    pub const FIFOEN: u32 = 1 << 29;
-}
-
-/// Bits of ISR.
-mod isr {
-    pub const FE: u32 = 2;
-    pub const NE: u32 = 4;
-    pub const ORE: u32 = 8;
-    pub const IDLE: u32 = 0x10;
-    pub const RXNE: u32 = 0x20;
-    pub const TC: u32 = 0x40;
-    pub const TXE: u32 = 0x80;
-    pub const RTOF: u32 = 0x800;
-    pub const BUSY: u32 = 1 << 16;
-    pub const TEACK: u32 = 1 << 21;
-    pub const REACK: u32 = 1 << 22;
-    pub const TXFE: u32 = 1 << 23;
-    pub const RXFF: u32 = 1 << 24;
-    /// Flags that ICR clears.
-    pub const STICKY: u32 = FE | NE | ORE | IDLE | TC | RTOF | 1;
-}
+use registers::{cr1, isr};
 
 const RTOEN: u32 = 1 << 23;
 const DMAR: u32 = 0x40;
 const DMAT: u32 = 0x80;
-const EIE: u32 = 1;
 const FIFO: usize = 16;
 /// Bytes ahead that are looked at for the next event.
 const LOOK_AHEAD: usize = 64;
@@ -318,160 +288,5 @@ impl Usart {
             self.garbled += 1;
             self.output.push_back(WireByte { byte: byte.byte.rotate_left(3) ^ 0xA5, ..byte });
         }
-    }
-
-    /// When something happens next that the firmware would notice by an interrupt.
-    pub fn next_event(&self, dma: &Dma) -> Time {
-        self.next_receive(dma).min(self.next_send(dma))
-    }
-
-    fn next_receive(&self, dma: &Dma) -> Time {
-        if !self.on(cr1::RE) {
-            return NEVER;
-        }
-        let frame = self.frame();
-        let idle_on = self.cr1 & cr1::IDLEIE != 0;
-        let silent = |from: Time| {
-            let idle = if idle_on { from.saturating_add(frame) } else { NEVER };
-            let timeout =
-                if self.cr1 & cr1::RTOIE != 0 { from.saturating_add(self.timeout()) } else { NEVER };
-            idle.min(timeout)
-        };
-        let Some(first) = self.rx_wire.front() else {
-            // Each of the two has come or not: a moment that is over would be looked at in every cycle.
-            let idle = self.idle_from.filter(|_| idle_on).map_or(NEVER, |from| from.saturating_add(frame));
-            let timeout = self.timeout_from.filter(|_| self.cr1 & cr1::RTOIE != 0);
-            return idle.min(timeout.map_or(NEVER, |from| from.saturating_add(self.timeout())));
-        };
-        let byte_by_byte = self.cr1 & cr1::RXNEIE != 0 || self.cr3 & DMAR == 0 || !self.rates_match();
-        if byte_by_byte {
-            let idle = self.idle_from.map_or(NEVER, silent);
-            return first.end.min(idle);
-        }
-        let until = dma
-            .serving(self.rx_request)
-            .and_then(|s| dma.until_interrupt(s))
-            .map_or(LOOK_AHEAD, |n| (n as usize).min(LOOK_AHEAD));
-        let mut before = self.idle_from;
-        for (i, byte) in self.rx_wire.iter().enumerate() {
-            if let Some(from) = before {
-                let quiet = silent(from);
-                if quiet <= byte.end.saturating_sub(frame) {
-                    return quiet;
-                }
-            }
-            if i + 1 >= until {
-                return byte.end;
-            }
-            before = Some(byte.end);
-        }
-        before.map_or(NEVER, silent)
-    }
-
-    fn next_send(&self, dma: &Dma) -> Time {
-        let Some(shifting) = self.shifting else { return NEVER };
-        let frame = self.frame();
-        let mut next = NEVER;
-        if self.cr1 & cr1::TXEIE != 0 {
-            next = shifting.end;
-        }
-        let stream = if self.cr3 & DMAT != 0 { dma.serving(self.tx_request) } else { None };
-        if let Some(transfers) = stream.and_then(|s| dma.until_interrupt(s)) {
-            next = next.min(shifting.end + u64::from(transfers.max(1) - 1) * frame);
-        }
-        if self.cr1 & cr1::TCIE != 0 {
-            next = next.min(shifting.end + self.tx_fifo.len() as u64 * frame);
-        }
-        next
-    }
-
-    fn status(&self) -> u32 {
-        let fifo = self.cr1 & cr1::FIFOEN != 0;
-        let depth = if fifo { FIFO } else { 1 };
-        let bit = |condition: bool, mask: u32| if condition { mask } else { 0 };
-        self.flags & !isr::TC
-            | bit(self.flags & isr::TC != 0 && self.shifting.is_none() && self.tx_fifo.is_empty(), isr::TC)
-            | bit(!self.rx_fifo.is_empty(), isr::RXNE)
-            | bit(self.tx_fifo.len() < depth, isr::TXE)
-            | bit(fifo && self.tx_fifo.is_empty(), isr::TXFE)
-            | bit(fifo && self.rx_fifo.len() >= FIFO, isr::RXFF)
-            | bit(self.on(cr1::TE), isr::TEACK)
-            | bit(self.on(cr1::RE), isr::REACK)
-            | bit(self.idle_from.is_some() && !self.rx_wire.is_empty(), isr::BUSY)
-    }
-
-    /// Interrupt line.
-    pub fn line(&self) -> bool {
-        let status = self.status();
-        let pairs = [
-            (cr1::IDLEIE, isr::IDLE),
-            (cr1::RXNEIE, isr::RXNE | isr::ORE),
-            (cr1::TCIE, isr::TC),
-            (cr1::TXEIE, isr::TXE),
-            (cr1::RTOIE, isr::RTOF),
-        ];
-        self.cr1 & cr1::UE != 0
-            && (pairs.iter().any(|&(enable, flag)| self.cr1 & enable != 0 && status & flag != 0)
-                || self.cr3 & EIE != 0 && status & (isr::FE | isr::NE | isr::ORE) != 0)
-    }
-
-    /// Read a word.
-    pub fn read(&mut self, offset: u32, now: Time, dma: &mut Dma, memory: &mut dyn Memory) -> u32 {
-        self.advance(now, dma, memory);
-        match offset {
-            0x00 => self.cr1,
-            0x04 => self.cr2,
-            0x08 => self.cr3,
-            0x0C => self.brr,
-            0x10 => self.gtpr,
-            0x14 => self.rtor,
-            0x1C => self.status(),
-            0x24 => {
-                if let Some(byte) = self.rx_fifo.pop_front() {
-                    self.last_rdr = byte;
-                }
-                u32::from(self.last_rdr)
-            }
-            0x2C => self.presc,
-            _ => 0,
-        }
-    }
-
-    /// Write a word.
-    pub fn write(&mut self, offset: u32, value: u32, now: Time, dma: &mut Dma, memory: &mut dyn Memory) {
-        self.advance(now, dma, memory);
-        match offset {
-            0x00 => {
-                self.cr1 = value;
-                if value & cr1::UE == 0 {
-                    self.flags = isr::TC;
-                    self.rx_fifo.clear();
-                    self.tx_fifo.clear();
-                    (self.idle_from, self.timeout_from) = (None, None);
-                }
-            }
-            0x04 => self.cr2 = value,
-            0x08 => self.cr3 = value,
-            0x0C => self.brr = value & 0xFFFF,
-            0x10 => self.gtpr = value,
-            0x14 => self.rtor = value,
-            0x18 => {
-                if value & 8 != 0 {
-                    self.rx_fifo.clear();
-                }
-                if value & 16 != 0 {
-                    self.tx_fifo.clear();
-                }
-            }
-            0x20 => self.flags &= !(value & isr::STICKY),
-            0x28 => {
-                self.flags &= !isr::TC;
-                self.tx_fifo.push_back(value as u8);
-            }
-            0x2C => self.presc = value,
-            _ => {}
-        }
-        self.update_bit();
-        self.advance(now, dma, memory);
     }
 }

@@ -1,0 +1,174 @@
+//! Loads and stores of the core: which register of which peripheral they reach, and what has to be looked at afterwards.
+use std::collections::BTreeMap;
+
+use super::map::{
+    EXTI, EXTI_END, EXTICR, EXTICR_END, IWDG1, IWDG1_END, Place, RCC, RCC_END, is_plain, place, ready_bits,
+};
+use super::{Access, Chip};
+use crate::dma::Memory;
+use crate::rcc::Gate;
+use crate::timer::Timer;
+
+impl Chip {
+    fn clocked(&mut self, gate: Gate, address: u32, write: Option<u32>) -> bool {
+        let on = self.rcc.enabled(gate);
+        if !on {
+            note(&mut self.unclocked, address, self.core.pc, write);
+        }
+        on
+    }
+
+    /// A load by the core; what lies below a word is cut out.
+    pub fn load(&mut self, address: u32, size: usize, memory: &mut dyn Memory) -> u32 {
+        let word = self.read_word(address & !3, memory);
+        let value = word >> (8 * (address & 3));
+        if size < 4 { value & ((1 << (8 * size)) - 1) } else { value }
+    }
+
+    fn read_word(&mut self, address: u32, memory: &mut dyn Memory) -> u32 {
+        let now = self.now();
+        if address >= 0xE000_0000 {
+            let at = self.moment();
+            return self.scs.read(address, &self.nvic, at);
+        }
+        if let Some((gate, place)) = place(address) {
+            if !self.clocked(gate, address, None) {
+                return 0;
+            }
+            return match place {
+                Place::Timer(n, offset) => self.timers[n].read(offset, now),
+                Place::Usart(n, offset) => {
+                    let value = self.usarts[n].read(offset, now, &mut self.dma, memory);
+                    self.changed();
+                    value
+                }
+                Place::Dma(n, offset) => {
+                    self.catch_up(memory);
+                    self.dma.read(n, offset)
+                }
+                Place::Mux(offset) => self.dma.read_mux(offset),
+                Place::Gpio(n, offset) => self.gpio.read(n, offset),
+                Place::Fdcan(offset) => self.fdcan.read(offset, now),
+                Place::MessageRam(offset) => {
+                    self.fdcan.advance(now);
+                    self.fdcan.ram.read(offset)
+                }
+            };
+        }
+        match address {
+            RCC..RCC_END => self.rcc.read(address - RCC),
+            IWDG1..IWDG1_END => self.iwdg.read(address - IWDG1),
+            EXTI..EXTI_END => self.exti.read(address - EXTI),
+            EXTICR..EXTICR_END => self.exti.source((address - EXTICR) as usize / 4),
+            _ => {
+                if !is_plain(address) {
+                    note(&mut self.unknown, address, self.core.pc, None);
+                }
+                self.plain.read(address) | ready_bits(address, &self.plain)
+            }
+        }
+    }
+
+    /// A store by the core.
+    pub fn store(&mut self, address: u32, size: usize, value: u32, memory: &mut dyn Memory) {
+        let now = self.now();
+        let shift = 8 * (address & 3);
+        let word_address = address & !3;
+        if address >= 0xE000_0000 {
+            let at = self.moment();
+            let word = if size < 4 {
+                // Priorities are written by byte.
+                let mask = ((1u32 << (8 * size)) - 1) << shift;
+                self.scs.read(word_address, &self.nvic, at) & !mask | value << shift
+            } else {
+                value
+            };
+            self.scs.write(word_address, word, &mut self.nvic, at);
+            return self.changed();
+        }
+        let value = value << shift;
+        if let Some((gate, place)) = place(word_address) {
+            if !self.clocked(gate, word_address, Some(value)) {
+                return;
+            }
+            match place {
+                Place::Timer(n, offset) => self.timers[n].write(offset, value, now),
+                Place::Usart(n, offset) => {
+                    self.usarts[n].write(offset, value, now, &mut self.dma, memory);
+                }
+                Place::Dma(n, offset) => {
+                    self.catch_up(memory);
+                    self.dma.write(n, offset, value);
+                    self.catch_up(memory);
+                }
+                Place::Mux(offset) => self.dma.write_mux(offset, value),
+                Place::Gpio(n, offset) => return self.gpio.write(n, offset, value, now),
+                Place::Fdcan(offset) => self.fdcan.write(offset, value, now),
+                Place::MessageRam(offset) => {
+                    self.fdcan.advance(now);
+                    return self.fdcan.ram.write(offset, value);
+                }
+            }
+            return self.changed();
+        }
+        match word_address {
+            RCC..RCC_END => self.write_rcc(word_address - RCC, value, memory),
+            IWDG1..IWDG1_END => self.iwdg.write(word_address - IWDG1, value, now),
+            EXTI..EXTI_END => self.exti.write(word_address - EXTI, value),
+            EXTICR..EXTICR_END => self.exti.set_source((word_address - EXTICR) as usize / 4, value),
+            _ => {
+                if !is_plain(word_address) {
+                    note(&mut self.unknown, word_address, self.core.pc, Some(value));
+                }
+                self.plain.write(word_address, value);
+            }
+        }
+        self.changed();
+    }
+
+    fn write_rcc(&mut self, offset: u32, value: u32, memory: &mut dyn Memory) {
+        self.advance(memory);
+        self.rcc.write(offset, value);
+        let now = self.now();
+        for gate in core::mem::take(&mut self.rcc.resets) {
+            match gate {
+                Gate::Dma(n) => self.dma.reset(n as usize),
+                Gate::Timer(n) => self.timers[n as usize - 2] = Timer::new(n),
+                Gate::Usart(n) => self.usarts[n as usize - 2].reset(),
+                Gate::Fdcan => self.fdcan.reset(),
+                Gate::Gpio(_) | Gate::Sram(_) => {}
+            }
+        }
+        for timer in &mut self.timers {
+            timer.advance(now);
+        }
+        self.update_clocks();
+        self.remap = true;
+    }
+
+    fn catch_up(&mut self, memory: &mut dyn Memory) {
+        let now = self.now();
+        for usart in &mut self.usarts {
+            usart.advance(now, &mut self.dma, memory);
+        }
+    }
+
+    /// After an access that may have changed lines or events: the loop looks before the next instruction.
+    fn changed(&mut self) {
+        self.update_lines();
+        self.core.attention = true;
+        self.core.look_at = 0;
+    }
+}
+
+fn note(list: &mut BTreeMap<u32, Access>, address: u32, pc: u32, write: Option<u32>) {
+    let access = list.entry(address).or_default();
+    access.pc = pc;
+    match write {
+        Some(value) => {
+            access.writes += 1;
+            access.value = value;
+        }
+        None => access.reads += 1,
+    }
+}

@@ -1,4 +1,4 @@
-//! The boards: the pins of each in a file of its own.
+//! The boards: their pins, safety wires and LEDs.
 use embassy_stm32::gpio::{AfType, Flex, Output, OutputType, Pin, Pull, Speed};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::{Peri, pac};
@@ -9,14 +9,8 @@ use crate::uart::Line;
 mod safety_input;
 use safety_input::SafetyInput;
 
-#[cfg(not(feature = "nucleo-h743zi2"))]
-mod nucleo_h745zi_q;
-#[cfg(not(feature = "nucleo-h743zi2"))]
-pub use nucleo_h745zi_q::wire;
-#[cfg(feature = "nucleo-h743zi2")]
-mod nucleo_h743zi2;
-#[cfg(feature = "nucleo-h743zi2")]
-pub use nucleo_h743zi2::wire;
+mod nucleo_144;
+pub use nucleo_144::wire;
 
 /// A board, wired.
 pub struct Board {

@@ -1,4 +1,5 @@
-//! NUCLEO-H743ZI2 (MB1364): STM32H743ZI, Cortex-M7 only.
+//! NUCLEO-H743ZI2 (MB1364), with an STM32H743ZI, and NUCLEO-H745ZI-Q (MB1363), whose STM32H745ZI has a Cortex-M4 as well, which is
+//! parked: what the controller uses is at the same pins of both.
 use embassy_stm32::Peripherals;
 
 use super::{Board, Pins, led, receive, transmit};

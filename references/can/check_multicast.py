@@ -5,7 +5,6 @@ stay on this host (hop limit 0). Exit code 0: all agreed.
 """
 
 import os
-import pathlib
 import random
 import socket
 import subprocess
@@ -13,19 +12,11 @@ import sys
 import time
 
 import can
+from example import program
 from frames import messages
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 GROUPS = ["239.74.163.9", "ff15::7079:7468:9"]
 PATIENCE_S = 10.0
-
-
-def echo_program() -> list[str]:
-    built = os.environ.get("JTC_EXAMPLES")
-    if built and (pathlib.Path(built) / "echo").exists():
-        return [str(pathlib.Path(built) / "echo")]
-    cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", "echo"]
-    return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml"), "--"]
 
 
 def echoed(bus: can.BusABC) -> can.Message:
@@ -63,7 +54,7 @@ def send_noise(group: str, port: int) -> None:
 
 def check(group: str, port: int, seed: int) -> None:
     host = f"[{group}]" if ":" in group else group
-    echo = subprocess.Popen([*echo_program(), f"multicast:{host}:{port}"], stdout=subprocess.PIPE, text=True)
+    echo = subprocess.Popen([*program("echo"), f"multicast:{host}:{port}"], stdout=subprocess.PIPE, text=True)
     try:
         assert echo.stdout.readline().startswith("ready:"), "the example did not start"
         with can.Bus(interface="udp_multicast", channel=group, port=port, hop_limit=0) as bus:

@@ -5,36 +5,16 @@ agreed.
 """
 
 import os
-import pathlib
 import random
 import subprocess
 import sys
-import time
 
 import can
+from example import heard, program
 from frames import messages
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 PATIENCE_S = 120.0
 BURST = 2000
-
-
-def adapter_program() -> list[str]:
-    built = os.environ.get("JTC_EXAMPLES")
-    if built and (pathlib.Path(built) / "slcan_adapter").exists():
-        return [str(pathlib.Path(built) / "slcan_adapter")]
-    cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", "slcan_adapter"]
-    return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml")]
-
-
-def heard(bus: can.BusABC) -> can.Message:
-    """The next message; python-can returns without one for every confirmation."""
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        message = bus.recv(1.0)
-        if message is not None:
-            return message
-    raise AssertionError("nothing came")
 
 
 def same(sent: can.Message, got: can.Message) -> None:
@@ -51,7 +31,7 @@ def check(path: str, seed: int) -> None:
         count = 0
         for message in messages(random.Random(seed)):
             bus.send(message)
-            same(message, heard(bus))
+            same(message, heard(bus, PATIENCE_S))
             count += 1
         assert bus.get_version(PATIENCE_S) == (10, 13)
         for number in range(BURST):
@@ -59,7 +39,7 @@ def check(path: str, seed: int) -> None:
             # The line between the two is short: half-way through a burst its answers are taken.
             if number % 100 == 99:
                 for before in range(number - 99, number + 1):
-                    message = heard(bus)
+                    message = heard(bus, PATIENCE_S)
                     assert bytes(message.data) == before.to_bytes(2, "big"), message
     print(f"{path}: {count} kinds of frames and a burst of {BURST} answered alike")
 
@@ -67,7 +47,7 @@ def check(path: str, seed: int) -> None:
 def main() -> int:
     seed = int(os.environ.get("SEED", random.randrange(2**32)))
     print(f"seed {seed}")
-    adapter = subprocess.Popen(adapter_program(), stdout=subprocess.PIPE, text=True)
+    adapter = subprocess.Popen(program("slcan_adapter"), stdout=subprocess.PIPE, text=True)
     try:
         line = adapter.stdout.readline()
         assert line.startswith("ready: /"), line

@@ -5,40 +5,20 @@ Needs python-can. The example `socketcand_server` is taken from $JTC_EXAMPLES, e
 
 import logging
 import os
-import pathlib
 import random
 import subprocess
 import sys
 import threading
-import time
 
 import can
+from example import heard, program
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 PATIENCE_S = 120.0
 BURST = 5000
 
 
-def server_program() -> list[str]:
-    built = os.environ.get("JTC_EXAMPLES")
-    if built and (pathlib.Path(built) / "socketcand_server").exists():
-        return [str(pathlib.Path(built) / "socketcand_server")]
-    cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", "socketcand_server"]
-    return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml"), "--"]
-
-
 def connect(port: int, channel: str) -> can.BusABC:
     return can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel=channel)
-
-
-def heard(bus: can.BusABC) -> can.Message:
-    """The next message; python-can returns without one when only part of a line has come."""
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        message = bus.recv(1.0)
-        if message is not None:
-            return message
-    raise AssertionError("nothing came")
 
 
 def same(sent: can.Message, got: can.Message, step: int = 0) -> None:
@@ -58,7 +38,7 @@ def check_kinds(port: int, rng: random.Random) -> None:
                     number = rng.choice([0, top - 1, rng.randrange(0, top) & ~1])
                     message = can.Message(arbitration_id=number, is_extended_id=extended, data=data, check=True)
                     bus.send(message)
-                    same(message, heard(bus), step=1)
+                    same(message, heard(bus, PATIENCE_S), step=1)
                     count += 1
     print(f"{count} frames answered alike")
 
@@ -73,12 +53,12 @@ def check_two(port: int) -> None:
         sender = threading.Thread(target=send)
         sender.start()
         for number in range(BURST):
-            message = heard(two)
+            message = heard(two, PATIENCE_S)
             assert message.arbitration_id == 0x100 and bytes(message.data) == number.to_bytes(2, "big"), message
         sender.join()
         # A frame back: what `one` hears first is this, so none of its own came back.
         two.send(can.Message(arbitration_id=0x200, is_extended_id=False))
-        message = heard(one)
+        message = heard(one, PATIENCE_S)
         assert message.arbitration_id == 0x200 and message.dlc == 0, message
     print(f"a burst of {BURST} frames from one client to the other")
 
@@ -97,9 +77,9 @@ def check_busy(port: int) -> None:
             print(f"tried again: {error}")
             continue
         with bus:
-            first = int.from_bytes(heard(bus).data, "big")
+            first = int.from_bytes(heard(bus, PATIENCE_S).data, "big")
             for number in range(first + 1, first + 20):
-                message = heard(bus)
+                message = heard(bus, PATIENCE_S)
                 assert int.from_bytes(message.data, "big") == number, message
         connected += 1
         if connected == 20:
@@ -122,7 +102,7 @@ def main() -> int:
     logging.getLogger("can").setLevel(logging.CRITICAL)
     seed = int(os.environ.get("SEED", random.randrange(2**32)))
     print(f"seed {seed}")
-    server = subprocess.Popen([*server_program(), "127.0.0.1:0"], stdout=subprocess.PIPE, text=True)
+    server = subprocess.Popen([*program("socketcand_server"), "127.0.0.1:0"], stdout=subprocess.PIPE, text=True)
     try:
         line = server.stdout.readline()
         assert line.startswith("ready: socketcand:127.0.0.1:"), line

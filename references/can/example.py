@@ -1,0 +1,28 @@
+"""The examples of can-link that the checks talk to."""
+
+import os
+import pathlib
+import time
+
+import can
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def program(name: str) -> list[str]:
+    """The command of an example: taken from $JTC_EXAMPLES, else built with cargo."""
+    built = os.environ.get("JTC_EXAMPLES")
+    if built and (pathlib.Path(built) / name).exists():
+        return [str(pathlib.Path(built) / name)]
+    cargo = ["cargo", "run", "--quiet", "--package", "can-link", "--example", name]
+    return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml"), "--"]
+
+
+def heard(bus: can.BusABC, patience_s: float) -> can.Message:
+    """The next message; python-can returns without one when only a confirmation or a part of a line has come."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        message = bus.recv(1.0)
+        if message is not None:
+            return message
+    raise AssertionError("nothing came")

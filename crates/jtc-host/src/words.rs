@@ -37,13 +37,8 @@ pub fn data_status(code: DataStatus) -> &'static str {
     match code {
         DataStatus::Idle => "nothing",
         DataStatus::NoError => "accepted",
-        DataStatus::TooManyPoints => "too many points",
-        DataStatus::TooManySegments => "too many segments",
-        DataStatus::IncorrectSegmentOrder => "incorrect segment order",
-        DataStatus::IncorrectStepTime => "incorrect step time",
-        DataStatus::IncorrectValue => "incorrect value",
-        DataStatus::NotAllowed => "not allowed in this state",
         DataStatus::StartPositionMismatch => "the arm is not at the start of the trajectory",
+        refused => refused.name(),
     }
 }
 
@@ -52,10 +47,7 @@ pub fn frame_status(code: FrameStatus) -> &'static str {
     match code {
         FrameStatus::Idle => "nothing",
         FrameStatus::NoError => "good",
-        FrameStatus::IncorrectHeader => "incorrect header",
-        FrameStatus::IncorrectFrameType => "incorrect frame type",
-        FrameStatus::IncorrectCrc => "incorrect CRC",
-        FrameStatus::DiscontinuousFrame => "discontinuous frame",
+        bad => bad.name(),
     }
 }
 

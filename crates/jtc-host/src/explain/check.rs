@@ -1,12 +1,7 @@
 //! Pages about what a check of a trajectory finds, and about what a controller still waits for.
 
 use super::{Family, Page, page};
-use crate::check::ProblemKind as Kind;
-
-const fn found(kind: Kind, name: &'static str, texts: [&'static str; 3]) -> Page {
-    let [meaning, cause, remedy] = texts;
-    page(Family::Check, kind as u32, name, [meaning, cause, remedy, "jtc traj check FILE"])
-}
+use crate::check::ProblemKind;
 
 const fn missing(bit: u32, name: &'static str, meaning: &'static str) -> Page {
     let texts = [
@@ -18,7 +13,7 @@ const fn missing(bit: u32, name: &'static str, meaning: &'static str) -> Page {
     page(Family::Missing, bit, name, texts)
 }
 
-pub(super) const PAGES: &[Page] = &[
+pub(super) const MISSING: &[Page] = &[
     missing(
         0,
         "missing-friction",
@@ -30,191 +25,104 @@ pub(super) const PAGES: &[Page] = &[
         "missing-arm-model",
         "The controller has not been given masses and frames of the arm; it waits in Init.",
     ),
-    found(
-        Kind::Empty,
-        "check-empty",
-        ["The file has no point.", "An empty file, or only a head.", "Look at what wrote it."],
-    ),
-    found(
-        Kind::TooManyPoints,
-        "check-too-many-points",
-        [
-            "The trajectory has more points than the controller holds.",
-            "A long motion in short steps.",
-            "Take a longer step, or run it in parts.",
-        ],
-    ),
-    found(
-        Kind::TooManySegments,
-        "check-too-many-segments",
-        [
-            "The trajectory would be sent in more segments than there may be.",
-            "A small --points-per-segment.",
-            "Leave --points-per-segment out.",
-        ],
-    ),
-    found(
-        Kind::SegmentPoints,
-        "check-segment-points",
-        [
-            "A segment would have a number of points that no frame carries.",
-            "A wrong --points-per-segment.",
-            "Leave --points-per-segment out.",
-        ],
-    ),
-    found(
-        Kind::StepTime,
-        "check-step-time",
-        [
-            "The step between points is 0 ms.",
-            "Equal times in the file.",
-            "Give each point a later time than the one before.",
-        ],
-    ),
-    found(
-        Kind::PositionScale,
-        "check-position-scale",
-        [
-            "A position is outside what a frame carries.",
-            "Degrees instead of radians, most often.",
-            "Write radians, or use a header with q1_deg.",
-        ],
-    ),
-    found(
-        Kind::VelocityScale,
-        "check-velocity-scale",
-        [
-            "A velocity is outside what a frame carries.",
-            "Degrees instead of radians, or far too fast.",
-            "Write rad/s; slow it down with --speed.",
-        ],
-    ),
-    found(
-        Kind::AccelerationScale,
-        "check-acceleration-scale",
-        [
-            "An acceleration is outside what a frame carries.",
-            "Degrees instead of radians, or a jump in the velocities.",
-            "Write rad/s²; slow it down with --speed.",
-        ],
-    ),
-    found(
-        Kind::Jump,
-        "check-jump",
-        [
-            "Two points are so far apart that the arm cannot get from one to the other in a step.",
-            "Pieces put together, missing points, or degrees instead of radians.",
-            "Look at the points that are named; give more points there, or more time.",
-        ],
-    ),
-    found(
-        Kind::Position,
-        "check-position",
-        [
-            "A position is over its limit.",
-            "The path leaves the range of the joint.",
-            "Change the path at the point that is named.",
-        ],
-    ),
-    found(
-        Kind::Velocity,
-        "check-velocity",
-        [
-            "A velocity is over its limit.",
-            "The motion is too fast for this joint.",
-            "Slow it down: --speed PCT.",
-        ],
-    ),
-    found(
-        Kind::Acceleration,
-        "check-acceleration",
-        [
-            "An acceleration is over its limit.",
-            "The motion changes its speed too quickly.",
-            "Slow it down: --speed PCT.",
-        ],
-    ),
-    found(
-        Kind::Torque,
-        "check-torque",
-        [
-            "By the arm model the motion needs more torque than the limit.",
-            "Too fast, too heavy a load, or masses that are not the arm's.",
-            "Slow it down with --speed PCT, or name the right arm with --arm FILE.",
-        ],
-    ),
-    found(
-        Kind::HoldTorque,
-        "check-hold-torque",
-        [
-            "Standing still on this path takes nearly all of a joint's torque.",
-            "A stretched pose with a heavy load.",
-            "Change the pose that is named, or take a lighter load.",
-        ],
-    ),
-    found(
-        Kind::FrictionVelocity,
-        "check-friction-velocity",
-        [
-            "A velocity is outside the friction table.",
-            "The table was measured for slower motions.",
-            "Slow it down with --speed PCT, or use the friction polynomial.",
-        ],
-    ),
-    found(
-        Kind::NoStop,
-        "check-no-stop",
-        [
-            "From a place of the path Pause and Stop cannot bring the arm to rest in time with the torque that there is.",
-            "A fast motion downwards, or a heavy load.",
-            "Slow it down: --speed PCT.",
-        ],
-    ),
-    found(
-        Kind::PositionSpeed,
-        "check-position-speed",
-        [
-            "Positions move faster than the velocity limit, whatever the given velocities are.",
-            "Times that are too short, or degrees instead of radians.",
-            "Slow it down: --speed PCT.",
-        ],
-    ),
-    found(
-        Kind::VelocityMismatch,
-        "check-velocity-mismatch",
-        [
-            "Positions move at another speed than the given velocities.",
-            "Pieces put together, or velocities in another unit.",
-            "Leave the velocities out: they are derived from the positions.",
-        ],
-    ),
-    found(
-        Kind::NotAtRest,
-        "check-not-at-rest",
-        [
-            "The first or the last point is not at rest.",
-            "A part was cut out of a longer motion.",
-            "Begin and end with velocity 0.",
-        ],
-    ),
-    page(
-        Family::Check,
-        Kind::StartPose as u32,
-        "check-start-pose",
-        [
-            "The arm is not at the first point of the trajectory.",
-            "It was moved, or the last motion ended elsewhere.",
-            "Look whether the way is free, then let it move to the first point.",
-            "jtc traj run FILE --approach",
-        ],
-    ),
-    found(
-        Kind::AccelerationMismatch,
-        "check-acceleration-mismatch",
-        [
-            "Velocities change otherwise than by the given accelerations.",
-            "Pieces put together, or accelerations in another unit.",
-            "Leave the accelerations out: they are derived from the velocities.",
-        ],
-    ),
 ];
+
+/// Declares the pages of the check: kind and name, then what it means, what usually causes it, what to do, and the next command where
+/// it is not another check.
+macro_rules! found {
+    (@next) => { "jtc traj check FILE" };
+    (@next $command:literal) => { $command };
+    ($($kind:ident $name:literal: $meaning:literal, $cause:literal, $remedy:literal $(, $command:literal)?;)+) => {
+        pub(super) const FOUND: &[Page] = &[$(
+            page(Family::Check, ProblemKind::$kind as u32, $name, [$meaning, $cause, $remedy, found!(@next $($command)?)]),
+        )+];
+    };
+}
+
+found! {
+    Empty "check-empty":
+        "The file has no point.",
+        "An empty file, or only a head.",
+        "Look at what wrote it.";
+    TooManyPoints "check-too-many-points":
+        "The trajectory has more points than the controller holds.",
+        "A long motion in short steps.",
+        "Take a longer step, or run it in parts.";
+    TooManySegments "check-too-many-segments":
+        "The trajectory would be sent in more segments than there may be.",
+        "A small --points-per-segment.",
+        "Leave --points-per-segment out.";
+    SegmentPoints "check-segment-points":
+        "A segment would have a number of points that no frame carries.",
+        "A wrong --points-per-segment.",
+        "Leave --points-per-segment out.";
+    StepTime "check-step-time":
+        "The step between points is 0 ms.",
+        "Equal times in the file.",
+        "Give each point a later time than the one before.";
+    PositionScale "check-position-scale":
+        "A position is outside what a frame carries.",
+        "Degrees instead of radians, most often.",
+        "Write radians, or use a header with q1_deg.";
+    VelocityScale "check-velocity-scale":
+        "A velocity is outside what a frame carries.",
+        "Degrees instead of radians, or far too fast.",
+        "Write rad/s; slow it down with --speed.";
+    AccelerationScale "check-acceleration-scale":
+        "An acceleration is outside what a frame carries.",
+        "Degrees instead of radians, or a jump in the velocities.",
+        "Write rad/s²; slow it down with --speed.";
+    Jump "check-jump":
+        "Two points are so far apart that the arm cannot get from one to the other in a step.",
+        "Pieces put together, missing points, or degrees instead of radians.",
+        "Look at the points that are named; give more points there, or more time.";
+    Position "check-position":
+        "A position is over its limit.",
+        "The path leaves the range of the joint.",
+        "Change the path at the point that is named.";
+    Velocity "check-velocity":
+        "A velocity is over its limit.",
+        "The motion is too fast for this joint.",
+        "Slow it down: --speed PCT.";
+    Acceleration "check-acceleration":
+        "An acceleration is over its limit.",
+        "The motion changes its speed too quickly.",
+        "Slow it down: --speed PCT.";
+    Torque "check-torque":
+        "By the arm model the motion needs more torque than the limit.",
+        "Too fast, too heavy a load, or masses that are not the arm's.",
+        "Slow it down with --speed PCT, or name the right arm with --arm FILE.";
+    HoldTorque "check-hold-torque":
+        "Standing still on this path takes nearly all of a joint's torque.",
+        "A stretched pose with a heavy load.",
+        "Change the pose that is named, or take a lighter load.";
+    FrictionVelocity "check-friction-velocity":
+        "A velocity is outside the friction table.",
+        "The table was measured for slower motions.",
+        "Slow it down with --speed PCT, or use the friction polynomial.";
+    NoStop "check-no-stop":
+        "From a place of the path Pause and Stop cannot bring the arm to rest in time with the torque that there is.",
+        "A fast motion downwards, or a heavy load.",
+        "Slow it down: --speed PCT.";
+    PositionSpeed "check-position-speed":
+        "Positions move faster than the velocity limit, whatever the given velocities are.",
+        "Times that are too short, or degrees instead of radians.",
+        "Slow it down: --speed PCT.";
+    VelocityMismatch "check-velocity-mismatch":
+        "Positions move at another speed than the given velocities.",
+        "Pieces put together, or velocities in another unit.",
+        "Leave the velocities out: they are derived from the positions.";
+    NotAtRest "check-not-at-rest":
+        "The first or the last point is not at rest.",
+        "A part was cut out of a longer motion.",
+        "Begin and end with velocity 0.";
+    StartPose "check-start-pose":
+        "The arm is not at the first point of the trajectory.",
+        "It was moved, or the last motion ended elsewhere.",
+        "Look whether the way is free, then let it move to the first point.",
+        "jtc traj run FILE --approach";
+    AccelerationMismatch "check-acceleration-mismatch":
+        "Velocities change otherwise than by the given accelerations.",
+        "Pieces put together, or accelerations in another unit.",
+        "Leave the accelerations out: they are derived from the velocities.";
+}

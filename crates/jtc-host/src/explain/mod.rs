@@ -10,94 +10,67 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, Trajec
 use crate::check::ProblemKind;
 use crate::words;
 
-/// Which number a page is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Family {
+/// Declares the families of numbers: meaning, name, what stands before the colon in `can:0x100`, in words.
+macro_rules! families {
+    ($($(#[$meaning:meta])* $name:ident $key:literal, $title:literal;)+) => {
+        /// Which number a page is about.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Family {
+            $($(#[$meaning])* $name,)+
+        }
+
+        impl Family {
+            /// All, in the order in which a bare number is looked up.
+            pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
+
+            /// What stands before the colon in `can:0x100`.
+            pub fn key(self) -> &'static str {
+                match self {
+                    $(Self::$name => $key,)+
+                }
+            }
+
+            /// In words.
+            pub fn title(self) -> &'static str {
+                match self {
+                    $(Self::$name => $title,)+
+                }
+            }
+        }
+    };
+}
+
+families! {
     /// Bits of the controller's error words.
-    Jtc,
+    Jtc "jtc", "controller error word";
     /// Bits of a joint's internal error word.
-    Joint,
+    Joint "joint", "internal error word of a joint";
     /// CAN flags.
-    Can,
+    Can "can", "CAN flags";
     /// Bits of a node's error byte.
-    Node,
+    Node "node", "error byte of a node";
     /// Bits of a node's warning byte.
-    Warning,
+    Warning "warning", "warning byte of a node";
     /// Bits of the motor-control fault bytes.
-    Motor,
+    Motor "motor", "motor-control fault byte of a drive";
     /// Data status codes of a response.
-    Data,
+    Data "data", "data status of a response";
     /// Frame status codes of a response.
-    Frame,
+    Frame "frame", "frame status of a response";
     /// States of the controller.
-    State,
+    State "state", "state of the controller";
     /// Trajectory execution states.
-    Tes,
+    Tes "tes", "trajectory execution state";
     /// States of a node.
-    NodeState,
+    NodeState "node-state", "state of a node";
     /// Bits of what a controller has not been given.
-    Missing,
+    Missing "missing", "word of missing parameters";
     /// Kinds of what the check of a trajectory finds.
-    Check,
+    Check "check", "kind of a problem of a trajectory";
 }
 
 impl Family {
-    /// All, in the order in which a bare number is looked up.
-    pub const ALL: [Family; 13] = [
-        Family::Jtc,
-        Family::Joint,
-        Family::Can,
-        Family::Node,
-        Family::Warning,
-        Family::Motor,
-        Family::Data,
-        Family::Frame,
-        Family::State,
-        Family::Tes,
-        Family::NodeState,
-        Family::Missing,
-        Family::Check,
-    ];
-
-    /// What stands before the colon in `can:0x100`.
-    pub fn key(self) -> &'static str {
-        match self {
-            Family::Jtc => "jtc",
-            Family::Joint => "joint",
-            Family::Can => "can",
-            Family::Node => "node",
-            Family::Warning => "warning",
-            Family::Motor => "motor",
-            Family::Data => "data",
-            Family::Frame => "frame",
-            Family::State => "state",
-            Family::Tes => "tes",
-            Family::NodeState => "node-state",
-            Family::Missing => "missing",
-            Family::Check => "check",
-        }
-    }
-
-    /// In words.
-    pub fn title(self) -> &'static str {
-        match self {
-            Family::Jtc => "controller error word",
-            Family::Joint => "internal error word of a joint",
-            Family::Can => "CAN flags",
-            Family::Node => "error byte of a node",
-            Family::Warning => "warning byte of a node",
-            Family::Motor => "motor-control fault byte of a drive",
-            Family::Data => "data status of a response",
-            Family::Frame => "frame status of a response",
-            Family::State => "state of the controller",
-            Family::Tes => "trajectory execution state",
-            Family::NodeState => "state of a node",
-            Family::Missing => "word of missing parameters",
-            Family::Check => "kind of a problem of a trajectory",
-        }
-    }
-
     /// Its number is a set of bits, not one code.
     pub fn is_bits(self) -> bool {
         matches!(
@@ -154,6 +127,15 @@ impl std::fmt::Display for Page {
     }
 }
 
+/// Declares pages, family by family: number and name, then what it means, what usually causes it, what to do, the next command.
+macro_rules! entries {
+    ($($family:ident { $($code:literal $name:literal: $($text:literal),+;)+ })+) => {
+        pub(super) const PAGES: &[super::Page] =
+            &[$($(super::page(super::Family::$family, $code, $name, [$($text),+]),)+)+];
+    };
+}
+use entries;
+
 const fn page(family: Family, code: u32, name: &'static str, texts: [&'static str; 4]) -> Page {
     let [meaning, cause, remedy, command] = texts;
     Page { family, code, name, meaning, cause, remedy, command }
@@ -161,7 +143,8 @@ const fn page(family: Family, code: u32, name: &'static str, texts: [&'static st
 
 /// All pages.
 pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
-    controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES).chain(check::PAGES)
+    let own = controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES);
+    own.chain(check::MISSING).chain(check::FOUND)
 }
 
 /// The words that commands print for this code.

@@ -315,27 +315,7 @@ impl<P: Port> Session<P> {
 
 /// The type of a request that this library sent itself.
 fn frame_type(kind: u8) -> FrameType {
-    use FrameType::*;
-    const ALL: [FrameType; 17] = [
-        ClearCurrentErrors,
-        ClearOccurredErrors,
-        JtcStatus,
-        Trajectory,
-        FrictionTable,
-        FrictionTableUseDefault,
-        PidParam,
-        PidParamUseDefault,
-        ArmModel,
-        ArmModelUseDefault,
-        TrajSetExecStatus,
-        TeachingModeEnable,
-        TeachingModeDisable,
-        FrictionPolynomial,
-        FrictionPolynomialUseDefault,
-        ResetCanDevices,
-        GripperControl,
-    ];
-    ALL.into_iter().find(|t| *t as u8 == kind).unwrap_or(JtcStatus)
+    FrameType::from_byte(kind).unwrap_or(FrameType::JtcStatus)
 }
 
 /// The record refuses the request because of the state.

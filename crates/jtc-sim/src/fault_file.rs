@@ -11,32 +11,6 @@ mod error;
 
 pub use error::FaultFileError;
 
-const KINDS: [&str; 23] = [
-    "node-silent",
-    "node-reboot",
-    "motor-fault",
-    "hardware-fault",
-    "fault-state",
-    "ignores-state",
-    "encoder-jump",
-    "not-accurate",
-    "friction",
-    "temperature",
-    "frames-lost",
-    "frames-corrupted",
-    "frames-garbled",
-    "bus-off",
-    "no-acknowledge",
-    "safety-input",
-    "safety-line",
-    "serial-lost",
-    "serial-flipped",
-    "serial-delayed",
-    "tick-overrun",
-    "push",
-    "hand",
-];
-
 const STATES: [(&str, ControllerState); 6] = [
     ("start", ControllerState::Start),
     ("init", ControllerState::Init),

@@ -31,7 +31,7 @@ fn the_documented_example_is_read() {
 
 #[test]
 fn every_kind_is_read_by_its_own_name() {
-    for kind in KINDS {
+    for kind in FaultKind::NAMES {
         let keys = "joint = 1\ngripper = true\ntorque_nm = 3\nfile = \"a.csv\"\nfor_s = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n";
         // Take away what is too much until it fits: the messages name the keys.
         let mut keys: Vec<&str> = keys.lines().collect();

@@ -6,150 +6,140 @@ use jtc_core::ControllerState;
 
 use crate::hand::HandPath;
 
-/// A kind of fault.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FaultKind {
+/// Declares the kinds of faults: meaning, name, the name in fault files and tables, and what belongs to it.
+macro_rules! fault_kinds {
+    ($($(#[$doc:meta])* $kind:ident $name:literal $({ $($(#[$field_doc:meta])* $field:ident: $type:ty,)+ })?;)+) => {
+        /// A kind of fault.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum FaultKind {
+            $($(#[$doc])* $kind $({ $($(#[$field_doc])* $field: $type,)+ })?,)+
+        }
+
+        impl FaultKind {
+            /// The names of all kinds.
+            pub const NAMES: [&str; [$($name),+].len()] = [$($name),+];
+
+            /// Name in fault files and tables.
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$kind { .. } => $name,)+
+                }
+            }
+        }
+    };
+}
+
+fault_kinds! {
     /// A node is off the bus; a joint's motor goes on with its last torque.
-    NodeSilent {
+    NodeSilent "node-silent" {
         /// 0..5 joints, 6 gripper.
         node: u8,
-    },
+    };
     /// A node's processor restarts, once.
-    NodeReboot {
+    NodeReboot "node-reboot" {
         /// 0..5 joints, 6 gripper.
         node: u8,
-    },
+    };
     /// The motor control reports faults.
-    MotorFault {
+    MotorFault "motor-fault" {
         /// Which.
         joint: Joint,
         /// Bits of the fault byte.
         bits: u8,
-    },
+    };
     /// The gate driver reports a fault.
-    HardwareFault {
+    HardwareFault "hardware-fault" {
         /// Which.
         joint: Joint,
-    },
+    };
     /// A drive goes to its fault state with no error bit set, once.
-    FaultState {
+    FaultState "fault-state" {
         /// Which.
         joint: Joint,
-    },
+    };
     /// A drive answers requests for another state, and stays in the one that it is in.
-    IgnoresState {
+    IgnoresState "ignores-state" {
         /// Which.
         joint: Joint,
-    },
+    };
     /// The encoder reads something else.
-    EncoderJump {
+    EncoderJump "encoder-jump" {
         /// Which.
         joint: Joint,
         /// Added to the position, rad.
         rad: f64,
-    },
+    };
     /// A drive reports that its position is not accurate.
-    NotAccurate {
+    NotAccurate "not-accurate" {
         /// Which.
         joint: Joint,
-    },
+    };
     /// Friction is multiplied.
-    Friction {
+    Friction "friction" {
         /// Which.
         joint: Joint,
         /// Times the true one.
         factor: f64,
-    },
+    };
     /// A bearing is at this temperature.
-    Temperature {
+    Temperature "temperature" {
         /// Which.
         joint: Joint,
         /// °C.
         celsius: f64,
-    },
+    };
     /// Receptions fail.
-    FramesLost {
+    FramesLost "frames-lost" {
         /// 0..1.
         probability: f64,
-    },
+    };
     /// Frames are destroyed on the wire and repeated.
-    FramesCorrupted {
+    FramesCorrupted "frames-corrupted" {
         /// 0..1.
         probability: f64,
-    },
+    };
     /// Answers reach the controller with other contents.
-    FramesGarbled {
+    FramesGarbled "frames-garbled" {
         /// 0..1.
         probability: f64,
-    },
+    };
     /// The controller is kept off the bus.
-    BusOff,
+    BusOff "bus-off";
     /// The controller's bus line is cut.
-    NoAcknowledge,
+    NoAcknowledge "no-acknowledge";
     /// The controller's safety input is low.
-    SafetyInput,
+    SafetyInput "safety-input";
     /// The safety line of a drive reads danger.
-    SafetyLine {
+    SafetyLine "safety-line" {
         /// 0..5 joints, 6 gripper.
         node: u8,
-    },
+    };
     /// Bytes from the host vanish.
-    SerialLost {
+    SerialLost "serial-lost" {
         /// 0..1.
         probability: f64,
-    },
+    };
     /// Bits of bytes from the host are flipped.
-    SerialFlipped {
+    SerialFlipped "serial-flipped" {
         /// 0..1, of the bytes.
         probability: f64,
-    },
+    };
     /// Bytes from the host are held back until the fault is over.
-    SerialDelayed,
+    SerialDelayed "serial-delayed";
     /// The controller's tick does not come.
-    TickOverrun,
+    TickOverrun "tick-overrun";
     /// Someone pushes a joint.
-    Push {
+    Push "push" {
         /// Which.
         joint: Joint,
         /// N·m.
         torque: f64,
-    },
+    };
     /// A hand leads the arm while it is taught.
-    Hand {
+    Hand "hand" {
         /// Place in [`FaultPlan::hands`].
         path: usize,
-    },
-}
-
-impl FaultKind {
-    /// Name in fault files and tables.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::NodeSilent { .. } => "node-silent",
-            Self::NodeReboot { .. } => "node-reboot",
-            Self::MotorFault { .. } => "motor-fault",
-            Self::HardwareFault { .. } => "hardware-fault",
-            Self::FaultState { .. } => "fault-state",
-            Self::IgnoresState { .. } => "ignores-state",
-            Self::EncoderJump { .. } => "encoder-jump",
-            Self::NotAccurate { .. } => "not-accurate",
-            Self::Friction { .. } => "friction",
-            Self::Temperature { .. } => "temperature",
-            Self::FramesLost { .. } => "frames-lost",
-            Self::FramesCorrupted { .. } => "frames-corrupted",
-            Self::FramesGarbled { .. } => "frames-garbled",
-            Self::BusOff => "bus-off",
-            Self::NoAcknowledge => "no-acknowledge",
-            Self::SafetyInput => "safety-input",
-            Self::SafetyLine { .. } => "safety-line",
-            Self::SerialLost { .. } => "serial-lost",
-            Self::SerialFlipped { .. } => "serial-flipped",
-            Self::SerialDelayed => "serial-delayed",
-            Self::TickOverrun => "tick-overrun",
-            Self::Push { .. } => "push",
-            Self::Hand { .. } => "hand",
-        }
-    }
+    };
 }
 
 impl fmt::Display for FaultKind {

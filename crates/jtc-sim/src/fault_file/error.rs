@@ -3,7 +3,8 @@ use core::fmt;
 
 use jtc_dynamics::JOINTS;
 
-use super::{KINDS, STATES};
+use super::STATES;
+use crate::faults::FaultKind;
 
 /// Why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,7 +122,7 @@ impl fmt::Display for FaultFileError {
             ),
             Self::Hand { fault, text } => write!(f, "fault {fault}: {text}"),
             Self::UnknownKind { fault, kind } => {
-                write!(f, "fault {fault}: there is no kind `{kind}`; kinds are {}", KINDS.join(", "))
+                write!(f, "fault {fault}: there is no kind `{kind}`; kinds are {}", FaultKind::NAMES.join(", "))
             }
             Self::Missing { fault, kind, key } => write!(f, "fault {fault}: `{kind}` needs the key `{key}`"),
             Self::Superfluous { fault, kind, key } => {

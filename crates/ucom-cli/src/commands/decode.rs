@@ -11,7 +11,7 @@ use ucom_host::ProfileFile;
 use ucom_host::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 use ucom_host::session::{CleanupList, protocol_frame, recorded};
 
-use super::record::report_broken_off;
+use super::record::{Silence, report_broken_off};
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::interrupt::listen;
 
@@ -64,9 +64,11 @@ fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = listen(&CleanupList::default())?;
     let mut decoder = Decoder::new(link.profile()?);
     let mut bus = link.open()?;
+    let mut silence = Silence::begins(out);
     while left > 0 && !stop.asked() && !Output::gone() {
         let received = bus.receive(Duration::from_millis(100))?;
         bus.news().iter().for_each(|news| out.note(news));
+        silence.look(received.is_some(), out);
         if let Some(frame) = received {
             print(&mut decoder, bus.now_us() * 1000, &recorded(&frame), out);
             left -= 1;

@@ -30,6 +30,35 @@ pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     }
 }
 
+/// A bus on which nothing has come for so long is reported.
+const SILENCE: Duration = Duration::from_millis(1500);
+
+/// Reports once, to people, that nothing has come of a bus yet, and what to look at.
+pub struct Silence {
+    since: Instant,
+    over: bool,
+}
+
+impl Silence {
+    /// From now on it is listened; programs know themselves when nothing comes.
+    pub fn begins(out: &Output) -> Self {
+        Self { since: Instant::now(), over: out.is_json() }
+    }
+
+    /// To be called at each look at the bus: whether a frame came.
+    pub fn look(&mut self, came: bool, out: &Output) {
+        if !came && self.since.elapsed() < SILENCE {
+            return;
+        }
+        if !std::mem::replace(&mut self.over, true) && !came {
+            out.note(
+                "nothing has come of the bus yet: boards that nobody asks and whose control loop does not run send nothing \
+                 (`ucom scan` asks them, in another terminal); `ucom doctor` looks at bus and boards",
+            );
+        }
+    }
+}
+
 /// Records until Ctrl-C, so long, or so many frames.
 pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = listen(&CleanupList::default())?;
@@ -45,6 +74,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     };
     files.into_iter().for_each(OutputFile::is_written);
     let (start, mut flushed) = (Instant::now(), Instant::now());
+    let mut silence = Silence::begins(out);
     while !stop.asked() && recorder.frames() < args.count.unwrap_or(u64::MAX) {
         let rest = args.duration.map_or(Duration::MAX, |d| d.saturating_sub(start.elapsed()));
         if rest.is_zero() {
@@ -56,6 +86,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         }
         let received = bus.receive(rest.min(Duration::from_millis(100)))?;
         bus.news().iter().for_each(|news| out.note(news));
+        silence.look(received.is_some(), out);
         let Some(frame) = received else { continue };
         let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {

@@ -4,27 +4,12 @@ use cli_kit::Failure;
 use std::path::{Path, PathBuf};
 
 use ucom_host::files::SignalTable;
-use ucom_host::session::{Cache, SessionError};
+use ucom_host::session::Cache;
 
-use crate::args::{Boards, CacheArgs, LinkArgs};
+use crate::args::{CacheArgs, LinkArgs};
 
 /// The signal table that is taken without being named.
 const SIGNAL_TABLE: &str = "ucom-edges.toml";
-
-/// A board of several whose application is not started is seldom the only one.
-pub fn of_several(error: SessionError, boards: &Boards) -> Failure {
-    let list = match boards {
-        Boards::Some(numbers) if numbers.len() > 1 => {
-            numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(",")
-        }
-        Boards::All => "all".into(),
-        _ => return error.into(),
-    };
-    match error.is_not_started() {
-        true => Failure::of(&error).hint(format!("`ucom start {list}`")),
-        false => error.into(),
-    }
-}
 
 impl LinkArgs {
     /// The signal table; without a file an empty one.

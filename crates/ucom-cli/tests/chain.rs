@@ -318,7 +318,7 @@ fn several_boards_are_changed_only_when_all_answer() {
     assert_eq!(output["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
     // The next board has lost its start signal by that.
     let output = sim.json(&["io", "all"], 4);
-    assert!(output["error"]["hint"].as_str().unwrap().contains("start all"), "{output}");
+    assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
 
 /// D-T21: two boards with one flash number report at the same moment with the same bits: one frame, and one board too many.

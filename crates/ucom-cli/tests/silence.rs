@@ -30,3 +30,33 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     ask.join().unwrap();
     assert!(!output.err.contains("nothing has come"), "{}", output.err);
 }
+
+/// Each board without names is reported, with its cause and its next command.
+#[test]
+fn every_board_without_names_is_reported() {
+    let sim = Sim::start(&["--boards", "3"]);
+    sim.ucom(&["init"]).ends(0);
+    let one = sim.ucom(&["io", "2"]).ends(4);
+    assert!(
+        one.err.contains("names of inputs, outputs and parameters are not known: board 2: its application"),
+        "{}",
+        one.err
+    );
+    assert!(one.err.contains("`ucom start 2`"), "{}", one.err);
+    let all = sim.ucom(&["io", "all"]).ends(4);
+    for board in 1..=3 {
+        assert!(
+            all.err.contains(&format!(
+                "board {board}: its application is not started; next: `ucom start {board}`"
+            )),
+            "{}",
+            all.err
+        );
+    }
+    assert!(all.err.contains("`ucom start 1,2,3`"), "{}", all.err);
+    sim.ucom(&["start", "1"]).ends(0);
+    let mixed = sim.ucom(&["--json", "io", "1-2,9"]).ends(4).json();
+    let message = mixed["error"]["message"].as_str().unwrap();
+    assert!(!message.contains("board 1") && message.contains("board 2: its application"), "{message}");
+    assert!(message.contains("board 9 does not answer"), "{message}");
+}

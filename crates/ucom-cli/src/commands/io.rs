@@ -16,7 +16,6 @@ use ucom_host::session::{
 use super::outputs::{named, units};
 use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
-use crate::cache::of_several;
 
 /// Names of everything, what their words mean, and initial inputs where the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -30,9 +29,9 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     })?;
     let mut driver = link.session()?;
     let mut boards = Vec::new();
-    for board in driver.numbers(&args.boards)? {
-        let known = cache.known(&mut driver, &signals, board);
-        let known = known.map_err(|e| of_several(e, &args.boards))?;
+    let numbers = driver.numbers(&args.boards)?;
+    for known in cache.all(&mut driver, &signals, &numbers, |_| false)? {
+        let board = known.board;
         // Without a started application there is nobody to ask for them.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
@@ -260,10 +259,9 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let mut boards = Vec::new();
     if args.boards != crate::args::Boards::None {
         let mut driver = link.session()?;
-        for number in driver.numbers(&args.boards)? {
-            let known = args.cache.cache().known(&mut driver, &signals, number)?;
-            boards.push(DbcBoard::new(number, &known.names, &known.signals));
-        }
+        let numbers = driver.numbers(&args.boards)?;
+        let all = args.cache.cache().all(&mut driver, &signals, &numbers, |_| false)?;
+        boards.extend(all.iter().map(|known| DbcBoard::new(known.board, &known.names, &known.signals)));
     }
     let text = dbc_text(&boards, profile.endian);
     match file {

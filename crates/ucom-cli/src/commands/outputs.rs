@@ -54,10 +54,9 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let boards = driver.numbers(&args.boards)?;
     let signals = link.signal_table()?;
     let mut all = BTreeMap::new();
-    for board in boards {
-        let known = args.cache.cache().known(&mut driver, &signals, board)?;
-        driver.master.watch(board, Some(known.names.dimensions().so), true);
-        all.insert(board, known);
+    for known in args.cache.cache().all(&mut driver, &signals, &boards, |_| false)? {
+        driver.master.watch(known.board, Some(known.names.dimensions().so), true);
+        all.insert(known.board, known);
     }
     let mut stdout = Lines::stdout()?;
     if args.csv {

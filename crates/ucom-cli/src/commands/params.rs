@@ -5,17 +5,15 @@ use std::path::Path;
 use cli_kit::output_file::OutputError;
 use cli_kit::{Failure, Output, OutputFile, table};
 use serde_json::{Value, json};
-use ucom_host::files::SignalTable;
 use ucom_host::files::params::{SavedBoard, SavedSignal, params_text};
 use ucom_host::master::counted;
 use ucom_host::master::io::{Kind, ParValue};
 use ucom_host::session::{
-    Driver, History, Known, ParameterFile, Parameters, Word, for_board, inventory, name_of, note_rounded,
-    only, words, write,
+    Driver, History, ParameterFile, Parameters, Word, for_board, inventory, name_of, note_rounded, only,
+    words, write,
 };
 
 use crate::args::{Boards, LinkArgs, ParArgs};
-use crate::cache::of_several;
 
 /// Shows parameters, writes some, saves or applies a file.
 pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -32,16 +30,12 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let boards = driver.numbers(&args.boards)?;
     only(&boards, &args.values, "set")?;
     let mut all = Vec::new();
-    for board in &boards {
-        let values = for_board(&args.values, *board);
-        let known = match values.is_empty() {
-            true => args.cache.cache().known(&mut driver, &signals, *board),
-            false => args.cache.cache().described(&mut driver, &signals, *board),
-        };
-        let known = known.map_err(|e| of_several(e, &args.boards))?;
-        let words = words(&known, Kind::Par, &values)?;
-        note_rounded(&driver, *board, Kind::Par, &words);
-        let history = History::of(&args.cache.cache(), &known.info);
+    let cache = args.cache.cache();
+    let written = |board: u8| !for_board(&args.values, board).is_empty();
+    for known in cache.all(&mut driver, &signals, &boards, written)? {
+        let words = words(&known, Kind::Par, &for_board(&args.values, known.board))?;
+        note_rounded(&driver, known.board, Kind::Par, &words);
+        let history = History::of(&cache, &known.info);
         all.push(Parameters { known, words, history });
     }
     write(&mut driver, &mut all, args.force.force)?;
@@ -185,15 +179,16 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     let mut driver = link.session()?;
     file.identities(&mut driver)?;
-    let known = file.numbers().into_iter().map(|board| described(args, &mut driver, &signals, board));
-    let known = known.collect::<Result<Vec<Known>, Failure>>()?;
+    // What is written to must run. To check, what is known will do.
+    let cache = args.cache.cache();
+    let known = cache.all(&mut driver, &signals, &file.numbers(), |_| !args.dry_run)?;
     let checked = file.words(|number| known.iter().find(|k| k.board == number))?;
     let mut all = Vec::new();
     let mut inputs = 0;
     for (known, (_, (ci, words))) in known.into_iter().zip(checked) {
         inputs += ci.len();
         note_rounded(&driver, known.board, Kind::Par, &words);
-        let history = History::of(&args.cache.cache(), &known.info);
+        let history = History::of(&cache, &known.info);
         all.push(Parameters { known, words, history });
     }
     if !args.dry_run {
@@ -201,20 +196,6 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     report(&all, inputs, args.dry_run, out);
     Ok(())
-}
-
-/// Names of a board that parameters can be written to: its application runs. To check, what is known will do.
-fn described(
-    args: &ParArgs,
-    driver: &mut Driver,
-    signals: &SignalTable,
-    board: u8,
-) -> Result<Known, Failure> {
-    let cache = args.cache.cache();
-    match args.dry_run {
-        true => Ok(cache.known(driver, signals, board)?),
-        false => Ok(cache.described(driver, signals, board)?),
-    }
 }
 
 fn report(all: &[Parameters], inputs: usize, dry_run: bool, out: &Output) {

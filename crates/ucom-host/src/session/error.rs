@@ -57,6 +57,12 @@ pub enum SessionError {
         /// Their numbers.
         boards: Vec<u8>,
     },
+    /// The names of boards' inputs, outputs and parameters are not known.
+    #[error("{}", unnamed(failed))]
+    NoNames {
+        /// Those boards, each with what failed.
+        failed: Vec<(u8, SessionError)>,
+    },
     /// An outcome that does not fit its request: a mistake in this library.
     #[error("unexpected outcome {0:?}")]
     Unexpected(Box<Outcome>),
@@ -142,8 +148,13 @@ impl SessionError {
         matches!(self, Self::Procedure(Error::Master(MasterError::Cancelled)))
     }
 
+    /// It is about one board: the others may answer.
+    pub(crate) fn is_of_one_board(&self) -> bool {
+        matches!(self, Self::Procedure(Error::Exchange(_) | Error::Identity(_) | Error::Signal(_)))
+    }
+
     /// A board could be asked if its application were started.
-    pub fn is_not_started(&self) -> bool {
+    fn is_not_started(&self) -> bool {
         matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }
 
@@ -180,6 +191,16 @@ impl Diagnose for SessionError {
                 "left-loop",
                 "ucom doctor: another PC on the bus, heartbeats that did not arrive, an application that stops",
             ),
+            Self::NoNames { failed } => {
+                let started = failed.iter().all(|(_, e)| e.is_not_started());
+                let first = failed.first().map(|(_, e)| e.diagnosis());
+                let mut diagnosis = first.unwrap_or(Diagnosis::new(NoLink, "no-boards", ""));
+                if started {
+                    let boards: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
+                    diagnosis.next = format!("`ucom start {}`", boards.join(","));
+                }
+                return diagnosis;
+            }
             Self::Unexpected(_) => (Fault, "internal", "this is a mistake in ucom; please report it"),
         };
         Diagnosis::new(kind, code, next)
@@ -220,6 +241,18 @@ impl Diagnose for ValuesError {
                 "params",
                 "nothing was written; ucom io shows names and ranges, ucom info the boards",
             ),
+        }
+    }
+}
+
+/// What was asked, and for each board the cause; the next command beside it where there are several.
+fn unnamed(failed: &[(u8, SessionError)]) -> String {
+    let asked = "the names of inputs, outputs and parameters are not known";
+    match failed {
+        [(_, error)] => format!("{asked}: {error}"),
+        _ => {
+            let line = |(_, error): &(u8, SessionError)| format!("\n  {error}; next: {}", error.hint());
+            format!("{asked}:{}", failed.iter().map(line).collect::<String>())
         }
     }
 }

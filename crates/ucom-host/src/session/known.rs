@@ -71,6 +71,32 @@ impl Cache {
         Ok(with_signals(board, info, names, table, driver.master.profile()).with_notes(driver))
     }
 
+    /// Boards with their names, as [`Self::known`] gives them; those that `must_run` names as [`Self::described`] does.
+    ///
+    /// # Errors
+    /// [`SessionError::NoNames`] with every board that failed, after all were asked; what fails otherwise, at once.
+    pub fn all(
+        &self,
+        driver: &mut Driver,
+        table: &SignalTable,
+        boards: &[u8],
+        must_run: impl Fn(u8) -> bool,
+    ) -> Result<Vec<Known>, SessionError> {
+        let (mut all, mut failed) = (Vec::new(), Vec::new());
+        for &board in boards {
+            let known = match must_run(board) {
+                true => self.described(driver, table, board),
+                false => self.known(driver, table, board),
+            };
+            match known {
+                Ok(known) => all.push(known),
+                Err(error) if error.is_of_one_board() => failed.push((board, error)),
+                Err(error) => return Err(error),
+            }
+        }
+        if failed.is_empty() { Ok(all) } else { Err(SessionError::NoNames { failed }) }
+    }
+
     /// What is known of a program without asking for it.
     fn kept(&self, driver: &mut Driver, info: &BoardInfo) -> Option<IoDescription> {
         let key = DescriptionKey::of(info);

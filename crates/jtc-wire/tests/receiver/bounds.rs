@@ -1,8 +1,7 @@
 //! The device's parser at its bounds: nothing pushed, a full buffer, the work of a call.
 use jtc_wire::{FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, fixed};
 
-const INTER_BYTE_TIMEOUT_US: u32 = 5000;
-const ON: [u8; 6] = fixed::TEACHING_MODE_ENABLE;
+use crate::{INTER_BYTE_TIMEOUT_US, ON, receiver};
 
 /// Time passes by itself: a call without bytes does not keep half a frame alive.
 #[test]
@@ -70,7 +69,7 @@ fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
 /// A call of `poll` passes over at most 2,048 bytes, so that a tick is not held up (J-07).
 #[test]
 fn j07_noise_is_passed_over_in_bounded_steps() {
-    let mut receiver = Receiver::new(vec![0; FRAME_MAX], INTER_BYTE_TIMEOUT_US);
+    let mut receiver = receiver();
     assert_eq!(receiver.push(0, &[0; FRAME_MAX]), FRAME_MAX);
     assert!(receiver.poll(0));
     receiver.release();

@@ -165,8 +165,7 @@ fn j34_an_execute_waits_until_the_load_is_caught() {
         it.run(1);
     }
     it.run(200);
-    let raw = |q: f64| (q / 3.141592 * 32767.0).round() as i16;
-    let points = [RawPoint { position: POSES[1].map(raw), ..RawPoint::default() }; 20];
+    let points = [RawPoint { position: POSES[1].map(|q| rig::raw(q, 3.141592)), ..RawPoint::default() }; 20];
     it.rig.send(jtc_wire::FrameType::Trajectory, &rig::segment_body(7, 0, 1, 10, &points));
     it.rig.send(jtc_wire::FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
     it.run(100);

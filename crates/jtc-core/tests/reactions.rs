@@ -6,7 +6,7 @@ use std::path::Path;
 
 use jtc_core::{Config, ControllerState, TrajectoryState, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
-use rig::{Rig, rad};
+use rig::{Rig, point, rad};
 
 /// Joint 5 leads from 0 to 0.4 rad and back, at rest at both ends.
 fn path() -> Vec<RawPoint> {
@@ -15,12 +15,8 @@ fn path() -> Vec<RawPoint> {
         .map(|i| {
             let u = f64::from(i) / f64::from(n - 1);
             let (w, t) = (std::f64::consts::TAU, 4.0);
-            let mut point = RawPoint::default();
-            let raw = |value: f64, scale: f64| (value / scale * 32767.0).round() as i16;
-            point.position[4] = raw(0.2 * (1.0 - (w * u).cos()), 3.141592);
-            point.velocity[4] = raw(0.2 * w / t * (w * u).sin(), 6.283185);
-            point.acceleration[4] = raw(0.2 * w * w / (t * t) * (w * u).cos(), 12.566370);
-            point
+            let (sin, cos) = ((w * u).sin(), (w * u).cos());
+            point(4, 0.2 * (1.0 - cos), 0.2 * w / t * sin, 0.2 * w * w / (t * t) * cos)
         })
         .collect()
 }

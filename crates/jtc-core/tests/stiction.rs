@@ -5,7 +5,7 @@ mod rig;
 use jtc_core::{Config, Parameters, TrajectoryState};
 use jtc_wire::{FrameType, RawPoint};
 use plant::{ENCODER_STEP, LuGre, Plant, heavier};
-use rig::{Rig, segment_body};
+use rig::{Rig, raw, segment_body};
 
 const POSE: [f64; 6] = [0.3, 0.8, -0.9, 0.4, 0.7, 0.2];
 
@@ -125,7 +125,6 @@ fn point(rig: &Rig, u: f64) -> RawPoint {
     let way = 0.3 * u * u * u * (10.0 + u * (6.0 * u - 15.0));
     let speed = back * 0.3 * 30.0 * u * u * (1.0 - u) * (1.0 - u) / 2.0;
     let acceleration = 0.3 * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / 4.0;
-    let raw = |x: f64, scale: f64| (x / scale * 32767.0).round() as i16;
     let held = rig.controller.telemetry().joints.map(|j| j.set_position);
     RawPoint {
         position: held.map(|q| raw(q + way, 3.141592)),

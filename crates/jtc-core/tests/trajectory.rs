@@ -3,7 +3,7 @@ mod rig;
 
 use jtc_core::{Config, ControllerState, POINTS_MAX, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
-use rig::{Rig, rad, rest, segment_body};
+use rig::{Rig, put, rad, rest, segment_body};
 
 /// A motion of joint 2 (and a smaller one of joint 5) that starts and ends at rest: `n` points, `step` ms apart.
 fn motion(n: usize, step: u16) -> Vec<RawPoint> {
@@ -16,9 +16,7 @@ fn motion(n: usize, step: u16) -> Vec<RawPoint> {
             let a = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (total * total);
             let mut point = RawPoint::default();
             for (j, way) in [(2, 0.4), (5, -0.2)] {
-                point.position[j] = (way * p / 3.141592 * 32767.0).round() as i16;
-                point.velocity[j] = (way * v / 6.283185 * 32767.0).round() as i16;
-                point.acceleration[j] = (way * a / 12.566370 * 32767.0).round() as i16;
+                put(&mut point, j, way * p, way * v, way * a);
             }
             point
         })
@@ -256,8 +254,7 @@ fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
             way += if i == 0 { 0.0 } else { 0.005 * (speed(i - 1) + speed(i)) };
             let mut p = RawPoint::default();
             for j in 0..6 {
-                p.position[j] = (way / 3.141592 * 32767.0).round() as i16;
-                p.velocity[j] = (speed(i) / 6.283185 * 32767.0f64).round() as i16;
+                put(&mut p, j, way, speed(i), 0.0);
             }
             p
         })

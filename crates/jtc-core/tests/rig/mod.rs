@@ -12,34 +12,14 @@ use jtc_wire::{
 };
 
 mod bodies;
+mod node;
 mod paths;
 
 pub use bodies::{floats, frame, model_body, segment_body};
-pub use paths::{pieces, rad, rest};
+pub use node::Node;
+pub use paths::{pieces, point, put, rad, raw, rest};
 
 pub const SCALE: Scale = Scale { velocity: 2.0 };
-
-/// A node as its state machine shows it on the bus.
-#[derive(Clone, Copy, Debug)]
-pub struct Node {
-    pub report: JointReport,
-    /// Does not answer.
-    pub silent: bool,
-    /// Added to the position that it reports, rad.
-    pub glitch: f64,
-    /// Takes its configuration in Init only.
-    pub refuses_when_ready: bool,
-    /// Does not leave ReadyToOperate.
-    pub stays_ready: bool,
-    /// Does not leave OperationEnable.
-    pub stays_enabled: bool,
-    /// Refuses to be enabled: stays in the transition.
-    pub slow_enable: bool,
-    pub configured: bool,
-    pub resets: u32,
-    /// Ticks until it answers again after a reset.
-    pub booting: u32,
-}
 
 pub struct Rig {
     pub controller: Controller<Vec<RawPoint>>,
@@ -95,23 +75,11 @@ impl Sent {
 
 impl Rig {
     pub fn new(config: Config) -> Self {
-        let node = Node {
-            report: JointReport { temperature: 25, ..JointReport::default() },
-            silent: false,
-            glitch: 0.0,
-            refuses_when_ready: false,
-            stays_ready: false,
-            stays_enabled: false,
-            slow_enable: false,
-            configured: false,
-            resets: 0,
-            booting: 0,
-        };
         let last =
             Outputs { bus: None, safety_output: false, status: false, record_line: None, host_done: 0 };
         Self {
             controller: Controller::new(config, vec![RawPoint::default(); POINTS_MAX]),
-            nodes: [node; 7],
+            nodes: [Node::new(); 7],
             pump: false,
             torque: [0.0; 6],
             safety_input: true,
@@ -378,26 +346,5 @@ impl Rig {
                 Request::Reset(_) => {}
             }
         }
-    }
-}
-
-impl Node {
-    pub fn restart(&mut self) {
-        self.resets += 1;
-        self.booting = 50;
-        self.configured = false;
-        self.report = JointReport {
-            state: NodeState::INIT,
-            temperature: 25,
-            position: self.report.position,
-            ..JointReport::default()
-        };
-    }
-
-    pub fn fault(&mut self) {
-        self.report.state = NodeState::FAULT;
-        self.report.errors = 2;
-        self.report.mc_current = 4;
-        self.report.mc_occurred = 4;
     }
 }

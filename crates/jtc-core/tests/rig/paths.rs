@@ -13,14 +13,29 @@ pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
             let next = v + a * 0.01;
             p += 0.5 * (v + next) * 0.01;
             v = next;
-            let mut point = RawPoint::default();
-            point.position[joint] = (p / 3.141592 * 32767.0).round() as i16;
-            point.velocity[joint] = (v / 6.283185 * 32767.0).round() as i16;
-            point.acceleration[joint] = (if i < n { a } else { 0.0 } / 12.566370 * 32767.0).round() as i16;
-            points.push(point);
+            points.push(point(joint, p, v, if i < n { a } else { 0.0 }));
         }
     }
     points
+}
+
+/// A point of one joint alone: rad, rad/s, rad/s².
+pub fn point(joint: usize, q: f64, v: f64, a: f64) -> RawPoint {
+    let mut point = RawPoint::default();
+    put(&mut point, joint, q, v, a);
+    point
+}
+
+/// What a joint of a point does: rad, rad/s, rad/s².
+pub fn put(point: &mut RawPoint, joint: usize, q: f64, v: f64, a: f64) {
+    point.position[joint] = raw(q, 3.141592);
+    point.velocity[joint] = raw(v, 6.283185);
+    point.acceleration[joint] = raw(a, 12.566370);
+}
+
+/// The integer of a value, and the value of the largest one.
+pub fn raw(value: f64, scale: f64) -> i16 {
+    (value / scale * 32767.0).round() as i16
 }
 
 /// A point at rest: `raw` in every joint.

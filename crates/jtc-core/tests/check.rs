@@ -4,16 +4,7 @@ mod rig;
 use jtc_core::check::Quantity;
 use jtc_core::{Config, ControllerState, TrajectoryState, Violation};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
-use rig::{Rig, floats, rad, rest, segment_body};
-
-/// int16 of rad, rad/s and rad/s².
-fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
-    let raw = |value: f64, scale: f64| (value / scale * 32767.0).round() as i16;
-    let mut p = RawPoint::default();
-    (p.position[j], p.velocity[j], p.acceleration[j]) =
-        (raw(q, 3.141592), raw(v, 6.283185), raw(a, 12.566370));
-    p
-}
+use rig::{Rig, floats, point, rad, rest, segment_body};
 
 /// Limits that are not the same both ways, and no limits but these.
 fn rig() -> Rig {
@@ -282,21 +273,11 @@ fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
 /// Trajectories that exist keep their verdicts (19 columns of int16, 10 ms apart).
 #[test]
 fn j36_the_existing_trajectories_keep_their_verdicts() {
-    let folder = std::env::var("OPENJTC_DATA")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
     for (name, passes) in [("TrajectoryInt.csv", true), ("TrajectoryInt_Long.csv", false)] {
-        let Ok(text) = std::fs::read_to_string(format!("{folder}/{name}")) else {
-            println!("skipped: {folder}/{name} is not there");
-            continue;
-        };
-        let points: Vec<RawPoint> = text
-            .lines()
-            .filter(|line| !line.trim().is_empty())
-            .map(|line| {
-                let n: Vec<i16> = line.split(',').skip(1).map(|x| x.trim().parse().expect("int16")).collect();
-                let six = |at: usize| core::array::from_fn(|j| n[at + j]);
-                RawPoint { position: six(0), velocity: six(6), acceleration: six(12) }
-            })
+        let Some(points) = test_kit::existing::points(name) else { continue };
+        let points: Vec<RawPoint> = points
+            .into_iter()
+            .map(|[position, velocity, acceleration]| RawPoint { position, velocity, acceleration })
             .collect();
         let mut rig = Rig::holding();
         let chunks: Vec<_> = points.chunks(500).collect();

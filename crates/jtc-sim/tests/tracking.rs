@@ -53,25 +53,12 @@ fn j40_tracking_within_two_milliradians_rms_with_wrong_masses_and_friction() {
     }
 }
 
-/// The measured trajectory beside the checkout, if it is there: 19 integers a line, the first is the time.
-fn recorded() -> Option<Vec<RawPoint>> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena");
-    let directory = std::env::var("OPENJTC_DATA").unwrap_or_else(|_| beside.into());
-    let text = std::fs::read_to_string(format!("{directory}/TrajectoryInt.csv")).ok()?;
-    let point = |line: &str| {
-        let n: Vec<i16> = line.split(',').skip(1).map(|x| x.trim().parse().unwrap()).collect();
-        let six = |at: usize| std::array::from_fn(|j| n[at + j]);
-        RawPoint { position: six(0), velocity: six(6), acceleration: six(12) }
-    };
-    Some(text.lines().filter(|line| !line.trim().is_empty()).map(point).collect())
-}
-
 #[test]
 fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
-    let Some(points) = recorded() else {
-        println!("skipped: no TrajectoryInt.csv; OPENJTC_DATA names the directory");
-        return;
-    };
+    let Some(points) = test_kit::existing::points("TrajectoryInt.csv") else { return };
+    let raw =
+        |[position, velocity, acceleration]: [[i16; 6]; 3]| RawPoint { position, velocity, acceleration };
+    let points: Vec<RawPoint> = points.into_iter().map(raw).collect();
     for seed in [1, 2, 3] {
         let config = SimConfig { start: points[0].position_rad(), seed, baud: None, ..SimConfig::default() };
         let mut operator = Operator::new(config);

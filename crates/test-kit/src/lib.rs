@@ -1,7 +1,8 @@
-//! What the tests of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain, and documents that show
-//! what commands print.
+//! What the tests of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain, documents that show what
+//! commands print, and the data of an existing arm.
 #![forbid(unsafe_code)]
 
+pub mod existing;
 pub mod page;
 
 use std::fs::read_dir;

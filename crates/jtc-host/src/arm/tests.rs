@@ -4,19 +4,10 @@ use std::path::PathBuf;
 
 use jtc_dynamics::{Dynamics, Origin};
 
+use test_kit::existing;
+
 use super::*;
 use host_kit::Diagnose;
-
-fn data(name: &str) -> Option<PathBuf> {
-    let dir = std::env::var("OPENJTC_DATA")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
-    let path = Path::new(&dir).join(name);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
-}
 
 /// The host's reading of the arm file and the controller's built-in defaults are the same numbers.
 #[test]
@@ -319,12 +310,12 @@ fn a_reversed_polynomial_file_is_noticed() {
 #[test]
 fn the_existing_parameter_files_are_read() {
     let arm = Arm::avena();
-    let load = |name| data(name).map(|p| ParameterFile::load(&p).unwrap());
+    let load = |name| existing::file(name).map(|p| ParameterFile::load(&p).unwrap());
     if let Some(file) = load("FricPolynomialCoeffs.csv") {
         assert_eq!(file.polynomial, arm.polynomial);
     }
     let six = |head: &str| -> Option<ParameterFile> {
-        let paths: Option<Vec<PathBuf>> = (0..6).map(|j| data(&format!("{head}{j}.csv"))).collect();
+        let paths: Option<Vec<PathBuf>> = (0..6).map(|j| existing::file(&format!("{head}{j}.csv"))).collect();
         paths.map(|paths| ParameterFile::load_all(&paths).unwrap())
     };
     if let Some(file) = six("FricTableJoint") {
@@ -355,7 +346,7 @@ fn the_existing_parameter_files_are_read() {
         assert_eq!(found.joints[2].position_max, 2.9);
         assert!(file.warnings.iter().any(|w| w.problem.contains("no position limits")));
     }
-    if let Some(dir) = data("Avena.urdf").and_then(|p| p.parent().map(Path::to_owned)) {
+    if let Some(dir) = existing::file("Avena.urdf").and_then(|p| p.parent().map(Path::to_owned)) {
         let file = ParameterFile::load(&dir).unwrap();
         assert!(
             file.polynomial.is_some() && file.table.is_some() && file.pid.is_some() && file.model.is_none()

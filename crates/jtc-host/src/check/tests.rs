@@ -1,7 +1,5 @@
 //! Verdicts on made and existing trajectories.
 
-use std::path::Path;
-
 use jtc_core::Config;
 
 use super::*;
@@ -330,13 +328,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
 }
 
 fn load(name: &str) -> Option<Trajectory> {
-    let dir = std::env::var("OPENJTC_DATA")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
-    let path = Path::new(&dir).join(name);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
+    let path = test_kit::existing::file(name)?;
     Some(Loaded::load(&path, None).expect("it is read").trajectory)
 }
 

@@ -2,6 +2,8 @@
 
 use proptest::prelude::*;
 
+use test_kit::existing;
+
 use super::*;
 
 fn parse(text: &str) -> Result<Loaded, FileError> {
@@ -133,20 +135,9 @@ fn joint_trajectories_may_be_json_inside_other_messages() {
     assert_eq!((loaded.trajectory.step_ms, loaded.trajectory.points.len()), (100, 2));
 }
 
-fn data(name: &str) -> Option<std::path::PathBuf> {
-    let dir = std::env::var("OPENJTC_DATA")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
-    let path = Path::new(&dir).join(name);
-    let there = path.exists();
-    if !there {
-        println!("skipped: {} is not there", path.display());
-    }
-    there.then_some(path)
-}
-
 #[test]
 fn the_existing_files_are_read() {
-    if let Some(path) = data("TrajectoryInt.csv") {
+    if let Some(path) = existing::file("TrajectoryInt.csv") {
         let loaded = Loaded::load(&path, None).unwrap();
         let points = loaded.trajectory.points.len();
         assert_eq!(
@@ -154,7 +145,7 @@ fn the_existing_files_are_read() {
             (Form::Int16, 1054, 10, 0)
         );
     }
-    if let Some(path) = data("TrajectoryFloat.csv") {
+    if let Some(path) = existing::file("TrajectoryFloat.csv") {
         let loaded = Loaded::load(&path, None).unwrap();
         let points = loaded.trajectory.points.len();
         assert_eq!(
@@ -162,7 +153,7 @@ fn the_existing_files_are_read() {
             (Form::Float, 1054, 10, 0)
         );
     }
-    if let Some(path) = data("TrajectoryInt_Long.csv") {
+    if let Some(path) = existing::file("TrajectoryInt_Long.csv") {
         let loaded = Loaded::load(&path, None).unwrap();
         assert_eq!((loaded.form, loaded.trajectory.points.len()), (Form::Int16, 12_000));
         assert!(loaded.notes[0].contains("line 1055"), "{:?}", loaded.notes);

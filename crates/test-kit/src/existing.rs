@@ -1,0 +1,29 @@
+//! Data of an existing arm, which are no part of this project: `OPENJTC_DATA` names their directory. Tests of them are left out where
+//! they are not at hand.
+
+use std::path::{Path, PathBuf};
+
+/// A file of them; `None`, and a line that reports it, where it is not there.
+pub fn file(name: &str) -> Option<PathBuf> {
+    let directory = std::env::var("OPENJTC_DATA")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
+    let path = Path::new(&directory).join(name);
+    let there = path.exists();
+    if !there {
+        println!("skipped: {} is not there; OPENJTC_DATA names the directory", path.display());
+    }
+    there.then_some(path)
+}
+
+/// Positions, velocities and accelerations of a trajectory as they go over the wire: 19 integers a line, the first is the time.
+///
+/// # Panics
+/// When the file has another form.
+pub fn points(name: &str) -> Option<Vec<[[i16; 6]; 3]>> {
+    let text = std::fs::read_to_string(file(name)?).expect("it can be read");
+    let point = |line: &str| {
+        let n: Vec<i16> = line.split(',').skip(1).map(|x| x.trim().parse().expect("int16")).collect();
+        [0, 6, 12].map(|at| std::array::from_fn(|j| n[at + j]))
+    };
+    Some(text.lines().filter(|line| !line.trim().is_empty()).map(point).collect())
+}

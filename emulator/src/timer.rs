@@ -252,21 +252,21 @@ mod tests {
     use super::*;
     use crate::clock::{MICROSECOND, MILLISECOND};
 
-    fn millisecond_timer() -> Timer {
-        let mut timer = Timer::new(7);
+    /// It counts microseconds up to `reload`, compares with `compare`, and has these interrupts.
+    fn microsecond_timer(number: u32, reload: u32, compare: u32, interrupts: u32) -> Timer {
+        let mut timer = Timer::new(number);
         timer.set_clock(200_000_000, 0);
-        timer.write(0x28, 199, 0);
-        timer.write(0x2C, 999, 0);
-        timer.write(0x14, 1, 0);
-        timer.write(0x10, 0, 0);
-        timer.write(0x0C, 1, 0);
-        timer.write(0x00, 1, 0);
+        for (register, value) in
+            [(0x28, 199), (0x2C, reload), (0x14, 1), (0x10, 0), (0x38, compare), (0x0C, interrupts), (0x00, 1)]
+        {
+            timer.write(register, value, 0);
+        }
         timer
     }
 
     #[test]
     fn a_basic_timer_fires_every_millisecond() {
-        let mut timer = millisecond_timer();
+        let mut timer = microsecond_timer(7, 999, 0, 1);
         for ms in 1..5 {
             assert_eq!(timer.next_event(), ms * MILLISECOND);
             timer.advance(ms * MILLISECOND - 1);
@@ -281,15 +281,7 @@ mod tests {
 
     #[test]
     fn compare_flags_come_at_their_count() {
-        let mut timer = Timer::new(5);
-        timer.set_clock(200_000_000, 0);
-        timer.write(0x28, 199, 0);
-        timer.write(0x2C, 0xFFFF, 0);
-        timer.write(0x14, 1, 0);
-        timer.write(0x10, 0, 0);
-        timer.write(0x38, 100, 0);
-        timer.write(0x0C, 4, 0);
-        timer.write(0x00, 1, 0);
+        let mut timer = microsecond_timer(5, 0xFFFF, 100, 4);
         assert_eq!(timer.next_event(), 100 * MICROSECOND);
         timer.advance(100 * MICROSECOND);
         assert_eq!(timer.read(0x10, 100 * MICROSECOND), 4);

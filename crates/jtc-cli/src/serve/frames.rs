@@ -1,11 +1,15 @@
 //! Cuts the controller's bytes into whole statuses, so that a host that comes in the middle of one never sees half of it.
 
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 
 use jtc_wire::{FRAME_MAX, HEADER, STATUS_LEN};
 
 /// First bytes of each status.
 const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8];
+
+/// Longest time for which virtual time stands still within a frame while no bytes come.
+const STANDSTILL: Duration = Duration::from_millis(5);
 
 /// Bytes that came, and the pieces that are complete.
 #[derive(Default)]
@@ -58,11 +62,14 @@ pub struct Incoming {
     head: Vec<u8>,
     /// Bytes of the present frame that have not come.
     missing: usize,
+    /// How long virtual time has stood still in the present gap.
+    stood: Duration,
 }
 
 impl Incoming {
     /// Takes bytes of the host in.
     pub fn push(&mut self, bytes: &[u8]) {
+        self.stood = Duration::ZERO;
         for &byte in bytes {
             if self.missing > 0 {
                 self.missing -= 1;
@@ -82,13 +89,24 @@ impl Incoming {
     }
 
     /// Bytes of a frame are still to come.
-    pub fn mid_frame(&self) -> bool {
+    fn mid_frame(&self) -> bool {
         self.missing > 0 || !self.head.is_empty()
     }
 
-    /// The frame will not be completed.
-    pub fn give_up(&mut self) {
-        *self = Self::default();
+    /// Within a frame whose next bytes are still on their way through the operating system, virtual time waits a little for
+    /// them: such a gap is none of the host's making. `wait` waits for bytes, at most so long; `false`: time goes on.
+    pub fn stands_still<E>(&mut self, wait: impl FnOnce(Duration) -> Result<(), E>) -> Result<bool, E> {
+        if !self.mid_frame() || self.stood >= STANDSTILL {
+            return Ok(false);
+        }
+        let before = Instant::now();
+        wait(STANDSTILL - self.stood)?;
+        self.stood += before.elapsed();
+        if self.stood >= STANDSTILL {
+            // The frame will not be completed.
+            *self = Self { stood: self.stood, ..Self::default() };
+        }
+        Ok(true)
     }
 }
 

@@ -19,8 +19,6 @@ pub use typed::{Typed, hand};
 
 /// Bytes of the host that wait for the line: as much as an adapter's buffer; beyond that its writes block.
 const WAITING_MAX: usize = 4096;
-/// Longest time for which virtual time stands still within a frame while no bytes come.
-const STANDSTILL: Duration = Duration::from_millis(5);
 /// Longest wait for a host to read before statuses are lost, when virtual time runs free.
 const READER_WAIT: Duration = Duration::from_millis(100);
 /// Largest delay that is made up for; after a longer one (a suspended computer) time goes on from here.
@@ -44,8 +42,6 @@ pub struct Server {
     connected: bool,
     /// The host did not read for long: statuses are lost until it does.
     stalled: bool,
-    /// How long virtual time has stood still in the present gap.
-    stood: Duration,
     /// A status has left the controller.
     answers: bool,
     /// Takes every tick.
@@ -65,7 +61,6 @@ impl Server {
             rest: Vec::new(),
             connected: false,
             stalled: false,
-            stood: Duration::ZERO,
             answers: false,
             sink: None,
         }
@@ -138,25 +133,15 @@ impl Server {
             if n == 0 {
                 return Ok(());
             }
-            self.stood = Duration::ZERO;
             self.incoming.push(&buffer[..n]);
             self.world.host_write(&buffer[..n]);
         }
     }
 
-    /// Within a frame whose next bytes are still on their way through the operating system, virtual time waits a little for
-    /// them: such a gap is none of the host's making.
+    /// See [`Incoming::stands_still`]; bytes that the line has not carried yet are not waited for.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
-        if !self.incoming.mid_frame() || self.world.host_write_pending() > 0 || self.stood >= STANDSTILL {
-            return Ok(false);
-        }
-        let before = Instant::now();
-        self.pty.wait_input(STANDSTILL - self.stood)?;
-        self.stood += before.elapsed();
-        if self.stood >= STANDSTILL {
-            self.incoming.give_up();
-        }
-        Ok(true)
+        Ok(self.world.host_write_pending() == 0
+            && self.incoming.stands_still(|time| self.pty.wait_input(time))?)
     }
 
     /// Hands statuses to the host; without one they are lost, as on a line that nobody listens to.

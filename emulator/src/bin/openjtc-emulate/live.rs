@@ -12,8 +12,6 @@ use crate::pty::{Pty, PtyError};
 
 /// Bytes of the host that wait for the line.
 const WAITING_MAX: usize = 4096;
-/// Longest time for which virtual time stands still within a frame while no bytes come.
-const STANDSTILL: Duration = Duration::from_millis(5);
 /// Longest wait for a host to read, when virtual time runs free.
 const READER_WAIT: Duration = Duration::from_millis(100);
 /// Largest delay that is made up for.
@@ -43,7 +41,6 @@ pub struct Live {
     /// Bytes that the terminal did not take at once.
     rest: Vec<u8>,
     connected: bool,
-    stood: Duration,
     ready: bool,
     resets: usize,
     faults: usize,
@@ -70,7 +67,6 @@ impl Live {
             incoming: Incoming::default(),
             rest: Vec::new(),
             connected: false,
-            stood: Duration::ZERO,
             ready: false,
             resets: 1,
             faults: 0,
@@ -128,25 +124,14 @@ impl Live {
             if n == 0 {
                 return Ok(());
             }
-            self.stood = Duration::ZERO;
             self.incoming.push(&buffer[..n]);
             self.board.write(self.port, &buffer[..n]);
         }
     }
 
-    /// Within a frame whose next bytes are still on their way through the operating system, virtual time waits a little.
+    /// See [`Incoming::stands_still`]; bytes that the line has not carried yet are not waited for.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
-        let waiting = self.board.pending(self.port) > 0;
-        if !self.incoming.mid_frame() || waiting || self.stood >= STANDSTILL {
-            return Ok(false);
-        }
-        let before = Instant::now();
-        self.pty.wait_input(STANDSTILL - self.stood)?;
-        self.stood += before.elapsed();
-        if self.stood >= STANDSTILL {
-            self.incoming.give_up();
-        }
-        Ok(true)
+        Ok(self.board.pending(self.port) == 0 && self.incoming.stands_still(|time| self.pty.wait_input(time))?)
     }
 
     /// The firmware's log, and what nobody wants to see: resets and faults.

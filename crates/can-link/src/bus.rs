@@ -27,32 +27,23 @@ pub trait CanBus {
     }
 }
 
-impl<B: CanBus + ?Sized> CanBus for &mut B {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
-        (**self).send(frame)
-    }
-    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
-        (**self).receive(timeout)
-    }
-    fn state(&mut self) -> ControllerState {
-        (**self).state()
-    }
-    fn times_bus_off(&self) -> u64 {
-        (**self).times_bus_off()
-    }
+macro_rules! what_leads_to_a_bus_is_one {
+    ($($pointer:ty),+) => {$(
+        impl<B: CanBus + ?Sized> CanBus for $pointer {
+            fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+                (**self).send(frame)
+            }
+            fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
+                (**self).receive(timeout)
+            }
+            fn state(&mut self) -> ControllerState {
+                (**self).state()
+            }
+            fn times_bus_off(&self) -> u64 {
+                (**self).times_bus_off()
+            }
+        }
+    )+};
 }
 
-impl<B: CanBus + ?Sized> CanBus for Box<B> {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
-        (**self).send(frame)
-    }
-    fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
-        (**self).receive(timeout)
-    }
-    fn state(&mut self) -> ControllerState {
-        (**self).state()
-    }
-    fn times_bus_off(&self) -> u64 {
-        (**self).times_bus_off()
-    }
-}
+what_leads_to_a_bus_is_one!(&mut B, Box<B>);

@@ -47,12 +47,7 @@ impl fmt::Display for Admin {
             (self.debug, "debug"),
             (self.global_debug, "global-debug"),
         ];
-        let mut gap = "";
-        for (_, name) in flags.iter().filter(|(on, _)| *on) {
-            write!(f, "{gap}{name}")?;
-            gap = " ";
-        }
-        if gap.is_empty() { f.write_str("-") } else { Ok(()) }
+        crate::status::words(f, flags)
     }
 }
 

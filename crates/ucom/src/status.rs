@@ -102,15 +102,18 @@ impl Not for Status {
 /// The names of the bits that are set, `EXLRUN INIT IPINIT`; `-` when none is.
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut gap = "";
-        for (name, bit) in Self::NAMES {
-            if self.has(bit) {
-                write!(f, "{gap}{name}")?;
-                gap = " ";
-            }
-        }
-        if gap.is_empty() { f.write_str("-") } else { Ok(()) }
+        words(f, Self::NAMES.map(|(name, bit)| (self.has(bit), name)))
     }
+}
+
+/// The names that are set, with blanks between them; `-` when none is.
+pub(crate) fn words<const N: usize>(f: &mut fmt::Formatter<'_>, names: [(bool, &str); N]) -> fmt::Result {
+    let mut gap = "";
+    for (_, name) in names.iter().filter(|(on, _)| *on) {
+        write!(f, "{gap}{name}")?;
+        gap = " ";
+    }
+    if gap.is_empty() { f.write_str("-") } else { Ok(()) }
 }
 
 #[cfg(test)]

@@ -126,6 +126,14 @@ struct Mistake {
 
 const NONE: Mistake = Mistake { receives: |_, f| vec![*f], sends: |_, f, _| vec![*f] };
 
+fn receives(receives: fn(&TestNode, &Frame) -> Vec<Frame>) -> Mistake {
+    Mistake { receives, ..NONE }
+}
+
+fn sends(sends: fn(&TestNode, &Frame, usize) -> Vec<Frame>) -> Mistake {
+    Mistake { sends, ..NONE }
+}
+
 impl Member for Flawed {
     fn poll(&mut self, now: u64) -> Option<Frame> {
         if self.waiting.is_empty() && self.inside.is_none() {
@@ -182,127 +190,72 @@ fn with(mistake: Mistake) -> Bench {
 #[test]
 fn each_mistake_is_found_by_its_test() {
     let mistakes: [(&str, Mistake); 17] = [
-        ("D-T1", Mistake { sends: |_, f, _| if f.id() == 0x441 { vec![*f, *f] } else { vec![*f] }, ..NONE }),
+        ("D-T1", sends(|_, f, _| if f.id() == 0x441 { vec![*f, *f] } else { vec![*f] })),
         // Every second report does not come.
-        (
-            "D-T2",
-            Mistake {
-                sends: |_, f, n| if f.id() == 0x441 && n % 2 == 0 { vec![] } else { vec![*f] },
-                ..NONE
-            },
-        ),
+        ("D-T2", sends(|_, f, n| if f.id() == 0x441 && n % 2 == 0 { vec![] } else { vec![*f] })),
         // A request without a number is answered with an error.
         (
             "D-T3",
-            Mistake {
-                receives: |b, f| {
-                    if b.number().is_none() && f.id() == 0x2C1 { vec![*f, frame("240#")] } else { vec![*f] }
-                },
-                ..NONE
-            },
+            receives(|b, f| {
+                if b.number().is_none() && f.id() == 0x2C1 { vec![*f, frame("240#")] } else { vec![*f] }
+            }),
         ),
         // The pin does not follow PC_SETSTATUS.
         (
             "D-T4",
-            Mistake {
-                receives: |_, f| {
-                    // The chain must be numbered before; it is the second time that fails.
-                    static RECEIVED: AtomicUsize = AtomicUsize::new(0);
-                    let raised = f.to_string() == "1C1#0202";
-                    if raised && RECEIVED.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
-                },
-                ..NONE
-            },
+            receives(|_, f| {
+                // The chain must be numbered before; it is the second time that fails.
+                static RECEIVED: AtomicUsize = AtomicUsize::new(0);
+                let raised = f.to_string() == "1C1#0202";
+                if raised && RECEIVED.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
+            }),
         ),
-        (
-            "D-T5",
-            Mistake {
-                receives: |b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] },
-                ..NONE
-            },
-        ),
+        ("D-T5", receives(|b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] })),
         // The value is masked.
-        (
-            "D-T6",
-            Mistake { receives: |_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] }, ..NONE },
-        ),
+        ("D-T6", receives(|_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] })),
         // MSTART goes with EXLRUN.
         (
             "D-T7",
-            Mistake {
-                receives: |_, f| if f.to_string() == "1C1#1000" { vec![frame("1C1#4040")] } else { vec![*f] },
-                ..NONE
-            },
+            receives(|_, f| if f.to_string() == "1C1#1000" { vec![frame("1C1#4040")] } else { vec![*f] }),
         ),
         // PROG stays 0.
-        (
-            "D-T8",
-            Mistake {
-                receives: |_, f| if f.id() == 0x041 { vec![*f, frame("1C1#0400")] } else { vec![*f] },
-                ..NONE
-            },
-        ),
-        ("D-T9", Mistake { sends: |_, f, _| if f.id() == 0x501 { vec![] } else { vec![*f] }, ..NONE }),
-        (
-            "D-T10",
-            Mistake {
-                receives: |_, f| if f.to_string() == "581#00" { vec![frame("581#")] } else { vec![*f] },
-                ..NONE
-            },
-        ),
+        ("D-T8", receives(|_, f| if f.id() == 0x041 { vec![*f, frame("1C1#0400")] } else { vec![*f] })),
+        ("D-T9", sends(|_, f, _| if f.id() == 0x501 { vec![] } else { vec![*f] })),
+        ("D-T10", receives(|_, f| if f.to_string() == "581#00" { vec![frame("581#")] } else { vec![*f] })),
         (
             "D-T11",
-            Mistake {
-                sends: |_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] },
-                ..NONE
-            },
+            sends(|_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] }),
         ),
-        (
-            "D-T12",
-            Mistake { sends: |_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] }, ..NONE },
-        ),
+        ("D-T12", sends(|_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] })),
         // A heartbeat is enough to start it again.
         (
             "D-T13",
-            Mistake {
-                receives: |b, f| {
-                    let ready = f.to_string() == "680#" && b.status().0 == 0x8B;
-                    if ready { vec![*f, frame("541#")] } else { vec![*f] }
-                },
-                ..NONE
-            },
+            receives(|b, f| {
+                let ready = f.to_string() == "680#" && b.status().0 == 0x8B;
+                if ready { vec![*f, frame("541#")] } else { vec![*f] }
+            }),
         ),
         // Heartbeats stop it.
         (
             "D-T14",
-            Mistake {
-                receives: |b, f| {
-                    if f.to_string() == "680#" && b.application.running {
-                        vec![frame("601#00000000")]
-                    } else {
-                        vec![*f]
-                    }
-                },
-                ..NONE
-            },
+            receives(|b, f| {
+                if f.to_string() == "680#" && b.application.running {
+                    vec![frame("601#00000000")]
+                } else {
+                    vec![*f]
+                }
+            }),
         ),
         (
             "D-T15",
-            Mistake {
-                receives: |_, f| {
+            receives(
+                |_, f| {
                     if f.to_string() == "601#02000000" { vec![frame("601#00000000")] } else { vec![*f] }
                 },
-                ..NONE
-            },
+            ),
         ),
-        ("D-T17", Mistake { sends: |_, f, _| if f.id() == 0x101 { vec![] } else { vec![*f] }, ..NONE }),
-        (
-            "D-T18",
-            Mistake {
-                sends: |_, f, _| if f.to_string() == "081#0A" { vec![*f, *f] } else { vec![*f] },
-                ..NONE
-            },
-        ),
+        ("D-T17", sends(|_, f, _| if f.id() == 0x101 { vec![] } else { vec![*f] })),
+        ("D-T18", sends(|_, f, _| if f.to_string() == "081#0A" { vec![*f, *f] } else { vec![*f] })),
     ];
     for (id, mistake) in mistakes {
         let mut bench = with(mistake);

@@ -3,6 +3,7 @@ mod access;
 mod map;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::clock::{MICROSECOND, NEVER, Time, period};
 use crate::code::Code;
@@ -53,8 +54,10 @@ pub struct Core {
     pub stop_at: u64,
     /// The last instruction begun.
     pub pc: u32,
-    /// A stop was requested at this address.
-    pub stopping: Option<u32>,
+    /// Addresses of the members of the last IT block.
+    pub it_block: Range<u32>,
+    /// A stop was requested.
+    pub stopping: bool,
     /// Something changed that the loop must see before the next instruction.
     pub attention: bool,
     /// Something pends that only masks hold back.

@@ -1,18 +1,26 @@
 //! What the machine must know of an instruction before it runs, remembered per address.
 //!
-//! Unicorn executes `SEV` as nothing and shows no change of the stack pointer, so the few instructions that matter are
-//! recognised by their first half-words the first time an address is executed.
+//! Unicorn executes `SEV` as nothing, shows no change of the stack pointer and passes over the members of an IT block that its
+//! condition skips, so the few instructions that matter are recognised by their first half-words the first time an address is
+//! executed.
 
 /// Not looked at yet.
-pub const UNKNOWN: u8 = 0;
+pub const UNKNOWN: u16 = 0;
 /// Nothing of interest.
-pub const PLAIN: u8 = 1;
+pub const PLAIN: u16 = 1;
 /// Sets the event register.
-pub const SEV: u8 = 2;
+pub const SEV: u16 = 2;
 /// May lower the stack pointer.
-pub const LOWERS_SP: u8 = 4;
+pub const LOWERS_SP: u16 = 4;
 /// An observer waits for this address.
-pub const WATCHED: u8 = 8;
+pub const WATCHED: u16 = 8;
+/// Begins an IT block, whose members are counted with it: the core fetches and issues them all, whatever the condition.
+pub const IT: u16 = 16;
+/// Stands in an IT block.
+pub const MEMBER: u16 = 32;
+/// Place of the members' number and of their half-words' in the class of an IT instruction.
+const MEMBERS: u32 = 8;
+const HALF_WORDS: u32 = 12;
 
 const FLASH: u32 = 0x0800_0000;
 const FLASH_SIZE: u32 = 0x20_0000;
@@ -20,8 +28,8 @@ const ITCM_SIZE: u32 = 0x1_0000;
 
 /// Classes of the instructions in ITCM and flash; elsewhere every instruction is looked at each time.
 pub struct Code {
-    flash: Vec<u8>,
-    itcm: Vec<u8>,
+    flash: Vec<u16>,
+    itcm: Vec<u16>,
 }
 
 impl Default for Code {
@@ -33,7 +41,7 @@ impl Default for Code {
 impl Code {
     /// Class of the instruction at an address.
     #[inline]
-    pub fn class(&self, address: u32) -> u8 {
+    pub fn class(&self, address: u32) -> u16 {
         let in_flash = address.wrapping_sub(FLASH);
         if in_flash < FLASH_SIZE {
             return self.flash[in_flash as usize / 2];
@@ -41,7 +49,7 @@ impl Code {
         if address < ITCM_SIZE { self.itcm[address as usize / 2] } else { UNKNOWN }
     }
 
-    fn place(&mut self, address: u32) -> Option<&mut u8> {
+    fn place(&mut self, address: u32) -> Option<&mut u16> {
         let in_flash = address.wrapping_sub(FLASH);
         if in_flash < FLASH_SIZE {
             return self.flash.get_mut(in_flash as usize / 2);
@@ -49,10 +57,10 @@ impl Code {
         self.itcm.get_mut(address as usize / 2)
     }
 
-    /// Remember a class; what observers asked for stays.
-    pub fn learn(&mut self, address: u32, class: u8) {
+    /// Remember a class; what observers asked for stays, and that it is in an IT block.
+    pub fn learn(&mut self, address: u32, class: u16) {
         if let Some(place) = self.place(address) {
-            *place = class | *place & WATCHED;
+            *place = class | *place & (WATCHED | MEMBER);
         }
     }
 
@@ -87,7 +95,7 @@ impl Code {
 }
 
 /// Class of an instruction by its first two half-words.
-pub fn classify(first: u16, second: u16) -> u8 {
+pub fn classify(first: u16, second: u16) -> u16 {
     let lowers = first & 0xFE00 == 0xB400 // PUSH
         || first & 0xFF80 == 0xB080 // SUB SP, #
         || first == 0xE92D // PUSH.W, STMDB SP!
@@ -98,7 +106,9 @@ pub fn classify(first: u16, second: u16) -> u8 {
         || first & 0xFF87 == 0x4685 // MOV SP
         || first & 0xFFF0 == 0xF380 && matches!(second & 0xFF, 8 | 9); // MSR MSP, PSP
     let sev = first == 0xBF40 || first == 0xF3AF && second == 0x8004;
-    if lowers {
+    if it_block(first) > 0 {
+        IT
+    } else if lowers {
         LOWERS_SP
     } else if sev {
         SEV
@@ -107,9 +117,48 @@ pub fn classify(first: u16, second: u16) -> u8 {
     }
 }
 
+/// The IT block that an instruction of this class begins: number of its members, and their length in bytes.
+pub fn block(class: u16) -> (u32, u32) {
+    (u32::from(class >> MEMBERS) & 7, 2 * (u32::from(class >> HALF_WORDS) & 15))
+}
+
+/// Class of an IT instruction with so many members, in so many bytes.
+pub fn begins_block(members: u32, bytes: u32) -> u16 {
+    IT | (members << MEMBERS | bytes / 2 << HALF_WORDS) as u16
+}
+
+/// Number of members of the IT block that an instruction with this first half-word begins; 0: it begins none.
+pub fn it_block(first: u16) -> u32 {
+    // The lowest one of the mask ends the block; without a one it is a hint.
+    if first & 0xFF00 == 0xBF00 && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 }
+}
+
+/// Length in bytes of an instruction with this first half-word.
+pub fn length(first: u16) -> u32 {
+    if first >= 0xE800 { 4 } else { 2 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Encodings by the Arm v7-M Architecture Reference Manual, A7.7.38: one to four members.
+    #[test]
+    fn an_it_block_ends_where_its_mask_does() {
+        for (first, members) in
+            [(0xBF08, 1), (0xBF04, 2), (0xBF0C, 2), (0xBF02, 3), (0xBF1E, 3), (0xBF01, 4), (0xBF0F, 4)]
+        {
+            assert_eq!(it_block(first), members, "{first:04x}");
+            assert_eq!(classify(first, 0), IT);
+        }
+        for (members, bytes) in [(1, 2), (1, 4), (4, 8), (4, 16)] {
+            assert_eq!(block(begins_block(members, bytes)), (members, bytes));
+        }
+        for hint in [0xBF00, 0xBF10, 0xBF20, 0xBF30, 0xBF40] {
+            assert_eq!(it_block(hint), 0, "{hint:04x}");
+        }
+        assert_eq!([0xE7FE, 0xE800, 0xF000, 0xBD10].map(length), [2, 4, 4, 2]);
+    }
 
     #[test]
     fn instructions_that_matter_are_found() {

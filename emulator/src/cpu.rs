@@ -1,14 +1,14 @@
 //! The Cortex-M7 itself: Unicorn executes instructions, this loop gives it time, exceptions and sleep.
 //!
 //! Every instruction takes one cycle of the core clock. A hook before each instruction counts it and stops the run exactly
-//! where the next event is due; instructions of an IT block that its condition skips are not counted, and nothing interrupts
-//! an IT block.
+//! where the next event is due. An IT block is counted where it begins, with all its members, because the hardware takes its
+//! time for those that its condition skips, too; nothing interrupts it.
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, uc_error};
 use unicorn_engine::{ArmCpuModel, RegisterARM, Unicorn};
 
 use crate::chip::Chip;
 use crate::clock::Time;
-use crate::code::{LOWERS_SP, PLAIN, SEV, UNKNOWN, WATCHED, classify};
+use crate::code::{self, IT, LOWERS_SP, MEMBER, PLAIN, SEV, UNKNOWN, WATCHED};
 use crate::elf::Elf;
 use crate::exception;
 use crate::machine::{Machine, Sleep};
@@ -157,17 +157,13 @@ impl Machine {
     fn execute(&mut self) {
         let begin = u64::from(self.pc() | 1);
         let core = &mut self.uc.get_data_mut().core;
-        core.stopping = None;
+        core.stopping = false;
         core.raised = None;
         core.fault_address = 0;
         let result = self.uc.emu_start(begin, 0, 0, 0);
         let pc = self.pc();
         let core = &mut self.uc.get_data_mut().core;
-        if let Some(at) = core.stopping.take() {
-            if pc != at {
-                // It was within an IT block, which goes on to its end.
-                core.instructions += 1;
-            }
+        if core.stopping {
             return;
         }
         let last = core.pc;
@@ -247,33 +243,28 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
 
 /// Before an instruction that needs a closer look.
 fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
-    if uc.get_data().core.check_sp {
+    let chip = uc.get_data_mut();
+    if chip.core.it_block.contains(&address) {
+        // Counted where the block began, and nothing stops within it.
+        chip.core.pc = address;
+        return;
+    }
+    if chip.core.check_sp {
         let sp = uc.reg_read(RegisterARM::SP).unwrap_or(0) as u32;
         let chip = uc.get_data_mut();
         chip.core.check_sp = false;
         chip.observers.note_sp(sp);
     }
     let core = &uc.get_data().core;
-    let stop = core.instructions >= core.stop_at || core.attention || core.masked && unmasked(uc);
-    if stop {
+    if core.instructions >= core.stop_at || core.attention || core.masked && unmasked(uc) {
         let core = &mut uc.get_data_mut().core;
-        if core.stopping.is_some_and(|at| at != address) {
-            core.instructions += 1;
-        }
-        core.stopping = Some(address);
+        core.stopping = true;
         core.look_at = 0;
         // The instruction before this one is complete: only here may a run be stopped.
         let _ = uc.emu_stop();
         return;
     }
-    let mut class = uc.get_data().code.class(address);
-    if class & !WATCHED == UNKNOWN {
-        let mut bytes = [0; 4];
-        let _ = uc.mem_read(u64::from(address), &mut bytes);
-        let (first, second) = ([bytes[0], bytes[1]], [bytes[2], bytes[3]]);
-        class = class & WATCHED | classify(u16::from_le_bytes(first), u16::from_le_bytes(second));
-        uc.get_data_mut().code.learn(address, class);
-    }
+    let class = class(uc, address);
     if class & WATCHED != 0 {
         let sp = uc.reg_read(RegisterARM::SP).unwrap_or(0) as u32;
         let lr = uc.reg_read(RegisterARM::LR).unwrap_or(0) as u32;
@@ -284,6 +275,11 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
         }
     }
     let core = &mut uc.get_data_mut().core;
+    if class & IT != 0 {
+        let (members, bytes) = code::block(class);
+        core.it_block = address + 2..address + 2 + bytes;
+        core.instructions += u64::from(members);
+    }
     if class & SEV != 0 {
         core.event = true;
     }
@@ -291,6 +287,33 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
     core.look_at = if core.check_sp || core.masked { 0 } else { core.stop_at };
     core.instructions += 1;
     core.pc = address;
+}
+
+/// Class of the instruction at an address, which is remembered.
+fn class(uc: &mut Unicorn<'_, Chip>, address: u32) -> u16 {
+    let known = uc.get_data().code.class(address);
+    if known & !(WATCHED | MEMBER) != UNKNOWN {
+        return known;
+    }
+    let (first, second) = (half_word(uc, address), half_word(uc, address + 2));
+    let mut class = code::classify(first, second);
+    if class == IT {
+        let members = code::it_block(first);
+        let mut end = address + 2;
+        for _ in 0..members {
+            uc.get_data_mut().code.learn(end, MEMBER);
+            end += code::length(half_word(uc, end));
+        }
+        class = code::begins_block(members, end - address - 2);
+    }
+    uc.get_data_mut().code.learn(address, class);
+    known | class
+}
+
+fn half_word(uc: &Unicorn<'_, Chip>, address: u32) -> u16 {
+    let mut bytes = [0; 2];
+    let _ = uc.mem_read(u64::from(address), &mut bytes);
+    u16::from_le_bytes(bytes)
 }
 
 /// The masks no longer hold back what waits.

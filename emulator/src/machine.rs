@@ -90,6 +90,7 @@ impl Machine {
         let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
         if written && self.chip().code.forget(address, bytes.len() as u32) {
             // What was translated from the old code would go on running.
+            self.chip().core.it_block = 0..0;
             let _ = self.uc.ctl_flush_tb();
         }
         written

@@ -192,6 +192,36 @@ fn instructions_of_a_function_are_counted_by_its_symbol() {
 }
 
 #[test]
+fn an_it_block_counts_with_all_its_members_whether_they_are_skipped_or_not() {
+    let function = Symbol { address: MAIN + 16, size: 22, code: true };
+    let elf = image(CALL_IT_BLOCK, &[]).with_symbol("work", function);
+    let mut machine = openjtc_emulator::Machine::new(elf, 1);
+    let counter = machine.count("work").unwrap();
+    for condition in [0, 1] {
+        machine.poke(RESULT, &[condition, 0, 0, 0]);
+        machine.run_until(machine.now() + 10 * MICROSECOND);
+        let count = machine.counted(counter);
+        assert_eq!((count.min, count.max, count.last), (9, 9, 9), "{condition}");
+    }
+}
+
+#[test]
+fn the_same_run_with_it_blocks_comes_out_however_it_is_cut() {
+    let run = |step: u64| {
+        let mut machine = machine(CALL_IT_BLOCK, &[]);
+        machine.poke(RESULT, &[1, 0, 0, 0]);
+        while machine.now() < 5 * MICROSECOND {
+            machine.run_until((machine.now() + step).min(5 * MICROSECOND));
+        }
+        (machine.instructions(), machine.pc(), machine.register(RegisterARM::SP))
+    };
+    let whole = run(5 * MICROSECOND);
+    for step in [CYCLE, 3 * CYCLE, 7 * CYCLE + 1] {
+        assert_eq!(run(step), whole, "steps of {step}");
+    }
+}
+
+#[test]
 fn the_same_run_comes_out_however_it_is_cut() {
     let run = |step: u64| {
         let lines = [FIRST_LINE, FIRST_LINE + 1, FIRST_LINE + 2];

@@ -6,14 +6,14 @@
 //! *offset*, which fades, so that neither the loss nor the return makes a step of position, nor of the derivative of its error.
 //! The offset has no part in the prediction: what is predicted depends on answers and commands alone, so that the position loop
 //! stays closed however often answers are lost.
+mod history;
+
 use crate::DT;
 use crate::config::Config;
+use history::{Answered, History};
 
 /// Speed, in velocity limits, that no joint has: what is further from the prediction than that counts as no answer (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
-/// Usable answers that are kept, and milliseconds over which the rate of a joint is taken at least.
-const WINDOW: usize = 5;
-const WINDOW_MS: u32 = 5;
 /// Distance from the prediction, as a share of the implausible distance, from which on an answer does not count for the rate:
 /// the joint of an encoder that jumps has not moved.
 const UNEXPECTED: f64 = 0.1;
@@ -57,36 +57,27 @@ pub(crate) struct Measurement {
     used: Reading,
     /// There is a last usable answer.
     known: bool,
+    /// Milliseconds; it wraps around after 49 days, which the differences that are taken of it do not notice.
+    clock_ms: u32,
     /// The last usable answer, its position carried on since.
     answer: Reading,
-    /// Milliseconds since then.
-    age_ms: u32,
+    /// When it came.
+    answered_ms: u32,
     /// Commanded velocity then, rad/s.
     commanded: f64,
     /// Rate of the answered positions then, rad/s.
     rate: f64,
     /// That rate as far as the reported velocity bears it out, rad/s: what a prediction carries on.
     carried: f64,
-    /// The last usable answers, newest first.
-    history: [Answered; WINDOW],
-    /// An answer has been missing since then.
+    /// The last usable answers.
+    history: History,
+    /// An answer has been missing since the last usable one.
     missing: bool,
     /// Prediction less answer, as much as has not faded.
     position_offset: Fading,
     velocity_offset: Fading,
-}
-
-/// A usable answer.
-#[derive(Clone, Copy, Debug, Default)]
-struct Answered {
-    /// rad.
-    position: f64,
-    /// Milliseconds since then.
-    age_ms: u32,
-    /// It was about where it had been predicted.
-    as_predicted: bool,
-    /// There was such an answer.
-    known: bool,
+    /// Something of them is left.
+    fading: bool,
 }
 
 /// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. It goes on fading
@@ -100,12 +91,13 @@ struct Fading {
 }
 
 impl Fading {
+    /// Nothing is left.
+    fn over(&self) -> bool {
+        self.left == 0.0 && self.slope == 0.0
+    }
+
     /// One tick.
     fn step(&mut self, elapsed_ms: u32, config: &Config) {
-        if self.left == 0.0 && self.slope == 0.0 {
-            // Nearly always: nothing is left to fade.
-            return;
-        }
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
         let x = pole * ms;
@@ -139,15 +131,16 @@ impl Measurement {
     /// One tick; false when the answer is not usable, or there is none.
     pub fn step(&mut self, tick: &Tick, config: &Config) -> bool {
         let change = tick.commanded - self.commanded;
-        self.age_ms = self.age_ms.saturating_add(tick.elapsed_ms);
-        for answered in &mut self.history {
-            answered.age_ms = answered.age_ms.saturating_add(tick.elapsed_ms);
+        self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
+        self.answer.position += (self.carried + change) * (f64::from(tick.elapsed_ms) * DT);
+        if self.fading {
+            self.position_offset.step(tick.elapsed_ms, config);
+            self.velocity_offset.step(tick.elapsed_ms, config);
+            self.fading = !(self.position_offset.over() && self.velocity_offset.over());
         }
-        self.answer.position += (self.carried + change) * f64::from(tick.elapsed_ms) * DT;
-        self.position_offset.step(tick.elapsed_ms, config);
-        self.velocity_offset.step(tick.elapsed_ms, config);
 
-        let reach = IMPLAUSIBLE * tick.velocity_max * f64::from(self.age_ms) * DT;
+        let age_ms = self.clock_ms.wrapping_sub(self.answered_ms);
+        let reach = (IMPLAUSIBLE * DT) * tick.velocity_max * f64::from(age_ms);
         let usable = tick
             .answer
             .filter(|answer| !self.known || (answer.position - self.answer.position).abs() <= reach);
@@ -158,9 +151,10 @@ impl Measurement {
             } else if self.missing {
                 self.position_offset.left += off;
                 self.velocity_offset.left += self.answer.velocity + change - answer.velocity;
+                self.fading = true;
             }
             self.answer = answer;
-            (self.age_ms, self.commanded, self.missing) = (0, tick.commanded, false);
+            (self.answered_ms, self.commanded, self.missing) = (self.clock_ms, tick.commanded, false);
             self.take_rate(off.abs() <= UNEXPECTED * reach, tick.velocity_max);
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
@@ -179,19 +173,17 @@ impl Measurement {
     /// was about where the motion so far had led.
     fn take_rate(&mut self, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = self.answer;
-        let (mut rate, mut steady) = (None, as_predicted);
-        for before in self.history.iter().filter(|before| before.known) {
-            if rate.is_none() && before.age_ms >= WINDOW_MS {
-                rate = Some((position - before.position) / (f64::from(before.age_ms) * DT));
-            }
-            steady &= rate.is_some() || before.as_predicted;
-        }
-        self.rate = rate.unwrap_or_default();
-        let [a, b, c, d, _] = self.history;
-        self.history = [Answered { position, age_ms: 0, as_predicted, known: true }, a, b, c, d];
+        let answered = Answered { position, at_ms: self.clock_ms };
+        let rate = self.history.rate_to(&answered);
+        self.history.push(answered, as_predicted);
+        self.rate = rate.map_or(0.0, |rate| rate.rad_s);
+        // Where a joint has jumped on the way, its own report counts alone.
+        let carried = match rate {
+            Some(rate) if as_predicted && rate.as_predicted => rate.rad_s,
+            _ => velocity,
+        };
         let most = FASTEST * velocity_max;
-        let rate = rate.filter(|_| steady).unwrap_or(velocity);
-        self.carried = rate.max(velocity - DISAGREEMENT).min(velocity + DISAGREEMENT).max(-most).min(most);
+        self.carried = carried.max(velocity - DISAGREEMENT).min(velocity + DISAGREEMENT).max(-most).min(most);
     }
 }
 

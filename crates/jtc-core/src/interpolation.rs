@@ -46,25 +46,53 @@ pub(crate) fn smooth(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
+/// Hermite's basis at one place between two points: what each sample contributes to a channel. It is the same for all joints.
+struct Basis {
+    /// Of the way between the positions.
+    way: f64,
+    /// Of both velocities to the position, s.
+    velocity: [f64; 2],
+    /// Of both accelerations to the position, s².
+    acceleration: [f64; 2],
+    /// Of the change between the velocities to the velocity.
+    change: f64,
+    /// Of both accelerations to the velocity, s.
+    slope: [f64; 2],
+}
+
+impl Basis {
+    /// At the fraction `u` of a step of `h` seconds.
+    fn at(u: f64, h: f64) -> Self {
+        let (u2, h2) = (u * u, h * h);
+        let u3 = u2 * u;
+        Self {
+            way: u3 * (10.0 - 15.0 * u + 6.0 * u2),
+            velocity: [h * (u + u3 * (-6.0 + 8.0 * u - 3.0 * u2)), h * (u3 * (-4.0 + 7.0 * u - 3.0 * u2))],
+            acceleration: [
+                h2 * (0.5 * u2 + u3 * (-1.5 + 1.5 * u - 0.5 * u2)),
+                h2 * (u3 * (0.5 - u + 0.5 * u2)),
+            ],
+            change: u2 * (3.0 - 2.0 * u),
+            slope: [h * (u - 2.0 * u2 + u3), h * (u3 - u2)],
+        }
+    }
+}
+
 /// Set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
 #[inline]
 pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
-    let u2 = u * u;
-    let u3 = u2 * u;
+    let basis = Basis::at(u, h);
     let position = |j: usize| {
-        // Velocities and accelerations per step instead of per second: all in rad.
-        let (v0, v1) = (a.velocity[j] * h, b.velocity[j] * h);
-        let (a0, a1) = (a.acceleration[j] * h * h, b.acceleration[j] * h * h);
-        let d = b.position[j] - a.position[j];
-        let c3 = 10.0 * d - (4.0 * v1 + 6.0 * v0) - 0.5 * (3.0 * a0 - a1);
-        let c4 = -15.0 * d + (7.0 * v1 + 8.0 * v0) + 0.5 * (3.0 * a0 - 2.0 * a1);
-        let c5 = 6.0 * d - 3.0 * (v1 + v0) + 0.5 * (a1 - a0);
-        a.position[j] + u * v0 + u2 * (0.5 * a0) + u3 * (c3 + u * c4 + u2 * c5)
+        let way = basis.way * (b.position[j] - a.position[j]);
+        let velocities = basis.velocity[0] * a.velocity[j] + basis.velocity[1] * b.velocity[j];
+        let accelerations =
+            basis.acceleration[0] * a.acceleration[j] + basis.acceleration[1] * b.acceleration[j];
+        a.position[j] + (way + velocities + accelerations)
     };
     let velocity = |j: usize| {
-        let (va, vb) = (a.velocity[j], b.velocity[j]);
-        let (ah, bh) = (a.acceleration[j] * h, b.acceleration[j] * h);
-        va + u * ah + u2 * (3.0 * (vb - va) - 2.0 * ah - bh) + u3 * (2.0 * (va - vb) + ah + bh)
+        let change = basis.change * (b.velocity[j] - a.velocity[j]);
+        let slopes = basis.slope[0] * a.acceleration[j] + basis.slope[1] * b.acceleration[j];
+        a.velocity[j] + (change + slopes)
     };
     let acceleration = |j: usize| a.acceleration[j] + u * (b.acceleration[j] - a.acceleration[j]);
     SetPoint { position: from_fn(position), velocity: from_fn(velocity), acceleration: from_fn(acceleration) }

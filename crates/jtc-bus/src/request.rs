@@ -1,7 +1,7 @@
 //! What the controller sends: [`Request`].
 
 use crate::frame::{Frame, FrameError};
-use crate::scale::{TORQUE_FULL_SCALE, from_i16, to_i16};
+use crate::scale::{TORQUE_FULL_SCALE, to_i16};
 use crate::{GRIPPER, JOINTS, NODES, NodeState, id};
 
 /// Places in the payloads of requests.
@@ -120,7 +120,8 @@ impl Request {
             id::MOVE => {
                 frame.need(field::MOVE_LEN as u8)?;
                 let torque = core::array::from_fn(|joint| {
-                    from_i16(frame.get(field::TORQUE + 2 * joint), TORQUE_FULL_SCALE)
+                    let raw = i16::from_be_bytes(frame.get(field::TORQUE + 2 * joint));
+                    f64::from(raw) * TORQUE_FULL_SCALE / f64::from(i16::MAX)
                 });
                 Ok(Self::Move { torque, pump: frame.byte(field::PUMP) != 0 })
             }

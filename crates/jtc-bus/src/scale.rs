@@ -37,12 +37,14 @@ pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }
 
+/// The quotient is taken first: it is the same for every answer of a tick, and a division takes the board as long as seven
+/// products.
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
-    f64::from(i16::from_be_bytes(bytes)) * full_scale / f64::from(i16::MAX)
+    f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))
 }
 
 pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
-    f64::from(i32::from_be_bytes(bytes)) * full_scale / f64::from(i32::MAX)
+    f64::from(i32::from_be_bytes(bytes)) * (full_scale / f64::from(i32::MAX))
 }
 
 /// `value` in units of the last bit, moved by half a unit so that the cast (which truncates and makes NaN 0)

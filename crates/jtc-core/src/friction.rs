@@ -4,7 +4,8 @@ use crate::parameters::TableOf;
 
 /// Sign of a speed, smoothed: a straight line between −`width` and `width` (rad/s).
 fn smooth_sign(v: f64, width: f64) -> f64 {
-    (v / width).clamp(-1.0, 1.0)
+    // The quotient is the same for every joint of a tick.
+    (v * (1.0 / width)).clamp(-1.0, 1.0)
 }
 
 /// Torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.

@@ -8,7 +8,10 @@ pub const MAX_LEN: usize = 24;
 /// A CAN FD frame of this bus: 11-bit id, bit rate switch, at most 24 bytes.
 ///
 /// The payload has a length that CAN FD can send: 0..8, 12, 16, 20 or 24 bytes.
+///
+/// Aligned, so that it is copied by words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(align(4))]
 pub struct Frame {
     /// 11-bit identifier.
     pub id: u16,

@@ -107,7 +107,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // A joint that is faster than it may be is out of control: nothing to react to but by taking its torque away.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let (mut torque, mut errors) = self.compute(mode);
-        if errors != [0; JOINTS] {
+        if errors.iter().any(|&errors| errors != 0) {
             if self.gives_way(&errors) {
                 (torque, errors) = self.compute(ControlMode::Hold);
             } else if self.stops_on_path(mode, &errors) {

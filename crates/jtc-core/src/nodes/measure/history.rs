@@ -91,3 +91,46 @@ impl History {
         self.answers.get(at).unwrap_or(&self.answers[0])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..Default::default() })]
+
+        /// The same as found by looking through a list of all answers: milliseconds since the one before, mostly one, position and
+        /// whether it was as predicted.
+        #[test]
+        fn j63_the_rate_is_from_the_youngest_kept_answer_that_is_old_enough(
+            answers in prop::collection::vec((prop_oneof![6 => Just(1u32), 1 => 0..9u32], -3.0..3.0, prop::bool::weighted(0.9)), 1..40),
+            start in prop_oneof![Just(0), Just(u32::MAX - 9)],
+        ) {
+            let mut history = History::default();
+            let (mut all, mut at_ms): (Vec<(Answered, bool)>, u32) = (Vec::new(), start);
+            for (gap, position, as_predicted) in answers {
+                at_ms = at_ms.wrapping_add(gap);
+                let now = Answered { position, at_ms };
+                let kept: Vec<_> = all.iter().rev().take(5).collect();
+                let from = kept.iter().position(|(answer, _)| at_ms.wrapping_sub(answer.at_ms) >= 5);
+                match (history.rate_to(&now), from) {
+                    (None, None) => {}
+                    (Some(rate), Some(n)) => {
+                        let before = &kept[n].0;
+                        let seconds = f64::from(at_ms.wrapping_sub(before.at_ms)) * 0.001;
+                        prop_assert!((rate.rad_s - (position - before.position) / seconds).abs() < 1e-9);
+                        prop_assert_eq!(rate.as_predicted, kept[..n].iter().all(|(_, as_predicted)| *as_predicted));
+                    }
+                    (rate, from) => prop_assert!(false, "{rate:?}, but answer {from:?}"),
+                }
+                history.push(now, as_predicted);
+                all.push((now, as_predicted));
+            }
+        }
+    }
+}

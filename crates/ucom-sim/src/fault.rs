@@ -71,7 +71,7 @@ pub enum FaultError {
     #[error("{0}")]
     Form(String),
     /// There is no such kind.
-    #[error("fault {fault}: there is no kind `{kind}`; kinds are {}", KINDS.join(", "))]
+    #[error("fault {fault}: there is no kind `{kind}`; kinds are {}", kinds().join(", "))]
     Kind {
         /// Number in the file, from 1.
         fault: usize,
@@ -110,22 +110,38 @@ pub enum FaultError {
     },
 }
 
-const KINDS: [&str; 14] = [
-    "power-loss",
-    "silent",
-    "deaf",
-    "crash",
-    "wire-broken",
-    "same-number",
-    "ack-held",
-    "flash-broken",
-    "foreign-master",
-    "foreign-frames",
-    "lost",
-    "corrupted",
-    "doubled",
-    "disturbed",
+/// The kinds that concern one board.
+const OF_A_BOARD: [(&str, FaultKind); 8] = [
+    ("power-loss", FaultKind::PowerLoss),
+    ("silent", FaultKind::Silent),
+    ("deaf", FaultKind::Deaf),
+    ("crash", FaultKind::Crash),
+    ("wire-broken", FaultKind::WireBroken),
+    ("same-number", FaultKind::SameNumber),
+    ("ack-held", FaultKind::AckHeld),
+    ("flash-broken", FaultKind::FlashBroken),
 ];
+
+/// Those of the bus.
+const OF_THE_BUS: [(&str, FaultKind); 2] =
+    [("foreign-master", FaultKind::CompetingMaster), ("foreign-frames", FaultKind::ForeignFrames)];
+
+/// The kind with its share, 0 to 1.
+type OfAShare = fn(f64) -> FaultKind;
+
+/// Those that meet a share of the frames.
+const OF_A_SHARE: [(&str, OfAShare); 4] = [
+    ("lost", FaultKind::Lost),
+    ("corrupted", FaultKind::Corrupted),
+    ("doubled", FaultKind::Doubled),
+    ("disturbed", FaultKind::Disturbed),
+];
+
+/// The names of all kinds.
+fn kinds() -> Vec<&'static str> {
+    let whole = OF_A_BOARD.iter().chain(&OF_THE_BUS).map(|(name, _)| *name);
+    whole.chain(OF_A_SHARE.map(|(name, _)| name)).collect()
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -172,34 +188,16 @@ impl Entry {
         let missing = |key| FaultError::Missing { fault, kind: self.kind.clone(), key };
         let superfluous = |key| FaultError::Superfluous { fault, kind: self.kind.clone(), key };
         let range = |key, range| FaultError::Range { fault, key, range };
-        let share = || {
-            let share = self.share.ok_or_else(|| missing("share"))?;
-            if (0.0..=1.0).contains(&share) { Ok(share) } else { Err(range("share", "0 to 1")) }
-        };
-        let kind = match self.kind.as_str() {
-            "power-loss" => FaultKind::PowerLoss,
-            "silent" => FaultKind::Silent,
-            "deaf" => FaultKind::Deaf,
-            "crash" => FaultKind::Crash,
-            "wire-broken" => FaultKind::WireBroken,
-            "same-number" => FaultKind::SameNumber,
-            "ack-held" => FaultKind::AckHeld,
-            "flash-broken" => FaultKind::FlashBroken,
-            "foreign-master" => FaultKind::CompetingMaster,
-            "foreign-frames" => FaultKind::ForeignFrames,
-            "lost" => FaultKind::Lost(share()?),
-            "corrupted" => FaultKind::Corrupted(share()?),
-            "doubled" => FaultKind::Doubled(share()?),
-            "disturbed" => FaultKind::Disturbed(share()?),
+        let whole = OF_A_BOARD.iter().chain(&OF_THE_BUS).find(|(name, _)| *name == self.kind);
+        let shared = OF_A_SHARE.iter().find(|(name, _)| *name == self.kind);
+        let kind = match (whole, shared, self.share) {
+            (Some(_), _, Some(_)) => return Err(superfluous("share")),
+            (Some((_, kind)), ..) => *kind,
+            (_, Some(_), None) => return Err(missing("share")),
+            (_, Some((_, kind)), Some(share)) if (0.0..=1.0).contains(&share) => kind(share),
+            (_, Some(_), _) => return Err(range("share", "0 to 1")),
             _ => return Err(FaultError::Kind { fault, kind: self.kind }),
         };
-        let shared = matches!(
-            kind,
-            FaultKind::Lost(_) | FaultKind::Corrupted(_) | FaultKind::Doubled(_) | FaultKind::Disturbed(_)
-        );
-        if self.share.is_some() && !shared {
-            return Err(superfluous("share"));
-        }
         let of_a_board = kind.of_a_board();
         let board = match self.board {
             Some(_) if !of_a_board => return Err(superfluous("board")),
@@ -231,18 +229,8 @@ impl Entry {
 
 impl FaultKind {
     /// Whether it concerns one board.
-    pub const fn of_a_board(self) -> bool {
-        matches!(
-            self,
-            Self::PowerLoss
-                | Self::Silent
-                | Self::Deaf
-                | Self::Crash
-                | Self::WireBroken
-                | Self::SameNumber
-                | Self::AckHeld
-                | Self::FlashBroken
-        )
+    pub fn of_a_board(self) -> bool {
+        OF_A_BOARD.iter().any(|(_, kind)| *kind == self)
     }
 }
 
@@ -252,7 +240,7 @@ mod tests {
 
     #[test]
     fn every_kind_of_the_help_can_be_written() {
-        for kind in KINDS {
+        for kind in kinds() {
             assert!(FAULT_HELP.contains(&format!("\n{kind} ")), "{kind} is not in the help");
             let mut text = format!("[[fault]]\nkind = '{kind}'\nat_s = 1.5\n");
             if matches!(kind, "lost" | "corrupted" | "doubled" | "disturbed") {

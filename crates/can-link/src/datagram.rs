@@ -95,6 +95,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    use crate::frame::any_frame;
+
     /// Written by python-can 4.6.1 for `Message(arbitration_id=0x205, is_extended_id=False, is_fd=True,
     /// bitrate_switch=True, data=range(12), timestamp=1.5)`.
     const BY_PYTHON_CAN: &[u8] = b"\x8b\xa9timestamp\xcb?\xf8\0\0\0\0\0\0\xaearbitration_id\xcd\x02\x05\
@@ -126,22 +128,6 @@ mod tests {
                 let _ = decode(&bytes);
             }
         }
-    }
-
-    fn any_frame() -> impl Strategy<Value = CanFrame> {
-        let id = prop_oneof![
-            (0..0x800_u32).prop_map(|id| Id::standard(id).unwrap()),
-            (0..0x2000_0000_u32).prop_map(|id| Id::extended(id).unwrap()),
-        ];
-        (id, prop::collection::vec(any::<u8>(), 0..=64), 0..4).prop_map(|(id, data, kind)| {
-            let short = data.len().min(8);
-            match kind {
-                0 => CanFrame::classic(id, &data[..short]).unwrap(),
-                1 => CanFrame::remote(id, short).unwrap(),
-                2 => CanFrame::fd_padded(id, &data).unwrap(),
-                _ => CanFrame::fd_padded(id, &data).unwrap().with_brs(false),
-            }
-        })
     }
 
     proptest! {

@@ -216,6 +216,25 @@ pub enum InvalidFrame {
     },
 }
 
+/// Any frame at all, for tests.
+#[cfg(test)]
+pub(crate) fn any_frame() -> impl proptest::strategy::Strategy<Value = CanFrame> {
+    use proptest::prelude::*;
+    let id = prop_oneof![
+        (0..0x800_u32).prop_map(|id| Id::standard(id).unwrap()),
+        (0..0x2000_0000_u32).prop_map(|id| Id::extended(id).unwrap()),
+    ];
+    (id, prop::collection::vec(any::<u8>(), 0..=64), 0..4).prop_map(|(id, data, kind)| {
+        let short = data.len().min(8);
+        match kind {
+            0 => CanFrame::classic(id, &data[..short]).unwrap(),
+            1 => CanFrame::remote(id, short).unwrap(),
+            2 => CanFrame::fd_padded(id, &data).unwrap(),
+            _ => CanFrame::fd_padded(id, &data).unwrap().with_brs(false),
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -165,6 +165,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    use crate::frame::any_frame;
+
     fn frame(line: &str) -> Option<String> {
         parse_frame(line).map(|frame| format!("{frame:?}"))
     }
@@ -219,19 +221,6 @@ mod tests {
             assert_eq!(parse_flags(&format!("F{:02X}", flags(state))), Some(state));
         }
         assert_eq!(parse_flags("F"), None);
-    }
-
-    fn any_frame() -> impl Strategy<Value = CanFrame> {
-        let id = prop_oneof![
-            (0..0x800_u32).prop_map(|id| Id::standard(id).unwrap()),
-            (0..0x2000_0000_u32).prop_map(|id| Id::extended(id).unwrap()),
-        ];
-        (id, prop::collection::vec(any::<u8>(), 0..=64), 0..4).prop_map(|(id, data, kind)| match kind {
-            0 => CanFrame::classic(id, &data[..data.len().min(8)]).unwrap(),
-            1 => CanFrame::remote(id, data.len().min(8)).unwrap(),
-            2 => CanFrame::fd_padded(id, &data).unwrap(),
-            _ => CanFrame::fd_padded(id, &data).unwrap().with_brs(false),
-        })
     }
 
     proptest! {

@@ -137,21 +137,11 @@ fn joint_trajectories_may_be_json_inside_other_messages() {
 
 #[test]
 fn the_existing_files_are_read() {
-    if let Some(path) = existing::file("TrajectoryInt.csv") {
+    for (name, form) in [("TrajectoryInt.csv", Form::Int16), ("TrajectoryFloat.csv", Form::Float)] {
+        let Some(path) = existing::file(name) else { continue };
         let loaded = Loaded::load(&path, None).unwrap();
         let points = loaded.trajectory.points.len();
-        assert_eq!(
-            (loaded.form, points, loaded.trajectory.step_ms, loaded.notes.len()),
-            (Form::Int16, 1054, 10, 0)
-        );
-    }
-    if let Some(path) = existing::file("TrajectoryFloat.csv") {
-        let loaded = Loaded::load(&path, None).unwrap();
-        let points = loaded.trajectory.points.len();
-        assert_eq!(
-            (loaded.form, points, loaded.trajectory.step_ms, loaded.notes.len()),
-            (Form::Float, 1054, 10, 0)
-        );
+        assert_eq!((loaded.form, points, loaded.trajectory.step_ms, loaded.notes.len()), (form, 1054, 10, 0));
     }
     if let Some(path) = existing::file("TrajectoryInt_Long.csv") {
         let loaded = Loaded::load(&path, None).unwrap();

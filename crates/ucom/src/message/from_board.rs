@@ -1,6 +1,6 @@
 //! Messages of a board.
 
-use super::to_board::package;
+use super::to_board::{admin, package};
 use super::{DecodeError, need};
 use crate::admin::Admin;
 use crate::buffer::BufferPackage;
@@ -107,11 +107,7 @@ impl FromBoard {
             Function::McaReady => empty(Self::McaReady)?,
             // Without data it is the PC's request, always (D-12).
             Function::DumpIo if frame.dlc() > 0 => Self::IoDescription(some()?),
-            Function::Admin => {
-                let [run, active, debug, global, ..] = need(frame, function, 4, profile)?.padded();
-                let admin = Admin::from_bytes([run, active, debug, global]);
-                Self::Admin(admin.ok_or(DecodeError::Value(function))?)
-            }
+            Function::Admin => Self::Admin(admin(frame, profile)?),
             Function::Debug => Self::Debug(some()?),
             Function::Alive => empty(Self::Alive)?,
             Function::DspCi => Self::Ci(package(frame, function, profile)?),

@@ -103,16 +103,18 @@ impl ToBoard {
             // With data it is a board's answer, always (D-12).
             Function::DumpIo if frame.dlc() == 0 => Self::DumpIo,
             Function::DumpCi => empty(Self::DumpCi)?,
-            Function::Admin => {
-                let [run, active, debug, global, ..] = need(frame, function, 4, profile)?.padded();
-                let admin = Admin::from_bytes([run, active, debug, global]);
-                Self::Admin(admin.ok_or(DecodeError::Value(function))?)
-            }
+            Function::Admin => Self::Admin(admin(frame, profile)?),
             Function::Alive => empty(Self::Alive)?,
             other => return Err(DecodeError::Direction(other)),
         };
         Ok((to, message))
     }
+}
+
+/// The four flags of MCA_ADMIN_DATA.
+pub(super) fn admin(frame: &Frame, profile: &Profile) -> Result<Admin, DecodeError> {
+    let [run, active, debug, global, ..] = need(frame, Function::Admin, 4, profile)?.padded();
+    Admin::from_bytes([run, active, debug, global]).ok_or(DecodeError::Value(Function::Admin))
 }
 
 /// A buffer package: 4, 6 or 8 bytes.

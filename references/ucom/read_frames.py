@@ -14,10 +14,10 @@ def main(dbc: str, log: str) -> None:
     assert len(frames) > 100, f"{len(frames)} frames that {dbc} knows"
     best = float("inf")
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.thread_time()
         for frame in frames:
             database.decode_message(frame.arbitration_id, frame.data, allow_truncated=True)
-        best = min(best, (time.perf_counter() - start) / len(frames))
+        best = min(best, (time.thread_time() - start) / len(frames))
     print(1.0 / best)
 
 

@@ -1,4 +1,4 @@
-//! Prints what a call costs: lines of a name and nanoseconds, the median over batches of calls.
+//! Prints what a call costs: lines of a name and nanoseconds, the least of many batches of calls.
 //!
 //! `cargo run --release -p jtc-dynamics --example time -- FILE`, with an arm and its states as lines (see
 //! `lines/mod.rs`). `references/dynamics/anchors.py --ours` makes such a file and times other implementations
@@ -6,10 +6,10 @@
 mod lines;
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use jtc_dynamics::{Dynamics, sin_cos};
 use lines::Line;
+use test_kit::clock::least_ns;
 
 const BATCHES: usize = 101;
 
@@ -26,17 +26,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // `$call` on every state; each result has to be made, none can be kept from one call to the next.
     macro_rules! time {
         ($name:literal, |$state:ident| $call:expr) => {
-            let mut batches: Vec<f64> = (0..BATCHES)
-                .map(|_| {
-                    let begin = Instant::now();
-                    for $state in &states {
-                        black_box($call);
-                    }
-                    begin.elapsed().as_secs_f64() * 1e9 / states.len() as f64
-                })
-                .collect();
-            batches.sort_by(f64::total_cmp);
-            println!("{} {:.1}", $name, batches[BATCHES / 2]);
+            let least = least_ns(BATCHES, || {
+                for $state in &states {
+                    black_box($call);
+                }
+            });
+            println!("{} {:.1}", $name, least / states.len() as f64);
         };
     }
     time!("sin_cos_6", |s| s[0].map(sin_cos));

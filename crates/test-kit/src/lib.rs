@@ -1,7 +1,8 @@
-//! What the tests of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain, documents that show what
-//! commands print, and the data of an existing arm.
+//! What the tests and benchmarks of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain,
+//! documents that show what commands print, the data of an existing arm, and a clock.
 #![forbid(unsafe_code)]
 
+pub mod clock;
 pub mod existing;
 pub mod page;
 

@@ -1,13 +1,13 @@
 //! The longest tick: a run against the simulator, with a friction table and a segment taken over on the way, is kept and
 //! given again to fresh controllers.
 use std::hint::black_box;
-use std::time::Instant;
 
 use jtc_bus::Frame;
 use jtc_core::{BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, POINTS_MAX};
 use jtc_host::frame;
 use jtc_sim::{SimConfig, World};
 use jtc_wire::{Command, ExecCommand, FRAME_MAX, FrameRef, LinkEvent, RawPoint, UrgentCommands};
+use test_kit::clock::CpuTime;
 
 use crate::world::Result;
 use crate::{path, print};
@@ -105,9 +105,9 @@ pub fn figures() -> Result<()> {
         let mut controller = controller();
         for (tick, least) in seen.iter().zip(&mut least) {
             let host = tick.host.and_then(|index| event(&frames[index].1));
-            let start = Instant::now();
+            let start = CpuTime::now();
             black_box(controller.tick(&inputs(&tick.bus, &host)));
-            *least = least.min(start.elapsed().as_secs_f64() * 1e9);
+            *least = least.min(start.elapsed_ns());
         }
         assert_eq!(
             controller.telemetry().state,

@@ -1,0 +1,221 @@
+//! The table of `cargo xtask bench`: figures, their anchors and their targets.
+use super::Figures;
+use crate::size;
+
+/// Whether a figure should stay below its target or reach it.
+#[derive(Clone, Copy)]
+enum Target {
+    /// Ours ≤ factor × anchor.
+    Share(f64),
+    /// Ours ≤ value.
+    AtMost(f64),
+    /// Ours ≥ value.
+    AtLeast(f64),
+    /// Only to look at.
+    None,
+}
+
+/// One line of the table.
+struct Row {
+    title: &'static str,
+    ours: &'static str,
+    /// The smallest of these counts; one that could not be had is named.
+    anchors: &'static [&'static str],
+    target: Target,
+    unit: &'static str,
+}
+
+const fn row(
+    title: &'static str,
+    ours: &'static str,
+    anchors: &'static [&'static str],
+    target: Target,
+    unit: &'static str,
+) -> Row {
+    Row { title, ours, anchors, target, unit }
+}
+
+const OTHERS_INVERSE: &[&str] = &["mujoco.inverse", "kdl.inverse", "rbdl.inverse"];
+
+const ROWS: &[Row] = &[
+    row("inverse dynamics / Pinocchio", "ours.inverse", &["pinocchio.inverse"], Target::Share(0.25), "ns"),
+    row(
+        "inverse dynamics / Pinocchio built for this processor",
+        "ours.inverse",
+        &["pinocchio_native.inverse"],
+        Target::None,
+        "ns",
+    ),
+    row("inverse dynamics / generated code", "ours.inverse", &["casadi.inverse"], Target::Share(0.65), "ns"),
+    row(
+        "inverse dynamics / generated code built for this processor",
+        "ours.inverse",
+        &["casadi_native.inverse"],
+        Target::None,
+        "ns",
+    ),
+    row("inverse dynamics / best of MuJoCo, KDL, RBDL", "ours.inverse", OTHERS_INVERSE, Target::None, "ns"),
+    row("forward dynamics / Pinocchio", "ours.forward", &["pinocchio.forward"], Target::Share(0.2), "ns"),
+    row(
+        "forward dynamics / Pinocchio built for this processor",
+        "ours.forward",
+        &["pinocchio_native.forward"],
+        Target::None,
+        "ns",
+    ),
+    row("forward dynamics / generated code", "ours.forward", &["casadi.forward"], Target::Share(1.0), "ns"),
+    row(
+        "forward dynamics / generated code built for this processor",
+        "ours.forward",
+        &["casadi_native.forward"],
+        Target::None,
+        "ns",
+    ),
+    row("mass matrix / Pinocchio", "ours.mass_matrix", &["pinocchio.mass_matrix"], Target::None, "ns"),
+    row(
+        "sine and cosine of 6 angles / libm",
+        "ours.sin_cos_6",
+        &["libm_sin_cos_6"],
+        Target::AtMost(26.0),
+        "ns",
+    ),
+    row("control tick", "control_tick_ns", &[], Target::AtMost(250.0), "ns"),
+    row("longest tick while moving", "tick_longest_moving_ns", &[], Target::None, "ns"),
+    row(
+        "longest tick with friction table, segment",
+        "tick_longest_with_host_frames_ns",
+        &[],
+        Target::None,
+        "ns",
+    ),
+    row(
+        "simulated millisecond / MuJoCo RK4",
+        "sim_ms_ns",
+        &["mujoco.step_rk4"],
+        Target::AtMost(2500.0),
+        "ns",
+    ),
+    row("simulator, multiple of real time", "sim_times_real_time", &[], Target::AtLeast(400.0), "×"),
+    row("CRC-16 / crc crate, 16 tables", "crc16_gb_s", &["crate_slice16_gb_s"], Target::AtLeast(4.0), "GB/s"),
+    row("stream parser", "stream_parser_gb_s", &[], Target::None, "GB/s"),
+    row(
+        "upload of 12 000 points at 115 200 Bd",
+        "upload_115200_share",
+        &[],
+        Target::AtLeast(0.98),
+        "of the line",
+    ),
+    row(
+        "upload of 12 000 points at 921 600 Bd",
+        "upload_921600_share",
+        &[],
+        Target::AtLeast(0.98),
+        "of the line",
+    ),
+    row(
+        "upload of 12 000 points at 3 MBd",
+        "upload_3000000_share",
+        &[],
+        Target::AtLeast(0.98),
+        "of the line",
+    ),
+    row(
+        "controller with its trajectory",
+        "controller_kib",
+        &[],
+        Target::AtMost(size::LIMIT as f64 / 1024.0),
+        "KiB",
+    ),
+    row(
+        "UCoM: numbers for 31 boards / time on the bus",
+        "ucom_init_31_s",
+        &["ucom_init_31_bus_s"],
+        Target::None,
+        "s",
+    ),
+    row(
+        "UCoM: update of 60 KiB / time on the bus, without a frame gap",
+        "ucom_update_60k_no_gap_share",
+        &[],
+        Target::AtMost(1.25),
+        "×",
+    ),
+    row(
+        "UCoM: the same with the gap of 200 µs that boards are given",
+        "ucom_update_60k_share",
+        &[],
+        Target::None,
+        "×",
+    ),
+    row("UCoM: frames read / cantools", "ucom_decode_frames_s", &["cantools_frames_s"], Target::None, "1/s"),
+    row("UCoM: memory of a board's node", "ucom_node_bytes", &[], Target::AtMost(4096.0), "B"),
+    row(
+        "tracking, worst joint / PID on straight lines",
+        "tracking_worst_rms_mrad",
+        &["tracking_plain_worst_rms_mrad"],
+        Target::AtMost(2.0),
+        "mrad RMS",
+    ),
+];
+
+/// How many targets there are.
+pub fn targets() -> usize {
+    ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
+}
+
+/// Prints every row; returns how many targets were missed. What was measured on a machine that is not `quiet` is not judged.
+pub fn print(figures: &Figures, quiet: bool) -> usize {
+    let mut missed = 0;
+    let header = ["figure", "ours", "anchor", "ratio", "target", "met"];
+    println!(
+        "\n| {} | {} | {} | {} | {} | {} |",
+        header[0], header[1], header[2], header[3], header[4], header[5]
+    );
+    println!("|---|---|---|---|---|---|");
+    for row in ROWS {
+        let ours = figures.get(row.ours).copied();
+        let anchor = row
+            .anchors
+            .iter()
+            .filter_map(|name| Some((*name, *figures.get(*name)?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let ratio = ours.zip(anchor).map(|(ours, (_, anchor))| ours / anchor);
+        let (wanted, met) = match row.target {
+            Target::Share(share) => (format!("≤ {share} × anchor"), ratio.map(|ratio| ratio <= share)),
+            Target::AtMost(value) => (format!("≤ {}", short(value)), ours.map(|ours| ours <= value)),
+            Target::AtLeast(value) => (format!("≥ {}", short(value)), ours.map(|ours| ours >= value)),
+            Target::None => ("–".to_owned(), None),
+        };
+        let verdict = match (row.target, met) {
+            (Target::None, _) => "–",
+            (_, Some(_)) if !quiet => "not judged",
+            (_, Some(true)) => "yes",
+            (_, Some(false)) => "NO",
+            (_, None) => "not measured",
+        };
+        missed += usize::from(!matches!(row.target, Target::None) && met != Some(true));
+        let without: Vec<&str> =
+            row.anchors.iter().copied().filter(|name| !figures.contains_key(*name)).collect();
+        let without =
+            if without.is_empty() { String::new() } else { format!(" without {}", without.join(", ")) };
+        println!(
+            "| {} | {} {} | {}{without} | {} | {wanted} | {verdict} |",
+            row.title,
+            ours.map_or("?".into(), short),
+            row.unit,
+            anchor.map_or("–".into(), |(name, value)| format!("{} ({name})", short(value))),
+            ratio.map_or("–".into(), |ratio| format!("{ratio:.2}")),
+        );
+    }
+    missed
+}
+
+/// A number with about four significant digits.
+fn short(value: f64) -> String {
+    match value.abs() {
+        v if v >= 1000.0 => format!("{value:.0}"),
+        v if v >= 100.0 => format!("{value:.1}"),
+        v if v >= 10.0 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
+    }
+}

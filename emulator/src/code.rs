@@ -124,7 +124,7 @@ pub fn block(class: u16) -> (u32, u32) {
 
 /// Class of an IT instruction with so many members, in so many bytes.
 pub fn begins_block(members: u32, bytes: u32) -> u16 {
-    IT | (members << MEMBERS | bytes / 2 << HALF_WORDS) as u16
+    IT | ((members << MEMBERS) | ((bytes / 2) << HALF_WORDS)) as u16
 }
 
 /// Number of members of the IT block that an instruction with this first half-word begins; 0: it begins none.

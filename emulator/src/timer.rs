@@ -256,9 +256,15 @@ mod tests {
     fn microsecond_timer(number: u32, reload: u32, compare: u32, interrupts: u32) -> Timer {
         let mut timer = Timer::new(number);
         timer.set_clock(200_000_000, 0);
-        for (register, value) in
-            [(0x28, 199), (0x2C, reload), (0x14, 1), (0x10, 0), (0x38, compare), (0x0C, interrupts), (0x00, 1)]
-        {
+        for (register, value) in [
+            (0x28, 199),
+            (0x2C, reload),
+            (0x14, 1),
+            (0x10, 0),
+            (0x38, compare),
+            (0x0C, interrupts),
+            (0x00, 1),
+        ] {
             timer.write(register, value, 0);
         }
         timer

@@ -82,7 +82,7 @@ pub(crate) struct Measurement {
 
 /// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. It goes on fading
 /// whatever is added to it; where it began anew instead, it would never fade while every other answer is lost.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fading {
     /// rad or rad/s.
     left: f64,
@@ -91,11 +91,6 @@ struct Fading {
 }
 
 impl Fading {
-    /// Nothing is left.
-    fn over(&self) -> bool {
-        self.left == 0.0 && self.slope == 0.0
-    }
-
     /// One tick.
     fn step(&mut self, elapsed_ms: u32, config: &Config) {
         let ms = f64::from(elapsed_ms);
@@ -136,7 +131,7 @@ impl Measurement {
         if self.fading {
             self.position_offset.step(tick.elapsed_ms, config);
             self.velocity_offset.step(tick.elapsed_ms, config);
-            self.fading = !(self.position_offset.over() && self.velocity_offset.over());
+            self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
 
         let age_ms = self.clock_ms.wrapping_sub(self.answered_ms);

@@ -131,7 +131,8 @@ impl Live {
 
     /// See [`Incoming::stands_still`]; bytes that the line has not carried yet are not waited for.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
-        Ok(self.board.pending(self.port) == 0 && self.incoming.stands_still(|time| self.pty.wait_input(time))?)
+        Ok(self.board.pending(self.port) == 0
+            && self.incoming.stands_still(|time| self.pty.wait_input(time))?)
     }
 
     /// The firmware's log, and what nobody wants to see: resets and faults.

@@ -62,6 +62,18 @@ fn j35_the_reach_grows_with_the_time_since_the_last_usable_answer() {
 }
 
 #[test]
+fn j35_the_reach_grows_with_the_length_of_a_tick() {
+    for elapsed_ms in 1..5 {
+        let reach = 3.0 * VELOCITY_MAX * f64::from(elapsed_ms) * DT;
+        for (distance, usable) in [(0.99 * reach, true), (1.01 * reach, false), (-1.01 * reach, false)] {
+            let mut joint = moving(0.0);
+            let long = Tick { elapsed_ms, ..tick(Some(distance), 0.0) };
+            assert_eq!(joint.step(&long, &Config::avena()), usable, "{elapsed_ms} ms, {distance}");
+        }
+    }
+}
+
+#[test]
 fn j35_neither_position_nor_velocity_of_an_unusable_answer_is_used() {
     let mut joint = moving(0.2);
     let glitch = Tick { commanded: 0.2, ..tick(Some(0.05), 1.9) };

@@ -11,6 +11,7 @@ mod file;
 pub mod fuzzing;
 pub mod memory;
 mod model;
+mod server;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
@@ -20,5 +21,6 @@ pub use axis::AxisConfig;
 pub use board::BoardState;
 pub use fault::{FAULT_HELP, Fault, FaultError, FaultKind, Trigger};
 pub use file::{BoardConfig, ChainConfig, ChainFileError, HEAD, help};
+pub use server::ChainServer;
 pub use sim::ChainSim;
 pub use texts::Texts;

@@ -1,0 +1,284 @@
+//! A simulated chain behind a server of the socketcand protocol, in real time.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use can_link::{
+    BusError, BusEvent, BusStats, CanFrame, ClientEvent, ClientId, ErrorState, Id, ListenError, MemberId,
+    SocketcandGateway, TimedBus, TimedEvent,
+};
+use ucom::{Format, Frame};
+
+use crate::{ChainSim, Fault};
+
+/// The name of the bus.
+const CHANNEL: &str = "can0";
+/// A computer that was busy for longer than this makes virtual time stand still, or boards would lose their PC.
+const CATCH_UP_US: u64 = 200_000;
+
+/// Clients of the socketcand protocol outside, boards inside, and a bus between them, by the clock of this computer.
+pub struct ChainServer<'a> {
+    gateway: SocketcandGateway,
+    bus: TimedBus,
+    chain: ChainSim,
+    /// The chain's members on the bus, in its order.
+    inside: Vec<MemberId>,
+    clients: BTreeMap<ClientId, MemberId>,
+    /// Clients that have gone while frames of them still wait for the bus.
+    leaving: Vec<MemberId>,
+    started: Instant,
+    start_us: u64,
+    /// What clients receive of the last frame on the wire, and when it ended, ns.
+    carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
+    /// Clients to which bus-off of their controller was reported.
+    off: BTreeSet<ClientId>,
+    /// When it was last reported that a controller has left the bus, ns.
+    off_reported_ns: Option<u64>,
+    note: Box<dyn FnMut(String) + 'a>,
+}
+
+impl<'a> ChainServer<'a> {
+    /// Listens for clients at an address; port 0 takes a free one. The bus has `bitrate` bit/s and draws by `seed`; `note` takes what
+    /// people are to know while it serves.
+    ///
+    /// # Errors
+    /// Nobody can listen there.
+    pub fn bind(
+        address: &str,
+        chain: ChainSim,
+        bitrate: u32,
+        seed: u64,
+        note: impl FnMut(String) + 'a,
+    ) -> Result<Self, ListenError> {
+        let gateway = SocketcandGateway::bind(address, &[CHANNEL])?;
+        let mut bus = TimedBus::new(bitrate, seed);
+        bus.set_recovers_by_itself(true);
+        let inside = (0..chain.members()).map(|_| bus.join()).collect();
+        Ok(Self {
+            gateway,
+            bus,
+            chain,
+            inside,
+            clients: BTreeMap::new(),
+            leaving: Vec::new(),
+            started: Instant::now(),
+            start_us: 0,
+            carried: None,
+            off: BTreeSet::new(),
+            off_reported_ns: None,
+            note: Box::new(note),
+        })
+    }
+
+    /// The CAN URL for clients on this host.
+    pub fn url(&self) -> String {
+        self.gateway.url(CHANNEL)
+    }
+
+    /// What the bus has carried.
+    pub fn stats(&self) -> BusStats {
+        self.bus.stats()
+    }
+
+    /// Serves until nothing happens for a moment, no longer than `patience`.
+    pub fn turn(&mut self, patience: Duration) {
+        let now_us = self.now_us();
+        self.advance(now_us);
+        let bus = &mut self.bus;
+        self.leaving.retain(|member| {
+            let stays = bus.pending(*member) > 0;
+            if !stays {
+                bus.leave(*member);
+            }
+            stays
+        });
+        let due_us = self.due_us().saturating_sub(self.now_us());
+        let mut patience = Duration::from_micros(due_us).min(patience);
+        while let Some(event) = self.gateway.next(patience) {
+            // What comes now is on the bus now, not when the clock was last looked at.
+            let now_us = self.now_us();
+            self.advance(now_us);
+            self.received(event.client, event.event);
+            patience = Duration::ZERO;
+        }
+    }
+
+    /// Virtual time by the clock, µs.
+    fn now_us(&mut self) -> u64 {
+        let now = self.start_us + self.started.elapsed().as_micros() as u64;
+        let reached = self.bus.now_ns() / 1000;
+        if now.saturating_sub(reached) > CATCH_UP_US {
+            (self.started, self.start_us) = (Instant::now(), reached + CATCH_UP_US / 4);
+            return self.start_us;
+        }
+        now
+    }
+
+    /// When something happens next without the clients, µs.
+    fn due_us(&self) -> u64 {
+        let bus = self.bus.next_ns().map_or(u64::MAX, |ns| ns.div_ceil(1000));
+        bus.min(self.chain.next_due_us())
+    }
+
+    /// Lets virtual time pass.
+    fn advance(&mut self, to_us: u64) {
+        loop {
+            let at_us = self.due_us().clamp(self.bus.now_ns() / 1000, to_us);
+            for member in self.chain.advance(at_us) {
+                self.bus.clear(self.inside[member]);
+            }
+            self.bus.set_disturbance(self.chain.disturbance());
+            for (i, member) in self.inside.iter().enumerate() {
+                self.bus.set_acknowledges(*member, self.chain.is_powered(i));
+                while let Some(frame) = self.chain.poll(i) {
+                    let wire = on_wire(&frame);
+                    if wire.is_none_or(|wire| self.bus.queue(*member, wire).is_err()) {
+                        self.chain.not_sent(i, &frame);
+                        break;
+                    }
+                }
+            }
+            match self.bus.advance_to(at_us * 1000) {
+                Some(event) => self.happened(&event),
+                None if at_us >= to_us && self.chain.next_due_us() > to_us => return,
+                None => {}
+            }
+        }
+    }
+
+    fn happened(&mut self, event: &TimedEvent) {
+        self.chain.advance(event.at_ns / 1000);
+        let place = |member: &MemberId| self.inside.iter().position(|m| m == member);
+        match &event.what {
+            BusEvent::Received { member, frame } => match place(member) {
+                Some(i) => {
+                    let format = Format {
+                        extended: frame.is_extended(),
+                        remote: frame.is_remote(),
+                        fd: frame.is_fd(),
+                    };
+                    self.chain.receive(i, frame.id().value(), format, frame.data());
+                }
+                // A client that is bus-off receives nothing, like any controller.
+                None => {
+                    let copies = self.carried.iter().flat_map(|(_, _, copies)| copies);
+                    for (client, frame) in
+                        self.client_of(*member).into_iter().flat_map(|c| copies.clone().map(move |f| (c, f)))
+                    {
+                        self.gateway.deliver_to(client, frame);
+                    }
+                }
+            },
+            BusEvent::Sent { member, frame } => {
+                let board = place(member);
+                if let (Some(i), Ok(protocol)) = (board, plain(frame)) {
+                    self.chain.sent(i, &protocol);
+                }
+                // Frames of several members that are alike bit for bit are one on the wire (D-07).
+                if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
+                    // Frames of clients have met these faults on their way to the bus.
+                    let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
+                    self.carried = Some((event.at_ns, *frame, copies));
+                }
+            }
+            BusEvent::Failed { member, frame } => {
+                if let (Some(i), Ok(frame)) = (place(member), plain(frame)) {
+                    self.chain.not_sent(i, &frame);
+                }
+            }
+            BusEvent::Error { error: BusError::Collision, frame, .. } => {
+                let time_s = event.at_ns as f64 * 1e-9;
+                let id = frame.id();
+                (self.note)(format!(
+                    "{time_s:.3} s: two members send {id} at once with different data; both are destroyed (D-05)"
+                ));
+            }
+            BusEvent::State { member, state } => self.is_in_state(*member, state.errors, event.at_ns),
+            BusEvent::Error { .. } => {}
+        }
+    }
+
+    fn client_of(&self, member: MemberId) -> Option<ClientId> {
+        self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| *client)
+    }
+
+    /// A controller is in another state: a client receives the report that its own has left the bus, and that it is back.
+    fn is_in_state(&mut self, member: MemberId, state: ErrorState, at_ns: u64) {
+        let off = state == ErrorState::BusOff;
+        if let Some(client) = self.client_of(member)
+            && if off { self.off.insert(client) } else { self.off.remove(&client) }
+        {
+            self.gateway.report_state(client, if off { state } else { ErrorState::Active });
+        }
+        if off {
+            self.report_off(member, at_ns);
+        }
+    }
+
+    /// A controller has left the bus; it comes back by itself. Reported once a second at most: on a bad wire it happens all the time.
+    fn report_off(&mut self, member: MemberId, at_ns: u64) {
+        if self.off_reported_ns.is_some_and(|at| at_ns.saturating_sub(at) < 1_000_000_000) {
+            return;
+        }
+        self.off_reported_ns = Some(at_ns);
+        let client = self.client_of(member).map(|client| client.to_string());
+        let who = match self.inside.iter().position(|m| *m == member) {
+            Some(i) => format!("the board at position {}", i + 1),
+            None => client.unwrap_or_else(|| "a client that has gone".into()),
+        };
+        let time_s = at_ns as f64 * 1e-9;
+        (self.note)(format!(
+            "{time_s:.3} s: {who} is bus-off; its controller is back after 128 times 11 recessive bits"
+        ));
+    }
+
+    fn received(&mut self, client: ClientId, event: ClientEvent) {
+        let member = *self.clients.entry(client).or_insert_with(|| self.bus.join());
+        match event {
+            ClientEvent::Joined => {}
+            ClientEvent::Frame(frame) => {
+                for frame in through(&mut self.chain, &frame) {
+                    if let Err(e) = self.bus.queue(member, frame) {
+                        (self.note)(format!("{client}: {frame} is lost: {e}"));
+                    }
+                }
+            }
+            ClientEvent::Left => {
+                self.leaving.push(member);
+                self.clients.remove(&client);
+                self.off.remove(&client);
+            }
+        }
+    }
+
+    /// Injects the fault of a line, as `kill 3`, and notes that, or what is wrong with it.
+    pub fn fault(&mut self, line: &str) {
+        if line.is_empty() {
+            return;
+        }
+        match Fault::from_line(line) {
+            Ok(fault) => {
+                self.chain.inject(fault);
+                (self.note)(format!("fault: {line}"));
+            }
+            Err(e) => (self.note)(format!("{e}; ucom help faults lists them")),
+        }
+    }
+}
+
+/// What the faults between chain and clients make of a frame.
+fn through(chain: &mut ChainSim, frame: &CanFrame) -> Vec<CanFrame> {
+    let id = frame.id();
+    chain.through(frame.data()).iter().filter_map(|data| CanFrame::classic(id, data).ok()).collect()
+}
+
+/// A frame of a board as one of the bus.
+fn on_wire(frame: &Frame) -> Option<CanFrame> {
+    CanFrame::classic(Id::standard(frame.id().into()).ok()?, frame.data()).ok()
+}
+
+/// A frame of the bus as a board's.
+fn plain(frame: &CanFrame) -> Result<Frame, ()> {
+    let id = u16::try_from(frame.id().value()).map_err(|_| ())?;
+    Frame::new(id, frame.data()).ok_or(())
+}

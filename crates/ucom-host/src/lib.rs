@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod decoder;
+pub mod explain;
 pub mod files;
 pub mod master;
 mod profile_file;

@@ -3,12 +3,12 @@
 use cli_kit::{Diagnose, ErrorKind, Failure, Output};
 use serde_json::json;
 use ucom::{BoardInfo, Profile, Status};
-use ucom_host::master::{Outcome, RawStatus, Reports, Request, StopLevel, counted};
+use ucom_host::master::{Outcome, RawStatus, Reports, Request, StopLevel, counted, state_name};
 use ucom_host::session::{Driver, SessionError};
 
 use crate::args::{ActArgs, Boards, BoardsArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
 use crate::session::shared_numbers;
-use crate::shape::{bits, board_table, board_value, info_value, state};
+use crate::shape::{bits, board_table, board_value, info_value};
 
 /// What boards report about themselves.
 pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -139,7 +139,7 @@ fn lines_of(all: &[(u8, BoardInfo)]) -> String {
         if !status.has(Status::INIT) {
             return format!("board {n:<3} has forgotten its number; `ucom init` gives one\n");
         }
-        format!("board {n:<3} 0x{:02X}  {:12} {words}\n", status.0, state(status))
+        format!("board {n:<3} 0x{:02X}  {:12} {words}\n", status.0, state_name(status))
     };
     all.iter().map(line).collect()
 }

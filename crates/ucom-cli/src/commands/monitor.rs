@@ -13,7 +13,7 @@ use super::monitor_view as view;
 use super::monitor_watch::Watch;
 use crate::args::{LinkArgs, MonitorArgs};
 use crate::session::shared_numbers;
-use crate::shape::{age_s, bits, doing, info_value, is_known, life};
+use crate::shape::{bits, info_value};
 
 /// Shows the bus until `q`, Ctrl-C, or so many views.
 pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -53,9 +53,9 @@ fn value(driver: &Driver, watch: &Watch) -> Value {
         let mut value =
             b.info.map_or_else(|| json!({ "number": number }), |i| info_value(number, &i, &profile));
         value["description"] = json!(b.description);
-        value["state"] = json!(doing(b, now));
-        value["life"] = json!(life(b));
-        value["alive_age_s"] = json!(age_s(b, now));
+        value["state"] = json!(b.state_name(now));
+        value["life"] = json!(b.life.name());
+        value["alive_age_s"] = json!(b.alive_age_s(now));
         value["frames_per_s"] = json!(statistics.frames_per_s(number, now));
         value["errors"] = json!(b.error_count);
         value["last_error"] = json!(b.errors.last().map(|(_, code)| code.name()));
@@ -83,12 +83,12 @@ fn text(driver: &Driver) -> String {
         statistics.foreign_count()
     );
     for (number, b) in boards.iter() {
-        let status = b.status().filter(|_| is_known(b)).map(|s| bits(s).join(" ")).unwrap_or("?".into());
+        let status = b.status().filter(|_| b.is_known()).map(|s| bits(s).join(" ")).unwrap_or("?".into());
         text += &format!(
             "  board {number:<2} {:20} {:34} {:8} {:5} frames/s\n",
             b.description.as_deref().unwrap_or("?"),
             status,
-            life(b),
+            b.life.name(),
             statistics.frames_per_s(number, now)
         );
     }

@@ -7,8 +7,6 @@ use ratatui::widgets::{Cell, Row, Table};
 use ucom::Status;
 use ucom_host::master::{Board, Boards, Life, Statistics};
 
-use crate::shape::{age_s, doing, is_known, life};
-
 /// Status bits from the most significant one: a letter each where room is short, a word where there is more.
 pub const BITS: [(Status, char, &str); 8] = [
     (Status::MSTART, 'M', ""),
@@ -97,7 +95,7 @@ fn known(board: &Board, number: fn(&ucom::BoardInfo) -> u16) -> Cell<'static> {
 }
 
 fn state(board: &Board, now: u64) -> Cell<'static> {
-    let colour = match doing(board, now) {
+    let colour = match board.state_name(now) {
         "lost" | "rebooted" => Color::Rgb(201, 70, 59),
         "running" => Color::Rgb(63, 111, 224),
         "started" => Color::Rgb(47, 131, 124),
@@ -105,24 +103,28 @@ fn state(board: &Board, now: u64) -> Cell<'static> {
         _ => Color::Rgb(86, 97, 115),
     };
     let style = Style::new().bg(colour).fg(Color::White).add_modifier(Modifier::BOLD);
-    Cell::from(Span::styled(format!(" {} ", doing(board, now)), style))
+    Cell::from(Span::styled(format!(" {} ", board.state_name(now)), style))
 }
 
 /// A letter for each bit that is set, in its place.
 fn letters(board: &Board) -> Cell<'static> {
-    let Some(status) = board.status().filter(|_| is_known(board)) else { return Cell::from("?").dark_gray() };
+    let Some(status) = board.status().filter(|_| board.is_known()) else {
+        return Cell::from("?").dark_gray();
+    };
     let letter = |(bit, letter, _): &(Status, char, &str)| if status.has(*bit) { *letter } else { '·' };
     Cell::from(BITS.iter().map(letter).collect::<String>())
 }
 
 fn words(board: &Board) -> Cell<'static> {
-    let Some(status) = board.status().filter(|_| is_known(board)) else { return Cell::from("?").dark_gray() };
+    let Some(status) = board.status().filter(|_| board.is_known()) else {
+        return Cell::from("?").dark_gray();
+    };
     let set = BITS.iter().filter(|(bit, _, word)| status.has(*bit) && !word.is_empty());
     Cell::from(set.map(|(.., word)| *word).collect::<Vec<_>>().join(" "))
 }
 
 fn heartbeat(board: &Board, now: u64) -> Cell<'static> {
-    match (board.life, age_s(board, now)) {
+    match (board.life, board.alive_age_s(now)) {
         (Life::Unarmed, _) | (_, None) => match board.last {
             // It sends nothing by itself: what is shown of it is as old as its last answer.
             Some((at, _)) if now.saturating_sub(at) as f64 * 1e-6 >= OLD_S => {
@@ -131,7 +133,7 @@ fn heartbeat(board: &Board, now: u64) -> Cell<'static> {
             _ => Cell::from("-").dark_gray(),
         },
         (Life::Alive, Some(age)) => Cell::from(format!("{age:.1} s ago")).green(),
-        (_, Some(age)) => Cell::from(format!("{} {age:.1} s", life(board))).red().bold(),
+        (_, Some(age)) => Cell::from(format!("{} {age:.1} s", board.life.name())).red().bold(),
     }
 }
 
@@ -144,7 +146,19 @@ fn errors(board: &Board) -> Cell<'static> {
 
 #[cfg(test)]
 mod tests {
+    use ucom_host::explain::{find, words};
+
     use super::*;
+
+    /// The letters and words of the view are explained as the bits that they stand for.
+    #[test]
+    fn every_letter_and_word_of_a_bit_is_explained() {
+        let all = words();
+        for ((name, bit), (its_bit, letter, word)) in Status::NAMES.into_iter().zip(BITS) {
+            let is = |shown: &str| find(&all, shown).iter().any(|w| w.shown[0] == name);
+            assert!(bit == its_bit && is(&letter.to_string()) && (word.is_empty() || is(word)), "{name}");
+        }
+    }
 
     #[test]
     fn every_bit_has_its_place() {

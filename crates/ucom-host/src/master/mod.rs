@@ -66,7 +66,7 @@ pub mod update {
 }
 
 pub use counted::counted;
-pub use engine::{Board, Boards, Event, Life, Rate, Statistics, Supervision, WINDOW_US};
+pub use engine::{Board, Boards, Event, Life, Rate, Statistics, Supervision, WINDOW_US, state_name};
 pub use error::{
     AddressError, Error, ExchangeError, IdentityError, Incomplete, LastReceived, MasterError, Received,
     RunningError, SignalError, StatusError,

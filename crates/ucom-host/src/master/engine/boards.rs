@@ -54,7 +54,54 @@ pub struct Board {
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
 
+impl Life {
+    /// In a word, as screens show it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unarmed => "-",
+            Self::Alive => "alive",
+            Self::Late => "late",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// What a board of this status does, in one word.
+pub const fn state_name(status: Status) -> &'static str {
+    if status.has(Status::MCARUN) {
+        "running"
+    } else if status.has(Status::MSTART) {
+        "started"
+    } else if status.has(Status::PROG) {
+        "programming"
+    } else {
+        "exloader"
+    }
+}
+
 impl Board {
+    /// What was last received of it still holds: it is not lost, and has not begun anew.
+    pub fn is_known(&self) -> bool {
+        self.life != Life::Lost && !self.rebooted
+    }
+
+    /// What it does, in one word: what comes by itself counts more than an old answer.
+    pub fn state_name(&self, now_us: u64) -> &'static str {
+        match (self.life, self.status()) {
+            _ if self.rebooted => "rebooted",
+            (Life::Lost, _) => "lost",
+            _ if self.running(now_us) => "running",
+            (Life::Alive, _) => "started",
+            (_, Some(status)) => state_name(status),
+            (_, None) => "?",
+        }
+    }
+
+    /// Since the last heartbeat, s.
+    pub fn alive_age_s(&self, now_us: u64) -> Option<f64> {
+        self.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
+    }
+
     /// The status as last read.
     pub fn status(&self) -> Option<Status> {
         self.info.map(|info| info.status)

@@ -13,7 +13,7 @@ mod statistics;
 mod supervise;
 mod times;
 
-pub use boards::{Board, Boards, Life};
+pub use boards::{Board, Boards, Life, state_name};
 pub use event::{Event, Supervision};
 pub(crate) use holders::{Open, head};
 pub(crate) use link::{Link, lock};

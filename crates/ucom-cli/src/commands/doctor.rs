@@ -1,16 +1,15 @@
 //! `ucom doctor` and `ucom probe`: what is wrong, and how boards read the protocol.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use can_link::ErrorState;
 use cli_kit::{ErrorKind, Failure, Output, OutputFile};
 use serde_json::json;
 use ucom_host::ProfileFile;
 use ucom_host::files::{Image, ImageOptions};
-use ucom_host::master::doctor::{Controller, Finding, Observation, Severity, findings};
+use ucom_host::master::doctor::Finding;
 use ucom_host::master::probe::ProbeOptions;
-use ucom_host::master::{Event, Outcome, Request};
-use ucom_host::session::{Driver, SessionError};
+use ucom_host::master::{Outcome, Request};
+use ucom_host::session::SessionError;
 
 use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};
@@ -23,61 +22,13 @@ const LISTEN: Duration = Duration::from_millis(1500);
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     out.note(format!("listening on {}", link.url()?));
-    let start = Instant::now();
-    let mut competing_master = None;
-    while start.elapsed() < LISTEN && !driver.stop_asked() {
-        driver.turn(Duration::from_millis(50))?;
-        while let Some(event) = driver.master.take_event() {
-            if let Event::CompetingMaster { function, to } = event {
-                competing_master = Some((function, to));
-            }
-        }
-    }
-    // With another master on the bus even questions could mix with its own.
-    let scan = match competing_master {
-        Some(_) => None,
-        None => match driver.run(Request::Scan)? {
-            Outcome::Scan(report) => Some(report),
-            other => return Err(SessionError::from(other).into()),
-        },
-    };
-    let controller = controller(&mut driver);
-    let profile = driver.master.profile();
-    let seen = Observation {
-        listened_us: LISTEN.as_micros() as u64,
-        now_us: driver.now_us(),
-        statistics: driver.master.statistics(),
-        boards: driver.master.boards(),
-        controller,
-        scan,
-        competing_master,
-        profile,
-        ..Default::default()
-    };
-    let all = findings(&seen);
-    let bad = all.iter().any(|f| f.severity == Severity::Problem);
-    let boards =
-        seen.scan.iter().flat_map(|s| &s.boards).map(|b| board_value(b, &profile)).collect::<Vec<_>>();
-    let value = json!({ "bus": link.url()?, "healthy": !bad, "findings": all, "boards": boards });
+    let seen = driver.examine(LISTEN)?;
+    let (all, profile, failure) = (&seen.findings, driver.master.profile(), seen.failure());
+    let boards = seen.boards.iter().map(|b| board_value(b, &profile)).collect::<Vec<_>>();
+    let value =
+        json!({ "bus": link.url()?, "healthy": failure.is_none(), "findings": all, "boards": boards });
     out.result(&value, || all.iter().map(line).collect());
-    match (bad, seen.statistics.received) {
-        (false, _) => Ok(()),
-        (true, 0) => Err(Failure::printed(ErrorKind::NoLink)),
-        (true, _) => Err(Failure::printed(ErrorKind::Device)),
-    }
-}
-
-/// What the CAN adapter reports about itself; none where it reports nothing.
-pub fn controller(driver: &mut Driver) -> Option<Controller> {
-    let state = driver.link().state();
-    (state.errors != ErrorState::Unknown).then_some(Controller {
-        bus_off: state.errors == ErrorState::BusOff,
-        times_bus_off: driver.link().times_bus_off(),
-        passive: state.errors == ErrorState::Passive,
-        tec: state.tec,
-        rec: state.rec,
-        ..Default::default()
-    })
+    failure.map_or(Ok(()), |kind| Err(Failure::printed(kind)))
 }
 
 fn line(f: &Finding) -> String {

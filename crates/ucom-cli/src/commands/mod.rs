@@ -11,7 +11,6 @@ mod io;
 mod monitor;
 mod monitor_boards;
 mod monitor_view;
-mod monitor_watch;
 mod outputs;
 mod params;
 mod record;

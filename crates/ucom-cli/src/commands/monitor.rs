@@ -6,11 +6,9 @@ use cli_kit::view::Scroll;
 use cli_kit::{Failure, Key, Lines, Output, Screen};
 use serde_json::{Value, json};
 use ucom_host::master::Board;
-use ucom_host::session::{Driver, nothing_shared};
+use ucom_host::session::{Driver, Picture, Watch, nothing_shared};
 
-use super::doctor::controller;
 use super::monitor_view as view;
-use super::monitor_watch::Watch;
 use crate::args::{LinkArgs, MonitorArgs};
 use crate::session::shared_numbers;
 use crate::shape::{bits, info_value};
@@ -123,19 +121,13 @@ fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64, mut screen: Scree
         }
         if drawn.is_none_or(|at| at.elapsed() >= PICTURE) {
             drawn = Some(Instant::now());
-            let controller = controller(driver);
+            let controller = driver.controller();
             let shared: Vec<String> =
                 driver.master.shared_numbers().iter().map(ToString::to_string).collect();
             let (boards, statistics, now) =
                 (driver.master.boards(), driver.master.statistics(), driver.now_us());
-            let picture = view::Picture {
-                boards: &boards,
-                statistics: &statistics,
-                shared: &shared,
-                controller,
-                now,
-                watch,
-            };
+            let picture =
+                Picture { boards: &boards, statistics: &statistics, shared: &shared, controller, now, watch };
             screen.draw(|frame| view::draw(frame, &picture, &mut scroll));
         }
     }

@@ -7,11 +7,9 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
 use ratatui::text::Line;
 use ratatui::widgets::{Paragraph, Sparkline};
-use ucom_host::master::doctor::{Controller, Observation, Severity, findings};
-use ucom_host::master::{Boards, Statistics};
+use ucom_host::session::{Picture, Problems, Watch};
 
 use super::monitor_boards::{self as rows, WIDE};
-use super::monitor_watch::Watch;
 
 /// Keys, of which the first are shown on terminals that are too small.
 const KEYS: &str = "s stops  q ends";
@@ -19,22 +17,6 @@ const KEYS: &str = "s stops  q ends";
 const LEAST_ROWS: u16 = 4;
 /// Rows from which on there is one for the last event.
 const EVENT: u16 = 16;
-
-/// What is shown.
-pub struct Picture<'a> {
-    /// The boards as last seen.
-    pub boards: &'a Boards,
-    /// What the bus carried.
-    pub statistics: &'a Statistics,
-    /// Numbers that two boards have, in words.
-    pub shared: &'a [String],
-    /// The CAN adapter, where it reports something about itself.
-    pub controller: Option<Controller>,
-    /// µs.
-    pub now: u64,
-    /// What is beside the boards.
-    pub watch: &'a Watch,
-}
 
 /// Draws everything; `scroll` learns what has room.
 pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
@@ -91,57 +73,10 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
 }
 
-/// What is wrong: what `ucom doctor` would find in what was received, and numbers that two boards have.
+/// What is wrong, what a key did, and the next command.
 fn trouble(picture: &Picture<'_>) -> Trouble {
-    let Picture { boards, statistics, now, watch, .. } = picture;
-    let seen = Observation {
-        listened_us: *now,
-        now_us: *now,
-        statistics: (*statistics).clone(),
-        boards: (*boards).clone(),
-        controller: picture.controller,
-        competing_master: watch.competing_master,
-        profile: watch.profile,
-        ..Default::default()
-    };
-    let mut trouble =
-        Trouble { causes: picture.shared.to_vec(), message: watch.message.clone(), ..Trouble::default() };
-    let mut next: Vec<String> = Vec::new();
-    if !trouble.causes.is_empty() {
-        next.push("ucom doctor".into());
-    }
-    let all = findings(&seen).into_iter();
-    // Silence is reported below, with what was asked.
-    for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
-        let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
-        let text = format!("{}{why}", finding.what);
-        let list =
-            if finding.severity == Severity::Problem { &mut trouble.causes } else { &mut trouble.warnings };
-        list.push(text);
-        // It is this view that would show more.
-        let own = finding.next.is_empty() || finding.next.contains("ucom monitor");
-        next.push(if own { "ucom doctor".into() } else { finding.next });
-    }
-    for (number, _) in boards.iter().filter(|(_, b)| b.info.is_some_and(|i| !i.has_application())) {
-        trouble.warnings.push(format!("board {number} has no valid application"));
-        next.push(format!("ucom update {number} IMAGE"));
-    }
-    if boards.iter().next().is_none() && watch.quiet_long(*now) {
-        trouble.warnings.push(nobody(watch).into());
-        next.push(
-            if watch.listen_only { "ucom monitor" } else { "ucom doctor; ucom init numbers the chain" }
-                .into(),
-        );
-    }
-    trouble.next = next.into_iter().next().unwrap_or_default();
-    trouble
-}
-
-fn nobody(watch: &Watch) -> &'static str {
-    match watch.listen_only {
-        true => "no board sends anything; without --listen-only the boards are asked who they are",
-        false => "no board answers",
-    }
+    let Problems { causes, warnings, next } = picture.problems();
+    Trouble { causes, warnings, next, message: picture.watch.message.clone() }
 }
 
 /// The bus in one line, with its name where that fits whole.

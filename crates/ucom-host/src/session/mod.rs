@@ -2,6 +2,7 @@
 //!
 //! - [`Link`]: an open bus with its clock; [`pump`]: frames between it and the master, in the order that keeps times honest.
 //! - [`Driver`]: procedures from start to end, with an [`Operator`] who may stop them and reads notes.
+//! - [`Examination`]: what is wrong with a bus; [`Watch`]: a bus as it is looked at live.
 //! - [`CleanupList`]: what would be left undone if the process ended now.
 //! - [`Cache`], [`History`]: what is remembered of boards from session to session.
 //! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: values by name as words of boards, checked before anything is sent.
@@ -11,6 +12,7 @@ pub mod bus_off;
 mod cleanup;
 mod driver;
 mod error;
+mod examine;
 mod followed;
 mod history;
 mod known;
@@ -22,10 +24,12 @@ mod recorder;
 mod replay;
 mod selection;
 mod values;
+mod watch;
 
 pub use cleanup::CleanupList;
 pub use driver::{Driver, Operator, event_text, nothing_shared};
 pub use error::{SessionError, ValuesError};
+pub use examine::Examination;
 pub use followed::{Change, Followed, Notice};
 pub use history::{History, Written};
 pub use known::{Cache, Known};
@@ -38,3 +42,4 @@ pub use recorder::Recorder;
 pub use replay::{is_intrusive, replay};
 pub use selection::{Assignment, Boards, for_board, only};
 pub use values::{Prepared, Word, note_rounded, with_names, words};
+pub use watch::{CompetingMaster, HISTORY, LOG, Picture, Problems, Watch};

@@ -1,12 +1,14 @@
-//! What `ucom monitor` knows beside the boards: load, events, and what became of the last key.
+//! What a live view of a bus shows: load, events, what is wrong and the next command, and what became of the last wish.
 
-use cli_kit::Failure;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use ucom::{Function, Profile};
-use ucom_host::master::{Event, Request};
-use ucom_host::session::{Driver, event_text};
+
+use super::driver::{Driver, event_text};
+use super::error::SessionError;
+use crate::master::doctor::{Controller, Observation, Severity, findings};
+use crate::master::{Boards, Event, Request, Statistics};
 
 /// Function and addressee of another PC's frame.
 pub type CompetingMaster = (Function, u8);
@@ -32,7 +34,7 @@ pub struct Watch {
     pub ask: bool,
     /// How the boards read the protocol.
     pub profile: Profile,
-    /// What became of the last key, until the next one.
+    /// What became of the last wish, until the next one.
     pub message: String,
     loaded: Instant,
 }
@@ -41,6 +43,7 @@ pub struct Watch {
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {
+    /// Watches the bus of this URL; with `listen_only` nothing is ever sent.
     pub fn new(url: String, listen_only: bool, profile: Profile) -> Self {
         Self {
             url,
@@ -61,7 +64,7 @@ impl Watch {
     }
 
     /// Lets the bus go on for a moment.
-    pub fn turn(&mut self, driver: &mut Driver) -> Result<(), Failure> {
+    pub fn turn(&mut self, driver: &mut Driver) -> Result<(), SessionError> {
         driver.turn(Duration::from_millis(25))?;
         let time_s = driver.now_us() as f64 * 1e-6;
         while let Some(event) = driver.master.take_event() {
@@ -123,5 +126,89 @@ impl Watch {
             // Nothing else is under way that it could meet.
             let _ = driver.master.start(driver.now_us(), Request::Scan);
         }
+    }
+}
+
+/// All that a view shows at a time.
+pub struct Picture<'a> {
+    /// The boards as last seen.
+    pub boards: &'a Boards,
+    /// What the bus carried.
+    pub statistics: &'a Statistics,
+    /// Numbers that two boards have, in words.
+    pub shared: &'a [String],
+    /// The CAN adapter, where it reports something about itself.
+    pub controller: Option<Controller>,
+    /// µs.
+    pub now: u64,
+    /// What is beside the boards.
+    pub watch: &'a Watch,
+}
+
+/// What is wrong, and what to do.
+#[derive(Clone, Debug, Default)]
+pub struct Problems {
+    /// What keeps boards from working.
+    pub causes: Vec<String>,
+    /// What works, but not as it should.
+    pub warnings: Vec<String>,
+    /// The next command against the worst; empty when there is nothing to do.
+    pub next: String,
+}
+
+impl Picture<'_> {
+    /// What a doctor would find in what was received, and numbers that two boards have.
+    pub fn problems(&self) -> Problems {
+        let Picture { boards, statistics, now, watch, .. } = self;
+        let seen = Observation {
+            listened_us: *now,
+            now_us: *now,
+            statistics: (*statistics).clone(),
+            boards: (*boards).clone(),
+            controller: self.controller,
+            competing_master: watch.competing_master,
+            profile: watch.profile,
+            ..Default::default()
+        };
+        let mut problems = Problems { causes: self.shared.to_vec(), ..Problems::default() };
+        let mut next: Vec<String> = Vec::new();
+        if !problems.causes.is_empty() {
+            next.push("ucom doctor".into());
+        }
+        let all = findings(&seen).into_iter();
+        // Silence is reported below, with what was asked.
+        for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
+            let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
+            let text = format!("{}{why}", finding.what);
+            let list = if finding.severity == Severity::Problem {
+                &mut problems.causes
+            } else {
+                &mut problems.warnings
+            };
+            list.push(text);
+            // It is this view that would show more.
+            let own = finding.next.is_empty() || finding.next.contains("ucom monitor");
+            next.push(if own { "ucom doctor".into() } else { finding.next });
+        }
+        for (number, _) in boards.iter().filter(|(_, b)| b.info.is_some_and(|i| !i.has_application())) {
+            problems.warnings.push(format!("board {number} has no valid application"));
+            next.push(format!("ucom update {number} IMAGE"));
+        }
+        if boards.iter().next().is_none() && watch.quiet_long(*now) {
+            problems.warnings.push(nobody(watch).into());
+            next.push(
+                if watch.listen_only { "ucom monitor" } else { "ucom doctor; ucom init numbers the chain" }
+                    .into(),
+            );
+        }
+        problems.next = next.into_iter().next().unwrap_or_default();
+        problems
+    }
+}
+
+fn nobody(watch: &Watch) -> &'static str {
+    match watch.listen_only {
+        true => "no board sends anything; without --listen-only the boards are asked who they are",
+        false => "no board answers",
     }
 }

@@ -2,9 +2,9 @@
 
 use cli_kit::{Diagnose, ErrorKind, Failure, Output};
 use serde_json::json;
-use ucom::{BoardInfo, Profile, Status};
+use ucom::{Profile, Status};
 use ucom_host::master::{Outcome, RawStatus, Reports, Request, StopLevel, counted, state_name};
-use ucom_host::session::{Driver, SessionError};
+use ucom_host::session::{Numbered, SessionError, Stopped};
 
 use crate::args::{ActArgs, Boards, BoardsArgs, LinkArgs, ResetArgs, StatusArgs, StopArgs};
 use crate::session::shared_numbers;
@@ -43,15 +43,10 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let boards = driver.numbers(&args.boards)?;
+    let force = args.force.force;
     let all = match set | clear {
-        Status(0) => boards
-            .into_iter()
-            .map(|board| numbers(driver.run(Request::Info { board })?))
-            .collect::<Result<_, _>>()?,
-        mask => {
-            let force = args.force.force;
-            change_each(&mut driver, &boards, |board| Request::SetStatus { board, mask, value: set, force })?
-        }
+        Status(0) => driver.statuses(&boards)?,
+        mask => driver.change_each(&boards, |board| Request::SetStatus { board, mask, value: set, force })?,
     };
     print(&all, &profile, out);
     Ok(())
@@ -65,21 +60,7 @@ fn raw_status(
     out: &Output,
 ) -> Result<(), Failure> {
     let mut driver = link.session()?;
-    let numbers = driver.numbers(&args.boards)?;
-    all_there(&mut driver, &numbers)?;
-    let targets: Vec<(Option<u8>, Vec<u8>)> = match args.boards {
-        Boards::All if driver.master.profile().broadcast_number().is_some() => vec![(None, numbers)],
-        _ => numbers.into_iter().map(|n| (Some(n), vec![n])).collect(),
-    };
-    let mut all = Vec::new();
-    for (board, seen) in targets {
-        let request = Request::RawStatus { board, seen, mask, value, force: args.force.force };
-        let done: Vec<u8> = all.iter().map(|b: &RawStatus| b.board).collect();
-        match driver.run(request).map_err(|e| after(e.into(), &done))? {
-            Outcome::RawStatus(boards) => all.extend(boards),
-            other => return Err(SessionError::from(other).into()),
-        }
-    }
+    let all = driver.set_raw_status(&args.boards, (mask, value), args.force.force)?;
     let row = |b: &RawStatus| {
         json!({
             "number": b.board,
@@ -119,22 +100,14 @@ fn raw_status(
     }
 }
 
-fn numbers(outcome: Outcome) -> Result<(u8, BoardInfo), Failure> {
-    match outcome {
-        Outcome::Status { board, info } => Ok((board, info)),
-        Outcome::Info(seen) | Outcome::Started(seen) => Ok((seen.number, seen.info)),
-        other => Err(SessionError::from(other).into()),
-    }
-}
-
-fn print(all: &[(u8, BoardInfo)], profile: &Profile, out: &Output) {
+fn print(all: &[Numbered], profile: &Profile, out: &Output) {
     let value =
         json!({ "boards": all.iter().map(|(n, info)| info_value(*n, info, profile)).collect::<Vec<_>>() });
     out.result(&value, || lines_of(all));
 }
 
-fn lines_of(all: &[(u8, BoardInfo)]) -> String {
-    let line = |(n, info): &(u8, BoardInfo)| {
+fn lines_of(all: &[Numbered]) -> String {
+    let line = |(n, info): &Numbered| {
         let (status, words) = (info.status, bits(info.status).join(" "));
         if !status.has(Status::INIT) {
             return format!("board {n:<3} has forgotten its number; `ucom init` gives one\n");
@@ -192,44 +165,9 @@ fn act(
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let boards = driver.numbers(&args.boards)?;
-    let all = change_each(&mut driver, &boards, |board| request(board, args.force.force))?;
+    let all = driver.change_each(&boards, |board| request(board, args.force.force))?;
     print(&all, &profile, out);
     Ok(())
-}
-
-/// Changes one board after the other; none before all of them answer.
-fn change_each(
-    driver: &mut Driver,
-    boards: &[u8],
-    request: impl Fn(u8) -> Request,
-) -> Result<Vec<(u8, BoardInfo)>, Failure> {
-    all_there(driver, boards)?;
-    let mut all = Vec::new();
-    for board in boards {
-        match driver.run(request(*board)).map_err(Failure::from).and_then(numbers) {
-            Ok(changed) => all.push(changed),
-            Err(e) => return Err(after(e, &all.iter().map(|(n, _)| *n).collect::<Vec<_>>())),
-        }
-    }
-    Ok(all)
-}
-
-/// Of several boards each must answer before the first one is changed.
-fn all_there(driver: &mut Driver, boards: &[u8]) -> Result<(), Failure> {
-    let mut several = boards.iter().filter(|_| boards.len() > 1);
-    several.try_for_each(|board| Ok(driver.seen(*board).map(drop)?))
-}
-
-/// What has been done already when one of several boards fails.
-fn after(failure: Failure, done: &[u8]) -> Failure {
-    let list: Vec<String> = done.iter().map(u8::to_string).collect();
-    match done {
-        [] => failure,
-        _ => Failure {
-            message: format!("{}; changed already: board {}", failure.message, list.join(", ")),
-            ..failure
-        },
-    }
 }
 
 /// Outputs, control and application, as far as asked. Stopping is always allowed: no other PC can forbid it.
@@ -237,50 +175,31 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
-    // Before anything is asked: no board goes on because another one does not answer.
-    match &args.boards {
-        Boards::All => driver.stop_at_once(None),
-        Boards::Some(numbers) => driver.stop_at_once(Some(numbers)),
-        Boards::None => {}
-    }
-    let (mut all, mut failures) = (Vec::new(), Vec::new());
-    for board in driver.numbers_to_stop(&args.boards)? {
-        match driver.run(Request::Stop { board, level, force: true }).map_err(Failure::from).and_then(numbers)
-        {
-            Ok(stopped) => all.push(stopped),
-            Err(failure) => {
-                driver.note(format!("board {board}: {}", failure.message));
-                failures.push((board, failure));
-            }
-        }
-        if driver.stop_asked() {
-            break;
-        }
-    }
+    let Stopped { boards: all, failed } = driver.stop_each(&args.boards, level)?;
     // Only reported, and only now: both boards of such a number were commanded to stop.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
         driver.note(format!("{error}; both were commanded to stop\n  {}", error.hint()));
     }
-    let Some(worst) = failures.iter().map(|(_, failure)| failure).max_by_key(|f| f.exit()).map(|f| f.kind)
-    else {
-        let boards = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
+    let boards = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
+    let mut failures: Vec<(u8, Failure)> = failed.into_iter().map(|(board, e)| (board, e.into())).collect();
+    let Some(worst) = failures.iter().map(|(_, f)| f).max_by_key(|f| f.exit()).map(|f| f.kind) else {
         out.result(&json!({ "boards": boards, "shared_numbers": shared }), || lines_of(&all));
         return Ok(());
     };
-    if let [(_, failure)] = &mut failures[..]
-        && all.is_empty()
+    if all.is_empty()
+        && let [_] = failures[..]
+        && let Some((_, failure)) = failures.pop()
     {
-        return Err(std::mem::replace(failure, Failure::printed(worst)));
+        return Err(failure);
     }
-    let stopped = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
     let error = |(board, f): &(u8, Failure)| {
         let mut value = f.to_json();
         value["board"] = json!(board);
         value
     };
     let failed = failures.iter().map(error).collect::<Vec<_>>();
-    out.result(&json!({ "boards": stopped, "failed": failed, "shared_numbers": shared }), || {
+    out.result(&json!({ "boards": boards, "failed": failed, "shared_numbers": shared }), || {
         let numbers: Vec<String> = failures.iter().map(|(board, _)| board.to_string()).collect();
         lines_of(&all) + &format!("not stopped for certain: {}\n", numbers.join(", "))
     });

@@ -1,13 +1,12 @@
 //! `ucom run`: control loops under supervision, from the start of all boards to their stop.
 
-use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Lines, Output};
 use serde_json::{Value, json};
 use ucom_host::files::SignalTable;
 use ucom_host::master::io::Kind;
-use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel, counted};
+use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, counted};
 use ucom_host::session::{
     Cache, Driver, Followed, Notice, ParameterFile, Prepared, SessionError, nothing_shared, only, plans,
     remember, with_names,
@@ -59,7 +58,8 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let result = want_texts(&mut driver, args, &boards)
         .and_then(|()| supervise(&mut driver, args, &prepared, &mut followed, &stdout, out));
     followed.ask_no_more(&mut driver.master);
-    let running = halt(&mut driver, &boards, result.as_ref().err());
+    let known = result.as_ref().err().map(|failure| failure.message.clone());
+    let running = driver.halt(&boards, known);
     let list = running.iter().map(u8::to_string).collect::<Vec<_>>();
     let not_stopped = format!("not stopped for certain: {}", list.join(", "));
     let stopped = match running.is_empty() {
@@ -209,30 +209,4 @@ fn notice_value(notice: &Notice) -> Value {
         true => json!({ "event": change.name(), "board": board, "time_s": time_s, "age_s": age_s }),
         false => json!({ "event": change.name(), "board": board, "time_s": time_s }),
     }
-}
-
-/// Control loops and applications end: all loops at once, then each board in turn. Returns those whose end is not certain;
-/// why is reported.
-fn halt(driver: &mut Driver, boards: &[u8], why: Option<&Failure>) -> Vec<u8> {
-    driver.stop_at_once(Some(boards));
-    // A bus that is gone is gone for all boards, and is the reason that is printed last.
-    let mut printed: BTreeSet<String> = why.map(|failure| failure.message.clone()).into_iter().collect();
-    let mut running = BTreeSet::new();
-    for level in [StopLevel::Loop, StopLevel::Application] {
-        for board in boards.iter().rev() {
-            if let Err(e) = driver.stop_board(*board, level) {
-                if printed.insert(e.to_string()) {
-                    driver.note(format!("board {board}: {e}"));
-                }
-                running.insert(*board);
-            } else if level == StopLevel::Application {
-                running.remove(board);
-            }
-        }
-    }
-    driver.master.end_session();
-    if running.is_empty() {
-        driver.nothing_is_left();
-    }
-    running.into_iter().collect()
 }

@@ -34,6 +34,14 @@ pub enum SessionError {
         /// The URL of the bus.
         url: String,
     },
+    /// One of several boards failed after others had been changed.
+    #[error("{failure}; changed already: board {}", list(done))]
+    Partly {
+        /// What failed.
+        failure: Box<SessionError>,
+        /// Boards that were changed before it.
+        done: Vec<u8>,
+    },
     /// No board is there.
     #[error("no board answers")]
     NoBoards,
@@ -181,6 +189,7 @@ impl Diagnose for SessionError {
                 (Usage, "usage", "ucom --help shows the forms of --bus")
             }
             Self::Open(_) => (NoLink, "bus", "is the bus there and up? ucom sim makes a simulated one"),
+            Self::Partly { failure, .. } => return failure.diagnosis(),
             Self::Bus(_) => (NoLink, "bus", "is the bus still there? ucom doctor looks at it"),
             Self::Frame(_) => (Fault, "frame", ""),
             Self::NoBoards => (NoLink, "no-boards", "ucom doctor looks for the reason"),

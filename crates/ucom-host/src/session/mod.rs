@@ -9,6 +9,7 @@
 //! - [`Recorder`], [`replay()`]: frames of the bus to a recording and back.
 //! - [`Followed`]: the boards of a run under supervision.
 pub mod bus_off;
+mod changes;
 mod cleanup;
 mod driver;
 mod error;
@@ -26,6 +27,7 @@ mod selection;
 mod values;
 mod watch;
 
+pub use changes::{Numbered, Stopped};
 pub use cleanup::CleanupList;
 pub use driver::{Driver, Operator, event_text, nothing_shared};
 pub use error::{SessionError, ValuesError};

@@ -1,0 +1,153 @@
+//! Single acts on several boards: none is changed before all answer, and what was done before one fails is reported.
+
+use std::collections::BTreeSet;
+
+use ucom::BoardInfo;
+
+use super::driver::Driver;
+use super::error::SessionError;
+use super::selection::Boards;
+use crate::master::{Outcome, RawStatus, Request, StopLevel};
+
+/// A board by its number, with its answer to PC_INFO.
+pub type Numbered = (u8, BoardInfo);
+
+/// What became of a stop of several boards.
+#[derive(Debug)]
+pub struct Stopped {
+    /// Boards that confirmed it.
+    pub boards: Vec<Numbered>,
+    /// Boards that may still run, each with the reason.
+    pub failed: Vec<(u8, SessionError)>,
+}
+
+/// The one board of an outcome.
+fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
+    match outcome {
+        Outcome::Status { board, info } => Ok((board, info)),
+        Outcome::Info(seen) | Outcome::Started(seen) => Ok((seen.number, seen.info)),
+        other => Err(other.into()),
+    }
+}
+
+/// What has been done already when one of several boards fails.
+fn after(failure: SessionError, done: impl Iterator<Item = u8>) -> SessionError {
+    let done: Vec<u8> = done.collect();
+    if done.is_empty() { failure } else { SessionError::Partly { failure: Box::new(failure), done } }
+}
+
+impl Driver {
+    /// Status and numbers of boards.
+    ///
+    /// # Errors
+    /// That of the first board that does not answer.
+    pub fn statuses(&mut self, boards: &[u8]) -> Result<Vec<Numbered>, SessionError> {
+        boards.iter().map(|board| numbered(self.run(Request::Info { board: *board })?)).collect()
+    }
+
+    /// Changes one board after the other; none before all of them answer.
+    ///
+    /// # Errors
+    /// That of the first board that fails; [`SessionError::Partly`] where others were changed before it.
+    pub fn change_each(
+        &mut self,
+        boards: &[u8],
+        request: impl Fn(u8) -> Request,
+    ) -> Result<Vec<Numbered>, SessionError> {
+        self.all_there(boards)?;
+        let mut all: Vec<Numbered> = Vec::new();
+        for board in boards {
+            match self.run(request(*board)).and_then(numbered) {
+                Ok(changed) => all.push(changed),
+                Err(e) => return Err(after(e, all.iter().map(|(n, _)| *n))),
+            }
+        }
+        Ok(all)
+    }
+
+    /// One PC_SETSTATUS with these two bytes to each board, or by broadcast to all; `new = (old & ~mask) | value`.
+    ///
+    /// # Errors
+    /// As [`Self::change_each`].
+    pub fn set_raw_status(
+        &mut self,
+        boards: &Boards,
+        (mask, value): (u8, u8),
+        force: bool,
+    ) -> Result<Vec<RawStatus>, SessionError> {
+        let numbers = self.numbers(boards)?;
+        self.all_there(&numbers)?;
+        let targets: Vec<(Option<u8>, Vec<u8>)> = match boards {
+            Boards::All if self.master.profile().broadcast_number().is_some() => vec![(None, numbers)],
+            _ => numbers.into_iter().map(|n| (Some(n), vec![n])).collect(),
+        };
+        let mut all: Vec<RawStatus> = Vec::new();
+        for (board, seen) in targets {
+            match self.run(Request::RawStatus { board, seen, mask, value, force }) {
+                Ok(Outcome::RawStatus(boards)) => all.extend(boards),
+                Ok(other) => return Err(other.into()),
+                Err(e) => return Err(after(e, all.iter().map(|b| b.board))),
+            }
+        }
+        Ok(all)
+    }
+
+    /// Of several boards each must answer before the first one is changed.
+    fn all_there(&mut self, boards: &[u8]) -> Result<(), SessionError> {
+        let mut several = boards.iter().filter(|_| boards.len() > 1);
+        several.try_for_each(|board| self.seen(*board).map(drop))
+    }
+
+    /// Stops boards, as far as `level` says. All are commanded to before any is asked: no board goes on because another one does not
+    /// answer. What fails is noted.
+    ///
+    /// # Errors
+    /// Who is there is not known, or nobody is.
+    pub fn stop_each(&mut self, boards: &Boards, level: StopLevel) -> Result<Stopped, SessionError> {
+        match boards {
+            Boards::All => self.stop_at_once(None),
+            Boards::Some(numbers) => self.stop_at_once(Some(numbers)),
+            Boards::None => {}
+        }
+        let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
+        for board in self.numbers_to_stop(boards)? {
+            match self.run(Request::Stop { board, level, force: true }).and_then(numbered) {
+                Ok(one) => stopped.boards.push(one),
+                Err(failure) => {
+                    self.note(format!("board {board}: {failure}"));
+                    stopped.failed.push((board, failure));
+                }
+            }
+            if self.stop_asked() {
+                break;
+            }
+        }
+        Ok(stopped)
+    }
+
+    /// Ends a run: all control loops at once, then applications in reverse order, then the session. Returns the boards whose end is not
+    /// certain; why is noted once for each reason, except for the one that is `known` already.
+    pub fn halt(&mut self, boards: &[u8], known: Option<String>) -> Vec<u8> {
+        self.stop_at_once(Some(boards));
+        // A bus that is gone is gone for all boards.
+        let mut noted: BTreeSet<String> = known.into_iter().collect();
+        let mut running = BTreeSet::new();
+        for level in [StopLevel::Loop, StopLevel::Application] {
+            for board in boards.iter().rev() {
+                if let Err(e) = self.stop_board(*board, level) {
+                    if noted.insert(e.to_string()) {
+                        self.note(format!("board {board}: {e}"));
+                    }
+                    running.insert(*board);
+                } else if level == StopLevel::Application {
+                    running.remove(board);
+                }
+            }
+        }
+        self.master.end_session();
+        if running.is_empty() {
+            self.nothing_is_left();
+        }
+        running.into_iter().collect()
+    }
+}

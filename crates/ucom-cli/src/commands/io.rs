@@ -13,7 +13,6 @@ use ucom_host::session::{
     nothing_shared, only, with_names, words,
 };
 
-use super::outputs::{named, units};
 use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 
@@ -80,7 +79,7 @@ fn io_value((known, initial): &Described) -> Value {
         "so": d.so,
         "par": d.par,
         "initial_ci": initial,
-        "units": units(&d.ci, inputs),
+        "units": known.units(Kind::Ci),
         "edges": { "ci": signals(Kind::Ci), "so": signals(Kind::So), "par": signals(Kind::Par) },
     })
 }
@@ -238,8 +237,7 @@ fn move_for(
 
 fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output) {
     let (names, signals) = (known.names.names(kind), known.signals.all(kind));
-    let value =
-        json!({ "board": known.board, key: named(names, signals, words), "units": units(names, signals) });
+    let value = json!({ "board": known.board, key: known.values(kind, words), "units": known.units(kind) });
     out.result(&value, || {
         let row = |(i, word): (usize, &u16)| {
             let name = names.get(i).cloned().unwrap_or_default();

@@ -1,44 +1,16 @@
-//! `ucom so`: what boards send while they run, by name and in units; and its form, which `run` and `ci` share.
+//! `ucom so`: what boards send while they run, by name and in units.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use cli_kit::{ErrorKind, Failure, Lines, Output};
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use ucom_host::files::Signal;
 use ucom_host::master::Event;
 use ucom_host::master::io::{Kind, Snapshot, short};
 use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
-
-/// Keys for so many values: the short names; the whole text where another signal has the same one, with its place where
-/// that does not help either.
-fn keys(names: &[String], count: usize) -> Vec<String> {
-    let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
-    let key = |i: usize| match names.get(i) {
-        None => format!("#{i}"),
-        Some(name) if once(&mut names.iter().map(|n| short(n)), short(name)) => short(name).to_owned(),
-        Some(name) if once(&mut names.iter().map(String::as_str), name) => name.clone(),
-        Some(name) => format!("{name}#{i}"),
-    };
-    (0..count).map(key).collect()
-}
-
-/// Values by the names of their signals, in their units where a signal table knows them (D-11).
-pub fn named(names: &[String], signals: &[Signal], words: &[u16]) -> Value {
-    let value =
-        |i: usize, word: u16| signals.get(i).map_or_else(|| json!(word as i16), |signal| signal.json(word));
-    let values = words.iter().enumerate().map(|(i, word)| value(i, *word));
-    Value::Object(keys(names, words.len()).into_iter().zip(values).collect::<Map<_, _>>())
-}
-
-/// The units of such values, by the same keys, as far as a signal table has them.
-pub fn units(names: &[String], signals: &[Signal]) -> Value {
-    let pairs = keys(names, names.len()).into_iter().zip(signals);
-    let known = pairs.filter(|(_, signal)| signal.known && !signal.unit.is_empty());
-    Value::Object(known.map(|(key, signal)| (key, json!(signal.unit))).collect::<Map<_, _>>())
-}
 
 /// Waits for the reader of stdout as long as it reads.
 pub fn finish(stdout: &mut Lines, driver: &Driver) {
@@ -137,25 +109,12 @@ fn row(
         let list: Vec<String> = snapshot.words.iter().zip(signals).map(|(w, e)| e.text(*w)).collect();
         return format!("{time_s:.6},{board},{}", list.join(","));
     }
-    let so = named(names, signals, &snapshot.words);
-    let value = json!({ "time_s": time_s, "board": board, "so": so, "units": units(names, signals) });
+    let (so, units) = (known.values(Kind::So, &snapshot.words), known.units(Kind::So));
+    let value = json!({ "time_s": time_s, "board": board, "so": so, "units": units });
     out.words(&value, || {
         let pairs = names.iter().zip(signals).zip(&snapshot.words);
         let pairs: Vec<String> =
             pairs.map(|((n, e), w)| format!("{} {:>6}", short(n), e.text_with_unit(*w))).collect();
         format!("{time_s:9.3} s  board {board}  {}", pairs.join("  "))
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_of_equal_names_are_all_there() {
-        let names = ["pos [deg]", "pos [rad]", "x", "x", "current [mA]"].map(String::from);
-        let all = named(&names, &[], &[1, 2, 3, 4, 5, 6]);
-        let keys = json!({ "pos [deg]": 1, "pos [rad]": 2, "x#2": 3, "x#3": 4, "current": 5, "#5": 6 });
-        assert_eq!(all, keys);
-    }
 }

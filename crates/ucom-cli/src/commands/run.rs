@@ -12,7 +12,7 @@ use ucom_host::session::{
     remember, with_names,
 };
 
-use super::outputs::{finish, named, units};
+use super::outputs::finish;
 use super::typed::{obey, typed};
 use crate::args::{Boards, LinkArgs, OnLost, RunArgs};
 
@@ -191,8 +191,7 @@ fn supervise(
 fn print_outputs(driver: &Driver, prepared: &Prepared, followed: &Followed, stdout: &Lines, out: &Output) {
     for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
         let Some(known) = prepared.known.get(&board) else { continue };
-        let so = named(&known.names.so, known.signals.all(Kind::So), &snapshot.words);
-        let units = units(&known.names.so, known.signals.all(Kind::So));
+        let (so, units) = (known.values(Kind::So, &snapshot.words), known.units(Kind::So));
         let time_s = snapshot.time_us as f64 * 1e-6;
         let value = json!({
             "event": "so", "board": board, "time_s": time_s, "age_s": age_s, "stale": stale,

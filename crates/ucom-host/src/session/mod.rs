@@ -18,6 +18,7 @@ mod followed;
 mod history;
 mod known;
 mod link;
+mod named;
 mod parameters;
 mod plans;
 pub mod pump;

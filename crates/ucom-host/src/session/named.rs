@@ -1,0 +1,56 @@
+//! Values of boards by the names of their signals, as programs read them.
+
+use serde_json::{Map, Value, json};
+
+use super::known::Known;
+use crate::files::Signal;
+use crate::master::io::{Kind, short};
+
+impl Known {
+    /// Words of a buffer by the names of its signals, in their units where a signal table knows them (D-11), as a JSON object.
+    pub fn values(&self, kind: Kind, words: &[u16]) -> Value {
+        named(self.names.names(kind), self.signals.all(kind), words)
+    }
+
+    /// The units of such values, by the same keys, as far as a signal table has them.
+    pub fn units(&self, kind: Kind) -> Value {
+        let (names, signals) = (self.names.names(kind), self.signals.all(kind));
+        let pairs = keys(names, names.len()).into_iter().zip(signals);
+        let known = pairs.filter(|(_, signal)| signal.known && !signal.unit.is_empty());
+        Value::Object(known.map(|(key, signal)| (key, json!(signal.unit))).collect::<Map<_, _>>())
+    }
+}
+
+/// Keys for so many values: the short names; the whole text where another signal has the same one, with its place where
+/// that does not help either.
+fn keys(names: &[String], count: usize) -> Vec<String> {
+    let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
+    let key = |i: usize| match names.get(i) {
+        None => format!("#{i}"),
+        Some(name) if once(&mut names.iter().map(|n| short(n)), short(name)) => short(name).to_owned(),
+        Some(name) if once(&mut names.iter().map(String::as_str), name) => name.clone(),
+        Some(name) => format!("{name}#{i}"),
+    };
+    (0..count).map(key).collect()
+}
+
+/// Values by the names of their signals.
+fn named(names: &[String], signals: &[Signal], words: &[u16]) -> Value {
+    let value =
+        |i: usize, word: u16| signals.get(i).map_or_else(|| json!(word as i16), |signal| signal.json(word));
+    let values = words.iter().enumerate().map(|(i, word)| value(i, *word));
+    Value::Object(keys(names, words.len()).into_iter().zip(values).collect::<Map<_, _>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_equal_names_are_all_there() {
+        let names = ["pos [deg]", "pos [rad]", "x", "x", "current [mA]"].map(String::from);
+        let all = named(&names, &[], &[1, 2, 3, 4, 5, 6]);
+        let keys = json!({ "pos [deg]": 1, "pos [rad]": 2, "x#2": 3, "x#3": 4, "current": 5, "#5": 6 });
+        assert_eq!(all, keys);
+    }
+}

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use cli_kit::{Failure, Output};
 use time::{Date, Month, OffsetDateTime};
 use ucom::Profile;
-use ucom::profile::{HeaderForm, Plan};
+use ucom::profile::Plan;
 use ucom_host::files::image::{AddressUnit, Format};
 use ucom_host::files::{Image, ImageOptions};
-use ucom_host::master::update::UpdateImage;
+use ucom_host::master::update::{UpdateImage, has_header};
 
 use crate::args::{Addresses, UpdateArgs};
 
@@ -104,11 +104,6 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
         }
     }
     Ok(None)
-}
-
-/// Whether a header carries Program ID and date.
-pub fn has_header(profile: &Profile) -> bool {
-    profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
 }
 
 /// The flash date: as asked, else today (UTC); 0 where no header carries it.

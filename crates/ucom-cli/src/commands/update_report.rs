@@ -6,9 +6,7 @@ use cli_kit::{Diagnose, Failure, Output, exit, table};
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Memory, Profile};
 use ucom_host::date_text;
-use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult};
-
-use super::update_files::has_header;
+use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult, has_header};
 
 /// Prints the report; `names` are the files of its images.
 pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {

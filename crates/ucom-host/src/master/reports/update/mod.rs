@@ -8,5 +8,5 @@ mod report;
 pub use failure::UpdateFailure;
 pub use options::{UpdateImage, UpdateMode, UpdateOptions, UpdateTarget};
 pub use outcome::UpdateOutcome;
-pub use plan::{Expected, PlannedImage, Unverifiable, UpdatePlan};
+pub use plan::{Expected, PlannedImage, Unverifiable, UpdatePlan, has_header};
 pub use report::{Progress, UpdateReport, UpdateResult};

@@ -89,6 +89,11 @@ pub struct PlannedImage {
     pub program_id: Option<u16>,
 }
 
+/// Whether updates by this profile send a header, which carries Program ID and flash date (D-41).
+pub fn has_header(profile: &Profile) -> bool {
+    profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
+}
+
 /// What a board gets, and what it shall show afterwards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdatePlan {
@@ -137,7 +142,7 @@ impl UpdatePlan {
             (.., Checksum::None) => Some(Unverifiable::NoChecksum),
             _ => None,
         };
-        let with_header = plan != Plan::Raw && profile.prog_header == HeaderForm::V1;
+        let with_header = has_header(profile);
         let id = |image: &UpdateImage| checksum(profile.prog_checksum, profile.prog_endian, &image.bytes);
         let header = |cycle, (image, memory): (&UpdateImage, Memory)| Header {
             cycle,

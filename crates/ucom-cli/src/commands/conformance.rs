@@ -1,12 +1,12 @@
 //! `ucom conformance`: the acceptance tests of the board side, against boards that are there.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use cli_kit::{Diagnose, ErrorKind, Failure, Output};
+use cli_kit::{Diagnose, Failure, Output};
 use serde_json::json;
 use ucom::Profile;
-use ucom_host::files::{Image, ImageOptions, Inventory};
+use ucom_host::files::inventory::flash_number_of;
+use ucom_host::files::{Image, ImageOptions};
 use ucom_host::master::conformance::{
     ConformanceOptions, ConformanceProgram, ConformanceReport, ConformanceTest, Verdict, test_names,
 };
@@ -79,7 +79,7 @@ fn program(
     };
     let flash_number = match args.flash_id {
         Some(flash) => flash,
-        None => listed(&args.inventory, board)?,
+        None => flash_number_of(&args.inventory, board)?,
     };
     let image = Image::read(path, &ImageOptions::default())
         .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
@@ -89,23 +89,9 @@ fn program(
     Ok(ConformanceProgram { board, flash_number, image: image.into(), date })
 }
 
-/// The board's flash number by the inventory.
-fn listed(inventory: &Path, board: u8) -> Result<u16, Failure> {
-    let hint = "name its --flash-id; ucom init writes the inventory";
-    if !inventory.exists() {
-        let text = format!("which board is board {board}? there is no inventory {}", inventory.display());
-        return Err(Failure::new(ErrorKind::Refused, "no-inventory", text).hint(hint));
-    }
-    let known = Inventory::read(inventory).map_err(Failure::usage)?;
-    known.get(board).map(|b| b.flash_number).ok_or_else(|| {
-        let text = format!("board {board} is not in the inventory {}", inventory.display());
-        Failure::new(ErrorKind::Refused, "not-in-inventory", text).hint(hint)
-    })
-}
-
 fn print(report: &ConformanceReport, out: &Output) {
     let (passed, failed) = (report.passed(), report.failed());
-    let skipped = report.tests.len() - passed - failed;
+    let skipped = report.skipped();
     let ended = report.error.as_ref().map(|e| json!({ "code": e.code(), "message": e.to_string() }));
     let value = json!({
         "passed": passed, "failed": failed, "skipped": skipped,
@@ -113,7 +99,9 @@ fn print(report: &ConformanceReport, out: &Output) {
     });
     out.result(&value, || {
         let mut text: String = report.tests.iter().filter(|t| t.needs.is_none()).map(line).collect();
-        text += &not_allowed(report);
+        for (option, ids) in report.not_allowed() {
+            text += &format!("- not allowed without {option}: {}\n", ids.join(", "));
+        }
         if let Some(error) = &report.error {
             text += &format!("ended before the last test: {error}\n");
         }
@@ -122,23 +110,6 @@ fn print(report: &ConformanceReport, out: &Output) {
         }
         text + &format!("{passed} passed, {failed} failed, {skipped} skipped\n")
     });
-}
-
-/// What would need an option: one line each, however many boards there are.
-fn not_allowed(report: &ConformanceReport) -> String {
-    let mut by_option: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for test in &report.tests {
-        if let Some(option) = test.needs {
-            let ids = by_option.entry(option).or_default();
-            if !ids.contains(&test.id) {
-                ids.push(test.id);
-            }
-        }
-    }
-    by_option
-        .iter()
-        .map(|(option, ids)| format!("- not allowed without {option}: {}\n", ids.join(", ")))
-        .collect()
 }
 
 fn line(test: &ConformanceTest) -> String {

@@ -1,10 +1,10 @@
 //! `ucom repair`: one board gets its number back, the others keep theirs.
 
 use serde_json::json;
-use ucom_host::files::Inventory;
+use ucom_host::files::inventory::flash_number_of;
 use ucom_host::master::{Outcome, Request};
 
-use cli_kit::{Failure, Output};
+use cli_kit::{Diagnose, Failure, Output};
 use ucom_host::session::SessionError;
 
 use crate::args::{LinkArgs, RepairArgs};
@@ -15,7 +15,8 @@ pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let board = args.board;
     let flash_number = match args.flash_id {
         Some(flash) => flash,
-        None => known(args)?,
+        // Which board is meant is the command line's matter: wrong usage.
+        None => flash_number_of(&args.inventory, board).map_err(|e| Failure::usage(&e).hint(e.hint()))?,
     };
     let mut driver = link.session()?;
     let profile = driver.master.profile();
@@ -28,17 +29,4 @@ pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         format!("board {board} has its number\n{}", board_table(std::slice::from_ref(&seen), &profile))
     });
     Ok(())
-}
-
-/// The flash number of the inventory.
-fn known(args: &RepairArgs) -> Result<u16, Failure> {
-    let (board, file) = (args.board, args.inventory.display());
-    let helps = "name the board's --flash-id; ucom init writes an inventory";
-    if !args.inventory.exists() {
-        let text = format!("which board stands at number {board}? there is no inventory {file}");
-        return Err(Failure::usage(text).hint(helps));
-    }
-    let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
-    let known = inventory.get(board).map(|b| b.flash_number);
-    known.ok_or_else(|| Failure::usage(format!("board {board} is not in the inventory {file}")).hint(helps))
 }

@@ -3,6 +3,7 @@
 use cli_kit::{ErrorKind, Failure, Output};
 use ucom::Profile;
 use ucom_host::files::Inventory;
+use ucom_host::files::inventory::flash_number_of;
 use ucom_host::master::update::{
     UpdateFailure, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport, UpdateResult, UpdateTarget,
 };
@@ -110,27 +111,15 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
                 .hint("a list takes the flash ids from the inventory that ucom init writes")),
         };
     }
-    if !args.inventory.exists() {
-        // One board by its number alone is what the user asked for; a list needs to know who is who.
-        if let ([board], Boards::Some(_)) = (numbers, &args.boards) {
-            return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
-        }
-        return Err(Failure::new(
-            ErrorKind::Refused,
-            "no-inventory",
-            format!("which boards stand where? there is no inventory {}", args.inventory.display()),
-        )
-        .hint("ucom init writes one; or name one board and its --flash-id"));
+    // One board by its number alone is what the user asked for; a list needs to know who is who.
+    if let ([board], Boards::Some(_)) = (numbers, &args.boards)
+        && !args.inventory.exists()
+    {
+        return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
     }
-    let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
-    let target = |board: &u8| match inventory.get(*board) {
-        Some(known) => Ok(UpdateTarget { board: *board, flash_number: Some(known.flash_number) }),
-        None => Err(Failure::new(
-            ErrorKind::Refused,
-            "not-in-inventory",
-            format!("board {board} is not in the inventory {}", args.inventory.display()),
-        )
-        .hint("ucom init --renew writes it anew; or name the board's --flash-id")),
+    let target = |board: &u8| {
+        let flash_number = Some(flash_number_of(&args.inventory, *board)?);
+        Ok(UpdateTarget { board: *board, flash_number })
     };
     numbers.iter().map(target).collect()
 }

@@ -8,7 +8,7 @@
 //! name = "head pan"
 //! ```
 
-use host_kit::write_whole;
+use host_kit::{Diagnose, Diagnosis, ErrorKind, write_whole};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -90,6 +90,61 @@ pub enum InventoryError {
         /// Number of the other.
         second: u8,
     },
+}
+
+/// Why nobody knows which board stands at a number.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    /// There is no inventory.
+    #[error("which board stands at number {board}? there is no inventory {}", path.display())]
+    NoInventory {
+        /// The number.
+        board: u8,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The inventory does not have it.
+    #[error("board {board} is not in the inventory {}", path.display())]
+    NotListed {
+        /// The number.
+        board: u8,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The inventory cannot be read.
+    #[error(transparent)]
+    Inventory(#[from] InventoryError),
+}
+
+impl Diagnose for IdentifyError {
+    fn diagnosis(&self) -> Diagnosis {
+        let (kind, code, next) = match self {
+            Self::NoInventory { .. } => (
+                ErrorKind::Refused,
+                "no-inventory",
+                "ucom init writes one; or name the board and its --flash-id",
+            ),
+            Self::NotListed { .. } => (
+                ErrorKind::Refused,
+                "not-in-inventory",
+                "ucom init --renew writes it anew; or name the board's --flash-id",
+            ),
+            Self::Inventory(_) => (ErrorKind::Usage, "usage", ""),
+        };
+        Diagnosis::new(kind, code, next)
+    }
+}
+
+/// The flash number of a board by an inventory file.
+///
+/// # Errors
+/// There is no such file, it cannot be read, or it does not have the board.
+pub fn flash_number_of(path: &Path, board: u8) -> Result<u16, IdentifyError> {
+    if !path.exists() {
+        return Err(IdentifyError::NoInventory { board, path: path.into() });
+    }
+    let known = Inventory::read(path)?.get(board).map(|known| known.flash_number);
+    known.ok_or_else(|| IdentifyError::NotListed { board, path: path.into() })
 }
 
 impl Inventory {

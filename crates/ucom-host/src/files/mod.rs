@@ -13,7 +13,7 @@ mod text;
 
 pub use dbc::{DbcBoard, NamedSignal, dbc};
 pub use image::{Image, ImageError, ImageOptions};
-pub use inventory::{Inventory, InventoryBoard, InventoryError};
+pub use inventory::{IdentifyError, Inventory, InventoryBoard, InventoryError};
 pub use params::{ParamsError, ParamsFile};
 pub use recording::{Recording, RecordingError};
 pub use signals::{BoardSignals, Signal, SignalTable, SignalType, SignalValue};

@@ -3,6 +3,7 @@ use crate::master::error::Error;
 use crate::master::reports::update::UpdateImage;
 use host_kit::{Diagnose, ErrorKind};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// What the tests may do.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -101,6 +102,24 @@ impl ConformanceReport {
     /// Tests that were passed.
     pub fn passed(&self) -> usize {
         self.tests.iter().filter(|t| t.verdict == Verdict::Pass).count()
+    }
+
+    /// Tests that were not done.
+    pub fn skipped(&self) -> usize {
+        self.tests.len() - self.passed() - self.failed()
+    }
+
+    /// Names of the tests that were not allowed, by the option that would have allowed them; each once, however many boards there
+    /// are.
+    pub fn not_allowed(&self) -> BTreeMap<&'static str, Vec<&'static str>> {
+        let mut by_option: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for (option, test) in self.tests.iter().filter_map(|test| Some((test.needs?, test))) {
+            let ids = by_option.entry(option).or_default();
+            if !ids.contains(&test.id) {
+                ids.push(test.id);
+            }
+        }
+        by_option
     }
 
     /// What kind of failure it is: that of the error that ended the tests; of the board when a test failed, or a board is not

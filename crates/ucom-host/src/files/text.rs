@@ -44,7 +44,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
 ///
 /// # Errors
 ///
-/// What the system says; the file is as it was then.
+/// The system's error; the file is as it was then.
 pub fn write_text(path: &Path, text: &str) -> Result<(), TextError> {
     write_whole(path, text.as_bytes()).map_err(|source| TextError::Io { path: path.into(), source })
 }

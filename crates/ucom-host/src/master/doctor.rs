@@ -162,37 +162,50 @@ const BYTE_ORDER: &str = "`ucom probe --out FILE`, then `--profile FILE` with ev
 
 fn chain(o: &Observation, f: &mut Findings) {
     if let Some(init) = &o.init {
-        for finding in &init.findings {
-            let next = match finding {
-                InitFinding::NoBoards => {
-                    "check power, cable and bit rate, then `ucom doctor` again".to_owned()
-                }
-                InitFinding::NotReached { after: 0, .. } => {
-                    "the first board does not take number 1: is its incoming init pin strapped active?".into()
-                }
-                InitFinding::NotReached { after, .. } => {
-                    format!("check the init wire from board {after} to the next one, then `ucom init`")
-                }
-                InitFinding::MoreBoardsThanReports { .. } | InitFinding::DuplicateFlash { .. } => {
-                    "give one of the boards another flash number".into()
-                }
-                InitFinding::UnexpectedOrder { .. } | InitFinding::Missing { .. } => {
-                    "were boards swapped? `ucom init --inventory FILE` writes the new order".into()
-                }
-                InitFinding::Refused { error, .. } => error.hint(),
-                InitFinding::ByteOrder { .. } => BYTE_ORDER.into(),
-                _ => "`ucom init` again".into(),
-            };
-            f.problem(finding.to_string(), "", next);
-        }
-        if init.is_ok() {
-            f.good(match init.boards.len() {
-                1 => "1 board has its number".into(),
-                n => format!("{n} boards have their numbers"),
-            });
-        }
+        initialised(init, f);
     }
-    let Some(scan) = &o.scan else { return };
+    if let Some(scan) = &o.scan {
+        scanned(scan, f);
+    }
+}
+
+/// What an init found.
+fn initialised(init: &InitReport, f: &mut Findings) {
+    for finding in &init.findings {
+        f.problem(finding.to_string(), "", after_init(finding));
+    }
+    if init.is_ok() {
+        f.good(match init.boards.len() {
+            1 => "1 board has its number".into(),
+            n => format!("{n} boards have their numbers"),
+        });
+    }
+}
+
+/// The next command after a finding of an init.
+fn after_init(finding: &InitFinding) -> String {
+    match finding {
+        InitFinding::NoBoards => "check power, cable and bit rate, then `ucom doctor` again".to_owned(),
+        InitFinding::NotReached { after: 0, .. } => {
+            "the first board does not take number 1: is its incoming init pin strapped active?".into()
+        }
+        InitFinding::NotReached { after, .. } => {
+            format!("check the init wire from board {after} to the next one, then `ucom init`")
+        }
+        InitFinding::MoreBoardsThanReports { .. } | InitFinding::DuplicateFlash { .. } => {
+            "give one of the boards another flash number".into()
+        }
+        InitFinding::UnexpectedOrder { .. } | InitFinding::Missing { .. } => {
+            "were boards swapped? `ucom init --inventory FILE` writes the new order".into()
+        }
+        InitFinding::Refused { error, .. } => error.hint(),
+        InitFinding::ByteOrder { .. } => BYTE_ORDER.into(),
+        _ => "`ucom init` again".into(),
+    }
+}
+
+/// What a scan found.
+fn scanned(scan: &ScanReport, f: &mut Findings) {
     for shared in scan.findings.iter().filter_map(ScanFinding::error) {
         let (why, next) = SHARED_CAUSE;
         f.problem(shared.to_string(), why, next);
@@ -202,6 +215,34 @@ fn chain(o: &Observation, f: &mut Findings) {
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }
+    numbers(scan, f);
+    let reported = |x: &&ScanFinding| matches!(x, ScanFinding::Unnumbered { .. }) || x.error().is_some();
+    for finding in scan.findings.iter().filter(|x| !reported(x)) {
+        let next = match finding {
+            ScanFinding::SameFlash { .. } | ScanFinding::Ambiguous { .. } => {
+                "give one of them another flash number"
+            }
+            ScanFinding::Disagrees { .. } => "`ucom probe`",
+            ScanFinding::Status { .. } => "`ucom probe`; then `ucom reset` and `ucom init`",
+            ScanFinding::Contradicts { .. } => "`ucom init` numbers them anew",
+            _ => "`ucom scan` again",
+        };
+        f.warn(finding.to_string(), "", next);
+    }
+    for board in &scan.boards {
+        let n = board.number;
+        if !board.info.has_application() {
+            f.warn(
+                format!("board {n} has no valid application"),
+                "never programmed, or an update was cut off",
+                format!("`ucom update {n} IMAGE`"),
+            );
+        }
+    }
+}
+
+/// How many boards have a number.
+fn numbers(scan: &ScanReport, f: &mut Findings) {
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {
         f.warn(
@@ -230,29 +271,6 @@ fn chain(o: &Observation, f: &mut Findings) {
             1 => "1 board already has a number".into(),
             n => format!("{n} boards already have numbers"),
         });
-    }
-    let reported = |x: &&ScanFinding| matches!(x, ScanFinding::Unnumbered { .. }) || x.error().is_some();
-    for finding in scan.findings.iter().filter(|x| !reported(x)) {
-        let next = match finding {
-            ScanFinding::SameFlash { .. } | ScanFinding::Ambiguous { .. } => {
-                "give one of them another flash number"
-            }
-            ScanFinding::Disagrees { .. } => "`ucom probe`",
-            ScanFinding::Status { .. } => "`ucom probe`; then `ucom reset` and `ucom init`",
-            ScanFinding::Contradicts { .. } => "`ucom init` numbers them anew",
-            _ => "`ucom scan` again",
-        };
-        f.warn(finding.to_string(), "", next);
-    }
-    for board in &scan.boards {
-        let n = board.number;
-        if !board.info.has_application() {
-            f.warn(
-                format!("board {n} has no valid application"),
-                "never programmed, or an update was cut off",
-                format!("`ucom update {n} IMAGE`"),
-            );
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The boards as last seen, and their supervision by heartbeats (D-51).
 
 use std::collections::BTreeMap;
-use ucom::{Admin, BoardInfo, ErrorCode, Function, Status, StringAssembler};
+use ucom::{Admin, Assembled, BoardInfo, ErrorCode, Function, Payload, Profile, Status, StringAssembler};
 
 /// How a board's heartbeats are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,6 +111,24 @@ impl Board {
     pub fn running(&self, now: u64) -> bool {
         let so = self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000);
         so || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
+    }
+
+    /// A piece of a text of its own; the text when it is whole. `passed_us` is the time that has passed between frames.
+    pub(crate) fn debug_text(
+        &mut self,
+        passed_us: u64,
+        payload: &Payload,
+        profile: &Profile,
+    ) -> Option<String> {
+        let assembler = self.debug.get_or_insert_with(|| Box::new(StringAssembler::new()));
+        match assembler.push(passed_us, payload, profile) {
+            Assembled::Complete(text) => Some(text.to_string()),
+            Assembled::Partial => None,
+            Assembled::Refused => {
+                self.bad_strings += 1;
+                None
+            }
+        }
     }
 
     pub(crate) fn error(&mut self, at: u64, code: ErrorCode) {

@@ -4,10 +4,7 @@ use crate::master::engine::event::{Event, Supervision};
 use crate::master::engine::shared::{Core, Session};
 use crate::master::io::Snapshot;
 use ucom::profile::{AliveMode, OnLost};
-use ucom::{
-    Admin, Assembled, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status,
-    StringAssembler, ToBoard,
-};
+use ucom::{Admin, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status, ToBoard};
 
 /// Between a stop and its repetition, µs.
 const STOP_AGAIN: u64 = 30_000;
@@ -194,19 +191,22 @@ impl Core {
         }
     }
 
+    /// A frame of a board without a number, which can only report errors (D-06).
+    fn unnumbered_message(&mut self, from: u8, message: FromBoard) {
+        if let FromBoard::Error(code) = message {
+            let during = self.mailboxes.keys().next().copied();
+            self.event(Event::BoardError { board: from, code, during });
+        } else {
+            self.statistics.undecodable += 1;
+        }
+        // A probe wants to know who answers under the number that should be nobody's.
+        self.deliver(from, message);
+    }
+
     fn board_message(&mut self, from: u8, message: FromBoard) {
         let now = self.now;
-        let unnumbered = from == self.profile.unnumbered().number();
-        if unnumbered {
-            // Without a number a board can only complain (D-06).
-            if let FromBoard::Error(code) = message {
-                let during = self.mailboxes.keys().next().copied();
-                self.event(Event::BoardError { board: from, code, during });
-            } else {
-                self.statistics.undecodable += 1;
-            }
-            // A probe wants to know who answers under the number that should be nobody's.
-            return self.deliver(from, message);
+        if from == self.profile.unnumbered().number() {
+            return self.unnumbered_message(from, message);
         }
         self.boards.of(from).last = Some((now, message.function()));
         if let FromBoard::Info(payload) = &message
@@ -247,16 +247,7 @@ impl Core {
                 }
             }
             FromBoard::Debug(payload) => {
-                let board = self.boards.of(from);
-                let assembler = board.debug.get_or_insert_with(|| Box::new(StringAssembler::new()));
-                let text = match assembler.push(self.passed, &payload, &self.profile) {
-                    Assembled::Complete(text) => Some(text.to_string()),
-                    Assembled::Partial => None,
-                    Assembled::Refused => {
-                        board.bad_strings += 1;
-                        None
-                    }
-                };
+                let text = self.boards.of(from).debug_text(self.passed, &payload, &self.profile);
                 if let Some(text) = text {
                     self.event(Event::Debug { board: from, text });
                 }

@@ -120,29 +120,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
         bench.send(Function::SetStatus, board, &[4, 0]).await;
         bench.send(Function::SetStatus, board, &[4, 4]).await;
         bench.receive(20 * MS).await;
-        match case {
-            Case::Short => bench.send(Function::Prog, board, &[0x43; 7]).await,
-            Case::Pause => {
-                bench.send(Function::Prog, board, &[0x43; 8]).await;
-                bench.link.sleep(300 * MS).await;
-                // Boards may look at the pause only when the next frame comes; what came in it counts as well.
-                bench
-                    .link
-                    .with(|core| core.queue_frame(Some(bench.link.id), next_frame(board), Forget::Nothing));
-                bench.link.flush().await;
-            }
-            Case::Block(bytes) => block(bench, board, &bytes).await,
-            Case::Cycle => {
-                let data: Vec<[u8; BLOCK_LEN]> =
-                    (0..).map_while(|i| data_block(&program.image.bytes, i)).collect();
-                for next in core::iter::once(&good.build(endian)).chain(&data) {
-                    block(bench, board, next).await;
-                    answer(bench, bench.link.times().ready).await;
-                }
-                let other = Header { cycle: 2, length: good.length + 1, ..good };
-                block(bench, board, &other.build(endian)).await;
-            }
-        }
+        wrong(bench, board, program, good, &case).await;
         let came = bench.receive(300 * MS).await;
         let errors: Vec<&Frame> = came.iter().filter(|f| f.id() >> 6 == 2).collect();
         if !matches!(errors.as_slice(), [f] if f.id() == 0x080 + u16::from(board) && f.data() == [code]) {
@@ -156,6 +134,32 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
         true => Verdict::Pass,
         false => Verdict::Fail(format!("afterwards program and date are {after:?}")),
     })
+}
+
+/// Sends one wrong transfer; `good` is the header of a right one.
+async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, good: Header, case: &Case) {
+    let endian = bench.profile().prog_endian;
+    match case {
+        Case::Short => bench.send(Function::Prog, board, &[0x43; 7]).await,
+        Case::Pause => {
+            bench.send(Function::Prog, board, &[0x43; 8]).await;
+            bench.link.sleep(300 * MS).await;
+            // Boards may look at the pause only when the next frame comes; what came in it counts as well.
+            bench.link.with(|core| core.queue_frame(Some(bench.link.id), next_frame(board), Forget::Nothing));
+            bench.link.flush().await;
+        }
+        Case::Block(bytes) => block(bench, board, bytes).await,
+        Case::Cycle => {
+            let data: Vec<[u8; BLOCK_LEN]> =
+                (0..).map_while(|i| data_block(&program.image.bytes, i)).collect();
+            for next in core::iter::once(&good.build(endian)).chain(&data) {
+                block(bench, board, next).await;
+                answer(bench, bench.link.times().ready).await;
+            }
+            let other = Header { cycle: 2, length: good.length + 1, ..good };
+            block(bench, board, &other.build(endian)).await;
+        }
+    }
 }
 
 /// Another eight bytes of program data.

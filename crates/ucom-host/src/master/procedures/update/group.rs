@@ -7,6 +7,7 @@ use crate::master::procedures::survey::statuses;
 use crate::master::procedures::update::board::{enter, has, judge, one, verify};
 use crate::master::procedures::update::session::{Stage, UpdateSession};
 use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
+use crate::master::reports::update::UpdatePlan;
 use ucom::{Sequence, Status, ToBoard};
 
 /// All open boards at once by broadcast; those that fall behind get attempts of their own.
@@ -52,22 +53,8 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
         }
     }
     for (board, why) in broken {
-        if !why.ended_transfer()
-            && let Ok(seen) = confirmed(link, board).await
-        {
-            let had = session.before(board).is_some_and(|before| has(&before, &plan));
-            if has(&seen.info, &plan) && !had {
-                // A board whose READY was lost may have gone on with the others and be done. One that had this program
-                // before proves nothing by it.
-                verify(link, session, board, &plan).await;
-                continue;
-            }
-            let same = session.before(board).is_some_and(|before| identity(&before) == identity(&seen.info));
-            if same && seen.info.has_application() {
-                session.proved_untouched(board);
-            } else if session.stage(board) == Stage::MaybeErased {
-                session.reach(board, Stage::Erased);
-            }
+        if !why.ended_transfer() && is_done_after_all(link, session, board, &plan).await {
+            continue;
         }
         if judge(link, session, board, &plan, 1, Some(why)).await.is_some()
             && link.profile().prog_attempts > 1
@@ -76,6 +63,24 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
         }
     }
     Ok(())
+}
+
+/// Whether a board whose READY was lost has gone on with the others and is done: then it is verified. Otherwise what it shows of
+/// its flash is kept in the session. One that had this program before proves nothing by having it.
+async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
+    let Ok(seen) = confirmed(link, board).await else { return false };
+    let had = session.before(board).is_some_and(|before| has(&before, plan));
+    if has(&seen.info, plan) && !had {
+        verify(link, session, board, plan).await;
+        return true;
+    }
+    let same = session.before(board).is_some_and(|before| identity(&before) == identity(&seen.info));
+    if same && seen.info.has_application() {
+        session.proved_untouched(board);
+    } else if session.stage(board) == Stage::MaybeErased {
+        session.reach(board, Stage::Erased);
+    }
+    false
 }
 
 /// Takes every number that is not selected out of programming, and reads that back.

@@ -89,9 +89,48 @@ pub struct PlannedImage {
     pub program_id: Option<u16>,
 }
 
+impl Unverifiable {
+    /// Why nothing shows afterwards what a board has by this profile; `None`: something does.
+    fn by_profile(profile: &Profile) -> Option<Self> {
+        match (profile.prog_plan, profile.prog_header, profile.prog_checksum) {
+            (Plan::Raw, ..) => Some(Self::RawPlan),
+            (_, HeaderForm::None, _) => Some(Self::NoHeader),
+            (.., Checksum::None) => Some(Self::NoChecksum),
+            _ => None,
+        }
+    }
+}
+
+impl UpdateImage {
+    /// Whether it can be sent: words, where files are not sent as they are.
+    fn check(&self, plan: Plan) -> Result<(), PlanError> {
+        match self.bytes.len() {
+            0 => Err(PlanError::Empty),
+            bytes if plan != Plan::Raw && bytes % 2 == 1 => Err(PlanError::HalfWord { bytes }),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Whether updates by this profile send a header, which carries Program ID and flash date (D-41).
 pub fn has_header(profile: &Profile) -> bool {
     profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
+}
+
+/// What each cycle carries, and to which memory.
+fn parts<'a>(
+    plan: Plan,
+    image: &'a UpdateImage,
+    other: Option<&'a UpdateImage>,
+) -> Result<[(&'a UpdateImage, Memory); 2], SecondImageError> {
+    let second = || other.ok_or(SecondImageError::Missing { plan });
+    Ok(match plan {
+        Plan::VerifyWrite if other.is_some() => return Err(SecondImageError::Unused { plan }),
+        Plan::VerifyWrite => [(image, Memory::Program); 2],
+        Plan::ExloaderApp => [(second()?, Memory::Ram), (image, Memory::Program)],
+        Plan::PmemXmem => [(image, Memory::Program), (second()?, Memory::Data)],
+        Plan::Raw => [(image, Memory::Program), (other.unwrap_or(image), Memory::Program)],
+    })
 }
 
 /// What a board gets, and what it shall show afterwards.
@@ -114,34 +153,17 @@ impl UpdatePlan {
         let plan = profile.prog_plan;
         let image = &options.image;
         for one in [Some(image), options.second.as_ref()].into_iter().flatten() {
-            if one.bytes.is_empty() {
-                return Err(PlanError::Empty);
-            }
-            if plan != Plan::Raw && one.bytes.len() % 2 == 1 {
-                return Err(PlanError::HalfWord { bytes: one.bytes.len() });
-            }
+            one.check(plan)?;
         }
         let other = options.second.as_ref();
-        let second = || other.ok_or(SecondImageError::Missing { plan });
-        let [first, last] = match plan {
-            Plan::VerifyWrite if other.is_some() => return Err(SecondImageError::Unused { plan }.into()),
-            Plan::VerifyWrite => [(image, Memory::Program); 2],
-            Plan::ExloaderApp => [(second()?, Memory::Ram), (image, Memory::Program)],
-            Plan::PmemXmem => [(image, Memory::Program), (second()?, Memory::Data)],
-            Plan::Raw => [(image, Memory::Program), (other.unwrap_or(image), Memory::Program)],
-        };
+        let [first, last] = parts(plan, image, other)?;
         let erases_from = match plan {
             // The first cycle only checks, or fills RAM: the application in flash stays valid.
             Plan::VerifyWrite | Plan::ExloaderApp => 2,
             // The first cycle writes program flash; what raw files make a board do only their makers know.
             Plan::PmemXmem | Plan::Raw => 1,
         };
-        let unverifiable = match (plan, profile.prog_header, profile.prog_checksum) {
-            (Plan::Raw, ..) => Some(Unverifiable::RawPlan),
-            (_, HeaderForm::None, _) => Some(Unverifiable::NoHeader),
-            (.., Checksum::None) => Some(Unverifiable::NoChecksum),
-            _ => None,
-        };
+        let unverifiable = Unverifiable::by_profile(profile);
         let with_header = has_header(profile);
         let id = |image: &UpdateImage| checksum(profile.prog_checksum, profile.prog_endian, &image.bytes);
         let header = |cycle, (image, memory): (&UpdateImage, Memory)| Header {

@@ -1,5 +1,6 @@
 //! USART2 and USART3 (RM0399 chapter 51): asynchronous 8N1 with FIFOs, DMA requests, idle line and receiver timeout; every
 //! byte takes its time on the wire.
+mod bits;
 mod next;
 mod registers;
 
@@ -7,7 +8,7 @@ use std::collections::VecDeque;
 
 use crate::clock::{NEVER, SECOND, Time};
 use crate::dma::{Dma, Memory};
-use registers::{cr1, isr};
+use bits::{cr1, isr};
 
 const RTOEN: u32 = 1 << 23;
 const DMAR: u32 = 0x40;

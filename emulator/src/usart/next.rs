@@ -1,5 +1,5 @@
 //! When a serial port has something to show next.
-use super::registers::cr1;
+use super::bits::cr1;
 use super::{DMAR, DMAT, LOOK_AHEAD, Usart};
 use crate::clock::{NEVER, Time};
 use crate::dma::Dma;

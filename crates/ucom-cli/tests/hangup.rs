@@ -33,7 +33,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
         peer.wait("601#01010000");
-        peer.wait("381#");
+        // Long enough for a whole snapshot to have come on a loaded computer: without one the loop has shown nothing.
+        peer.wait_for(50, "381#");
         signal(&child, name);
         peer.wait("601#00000000");
         ended(child).ends(0);

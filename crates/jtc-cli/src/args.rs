@@ -133,7 +133,7 @@ pub enum Command {
     /// Vacuum pump of the gripper
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
     Gripper(GripperArgs),
-    /// The whole way back to HoldPos, saying each step and whose numbers it uses; resumes no motion
+    /// The whole way back to HoldPos, naming each step and whose numbers it uses; resumes no motion
     #[command(
         after_help = "--arm FILE gives friction, gains and arm model of that file to a controller that does not hold the arm, also\n\
                             in place of others that it was given before; where the arm is held, those given before stay, and it is reported.\n\

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// Time that this thread has had of a processor. While another program has it, this clock stands; what other programs leave
-/// in caches still slows the thread down, so that of many measurements the least says most.
+/// in caches still slows the thread down, so that of many measurements the least is the nearest to the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct CpuTime(Duration);
 

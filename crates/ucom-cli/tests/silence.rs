@@ -11,7 +11,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     let sim = Sim::start(&["--boards", "2"]);
     let file = sim.path("silent.log");
     let output = sim.ucom(&["record", &file, "--for", "4"]).ends(0);
-    assert_eq!(output.err.matches("nothing has come of the bus yet").count(), 1, "{}", output.err);
+    assert_eq!(output.err.matches("nothing has come from the bus yet").count(), 1, "{}", output.err);
     assert!(output.err.contains("ucom doctor"), "{}", output.err);
     let piped = sim.ucom(&["record", "-", "--for", "3"]).ends(0);
     assert!(piped.out.is_empty() && piped.err.contains("nothing has come"), "{}", piped.err);

@@ -52,7 +52,7 @@ impl Silence {
         }
         if !std::mem::replace(&mut self.over, true) && !came {
             out.note(
-                "nothing has come of the bus yet: boards that nobody asks and whose control loop does not run send nothing \
+                "nothing has come from the bus yet: boards that nobody asks and whose control loop does not run send nothing \
                  (`ucom scan` asks them, in another terminal); `ucom doctor` looks at bus and boards",
             );
         }

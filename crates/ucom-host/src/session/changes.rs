@@ -98,7 +98,7 @@ impl Driver {
         several.try_for_each(|board| self.seen(*board).map(drop))
     }
 
-    /// Stops boards, as far as `level` says. All are commanded to before any is asked: no board goes on because another one does not
+    /// Stops boards, as far as `level` demands. All are commanded to before any is asked: no board goes on because another one does not
     /// answer. What fails is noted.
     ///
     /// # Errors

@@ -48,7 +48,7 @@ impl<'a> Runner<'a> {
         let boards = self.found.boards.iter().map(|b| b.number);
         match test.scope {
             Scope::Chain | Scope::Numbers => vec![None],
-            // That they are not allowed is said once.
+            // That they are not allowed is reported once.
             _ if test.level == Level::Init && !self.options.init => vec![None],
             Scope::First => boards.min().into_iter().map(Some).collect(),
             Scope::Board | Scope::Programmed => boards.map(Some).collect(),

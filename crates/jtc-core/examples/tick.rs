@@ -2,8 +2,8 @@
 use std::hint::black_box;
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
-use jtc_core::{BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, POINTS_MAX};
-use jtc_wire::{FrameRef, FrameType, LinkEvent, RawPoint, UrgentCommands, crc16};
+use jtc_core::{Config, Controller, ControllerState, HostEvent, Inputs, POINTS_MAX};
+use jtc_wire::{FrameRef, FrameType, LinkEvent, RawPoint, crc16};
 use test_kit::clock::CpuTime;
 
 const SCALE: Scale = Scale { velocity: 2.0 };
@@ -89,15 +89,6 @@ fn main() {
     let mut recorded: Vec<Vec<Frame>> = Vec::new();
     let mut start = None;
     let mut ticks = 0;
-    let quiet = Inputs {
-        bus: &[],
-        bus_state: BusState { acknowledged: true, bus_off: false },
-        safety_input: true,
-        missed_ticks: 0,
-        urgent: [UrgentCommands::NONE; HOST_LINES],
-        host: &[],
-        status_free: true,
-    };
     while recorded.len() < 4_000 {
         // Later commands need HoldPos.
         let ready = queue.len() > 2 || controller.telemetry().state == ControllerState::HoldPos;
@@ -112,7 +103,7 @@ fn main() {
         if start.is_some() {
             recorded.push(bus.clone());
         }
-        let outputs = controller.tick(&Inputs { bus: &bus, host: host.as_slice(), ..quiet });
+        let outputs = controller.tick(&Inputs { bus: &bus, host: host.as_slice(), ..Inputs::QUIET });
         queue.drain(..outputs.host_done);
         ticks += 1;
         assert!(ticks < 60_000, "the trajectory is not executed: {:?}", controller.violation());
@@ -127,7 +118,7 @@ fn main() {
         let mut controller = start.clone();
         let begin = CpuTime::now();
         for bus in &recorded {
-            black_box(controller.tick(black_box(&Inputs { bus, ..quiet })));
+            black_box(controller.tick(black_box(&Inputs { bus, ..Inputs::QUIET })));
         }
         least = least.min(begin.elapsed_ns() / recorded.len() as f64);
         assert_eq!(controller.telemetry().state, ControllerState::Operate);

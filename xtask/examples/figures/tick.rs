@@ -3,10 +3,10 @@
 use std::hint::black_box;
 
 use jtc_bus::Frame;
-use jtc_core::{BusState, Config, Controller, ControllerState, HOST_LINES, HostEvent, Inputs, POINTS_MAX};
+use jtc_core::{Config, Controller, ControllerState, HostEvent, Inputs, POINTS_MAX};
 use jtc_host::frame;
 use jtc_sim::{SimConfig, World};
-use jtc_wire::{Command, ExecCommand, FRAME_MAX, FrameRef, LinkEvent, RawPoint, UrgentCommands};
+use jtc_wire::{Command, ExecCommand, FRAME_MAX, FrameRef, LinkEvent, RawPoint};
 use test_kit::clock::CpuTime;
 
 use crate::world::Result;
@@ -58,15 +58,7 @@ fn event(bytes: &[u8]) -> Option<HostEvent<'_>> {
 }
 
 fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
-    Inputs {
-        bus,
-        bus_state: BusState { acknowledged: true, bus_off: false },
-        safety_input: true,
-        missed_ticks: 0,
-        urgent: [UrgentCommands::NONE; HOST_LINES],
-        host: host.as_slice(),
-        status_free: true,
-    }
+    Inputs { bus, host: host.as_slice(), ..Inputs::QUIET }
 }
 
 /// A whole run: bring-up, parameters, upload, motion. The world answers a controller of its own, which sees the same.

@@ -16,15 +16,15 @@ from example import program
 from frames import messages
 
 GROUPS = ["239.74.163.9", "ff15::7079:7468:9"]
-PATIENCE_S = 10.0
+TIMEOUT_S = 10.0
 
 
 def echoed(bus: can.BusABC) -> can.Message:
     """The next message that is not our own (python-can hears itself)."""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while time.monotonic() < end:
         try:
-            message = bus.recv(PATIENCE_S)
+            message = bus.recv(TIMEOUT_S)
         except can.CanOperationError:
             continue  # the noise, which python-can reports
         if message is not None and message.arbitration_id & 1:

@@ -10,10 +10,10 @@ import subprocess
 import sys
 
 import can
-from example import heard, program
+from example import program, received
 from frames import messages
 
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 BURST = 2000
 
 
@@ -31,15 +31,15 @@ def check(path: str, seed: int) -> None:
         count = 0
         for message in messages(random.Random(seed)):
             bus.send(message)
-            same(message, heard(bus, PATIENCE_S))
+            same(message, received(bus, TIMEOUT_S))
             count += 1
-        assert bus.get_version(PATIENCE_S) == (10, 13)
+        assert bus.get_version(TIMEOUT_S) == (10, 13)
         for number in range(BURST):
             bus.send(can.Message(arbitration_id=0x100, is_extended_id=False, data=number.to_bytes(2, "big")))
             # The line between the two is short: half-way through a burst its answers are taken.
             if number % 100 == 99:
                 for before in range(number - 99, number + 1):
-                    message = heard(bus, PATIENCE_S)
+                    message = received(bus, TIMEOUT_S)
                     assert bytes(message.data) == before.to_bytes(2, "big"), message
     print(f"{path}: {count} kinds of frames and a burst of {BURST} answered alike")
 

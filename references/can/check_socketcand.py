@@ -11,9 +11,9 @@ import sys
 import threading
 
 import can
-from example import heard, program
+from example import program, received
 
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 BURST = 5000
 
 
@@ -38,7 +38,7 @@ def check_kinds(port: int, rng: random.Random) -> None:
                     number = rng.choice([0, top - 1, rng.randrange(0, top) & ~1])
                     message = can.Message(arbitration_id=number, is_extended_id=extended, data=data, check=True)
                     bus.send(message)
-                    same(message, heard(bus, PATIENCE_S), step=1)
+                    same(message, received(bus, TIMEOUT_S), step=1)
                     count += 1
     print(f"{count} frames answered alike")
 
@@ -53,12 +53,12 @@ def check_two(port: int) -> None:
         sender = threading.Thread(target=send)
         sender.start()
         for number in range(BURST):
-            message = heard(two, PATIENCE_S)
+            message = received(two, TIMEOUT_S)
             assert message.arbitration_id == 0x100 and bytes(message.data) == number.to_bytes(2, "big"), message
         sender.join()
         # A frame back: what `one` hears first is this, so none of its own came back.
         two.send(can.Message(arbitration_id=0x200, is_extended_id=False))
-        message = heard(one, PATIENCE_S)
+        message = received(one, TIMEOUT_S)
         assert message.arbitration_id == 0x200 and message.dlc == 0, message
     print(f"a burst of {BURST} frames from one client to the other")
 
@@ -77,9 +77,9 @@ def check_busy(port: int) -> None:
             print(f"tried again: {error}")
             continue
         with bus:
-            first = int.from_bytes(heard(bus, PATIENCE_S).data, "big")
+            first = int.from_bytes(received(bus, TIMEOUT_S).data, "big")
             for number in range(first + 1, first + 20):
-                message = heard(bus, PATIENCE_S)
+                message = received(bus, TIMEOUT_S)
                 assert int.from_bytes(message.data, "big") == number, message
         connected += 1
         if connected == 20:

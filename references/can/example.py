@@ -18,9 +18,9 @@ def program(name: str) -> list[str]:
     return [*cargo, "--manifest-path", str(ROOT / "Cargo.toml"), "--"]
 
 
-def heard(bus: can.BusABC, patience_s: float) -> can.Message:
+def received(bus: can.BusABC, timeout_s: float) -> can.Message:
     """The next message; python-can returns without one when only a confirmation or a part of a line has come."""
-    end = time.monotonic() + patience_s
+    end = time.monotonic() + timeout_s
     while time.monotonic() < end:
         message = bus.recv(1.0)
         if message is not None:

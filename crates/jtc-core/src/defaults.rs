@@ -13,7 +13,7 @@ mod arm {
     include!(concat!(env!("OUT_DIR"), "/default_arm.rs"));
 }
 
-pub(crate) use arm::{MODEL, PID, POLYNOMIAL};
+pub(crate) use arm::{MODEL, NAME, PID, POLYNOMIAL};
 
 /// The default friction table of joint `j`.
 pub(crate) fn friction_table(j: usize) -> &'static TableOf<f32> {
@@ -57,6 +57,8 @@ impl Config {
             teach_payload_velocity: 0.2,
             teach_fade_ms: 500,
             friction_sign_width: 0.02,
+            host_timeout_ms: 0,
+            speed: 1.0,
             parameter_bounds: ParameterBounds::known_drives(),
         }
     }

@@ -57,10 +57,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// From standstill on the path to full speed.
+    /// From standstill on the path to the speed that is set.
     fn go_on(&mut self) {
-        self.clock.go();
+        self.clock.go(self.config.speed);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
+    }
+
+    /// Another speed on the path (J-57): path time gets there along the ramp of J-33.
+    pub(crate) fn set_speed(&mut self, speed: f64) {
+        self.config.speed = speed;
+        if self.clock.set_pace(speed) {
+            self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
+        }
     }
 
     /// Pause or Stop during execution: TES stays Execute until standstill (J-33).
@@ -122,7 +130,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 }
             }
             Phase::AtStart => {
-                self.clock = PathClock::start();
+                self.clock = PathClock::start(self.config.speed);
                 self.phase = Phase::Running { leave: None };
                 self.follow();
                 self.finish_at_end();
@@ -157,6 +165,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             let ramp_ms = f64::from(self.config.ramp_ms);
             if self.clock.halting() {
                 self.clock.slow_down(ramp_ms, f64::from(self.config.stop_ms), &bounds);
+            } else if self.clock.slowing() {
+                self.clock.ease_off(ramp_ms, bounds.easy);
             } else {
                 self.clock.speed_up(ramp_ms, bounds.easy);
             }

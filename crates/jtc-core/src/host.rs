@@ -3,7 +3,8 @@ pub(crate) mod overtaking;
 pub(crate) mod slices;
 
 use jtc_wire::{
-    Command, DataStatus, EVENTS_MAX, ExecCommand, LinkEvent, RawPoint, Response, Segment, UrgentCommand,
+    Command, DataStatus, EVENTS_MAX, ExecCommand, FrictionImage, LinkEvent, RawPoint, Response, Segment,
+    UrgentCommand,
 };
 
 use crate::check::{self, TrajectoryCheck, Violation};
@@ -76,6 +77,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             LinkEvent::Bad(response) => (response, false, Served::Quickly),
             LinkEvent::Noise(response) => (response, true, Served::Quickly),
             LinkEvent::Frame(frame) => {
+                if frame.frame_type.is_extension() {
+                    self.extensions.answers.asked(received.line);
+                }
                 let (data, served) = match Command::parse(frame) {
                     Err(status) => (status, Served::Quickly),
                     Ok(command) => {
@@ -85,7 +89,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             }
                             command => {
                                 let quick = self.is_quick(&command);
-                                (self.carry_out(command), if quick { Served::Quickly } else { Served::Fully })
+                                (
+                                    self.carry_out(received.line, command),
+                                    if quick { Served::Quickly } else { Served::Fully },
+                                )
                             }
                         };
                         match progress {
@@ -122,10 +129,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    fn carry_out(&mut self, command: Command<'_>) -> SliceOutcome {
+    fn carry_out(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
         // Parameters would change the torque under a moving arm.
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error);
+        let mut stored = None;
+        if command.frame_type().is_parameter() {
+            self.extensions.hash = None;
+            stored = self.extensions.stored.arm();
+        }
         let (parameters, motion, config) = (&mut self.parameters, &mut self.motion, &self.config);
         match command {
             Command::ClearCurrentErrors { jtc, nodes } => {
@@ -170,31 +182,53 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 SliceOutcome::Done
             }
             Command::GripperControl { .. } => SliceOutcome::Refused(DataStatus::NotAllowed),
+            command if command.frame_type().is_extension() => self.carry_out_extension(line, command),
             _ if !settable => SliceOutcome::Refused(DataStatus::NotAllowed),
             Command::PidParam(floats) => {
                 parameters.take_pid(&floats, config).map(|()| motion.law.change_mode()).into()
             }
             Command::PidParamUseDefault => {
-                parameters.set_pid(defaults::PID, config).map(|()| motion.law.change_mode()).into()
+                let taken = match stored {
+                    Some(arm) => parameters.take_pid(&arm.pid, config),
+                    None => parameters.set_pid(defaults::PID, config),
+                };
+                taken.map(|()| motion.law.change_mode()).into()
             }
             Command::ArmModel(floats) => parameters
                 .take_model(&floats, self.nodes.known_positions(), config)
                 .map(|()| motion.law.change_model())
                 .into(),
-            Command::ArmModelUseDefault => parameters
-                .set_model(&defaults::MODEL, self.nodes.known_positions(), config)
-                .map(|()| motion.law.change_model())
-                .into(),
+            Command::ArmModelUseDefault => {
+                let at = self.nodes.known_positions();
+                let taken = match stored {
+                    Some(arm) => parameters.take_model(&arm.model, at, config),
+                    None => parameters.set_model(&defaults::MODEL, at, config),
+                };
+                taken.map(|()| motion.law.change_model()).into()
+            }
             Command::FrictionPolynomial(floats) => parameters.take_polynomial(&floats, config).into(),
-            Command::FrictionPolynomialUseDefault => {
-                parameters.take_default_polynomial();
-                SliceOutcome::Done
-            }
             Command::FrictionTable(floats) => parameters.take_table(&floats, self.slice_progress, config),
-            Command::FrictionTableUseDefault => {
-                parameters.take_default_tables();
-                SliceOutcome::Done
+            // A stored arm has one friction, whichever default a host asks for.
+            Command::FrictionPolynomialUseDefault | Command::FrictionTableUseDefault
+                if let Some(arm) = stored =>
+            {
+                match arm.friction {
+                    FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
+                    FrictionImage::Table(floats) => {
+                        parameters.take_table(&floats, self.slice_progress, config)
+                    }
+                }
             }
+            Command::FrictionPolynomialUseDefault => parameters.take_default_polynomial(config).into(),
+            Command::FrictionTableUseDefault => parameters.take_default_tables(self.slice_progress, config),
+            Command::GetInfo
+            | Command::GetSettings { .. }
+            | Command::SetSettings(_)
+            | Command::SetName(_)
+            | Command::GetArm { .. }
+            | Command::StoreArm
+            | Command::Disable
+            | Command::Jog(_) => SliceOutcome::Refused(DataStatus::NotAllowed),
         }
     }
 
@@ -274,7 +308,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         match (self.trajectory, command) {
             // Teaching was accepted, and begins as soon as the arm is held.
-            (_, ExecCommand::Execute) if self.teaching => Err(DataStatus::NotAllowed),
+            (_, ExecCommand::Execute) if self.teaching || self.motion.set.jogging() => {
+                Err(DataStatus::NotAllowed)
+            }
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute) => {
                 self.check_friction()?;
                 self.start_path()

@@ -72,6 +72,11 @@ pub struct Outputs {
     pub status: bool,
     /// The line that the response record in that status is for, the other gets the status without it. `None`: it has none.
     pub record_line: Option<usize>,
+    /// [`Controller::answer_frame`](crate::Controller::answer_frame) is to be sent now, on this line only (J-50). Never together with a
+    /// status.
+    pub answer_line: Option<usize>,
+    /// [`Controller::stored_arm`](crate::Controller::stored_arm) is to be written to the memory that lasts (J-54).
+    pub store: bool,
     /// So many of the host events are done, from the oldest on: release them.
     pub host_done: usize,
 }

@@ -19,6 +19,9 @@ pub struct JointConfig {
     pub position_error_max: f64,
     /// Reflected inertia of the drive's rotor, kg·m² at the joint (J-40).
     pub rotor_inertia: f64,
+    /// What the drive is asked for, as a multiple of the torque that the joint is to have (J-61). Drives that deliver less than
+    /// they are asked need more than 1.
+    pub torque_gain: f64,
 }
 
 /// Ticks in which torque at its limit is counted.

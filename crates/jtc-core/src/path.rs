@@ -19,7 +19,7 @@ pub struct PathClock {
     pub rate: f64,
     /// Change of `rate`, 1/s.
     pub slope: f64,
-    /// The rate that is wanted, 0 or 1.
+    /// The rate that is wanted: 0, or the speed override (J-57).
     target: f64,
     /// Ticks since standstill was requested.
     halting_ms: f64,
@@ -72,15 +72,24 @@ impl Ramp {
 }
 
 impl PathClock {
-    /// At point 0 and at full speed.
-    pub fn start() -> Self {
-        Self { rate: 1.0, target: 1.0, ..Self::default() }
+    /// At point 0, which is at rest, and going at this rate.
+    pub fn start(pace: f64) -> Self {
+        Self { rate: pace, target: pace, ..Self::default() }
     }
 
-    /// Standing at the present time, about to go.
-    pub fn go(&mut self) {
-        self.target = 1.0;
+    /// Standing at the present time, about to go at this rate.
+    pub fn go(&mut self, pace: f64) {
+        self.target = pace;
         self.slope = 0.0;
+    }
+
+    /// Another rate is wanted from now on; standstill that is wanted remains so. Returns whether path time begins to change its rate.
+    pub fn set_pace(&mut self, pace: f64) -> bool {
+        let changes = self.target != 0.0 && self.target != pace;
+        if changes {
+            self.target = pace;
+        }
+        changes
     }
 
     /// Slow down to standstill. The time for it runs from the first call.
@@ -105,7 +114,12 @@ impl PathClock {
         self.target == 0.0 && self.rate != 0.0
     }
 
-    /// Neither at full speed nor standing.
+    /// The rate is above the one that is wanted, which is not standstill.
+    pub fn slowing(&self) -> bool {
+        self.target != 0.0 && self.rate > self.target
+    }
+
+    /// Not at the rate that is wanted.
     pub fn ramping(&self) -> bool {
         self.rate != self.target
     }
@@ -115,7 +129,21 @@ impl PathClock {
         self.time = (self.time + self.rate).min(end);
     }
 
-    /// On the way to full speed: along an S of `ramp_ms`, or slower where the slope would leave `bounds`. The rate never falls.
+    /// On the way to a lower rate: along an S of `ramp_ms`, or slower where the slope would leave `bounds`. The rate never rises.
+    pub fn ease_off(&mut self, ramp_ms: f64, bounds: Bounds) {
+        let distance = self.rate - self.target;
+        let wanted = Ramp::of(ramp_ms).next(-self.slope, distance);
+        let (low, high) = (-bounds.1, -bounds.0);
+        // Bounds that leave nothing, or only the other direction: keep the rate for now.
+        let slope = if low <= high { wanted.min(high).max(low.min(wanted)).max(0.0) } else { 0.0 };
+        if slope * DT >= distance || distance < 1e-9 {
+            (self.rate, self.slope) = (self.target, 0.0);
+        } else {
+            (self.rate, self.slope) = (self.rate - slope * DT, -slope);
+        }
+    }
+
+    /// On the way to a higher rate: along an S of `ramp_ms`, or slower where the slope would leave `bounds`. The rate never falls.
     pub fn speed_up(&mut self, ramp_ms: f64, bounds: Bounds) {
         let distance = self.target - self.rate;
         let wanted = Ramp::of(ramp_ms).next(self.slope, distance);

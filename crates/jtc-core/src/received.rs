@@ -1,4 +1,6 @@
 //! The parameters received from the host: gains, model and friction, taken whole or not at all (J-06).
+mod floats;
+
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 use jtc_wire::{DataStatus, Floats, missing_parameter};
 
@@ -22,6 +24,8 @@ const NO_TABLE: TableOf<f32> =
 pub(crate) struct ReceivedParameters {
     /// One bit each ([`missing_parameter`]).
     received: u8,
+    /// What `dynamics` was made of.
+    model: ArmModel,
     pub dynamics: Dynamics,
     pub pid: [PidGains; JOINTS],
     polynomial: [[f64; 6]; JOINTS],
@@ -37,6 +41,7 @@ impl ReceivedParameters {
     pub fn new(config: &Config) -> Self {
         Self {
             received: 0,
+            model: defaults::MODEL,
             dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
             pid: defaults::PID,
             polynomial: defaults::POLYNOMIAL,
@@ -70,6 +75,34 @@ impl ReceivedParameters {
     /// The host has to send the model again.
     pub fn withdraw_model(&mut self) {
         self.received &= !missing_parameter::MODEL;
+    }
+
+    /// The host has to send all again.
+    pub fn withdraw_all(&mut self) {
+        self.received = 0;
+    }
+
+    /// Computes with the gravity of these settings from now on.
+    pub fn set_gravity(&mut self, config: &Config) {
+        self.dynamics = Dynamics::new(&self.model, config.gravity);
+    }
+
+    /// What was received is within the bounds of these settings, too (J-06).
+    pub fn fits(&self, config: &Config) -> bool {
+        let bounds = &config.parameter_bounds;
+        let has = |part: u8| self.received & part != 0;
+        let joints = || config.joints.iter();
+        let gains =
+            || self.pid.iter().zip(joints()).all(|(gains, joint)| bounds.check_gains(gains, joint).is_ok());
+        let friction = || match self.tables_in_use() {
+            Some(tables) => {
+                tables.iter().zip(joints()).all(|(table, joint)| bounds.check_table(table, joint).is_ok())
+            }
+            None => check_polynomials(&self.polynomial, config).is_ok(),
+        };
+        (!has(missing_parameter::PID) || gains())
+            && (!has(missing_parameter::FRICTION) || friction())
+            && (!has(missing_parameter::MODEL) || bounds.check_masses(&self.model).is_ok())
     }
 
     pub fn take_pid(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
@@ -121,7 +154,7 @@ impl ReceivedParameters {
         if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
             return Err(DataStatus::IncorrectValue);
         }
-        self.dynamics = dynamics;
+        (self.model, self.dynamics) = (*model, dynamics);
         self.received |= missing_parameter::MODEL;
         Ok(())
     }
@@ -135,29 +168,45 @@ impl ReceivedParameters {
                 *c = finite(floats, count * j + i)?;
             }
         }
-        for (coefficients, joint) in polynomial.iter().zip(&config.joints) {
-            config.parameter_bounds.check_polynomial(coefficients, joint)?;
-        }
-        self.polynomial = polynomial;
+        self.set_polynomial(&polynomial, config)
+    }
+
+    pub fn take_default_polynomial(&mut self, config: &Config) -> Result<(), DataStatus> {
+        self.set_polynomial(&defaults::POLYNOMIAL, config)
+    }
+
+    fn set_polynomial(&mut self, polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result<(), DataStatus> {
+        check_polynomials(polynomial, config)?;
+        self.polynomial = *polynomial;
         self.friction_received(false);
         Ok(())
     }
 
-    pub fn take_default_polynomial(&mut self) {
-        self.polynomial = defaults::POLYNOMIAL;
-        self.friction_received(false);
-    }
-
-    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
+    /// The tables of a frame, in as many ticks as [`take_tables`](Self::take_tables) needs.
     pub fn take_table(
         &mut self,
         floats: &Floats<'_>,
         progress: SliceProgress,
         config: &Config,
     ) -> SliceOutcome {
+        self.take_tables(|j| read_table(floats, j), progress, config)
+    }
+
+    /// The default tables, alike.
+    pub fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
+        self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
+    }
+
+    /// One joint's table a tick: first all are checked, then all are copied, so that a refused table changes nothing.
+    fn take_tables(
+        &mut self,
+        table: impl Fn(usize) -> Result<TableOf<f32>, DataStatus>,
+        progress: SliceProgress,
+        config: &Config,
+    ) -> SliceOutcome {
         match progress {
             SliceProgress::TableCopy(j) => {
-                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), read_table(floats, j)) {
+                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), table(j)) {
                     *slot = table;
                 }
                 if j + 1 < JOINTS {
@@ -168,7 +217,7 @@ impl ReceivedParameters {
             }
             progress => {
                 let j = if let SliceProgress::TableCheck(j) = progress { j } else { 0 };
-                let table = read_table(floats, j).and_then(|table| {
+                let table = table(j).and_then(|table| {
                     let joint = config.joints.get(j).ok_or(DataStatus::IncorrectValue)?;
                     config.parameter_bounds.check_table(&table, joint).map_err(DataStatus::from)
                 });
@@ -181,19 +230,18 @@ impl ReceivedParameters {
         }
     }
 
-    pub fn take_default_tables(&mut self) {
-        // One after the other: all of them at once would stand on the stack first.
-        for (j, table) in self.tables.iter_mut().enumerate() {
-            *table = *defaults::friction_table(j);
-        }
-        self.friction_received(true);
-    }
-
     fn friction_received(&mut self, table: bool) {
         self.friction_is_table = table;
         self.friction_is_new = true;
         self.received |= missing_parameter::FRICTION;
     }
+}
+
+fn check_polynomials(polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result<(), DataStatus> {
+    for (coefficients, joint) in polynomial.iter().zip(&config.joints) {
+        config.parameter_bounds.check_polynomial(coefficients, joint)?;
+    }
+    Ok(())
 }
 
 /// An arm like this can be held at `position` (rad), by the torque limits (J-06).

@@ -66,7 +66,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 internal_occurred,
                 position: q[j] as f32,
                 velocity: v[j] as f32,
-                torque: report.torque as f32,
+                torque: (report.torque / self.config.joints[j].torque_gain) as f32,
                 temperature: report.temperature,
             }
         });

@@ -42,6 +42,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.segments > 0 && self.next_segment == self.segments
     }
 
+    /// Segments are here, and others are still to come.
+    pub fn receiving(&self) -> bool {
+        self.segments > 0 && self.next_segment < self.segments
+    }
+
     /// Time of the last point, ms.
     pub fn duration_ms(&self) -> u32 {
         // At most 11 999 · 65 535, which fits.

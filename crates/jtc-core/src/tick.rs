@@ -19,6 +19,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.enter(ControllerState::Error);
         }
         let host_done = if before == ControllerState::Start { 0 } else { self.serve_host(inputs) };
+        self.watch_hosts(inputs, host_done);
 
         // 2. What state that makes. What persists is raised again, where a host may have cleared it.
         if !inputs.host.is_empty() {
@@ -36,12 +37,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let bus = self.frame(before, torque);
         self.observe(&torque);
 
-        // 6. What the board and the host get.
+        // 6. What the board and the hosts get.
         // J-22: 0 in Start and while an internal error is latched.
         let safety_output = self.state != ControllerState::Start && !self.errors.internal();
         let status = self.status_due(inputs.status_free);
         let record_line = if status { self.prepare_status() } else { None };
-        Outputs { bus: Some(bus), safety_output, status, record_line, host_done }
+        // J-50: a waiting status goes first.
+        let answer_line = if inputs.status_free && !status { self.extensions.answers.send() } else { None };
+        let store = core::mem::take(&mut self.extensions.store_requested);
+        Outputs { bus: Some(bus), safety_output, status, record_line, answer_line, store, host_done }
     }
 
     /// The answers of the nodes, and whether this tick comes in time.
@@ -83,8 +87,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         self.motion.latch(&self.nodes, &self.config);
+        let jogged = self.motion.set.jogging();
         self.motion.set.hold(&self.config);
-        self.control(ControlMode::Hold)
+        if !jogged {
+            return self.control(ControlMode::Hold);
+        }
+        if !self.motion.set.jogging() {
+            // It has come to rest.
+            self.motion.law.change_mode();
+        }
+        self.control(ControlMode::Approach)
     }
 
     fn teach(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
@@ -139,16 +151,19 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// The one frame of this tick (J-12).
-    fn frame(&mut self, before: ControllerState, torque: [f64; JOINTS]) -> Frame {
+    pub(crate) fn frame(&mut self, before: ControllerState, torque: [f64; JOINTS]) -> Frame {
         // Drives keep their last torque: taking it away comes before everything else.
         let new_error = self.state == ControllerState::Error && before != ControllerState::Error;
         let must_move = new_error || (before.has_torque() && !self.powered());
+        // J-61: up to here torque is that of the joints.
+        let torque = core::array::from_fn(|j| torque[j] * self.config.joints[j].torque_gain);
         self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move)
     }
 
     /// Puts the oldest record into a status; returns the line that it is for.
     fn prepare_status(&mut self) -> Option<usize> {
-        let record = self.records.pop();
+        let record =
+            self.records.pop().map(|(line, record)| (line, self.extensions.answers.record_for(line, record)));
         self.status_frame = self.status(record.map_or(Response::NONE, |(_, record)| record)).emit();
         record.map(|(line, _)| line)
     }

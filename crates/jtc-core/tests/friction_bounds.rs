@@ -134,8 +134,10 @@ fn j06_a_table_that_would_throw_the_arm_is_refused_whole() {
 fn j06_the_bounds_of_friction_are_settings() {
     let mut config = Config::avena();
     config.parameter_bounds.friction_max = 0.2;
-    let mut rig = Rig::holding_with(config);
+    let mut rig = Rig::new(config);
     assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::IncorrectValue);
+    assert_eq!(rig.ask(FrameType::FrictionTableUseDefault, &[]), DataStatus::IncorrectValue);
+    assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::IncorrectValue);
 }
 
 /// A cubic between the speeds at which it is looked at: arms often move as slowly as this.

@@ -29,6 +29,14 @@ pub fn request(request: FrameType) -> &'static str {
         FrameType::FrictionPolynomialUseDefault => "the default friction polynomial",
         FrameType::ResetCanDevices => "resetting nodes",
         FrameType::GripperControl => "switching the pump",
+        FrameType::GetInfo | FrameType::Info => "who the device is",
+        FrameType::GetSettings | FrameType::Settings => "reading the settings",
+        FrameType::SetSettings => "changing the settings",
+        FrameType::SetName => "naming the arm",
+        FrameType::GetArm | FrameType::Arm => "reading the arm",
+        FrameType::StoreArm => "storing the arm",
+        FrameType::Disable => "taking the torque off",
+        FrameType::Jog => "jogging",
     }
 }
 

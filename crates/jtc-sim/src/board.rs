@@ -3,10 +3,12 @@
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;
-use jtc_core::{BusState, Config, Controller, HOST_LINES, HostEvent, Inputs, Outputs, POINTS_MAX, Telemetry};
+use jtc_core::{
+    BusState, Config, Controller, HOST_LINES, HostEvent, Identity, Inputs, Outputs, POINTS_MAX, Telemetry,
+};
 use jtc_wire::{
-    EVENTS_MAX, EventBatch, FRAME_MAX, FrameStatus, FrameType, LinkEvent, RawPoint, ReceivedEvent, Receiver,
-    STATUS_LEN, UrgentWatch,
+    BootCause, EVENTS_MAX, EventBatch, FRAME_MAX, FrameStatus, FrameType, LinkEvent, RawPoint, ReceivedEvent,
+    Receiver, STATUS_LEN, StoreState, UrgentWatch,
 };
 
 /// The host's line: the world has one.
@@ -17,6 +19,9 @@ const RING: usize = 32 * 1024;
 const TICK_US: u32 = 1000;
 /// Bytes given to the parser at once.
 const CHUNK: usize = 4096;
+
+/// Ticks that storing an arm takes: erasing a sector of flash does.
+const STORE_MS: u32 = 2_000;
 
 /// Looks at the parser between two ticks: what a processor with time to spare does.
 const POLLS: usize = 64;
@@ -57,6 +62,15 @@ pub struct Pins<'a> {
     pub status_free: bool,
 }
 
+/// The memory that keeps an arm over a reset (J-54).
+#[derive(Clone, Debug, Default)]
+struct Memory {
+    arm: Option<Vec<u8>>,
+    sequence: u32,
+    /// What is being written, and ticks until it is there.
+    writing: Option<(Vec<u8>, u32)>,
+}
+
 /// The board.
 pub struct Board {
     controller: Controller<Vec<RawPoint>>,
@@ -65,6 +79,7 @@ pub struct Board {
     watch: UrgentWatch<HOST_LINES>,
     batch: Box<EventBatch>,
     config: Config,
+    memory: Memory,
     inter_byte_timeout_us: u32,
     watchdog_ms: u32,
     /// Ticks that did not come.
@@ -78,29 +93,80 @@ pub struct Board {
 }
 
 impl Board {
-    /// A board with power just switched on.
-    pub fn new(config: Config, inter_byte_timeout_us: u32, watchdog_ms: u32) -> Self {
-        Self {
+    /// A board with power just switched on, in whose memory this arm is.
+    pub fn new(config: Config, arm: Option<Vec<u8>>, inter_byte_timeout_us: u32, watchdog_ms: u32) -> Self {
+        let mut board = Self {
             controller: Controller::new(config.clone(), vec![RawPoint::default(); POINTS_MAX]),
             ring: VecDeque::new(),
             receiver: Receiver::new(vec![0; FRAME_MAX], inter_byte_timeout_us),
             watch: UrgentWatch::new(inter_byte_timeout_us + TICK_US),
             batch: Box::new(EventBatch::new()),
             config,
+            memory: Memory { sequence: arm.is_some().into(), arm, writing: None },
             inter_byte_timeout_us,
             watchdog_ms,
             missed: 0,
             worked: Vec::new(),
             lost_bytes: 0,
             watchdog_resets: 0,
-        }
+        };
+        board.boot();
+        board
     }
 
-    /// Forget everything, as a reset does.
+    /// What the board does before the first tick.
+    fn boot(&mut self) {
+        let boot_cause = if self.watchdog_resets > 0 { BootCause::Watchdog } else { BootCause::PowerOn };
+        self.controller.set_identity(Identity {
+            board: "simulator",
+            firmware: env!("CARGO_PKG_VERSION"),
+            revision: "",
+            boots: 1 + self.watchdog_resets,
+            boot_cause,
+        });
+        let state = match &self.memory.arm {
+            None => StoreState::Empty,
+            Some(arm) if self.controller.load_arm(arm) => StoreState::Stored,
+            Some(_) => StoreState::Failed,
+        };
+        self.controller.set_store_state(state, self.memory.sequence);
+    }
+
+    /// Forget everything but what is in the memory that lasts, as a reset does.
     pub fn reset(&mut self) {
         let resets = self.watchdog_resets;
-        *self = Self::new(self.config.clone(), self.inter_byte_timeout_us, self.watchdog_ms);
-        self.watchdog_resets = resets;
+        // What was being written is lost; the arm before it is still there.
+        let memory = Memory { writing: None, ..core::mem::take(&mut self.memory) };
+        *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
+        (self.watchdog_resets, self.memory) = (resets, memory);
+        self.boot();
+    }
+
+    /// The arm in the memory that lasts, and its number.
+    pub fn stored_arm(&self) -> Option<(&[u8], u32)> {
+        self.memory.arm.as_deref().map(|arm| (arm, self.memory.sequence))
+    }
+
+    /// What the last tick returns to an extension request, when its outputs had `answer_line` set.
+    pub fn answer_frame(&self) -> &[u8] {
+        self.controller.answer_frame()
+    }
+
+    /// The memory works while the controller does.
+    fn store(&mut self, requested: bool) {
+        let memory = &mut self.memory;
+        if requested {
+            memory.writing = Some((self.controller.stored_arm().to_vec(), STORE_MS));
+        }
+        match memory.writing.take() {
+            Some((arm, 0)) => {
+                memory.sequence += 1;
+                memory.arm = Some(arm);
+                self.controller.set_store_state(StoreState::Stored, memory.sequence);
+            }
+            Some((arm, ms)) => memory.writing = Some((arm, ms - 1)),
+            None => {}
+        }
     }
 
     /// The status of the last tick, when its outputs had `status` set.
@@ -188,6 +254,7 @@ impl Board {
         self.worked.clear();
         self.worked.extend(host.iter().take(outputs.host_done).map(|host| Worked::from(&host.event)));
         self.batch.done(outputs.host_done);
+        self.store(outputs.store);
         outputs
     }
 }

@@ -69,6 +69,8 @@ pub struct SimConfig {
     pub arm: SimArm,
     /// Settings of the controller.
     pub controller: Config,
+    /// Image of the arm that its board has stored (J-54).
+    pub stored_arm: Option<Vec<u8>>,
     /// How far the true arm is from `arm`.
     pub model_error: ModelError,
     /// Pose at the start, rad.
@@ -118,6 +120,7 @@ impl SimConfig {
             arm: SimArm::new(&controller, parameters),
             gripper: controller.gripper,
             controller,
+            stored_arm: None,
             model_error: ModelError::default(),
             start: [0.0; JOINTS],
             support: Support::Brakes,

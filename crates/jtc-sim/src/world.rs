@@ -64,7 +64,12 @@ impl World {
         let scales = config.drives.map(|d| Scale { velocity: d.velocity_full_scale });
         let mut world = Self {
             ticks: 0,
-            board: Board::new(config.controller.clone(), config.inter_byte_timeout_us, config.watchdog_ms),
+            board: Board::new(
+                config.controller.clone(),
+                config.stored_arm.clone(),
+                config.inter_byte_timeout_us,
+                config.watchdog_ms,
+            ),
             bus: Bus::new(scales, config.seed ^ 0x6275_7300),
             node_states: plant.node_states(),
             plant,
@@ -214,6 +219,9 @@ impl World {
         self.safety_output = outputs.safety_output;
         if outputs.status {
             self.to_host.write(self.now_us(), self.board.status_frame());
+        }
+        if outputs.answer_line.is_some() {
+            self.to_host.write(self.now_us(), self.board.answer_frame());
         }
         let now = self.now_us();
         for worked in &self.board.worked {

@@ -1,5 +1,6 @@
 //! The commands of the host: the meaning of each frame type.
 use crate::code::codes;
+use crate::extension::{Name, Values};
 use crate::frame::{FrameRef, FrameType};
 use crate::response::DataStatus;
 use crate::segment::Segment;
@@ -97,6 +98,28 @@ pub enum Command<'a> {
         /// On.
         pump: bool,
     },
+    /// Who the device is, and what it runs (J-52).
+    GetInfo,
+    /// Settings from this one on, in the order of the device's table (J-53).
+    GetSettings {
+        /// How many to leave out.
+        first: u16,
+    },
+    /// Settings to change, all of them or none (J-53).
+    SetSettings(Values<'a>),
+    /// The name of the arm (J-54).
+    SetName(Name),
+    /// A part of the arm image (J-54).
+    GetArm {
+        /// Its first byte.
+        offset: u16,
+    },
+    /// Keeps the arm in use over a loss of power (J-54).
+    StoreArm,
+    /// Torque off, back to Init (J-53).
+    Disable,
+    /// Joint velocities, rad/s (J-58).
+    Jog(Floats<'a>),
 }
 
 /// Where the parts of the short bodies are, from their first byte.
@@ -111,6 +134,8 @@ pub mod field {
     pub const RESET_NODES: usize = 0;
     /// GripperControl: pump 0 or 1.
     pub const PUMP: usize = 0;
+    /// GetSettings and GetArm: where to begin, u16.
+    pub const FROM: core::ops::Range<usize> = 0..2;
 }
 
 impl<'a> Command<'a> {
@@ -119,6 +144,10 @@ impl<'a> Command<'a> {
     pub fn parse(frame: FrameRef<'a>) -> Result<Self, DataStatus> {
         let body = frame.body();
         let byte = |i: usize| body.get(i).copied().ok_or(DataStatus::IncorrectValue);
+        let from = || {
+            let bytes = body.get(field::FROM).and_then(|b| b.first_chunk());
+            bytes.map(|b| u16::from_be_bytes(*b)).ok_or(DataStatus::IncorrectValue)
+        };
         let floats = || {
             let counts = frame.frame_type.float_counts();
             let fits = counts.iter().any(|count| 4 * count == body.len());
@@ -133,7 +162,9 @@ impl<'a> Command<'a> {
                 nodes: byte(field::CLEAR_NODES)? & ALL_NODES,
             },
             FrameType::ClearOccurredErrors => Self::ClearOccurredErrors,
-            FrameType::JtcStatus => return Err(DataStatus::NotAllowed),
+            FrameType::JtcStatus | FrameType::Info | FrameType::Settings | FrameType::Arm => {
+                return Err(DataStatus::NotAllowed);
+            }
             FrameType::Trajectory => {
                 Self::Trajectory(Segment::parse(body).ok_or(DataStatus::IncorrectValue)?)
             }
@@ -159,6 +190,16 @@ impl<'a> Command<'a> {
                 1 => Self::GripperControl { pump: true },
                 _ => return Err(DataStatus::IncorrectValue),
             },
+            FrameType::GetInfo => Self::GetInfo,
+            FrameType::GetSettings => Self::GetSettings { first: from()? },
+            FrameType::SetSettings => {
+                Self::SetSettings(Values::parse(body).ok_or(DataStatus::IncorrectValue)?)
+            }
+            FrameType::SetName => Self::SetName(Name::parse(body).ok_or(DataStatus::IncorrectValue)?),
+            FrameType::GetArm => Self::GetArm { offset: from()? },
+            FrameType::StoreArm => Self::StoreArm,
+            FrameType::Disable => Self::Disable,
+            FrameType::Jog => Self::Jog(floats()?),
         })
     }
 
@@ -181,6 +222,14 @@ impl<'a> Command<'a> {
             Self::FrictionPolynomialUseDefault => FrameType::FrictionPolynomialUseDefault,
             Self::ResetCanDevices { .. } => FrameType::ResetCanDevices,
             Self::GripperControl { .. } => FrameType::GripperControl,
+            Self::GetInfo => FrameType::GetInfo,
+            Self::GetSettings { .. } => FrameType::GetSettings,
+            Self::SetSettings(_) => FrameType::SetSettings,
+            Self::SetName(_) => FrameType::SetName,
+            Self::GetArm { .. } => FrameType::GetArm,
+            Self::StoreArm => FrameType::StoreArm,
+            Self::Disable => FrameType::Disable,
+            Self::Jog(_) => FrameType::Jog,
         }
     }
 }

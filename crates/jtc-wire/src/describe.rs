@@ -3,6 +3,7 @@ use core::fmt::{Display, Formatter, Result};
 
 use crate::command::{Command, Floats};
 use crate::encode::FloatName;
+use crate::extension::Answer;
 use crate::frame::{FrameRef, FrameType, HEADER, field};
 use crate::segment::Segment;
 use crate::status::Status;
@@ -60,6 +61,9 @@ impl Display for FrameRef<'_> {
                 Some(status) => status.fmt(f),
                 None => f.write_str("JtcStatus that does not parse"),
             };
+        }
+        if let Some(answer) = Answer::parse(*self) {
+            return answer.fmt(f);
         }
         match Command::parse(*self) {
             Ok(command) => {
@@ -127,13 +131,24 @@ impl Display for Command<'_> {
             Self::TrajSetExecStatus(command) => write!(f, ": {command}"),
             Self::ResetCanDevices { nodes } => write!(f, ": {}", Bits(nodes.into(), &words::NODES)),
             Self::GripperControl { pump } => write!(f, ": pump {}", if pump { "on" } else { "off" }),
+            Self::GetSettings { first } => write!(f, ": from value {first} on"),
+            Self::SetSettings(values) => write!(f, ": {values}"),
+            Self::SetName(name) => write!(f, ": {name}"),
+            Self::GetArm { offset } => write!(f, ": from byte {offset} on"),
+            Self::Jog(values) => {
+                f.write_str(": rad/s")?;
+                values.iter().try_for_each(|value| write!(f, " {value}"))
+            }
             Self::ClearOccurredErrors
             | Self::FrictionTableUseDefault
             | Self::PidParamUseDefault
             | Self::ArmModelUseDefault
             | Self::TeachingModeEnable
             | Self::TeachingModeDisable
-            | Self::FrictionPolynomialUseDefault => Ok(()),
+            | Self::FrictionPolynomialUseDefault
+            | Self::GetInfo
+            | Self::StoreArm
+            | Self::Disable => Ok(()),
         }
     }
 }

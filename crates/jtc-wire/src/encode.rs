@@ -3,9 +3,11 @@ use core::fmt;
 
 use crate::command::{Command, Floats};
 use crate::crc16;
+use crate::extension::{SET_VALUES_MAX, SettingValue, VALUE_LEN};
 use crate::fixed;
 use crate::frame::{
-    FRAME_POINTS_MAX, FrameType, HEADER, JOINTS, POINT_LEN, TRAJECTORY_OVERHEAD, field as frame_field,
+    FRAME_MIN, FRAME_POINTS_MAX, FrameType, HEADER, JOINTS, POINT_LEN, TRAJECTORY_OVERHEAD,
+    field as frame_field,
 };
 use crate::segment::{
     ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, Segment, VELOCITY_SCALE, field,
@@ -185,13 +187,14 @@ impl fmt::Display for FloatName {
                     _ => write!(f, "joint {joint} torque [{}][{}]", (i - 40) / 20, (i - 40) % 20),
                 }
             }
+            FrameType::Jog => write!(f, "joint {}", 1 + index),
             _ => write!(f, "number {index}"),
         }
     }
 }
 
 /// Writes header and length for `n` bytes, leaves the body to `body`, ends with the CRC.
-fn frame(
+pub(crate) fn frame(
     out: &mut [u8],
     frame_type: FrameType,
     n: usize,
@@ -332,19 +335,50 @@ impl Command<'_> {
             Self::FrictionTable(values)
             | Self::PidParam(values)
             | Self::ArmModel(values)
-            | Self::FrictionPolynomial(values) => raw_floats(out, self.frame_type(), values),
+            | Self::FrictionPolynomial(values)
+            | Self::Jog(values) => raw_floats(out, self.frame_type(), values),
             Self::TrajSetExecStatus(command) => fixed(&fixed::exec(command)),
             Self::ResetCanDevices { nodes } => fixed(&fixed::reset_can_devices(nodes)),
             Self::GripperControl { pump } => fixed(&fixed::gripper_control(pump)),
+            Self::GetSettings { first } => fixed(&fixed::get_settings(first)),
+            Self::SetSettings(values) => set_settings(out, values.iter()),
+            Self::SetName(name) => fixed(&fixed::set_name(&name)),
+            Self::GetArm { offset } => fixed(&fixed::get_arm(offset)),
             Self::ClearOccurredErrors
             | Self::FrictionTableUseDefault
             | Self::PidParamUseDefault
             | Self::ArmModelUseDefault
             | Self::TeachingModeEnable
             | Self::TeachingModeDisable
-            | Self::FrictionPolynomialUseDefault => fixed(&fixed::empty(self.frame_type())),
+            | Self::FrictionPolynomialUseDefault
+            | Self::GetInfo
+            | Self::StoreArm
+            | Self::Disable => fixed(&fixed::empty(self.frame_type())),
         }
     }
+}
+
+/// A SetSettings frame; returns its length.
+pub fn set_settings(
+    out: &mut [u8],
+    values: impl IntoIterator<Item = SettingValue>,
+) -> Result<usize, EncodeError> {
+    let given = out.len();
+    let mut count = 0;
+    for value in values {
+        if count == SET_VALUES_MAX {
+            return Err(EncodeError::WrongCount { frame_type: FrameType::SetSettings, count: count + 1 });
+        }
+        let at = frame_field::BODY + VALUE_LEN * count;
+        count += 1;
+        let needed = at + VALUE_LEN + frame_field::CRC_LEN;
+        let to = out.get_mut(at..at + VALUE_LEN).ok_or(EncodeError::BufferTooShort { needed, given })?;
+        to.copy_from_slice(&value.emit());
+    }
+    if count == 0 {
+        return Err(EncodeError::WrongCount { frame_type: FrameType::SetSettings, count });
+    }
+    frame(out, FrameType::SetSettings, FRAME_MIN + VALUE_LEN * count, |_| Ok(()))
 }
 
 fn segment(out: &mut [u8], s: Segment<'_>) -> Result<usize, EncodeError> {

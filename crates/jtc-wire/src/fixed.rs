@@ -1,6 +1,7 @@
 //! Frames of few bytes, as constants.
 use crate::command::ExecCommand;
 use crate::crc::crc16_const;
+use crate::extension::Name;
 use crate::frame::{FrameType, HEADER};
 
 const fn sealed<const N: usize>(frame_type: FrameType, body: &[u8]) -> [u8; N] {
@@ -45,6 +46,21 @@ pub const fn gripper_control(pump: bool) -> [u8; 10] {
     sealed(FrameType::GripperControl, &[pump as u8])
 }
 
+/// GetSettings: what follows the first `first` values.
+pub const fn get_settings(first: u16) -> [u8; 8] {
+    sealed(FrameType::GetSettings, &first.to_be_bytes())
+}
+
+/// SetName.
+pub const fn set_name(name: &Name) -> [u8; 38] {
+    sealed(FrameType::SetName, name.as_bytes())
+}
+
+/// GetArm: the arm image from byte `offset` on.
+pub const fn get_arm(offset: u16) -> [u8; 8] {
+    sealed(FrameType::GetArm, &offset.to_be_bytes())
+}
+
 /// ClearOccurredErrors.
 pub const CLEAR_OCCURRED_ERRORS: [u8; 6] = empty(FrameType::ClearOccurredErrors);
 /// FrictionTableUseDefault.
@@ -65,6 +81,12 @@ pub const STOP: [u8; 7] = exec(ExecCommand::Stop);
 pub const PAUSE: [u8; 7] = exec(ExecCommand::Pause);
 /// TrajSetExecStatus: execute.
 pub const EXECUTE: [u8; 7] = exec(ExecCommand::Execute);
+/// GetInfo.
+pub const GET_INFO: [u8; 6] = empty(FrameType::GetInfo);
+/// StoreArm.
+pub const STORE_ARM: [u8; 6] = empty(FrameType::StoreArm);
+/// Disable.
+pub const DISABLE: [u8; 6] = empty(FrameType::Disable);
 /// GripperControl: pump on.
 pub const PUMP_ON: [u8; 10] = gripper_control(true);
 /// GripperControl: pump off.

@@ -3,6 +3,7 @@ use core::ops::Range;
 
 use crate::code::codes;
 use crate::crc16;
+use crate::extension::{ANSWER_MAX, INFO_LEN, PAGE_HEAD_LEN, SET_VALUES_MAX, VALUE_LEN};
 
 /// First byte of every frame.
 pub const HEADER: u8 = 0x9B;
@@ -55,6 +56,18 @@ codes! {
         FrictionPolynomialUseDefault = 0x0F;
         ResetCanDevices = 0x10;
         GripperControl = 0x11;
+        // Extensions (J-50): requests from 0x40, what they return from 0x50.
+        GetInfo = 0x40;
+        GetSettings = 0x41;
+        SetSettings = 0x42;
+        SetName = 0x43;
+        GetArm = 0x44;
+        StoreArm = 0x45;
+        Disable = 0x46;
+        Jog = 0x47;
+        Info = 0x50;
+        Settings = 0x51;
+        Arm = 0x52;
     }
 }
 
@@ -63,12 +76,14 @@ codes! {
 pub enum Lengths {
     /// One of these.
     OneOf(&'static [u16]),
-    /// `first` and every `step` bytes more, up to [`FRAME_MAX`].
+    /// `first` and every `step` bytes more, up to `last`.
     Steps {
         /// Shortest.
         first: u16,
         /// Bytes from one to the next.
         step: u16,
+        /// None is longer.
+        last: u16,
     },
 }
 
@@ -87,20 +102,30 @@ impl FrameType {
         match self {
             ClearCurrentErrors => Lengths::OneOf(&[6, 10]),
             JtcStatus => Lengths::OneOf(&[165, 173, 175]),
-            Trajectory => Lengths::Steps { first: TRAJECTORY_OVERHEAD as u16, step: POINT_LEN as u16 },
+            Trajectory => steps(TRAJECTORY_OVERHEAD, POINT_LEN, FRAME_MAX),
             FrictionTable => Lengths::OneOf(&[10_566]),
             PidParam => Lengths::OneOf(&[126]),
             ArmModel => Lengths::OneOf(&[538]),
             TrajSetExecStatus => Lengths::OneOf(&[7]),
             FrictionPolynomial => Lengths::OneOf(&[6, 102, 150]),
             ResetCanDevices | GripperControl => Lengths::OneOf(&[10]),
+            GetSettings | GetArm => Lengths::OneOf(&[8]),
+            SetSettings => steps(FRAME_MIN + VALUE_LEN, VALUE_LEN, FRAME_MIN + VALUE_LEN * SET_VALUES_MAX),
+            SetName => Lengths::OneOf(&[38]),
+            Jog => Lengths::OneOf(&[30]),
+            Info => steps(FRAME_MIN + INFO_LEN, 1, ANSWER_MAX),
+            Settings => steps(FRAME_MIN + PAGE_HEAD_LEN, VALUE_LEN, ANSWER_MAX),
+            Arm => steps(FRAME_MIN + PAGE_HEAD_LEN, 1, ANSWER_MAX),
             ClearOccurredErrors
             | FrictionTableUseDefault
             | PidParamUseDefault
             | ArmModelUseDefault
             | TeachingModeEnable
             | TeachingModeDisable
-            | FrictionPolynomialUseDefault => Lengths::OneOf(&[6]),
+            | FrictionPolynomialUseDefault
+            | GetInfo
+            | StoreArm
+            | Disable => Lengths::OneOf(&[6]),
         }
     }
 
@@ -117,9 +142,9 @@ impl FrameType {
                 }
                 false
             }
-            Lengths::Steps { first, step } => {
-                let (first, step) = (first as usize, step as usize);
-                n >= first && n <= FRAME_MAX && (n - first).is_multiple_of(step)
+            Lengths::Steps { first, step, last } => {
+                let (first, step, last) = (first as usize, step as usize, last as usize);
+                n >= first && n <= last && (n - first).is_multiple_of(step)
             }
         }
     }
@@ -131,14 +156,45 @@ impl FrameType {
             FrameType::PidParam => &[30],
             FrameType::ArmModel => &[133],
             FrameType::FrictionPolynomial => &[24, 36],
+            FrameType::Jog => &[6],
             _ => &[],
         }
     }
 
-    /// Sent by the host (all but JtcStatus).
+    /// Sent by the host; the others come from the device.
     pub const fn from_host(self) -> bool {
-        !matches!(self, FrameType::JtcStatus)
+        !matches!(self, FrameType::JtcStatus) && !self.is_answer()
     }
+
+    /// It gives the controller parameters: friction, gains or model.
+    pub const fn is_parameter(self) -> bool {
+        use FrameType::*;
+        matches!(
+            self,
+            FrictionTable
+                | FrictionTableUseDefault
+                | PidParam
+                | PidParamUseDefault
+                | ArmModel
+                | ArmModelUseDefault
+                | FrictionPolynomial
+                | FrictionPolynomialUseDefault
+        )
+    }
+
+    /// What an extension request returns beside its record (J-50).
+    pub const fn is_answer(self) -> bool {
+        self as u8 >= 0x50
+    }
+
+    /// An extension request: existing devices do not know it, existing hosts do not send it (J-50).
+    pub const fn is_extension(self) -> bool {
+        matches!(self as u8, 0x40..0x50)
+    }
+}
+
+const fn steps(first: usize, step: usize, last: usize) -> Lengths {
+    Lengths::Steps { first: first as u16, step: step as u16, last: last as u16 }
 }
 
 /// A complete frame whose CRC is right and whose length its type can have. Bodies are not yet checked.
@@ -180,7 +236,7 @@ mod tests {
         for byte in 0..=255u8 {
             match FrameType::from_byte(byte) {
                 Some(t) => assert_eq!(t as u8, byte),
-                None => assert!(byte == 0 || byte > 0x11),
+                None => assert!(byte == 0 || matches!(byte, 0x12..0x40 | 0x48..0x50 | 0x53..)),
             }
         }
     }
@@ -193,6 +249,10 @@ mod tests {
                 FrameType::ClearCurrentErrors => 2,
                 FrameType::JtcStatus | FrameType::FrictionPolynomial => 3,
                 FrameType::Trajectory => FRAME_POINTS_MAX + 1,
+                FrameType::SetSettings => SET_VALUES_MAX,
+                FrameType::Info => 256 - 142 + 1,
+                FrameType::Settings => 25,
+                FrameType::Arm => 247,
                 _ => 1,
             };
             assert_eq!(allowed(t), expected, "{t}");

@@ -26,14 +26,21 @@ pub fn sealed(kind: u8, body: &[u8]) -> Vec<u8> {
 fn body_len(kind: FrameType, pick: u8) -> usize {
     match kind.lengths() {
         Lengths::OneOf(list) => usize::from(list[usize::from(pick) % list.len()]) - 6,
-        Lengths::Steps { first, step } => usize::from(first) - 6 + usize::from(step) * usize::from(pick % 40),
+        Lengths::Steps { first, step, last } => {
+            let count = (usize::from(last - first) / usize::from(step)).min(39) + 1;
+            usize::from(first) - 6 + usize::from(step) * (usize::from(pick) % count)
+        }
     }
 }
 
 /// The frame that an input of [`frame_bodies`] stands for: type, pick of a length, then the body, repeated or cut to the length.
 pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     let [kind, pick, rest @ ..] = data else { return None };
-    let kind = FrameType::from_byte(kind % 0x12)?;
+    // Types up to 0x11 by their number, as ever; the others are the extensions.
+    let kind = match usize::from(*kind % 0x20) {
+        kind @ 0..0x12 => FrameType::from_byte(kind as u8)?,
+        more => *FrameType::ALL.get(more - 1)?,
+    };
     let body: Vec<u8> = rest.iter().chain(&[0]).copied().cycle().take(body_len(kind, *pick)).collect();
     Some(sealed(kind as u8, &body))
 }

@@ -16,6 +16,7 @@ mod command;
 mod crc;
 mod describe;
 mod encode;
+mod extension;
 pub mod fixed;
 mod frame;
 mod receive;
@@ -35,16 +36,21 @@ pub use crc::{crc16, crc16_update};
 pub use describe::{Described, Piece, Pieces, pieces};
 pub use encode::{
     Channel, EncodeError, FloatName, FrictionTable, OutOfScale, arm_model, floats, friction_polynomial,
-    friction_table, pid_param, trajectory,
+    friction_table, pid_param, set_settings, trajectory,
 };
 /// States of drives and gripper in a status are those of the joint bus.
 pub use jtc_bus::{Joint, NodeState};
 
+pub use extension::{
+    ANSWER_MAX, Answer, ArmImage, BootCause, EXTENSION_VERSION, FrictionImage, Hash, IMAGE_MAX, Info,
+    NAME_LEN, Name, PAGE_BYTES, PAGE_VALUES, SET_VALUES_MAX, SettingValue, StoreState, VALUE_LEN, Values,
+    capability,
+};
 pub use frame::{
     FRAME_MAX, FRAME_MIN, FRAME_POINTS_MAX, FrameRef, FrameType, HEADER, JOINTS, Lengths, POINT_LEN,
     TRAJECTORY_OVERHEAD,
 };
-pub use receive::{StatusCounters, StatusReceiver};
+pub use receive::{FromDevice, StatusCounters, StatusReceiver};
 pub use response::{DataStatus, FrameStatus, Response};
 pub use segment::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, Segment, VELOCITY_SCALE};
 pub use state::{ControllerState, TrajectoryState};
@@ -57,6 +63,7 @@ pub use urgent::{UrgentCommand, UrgentCommands, UrgentWatch};
 /// Where each part of a frame is: byte ranges, named once.
 pub mod field {
     pub use crate::command::field as command;
+    pub use crate::extension::image_field as image;
     pub use crate::frame::field as frame;
     pub use crate::segment::field as segment;
     pub use crate::status::field as status;

@@ -1,6 +1,7 @@
-//! The host's stream parser: finds JtcStatus frames in bytes that arrive in any pieces.
-use crate::frame::{FrameType, HEADER, field};
-use crate::status::{STATUS_LEN, Status};
+//! The host's stream parser: finds JtcStatus frames, and what extension requests return, in bytes that arrive in any pieces.
+use crate::extension::{ANSWER_MAX, Answer};
+use crate::frame::{FrameRef, FrameType, HEADER, field};
+use crate::status::Status;
 
 /// Bytes and statuses received so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -13,8 +14,18 @@ pub struct StatusCounters {
     pub skipped_bytes: u64,
 }
 
-/// Stream parser of the host, for the layouts of 165, 173 and 175 bytes (J-08). It resynchronises after noise
-/// and lost bytes without losing a good status that follows them.
+/// A frame from the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)]
+pub enum FromDevice<'a> {
+    /// Its report.
+    Status(Status),
+    /// What an extension request returns (J-50).
+    Answer(Answer<'a>),
+}
+
+/// Stream parser of the host, for statuses of 165, 173 and 175 bytes (J-08) and the frames that extension requests return. It
+/// resynchronises after noise and lost bytes without losing a good frame that follows them.
 ///
 /// ```
 /// use jtc_wire::{Status, StatusReceiver};
@@ -29,8 +40,10 @@ pub struct StatusCounters {
 /// ```
 #[derive(Clone, Debug)]
 pub struct StatusReceiver {
-    held: [u8; STATUS_LEN],
+    held: [u8; ANSWER_MAX],
     len: usize,
+    /// Bytes in front of the held ones that were handed out and are to go.
+    used: usize,
     counters: StatusCounters,
 }
 
@@ -52,15 +65,28 @@ impl StatusReceiver {
     /// Nothing held.
     pub const fn new() -> Self {
         Self {
-            held: [0; STATUS_LEN],
+            held: [0; ANSWER_MAX],
             len: 0,
+            used: 0,
             counters: StatusCounters { frames: 0, bad_frames: 0, skipped_bytes: 0 },
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a status is complete; `None` when all are taken.
+    /// Takes bytes from the front of `bytes` until a status is complete; `None` when all are taken. What extension requests return is
+    /// passed over.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Status> {
         loop {
+            if let FromDevice::Status(status) = self.next_frame(bytes)? {
+                return Some(status);
+            }
+        }
+    }
+
+    /// Takes bytes from the front of `bytes` until a frame is complete; `None` when all are taken.
+    pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Option<FromDevice<'_>> {
+        self.drop_front(self.used);
+        self.used = 0;
+        let n = loop {
             match scan(&self.held[..self.len]) {
                 ScanResult::Nothing => self.skip(),
                 ScanResult::Needs(n) if self.len < n => {
@@ -72,19 +98,17 @@ impl StatusReceiver {
                     self.len += taken.len();
                     *bytes = rest;
                 }
-                ScanResult::Needs(n) => match Status::parse(&self.held[..n]) {
-                    Some(status) => {
-                        self.drop_front(n);
-                        self.counters.frames += 1;
-                        return Some(status);
-                    }
-                    None => {
-                        self.counters.bad_frames += 1;
-                        self.skip();
-                    }
-                },
+                ScanResult::Needs(n) if parse(&self.held[..n]).is_some() => break n,
+                ScanResult::Needs(_) => {
+                    self.counters.bad_frames += 1;
+                    self.skip();
+                }
             }
-        }
+        };
+        self.used = n;
+        let frame = parse(&self.held[..n])?;
+        self.counters.frames += u64::from(matches!(frame, FromDevice::Status(_)));
+        Some(frame)
     }
 
     /// Bytes and statuses received so far.
@@ -92,15 +116,15 @@ impl StatusReceiver {
         self.counters
     }
 
-    /// Bytes held that may become a status.
+    /// Bytes held that may become a frame.
     pub fn held(&self) -> usize {
-        self.len
+        self.len - self.used
     }
 
     /// Discards the held bytes: for a line that was closed and opened again.
     pub fn clear(&mut self) {
-        self.counters.skipped_bytes += self.len as u64;
-        self.len = 0;
+        self.counters.skipped_bytes += self.held() as u64;
+        (self.len, self.used) = (0, 0);
     }
 
     /// Skips the first byte and all up to the next header.
@@ -117,16 +141,72 @@ impl StatusReceiver {
     }
 }
 
-fn scan(held: &[u8]) -> ScanResult {
-    let wrong = |at: usize, value: u8| held.get(at).is_some_and(|byte| *byte != value);
-    if wrong(field::HEADER, HEADER) || wrong(field::TYPE, FrameType::JtcStatus as u8) {
-        return ScanResult::Nothing;
+fn parse(bytes: &[u8]) -> Option<FromDevice<'_>> {
+    let frame = FrameRef::new_checked(bytes)?;
+    match frame.frame_type {
+        FrameType::JtcStatus => Status::parse(bytes).map(FromDevice::Status),
+        _ => Answer::parse(frame).map(FromDevice::Answer),
     }
+}
+
+fn scan(held: &[u8]) -> ScanResult {
+    let Some((&header, rest)) = held.split_first() else { return ScanResult::Needs(field::LENGTH.end) };
+    let kind = match rest.first() {
+        _ if header != HEADER => return ScanResult::Nothing,
+        None => return ScanResult::Needs(field::LENGTH.end),
+        Some(&kind) => FrameType::from_byte(kind).filter(|kind| !kind.from_host()),
+    };
+    let Some(kind) = kind else { return ScanResult::Nothing };
     match held.get(field::LENGTH) {
         None => ScanResult::Needs(field::LENGTH.end),
         Some(n) => match usize::from(u16::from_be_bytes([n[0], n[1]])) {
-            n if FrameType::JtcStatus.can_have(n) => ScanResult::Needs(n),
+            // No such frame is longer than the buffer.
+            n if kind.can_have(n) => ScanResult::Needs(n.min(ANSWER_MAX)),
             _ => ScanResult::Nothing,
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn j50_statuses_are_found_among_what_requests_return() {
+        let mut out = [0; ANSWER_MAX];
+        let arm = Answer::Arm { offset: 7, total: 1900, bytes: &[0x9B; 246] };
+        let n = arm.emit(&mut out).expect("it fits");
+        assert_eq!(n, ANSWER_MAX);
+        let status = Status { gripper: Some(Default::default()), ..Status::default() };
+        let stream =
+            [&[0x9B, 0x50][..], &out, &status.emit(), &[0x9B; 3], &out, &out, &status.emit()].concat();
+        for piece in [1, 2, 3, 7, 255, 256, 1000] {
+            let (mut receiver, mut kinds, mut statuses) = (StatusReceiver::new(), Vec::new(), 0);
+            let mut only_statuses = StatusReceiver::new();
+            for mut bytes in stream.chunks(piece) {
+                let mut again = bytes;
+                while let Some(frame) = receiver.next_frame(&mut bytes) {
+                    match frame {
+                        FromDevice::Status(found) => {
+                            assert_eq!(found, status);
+                            kinds.push('s');
+                        }
+                        FromDevice::Answer(found) => {
+                            assert_eq!(found, arm);
+                            kinds.push('a');
+                        }
+                    }
+                }
+                while only_statuses.next(&mut again).is_some() {
+                    statuses += 1;
+                }
+            }
+            assert_eq!((kinds, statuses), (['a', 's', 'a', 'a', 's'].to_vec(), 2), "pieces of {piece}");
+            assert_eq!(
+                (receiver.counters().frames, receiver.counters().skipped_bytes, receiver.held()),
+                (2, 5, 0)
+            );
+        }
     }
 }

@@ -12,6 +12,7 @@ fn only_frames_of_floats_are_made_of_floats() {
             FrameType::PidParam => &[6 * 5],
             FrameType::ArmModel => &[7 * 6 + 7 * 13],
             FrameType::FrictionPolynomial => &[6 * 4, 6 * 6],
+            FrameType::Jog => &[6],
             _ => &[],
         };
         for count in (0..150).chain(2639..2642) {

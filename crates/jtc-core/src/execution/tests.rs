@@ -55,7 +55,7 @@ fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
     let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
     controller.phase = Phase::Running { leave: Some(TrajectoryState::Pause) };
     controller.braking_ms = Some(ms);
-    (controller.clock, controller.clock.time) = (PathClock::start(), 250.0);
+    (controller.clock, controller.clock.time) = (PathClock::start(1.0), 250.0);
     controller
 }
 

@@ -67,7 +67,7 @@ fn j21_a_clear_of_nodes_alone_leaves_the_controller_its_own_errors() {
     for (jtc, left) in [(true, false), (false, true)] {
         let mut controller = holding();
         controller.errors.raise_device();
-        controller.carry_out(Command::ClearCurrentErrors { jtc, nodes: 0x7F });
+        controller.carry_out(0, Command::ClearCurrentErrors { jtc, nodes: 0x7F });
         assert_eq!(controller.errors.any(), left, "{jtc}");
     }
 }
@@ -77,7 +77,7 @@ fn j23_a_reset_switches_the_pump_off_with_its_gripper_only() {
     for (nodes, pump) in [(0x00, true), (0x3F, true), (0x40, false), (0x7F, false)] {
         let mut controller = holding();
         controller.pump = true;
-        assert!(matches!(controller.carry_out(Command::ResetCanDevices { nodes }), SliceOutcome::Done));
+        assert!(matches!(controller.carry_out(0, Command::ResetCanDevices { nodes }), SliceOutcome::Done));
         assert_eq!(controller.pump, pump, "{nodes:#x}");
     }
 }
@@ -95,7 +95,7 @@ fn j23_a_pump_is_switched_where_there_is_a_gripper_and_never_on_in_error() {
     ] {
         let mut controller = holding();
         (controller.config.gripper, controller.state, controller.pump) = (gripper, state, !pump);
-        let progress = controller.carry_out(Command::GripperControl { pump });
+        let progress = controller.carry_out(0, Command::GripperControl { pump });
         assert_eq!(matches!(progress, SliceOutcome::Done), done, "{gripper} {state:?} {pump}");
         assert_eq!(controller.pump == pump, done, "{gripper} {state:?} {pump}");
     }
@@ -177,7 +177,7 @@ fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
         if known {
             controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         }
-        let outcome = controller.carry_out(Command::ArmModelUseDefault);
+        let outcome = controller.carry_out(0, Command::ArmModelUseDefault);
         assert_eq!(matches!(outcome, SliceOutcome::Done), taken, "{known} {torque_max}");
         let missing = controller.parameters.missing() & missing_parameter::MODEL;
         assert_eq!(missing == 0, taken, "{known} {torque_max}");

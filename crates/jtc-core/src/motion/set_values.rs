@@ -3,6 +3,7 @@ use crate::catch::Catch;
 use crate::config::Config;
 use crate::deceleration::{Deceleration, moves};
 use crate::interpolation::SetPoint;
+use crate::jog::Jog;
 use crate::limits::JointConfig;
 use crate::nodes::Nodes;
 use crate::{DT, JOINTS};
@@ -19,22 +20,43 @@ pub(crate) struct SetValues {
     pub(super) catch: [Catch; JOINTS],
     /// Joints that decelerate to rest.
     pub(super) deceleration: [Option<Deceleration>; JOINTS],
+    /// The arm is jogged (J-58).
+    jog: Option<Jog>,
 }
 
 impl SetValues {
     /// Nothing is held; the set position is the measured one.
     pub fn release(&mut self, nodes: &Nodes) {
-        let Self { point, holding, catch, deceleration } = self;
+        let Self { point, holding, catch, deceleration, jog } = self;
         *point = SetPoint::still(*nodes.positions());
         *holding = [false; JOINTS];
         *catch = [Catch::default(); JOINTS];
         *deceleration = [None; JOINTS];
+        *jog = None;
     }
 
     /// Whatever comes next begins at rest at `position`.
     pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
         self.deceleration = [None; JOINTS];
+        self.jog = None;
+    }
+
+    /// Joint velocities to move at from now on, rad/s.
+    pub fn jog(&mut self, wanted: &[f64; JOINTS]) {
+        self.jog.get_or_insert_default().command(wanted);
+    }
+
+    /// What is jogged comes to rest.
+    pub fn end_jog(&mut self) {
+        if let Some(jog) = &mut self.jog {
+            jog.end();
+        }
+    }
+
+    /// The arm is jogged, or has not come to rest since.
+    pub fn jogging(&self) -> bool {
+        self.jog.is_some()
     }
 
     /// Begin to hold where the arm is, coming to rest first if it moves.
@@ -70,7 +92,8 @@ impl SetValues {
 
     /// Every joint is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
-        self.deceleration.iter().all(Option::is_none)
+        self.jog.is_none()
+            && self.deceleration.iter().all(Option::is_none)
             && self.holding.iter().all(|&h| h)
             && !self.catch.iter().any(Catch::busy)
     }
@@ -106,6 +129,13 @@ impl SetValues {
     /// A tick of HoldPos: the held position.
     pub fn hold(&mut self, config: &Config) {
         (self.point.velocity, self.point.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
+        if let Some(jog) = &mut self.jog {
+            (self.point.velocity, self.point.acceleration) = jog.step(&mut self.point.position, config);
+            if jog.rests() {
+                self.jog = None;
+            }
+            return;
+        }
         for j in 0..JOINTS {
             let Some(deceleration) = &mut self.deceleration[j] else { continue };
             let (position, velocity, rests) = deceleration.step(&config.joints[j]);

@@ -16,7 +16,7 @@ fn tick(clock: &mut PathClock, easy: f64, full: f64) {
 
 /// Ticks from full speed to standstill, in each of which the bounds are those of `bounds`.
 fn stop(mut bounds: impl FnMut(u32, &PathClock) -> SlopeBounds) -> u32 {
-    let mut clock = PathClock::start();
+    let mut clock = PathClock::start(1.0);
     clock.halt();
     for ms in 1..=2_000 {
         clock.advance(1e9);
@@ -31,7 +31,7 @@ fn stop(mut bounds: impl FnMut(u32, &PathClock) -> SlopeBounds) -> u32 {
 
 #[test]
 fn j33_full_speed_counts_whole_milliseconds() {
-    let mut clock = PathClock::start();
+    let mut clock = PathClock::start(1.0);
     for k in 1..100_000 {
         tick(&mut clock, f64::INFINITY, f64::INFINITY);
         assert_eq!(clock.time, f64::from(k));
@@ -43,7 +43,7 @@ fn j33_a_ramp_takes_its_length() {
     let ticks = stop(|_, _| SlopeBounds { easy: FREE, full: FREE });
     assert!((195..=206).contains(&ticks), "{ticks}");
     let mut clock = PathClock::default();
-    clock.go();
+    clock.go(1.0);
     let mut ticks = 0;
     while clock.ramping() && ticks < 1_000 {
         tick(&mut clock, f64::INFINITY, f64::INFINITY);
@@ -92,7 +92,7 @@ fn j33_a_stop_uses_all_the_torque_but_no_more() {
 
 #[test]
 fn j33_time_for_a_stop_runs_from_the_first_one() {
-    let mut clock = PathClock::start();
+    let mut clock = PathClock::start(1.0);
     for ms in 0..480 {
         // Asked for again and again.
         clock.halt();
@@ -138,7 +138,7 @@ fn j33_each_tick_of_a_stop() {
 /// Ramps are shortened to what a stop leaves them.
 #[test]
 fn j33_a_stop_sooner_than_the_ramp_shortens_the_ramp() {
-    let mut clock = PathClock::start();
+    let mut clock = PathClock::start(1.0);
     clock.halt();
     let free = SlopeBounds { easy: FREE, full: FREE };
     clock.slow_down(1_000.0, 500.0, &free);
@@ -155,7 +155,7 @@ proptest! {
         easy in 0.5..20.0f64,
         full in 6.0..40.0f64,
     ) {
-        let mut clock = PathClock::start();
+        let mut clock = PathClock::start(1.0);
         for ticks in pauses {
             for ms in 0..ticks + 480 {
                 let before = clock;
@@ -172,7 +172,7 @@ proptest! {
                 if ms < ticks { prop_assert!(change >= 0.0) }
             }
             prop_assert!(clock.standing(), "{:?}", clock);
-            clock.go();
+            clock.go(1.0);
         }
     }
 }
@@ -243,7 +243,7 @@ fn j33_a_clock_stands_halts_or_goes() {
     let mut clock = PathClock::default();
     let states = |clock: &PathClock| (clock.standing(), clock.halting(), clock.ramping());
     assert_eq!(states(&clock), (true, false, false));
-    clock.go();
+    clock.go(1.0);
     assert_eq!(states(&clock), (false, false, true), "about to go");
     tick(&mut clock, FREE.1, FREE.1);
     assert_eq!(states(&clock), (false, false, true));
@@ -251,7 +251,7 @@ fn j33_a_clock_stands_halts_or_goes() {
     assert_eq!(states(&clock), (false, true, true));
     clock.rest();
     assert_eq!(states(&clock), (true, false, false));
-    assert_eq!(states(&PathClock::start()), (false, false, false));
+    assert_eq!(states(&PathClock::start(1.0)), (false, false, false));
 }
 
 #[test]
@@ -262,5 +262,71 @@ fn j33_a_rate_below_a_billionth_is_standstill() {
         // The limits leave no slope for it.
         clock.slow_down(200.0, 500.0, &SlopeBounds { easy: (0.0, 0.0), full: (0.0, 0.0) });
         assert_eq!(clock.standing(), stands, "{clock:?}");
+    }
+}
+
+proptest! {
+    /// Whatever speeds are set and when: path time gets there by itself, never turns, never jumps, and is not faster than was wanted.
+    #[test]
+    fn j57_path_time_gets_to_every_speed_along_the_ramp(
+        start in 0.05..1.0f64,
+        changes in prop::collection::vec((0.05..1.0f64, 1u32..400), 1..8),
+    ) {
+        let mut clock = PathClock::start(start);
+        let mut steepest = 0.0f64;
+        for (pace, ticks) in changes {
+            let (from, turned) = (clock.rate, clock.slope);
+            prop_assert!(clock.set_pace(pace) || clock.target == pace);
+            for ms in 0..ticks {
+                let before = clock;
+                clock.advance(1e9);
+                if clock.slowing() {
+                    clock.ease_off(200.0, FREE);
+                } else if clock.ramping() {
+                    clock.speed_up(200.0, FREE);
+                }
+                steepest = steepest.max((clock.rate - before.rate).abs() / DT);
+                prop_assert!(clock.rate >= pace.min(from) - 1e-12 && clock.rate <= pace.max(from) + 1e-12);
+                prop_assert!((clock.rate - before.rate) * (pace - from) >= 0.0, "it turns at {ms} ms, slope {turned}");
+                prop_assert!(clock.time > before.time);
+                prop_assert!(ms < 220 || clock.rate == pace, "{ms} ms: {clock:?}");
+            }
+        }
+        // The middle of an S of 200 ms.
+        prop_assert!(steepest <= 1.5 / 0.2 + 1e-9, "{steepest}");
+    }
+}
+
+/// A pause is a pause, whatever speed is wanted meanwhile; it takes no longer from a lower one.
+#[test]
+fn j57_a_speed_that_is_set_does_not_undo_a_pause() {
+    let mut clock = PathClock::start(0.5);
+    clock.halt();
+    assert!(!clock.set_pace(1.0));
+    let mut ticks = 0;
+    while !clock.standing() {
+        assert!(clock.halting() && !clock.slowing());
+        tick(&mut clock, f64::INFINITY, f64::INFINITY);
+        ticks += 1;
+        assert!(ticks < 206);
+    }
+    assert!(!clock.set_pace(0.3) && clock.standing());
+    clock.go(0.3);
+    while clock.ramping() {
+        tick(&mut clock, f64::INFINITY, f64::INFINITY);
+    }
+    assert_eq!(clock.rate, 0.3);
+}
+
+#[test]
+fn j57_the_speed_keeps_to_what_the_arm_can_follow() {
+    for bounds in [(-0.5, 0.5), (-0.1, 2.0), (0.3, 1.0), (1.0, -1.0)] {
+        let mut clock = PathClock::start(1.0);
+        clock.set_pace(0.2);
+        for _ in 0..100 {
+            clock.advance(1e9);
+            clock.ease_off(200.0, bounds);
+            assert!(clock.slope <= 0.0 && clock.slope >= bounds.0.min(0.0) - 1e-12, "{bounds:?}: {clock:?}");
+        }
     }
 }

@@ -47,6 +47,8 @@ pub struct Rig {
     /// Stop and Pause that arrive before the next tick.
     urgent: [UrgentCommands; HOST_LINES],
     host: std::collections::VecDeque<Sent>,
+    /// Tick in which the hosts last asked for an extension: they are told each data status (J-51).
+    known: Option<u64>,
 }
 
 /// What a host has sent, not done yet.
@@ -75,8 +77,15 @@ impl Sent {
 
 impl Rig {
     pub fn new(config: Config) -> Self {
-        let last =
-            Outputs { bus: None, safety_output: false, status: false, record_line: None, host_done: 0 };
+        let last = Outputs {
+            bus: None,
+            safety_output: false,
+            status: false,
+            record_line: None,
+            answer_line: None,
+            store: false,
+            host_done: 0,
+        };
         Self {
             controller: Controller::new(config, vec![RawPoint::default(); POINTS_MAX]),
             nodes: [Node::new(); 7],
@@ -96,6 +105,7 @@ impl Rig {
             status_free: true,
             urgent: [UrgentCommands::NONE; HOST_LINES],
             host: std::collections::VecDeque::new(),
+            known: None,
         }
     }
 
@@ -125,9 +135,18 @@ impl Rig {
 
     pub fn defaults(&mut self) {
         use FrameType::*;
+        self.introduce();
         for t in [FrictionPolynomialUseDefault, PidParamUseDefault, ArmModelUseDefault] {
             self.send(t, &[]);
         }
+    }
+
+    /// Both hosts ask for an extension.
+    pub fn introduce(&mut self) {
+        for line in 0..HOST_LINES {
+            self.send_on(line, FrameType::GetSettings, &[0, 0]);
+        }
+        self.known = Some(self.controller.telemetry().tick);
     }
 
     pub fn state(&self) -> ControllerState {
@@ -183,13 +202,16 @@ impl Rig {
         self.host.len()
     }
 
-    /// Records that came, oldest first.
+    /// Records that came, oldest first, but for those of extensions.
     pub fn records(&self) -> Vec<Response> {
-        self.statuses.iter().filter_map(Status::response).collect()
+        self.statuses.iter().filter_map(Status::response).filter(|record| record.frame_type < 0x40).collect()
     }
 
     /// Sends, runs until it is done, and returns how its data were taken.
     pub fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
+        if self.known.is_none_or(|tick| self.controller.telemetry().tick > tick + 9_000) {
+            self.introduce();
+        }
         self.send(frame_type, body);
         for _ in 0..1000 {
             self.tick();

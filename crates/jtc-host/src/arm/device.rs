@@ -41,7 +41,7 @@ impl std::fmt::Display for Difference {
 /// Key, unit and value of each setting of a joint.
 type Setting = (&'static str, &'static str, fn(&JointConfig) -> f64);
 
-const JOINT_SETTINGS: [Setting; 7] = [
+const JOINT_SETTINGS: [Setting; 8] = [
     ("position_min_rad", "rad", |j| j.position_min),
     ("position_max_rad", "rad", |j| j.position_max),
     ("velocity_max_rad_s", "rad/s", |j| j.velocity_max),
@@ -49,6 +49,7 @@ const JOINT_SETTINGS: [Setting; 7] = [
     ("torque_max_nm", "N·m", |j| j.torque_max),
     ("position_error_max_rad", "rad", |j| j.position_error_max),
     (ROTOR, "kg·m²", |j| j.rotor_inertia),
+    ("torque_gain", "", |j| j.torque_gain),
 ];
 
 /// The setting that a URDF has no place for.
@@ -108,6 +109,7 @@ impl Arm {
                 torque_max: own.torque_max.min(device.torque_max),
                 position_error_max: own.position_error_max.min(device.position_error_max),
                 rotor_inertia: device.rotor_inertia,
+                torque_gain: device.torque_gain,
             };
         }
         config

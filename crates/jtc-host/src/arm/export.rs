@@ -53,6 +53,9 @@ impl Arm {
                     let _ = writeln!(out, "{key} = {value:?}");
                 }
             }
+            if limit.torque_gain != 1.0 {
+                let _ = writeln!(out, "torque_gain = {:?}", limit.torque_gain);
+            }
             if let Some(g) = self.pid.map(|p| p[i]) {
                 let _ = writeln!(
                     out,

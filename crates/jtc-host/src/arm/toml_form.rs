@@ -1,5 +1,6 @@
 //! The TOML form of an arm.
 
+use jtc_core::settings::{self, Setting};
 use jtc_core::{JOINTS, JointConfig, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
 use serde::{Deserialize, Serialize};
@@ -42,6 +43,8 @@ struct JointForm {
     torque_max_nm: Option<f64>,
     position_error_max_rad: Option<f64>,
     rotor_inertia_kg_m2: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torque_gain: Option<f64>,
     pid: Option<PidForm>,
     friction_polynomial: Option<Vec<f64>>,
 }
@@ -127,6 +130,7 @@ impl Arm {
             torque_max: 0.0,
             position_error_max: 0.0,
             rotor_inertia: 0.0,
+            torque_gain: 1.0,
         }; JOINTS];
         for (limit, joint) in limits.iter_mut().zip(joints) {
             *limit = joint.limits(&mut warnings)?;
@@ -194,6 +198,7 @@ impl JointForm {
             torque_max: need("torque_max_nm", self.torque_max_nm)?,
             position_error_max: or("position_error_max_rad", self.position_error_max_rad, 0.09),
             rotor_inertia: self.rotor_inertia_kg_m2.unwrap_or(0.0),
+            torque_gain: self.torque_gain.unwrap_or(1.0),
         };
         let positive = [
             ("velocity_max_rad_s", config.velocity_max),
@@ -223,6 +228,12 @@ impl JointForm {
                 place("rotor_inertia_kg_m2"),
                 format!("{v} is negative or not finite"),
             ));
+        }
+        if let Some(Setting { low, high, .. }) = settings::named("torque_gain")
+            && !(*low..=*high).contains(&config.torque_gain)
+        {
+            let problem = format!("{} is outside {low}..{high}", config.torque_gain);
+            return Err(FileError::at(place("torque_gain"), problem));
         }
         Ok(config)
     }

@@ -72,6 +72,11 @@ impl World {
         self.board.telemetry()
     }
 
+    /// The image of the arm that the controller's board has stored, and its number (J-54).
+    pub fn stored_arm(&self) -> Option<(&[u8], u32)> {
+        self.board.stored_arm()
+    }
+
     /// How the arm really is.
     pub fn truth(&self) -> &Truth {
         self.plant.truth()

@@ -1,7 +1,7 @@
 //! A second stream parser: slow, with the whole stream at hand, made to be seen to be right.
 use std::vec::Vec;
 
-use crate::{FrameRef, FrameStatus, FrameType, Response};
+use crate::{FrameRef, FrameStatus, Response};
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,7 +65,8 @@ fn of_region(region: &[u8], capacity: usize) -> Vec<(usize, Event)> {
 fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     let n = usize::from(u16::from_be_bytes([*bytes.get(2)?, *bytes.get(3)?]));
     let frame = FrameRef::new_checked(bytes.get(..n)?)?;
-    (frame.frame_type != FrameType::JtcStatus && n <= capacity).then_some(n)
+    let of_device = matches!(frame.frame_type as u8, 3 | 0x50..);
+    (!of_device && n <= capacity).then_some(n)
 }
 
 /// What is wrong with bytes that begin no good frame and end in a gap.
@@ -77,7 +78,8 @@ fn judge(bytes: &[u8], capacity: usize) -> Response {
     if bytes.len() == 1 {
         return record(0, FrameStatus::DiscontinuousFrame, 1);
     }
-    if bytes[1] == 0 || bytes[1] == 3 || bytes[1] > 0x11 {
+    let known = matches!(bytes[1], 1 | 2 | 4..=0x11 | 0x40..=0x47);
+    if !known {
         return record(bytes[1], FrameStatus::IncorrectFrameType, 0);
     }
     if bytes.len() < 4 {
@@ -96,6 +98,10 @@ fn judge(bytes: &[u8], capacity: usize) -> Response {
         0x0B => n == 7,
         0x0E => n == 6 || n == 102 || n == 150,
         0x10 | 0x11 => n == 10,
+        0x41 | 0x44 => n == 8,
+        0x42 => n >= 16 && n <= 2566 && (n - 6) % 10 == 0,
+        0x43 => n == 38,
+        0x47 => n == 30,
         _ => n == 6,
     };
     match () {

@@ -3,7 +3,7 @@ use std::format;
 use std::vec::Vec;
 
 use super::sealed;
-use crate::{FrameRef, FrameType, Status, StatusReceiver};
+use crate::{Answer, FrameRef, FrameType, Status, StatusReceiver};
 
 /// The statuses of a whole stream, each at the first place where one begins, and the bytes between them.
 fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
@@ -13,7 +13,12 @@ fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
             let frame = FrameRef::new_checked(stream.get(at..at + n)?)?;
             (frame.frame_type == FrameType::JtcStatus).then(|| Status::parse(frame.bytes))?
         });
+        let returned = || {
+            let n = usize::from(u16::from_be_bytes([*stream.get(at + 2)?, *stream.get(at + 3)?]));
+            Answer::parse(FrameRef::new_checked(stream.get(at..at + n)?)?).map(|_| n)
+        };
         match status {
+            None if let Some(n) = returned() => at += n,
             Some(status) => {
                 at += usize::from(u16::from_be_bytes([stream[at + 2], stream[at + 3]]));
                 found.push(status);
@@ -49,11 +54,12 @@ pub fn status_stream(data: &[u8]) {
                 stream.extend(broken);
             }
             5 => stream.extend(&status(175)[..n * 5]),
+            7 if n > 3 => stream.extend(sealed(FrameType::Arm as u8, bytes)),
             _ => stream.extend(bytes),
         }
     }
     // So that a candidate at the end is decided.
-    stream.extend([0; 175]);
+    stream.extend([0; 256]);
 
     let mut receiver = StatusReceiver::new();
     let mut found = Vec::new();

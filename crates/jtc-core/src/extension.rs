@@ -1,0 +1,337 @@
+//! The extensions of the protocol (J-50 to J-59): who the device is, its settings, the arm as one thing, jogging.
+mod answers;
+mod image;
+
+use jtc_wire::{
+    Answer, ArmImage, BootCause, Command, DataStatus, Floats, FrictionImage, Hash, Info, Name, PAGE_BYTES,
+    PAGE_VALUES, RawPoint, SettingValue, StoreState, VALUE_LEN, Values, capability,
+};
+
+use crate::controller::Controller;
+use crate::defaults;
+use crate::host::slices::{SliceOutcome, SliceProgress};
+use crate::received::ReceivedParameters;
+use crate::settings::{self, Live};
+use crate::{Config, ControllerState, JOINTS, TrajectoryState};
+use answers::Answers;
+use image::{ImageSource, StoredArm};
+
+/// Bytes of an arm image that are hashed or written in one tick.
+const IMAGE_PER_TICK: usize = 256;
+
+/// Who the device is, as its board knows it (J-52).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Identity {
+    /// The board.
+    pub board: &'static str,
+    /// Version of the firmware.
+    pub firmware: &'static str,
+    /// Its git revision.
+    pub revision: &'static str,
+    /// How often it has started.
+    pub boots: u32,
+    /// Why it started last.
+    pub boot_cause: BootCause,
+}
+
+/// What the controller remembers for the extensions.
+#[derive(Clone, Debug)]
+pub(crate) struct Extensions {
+    pub answers: Answers,
+    pub stored: StoredArm,
+    /// The stored arm is to be written to the memory that lasts.
+    pub store_requested: bool,
+    /// Of the arm in use; `None` when it has to be computed anew.
+    pub hash: Option<u64>,
+    /// Ticks since a host was heard.
+    pub hosts_silent_ms: u32,
+    identity: Identity,
+    name: Name,
+    store: StoreState,
+    sequence: u32,
+}
+
+impl Extensions {
+    pub fn new() -> Self {
+        Self {
+            answers: Answers::new(),
+            stored: StoredArm::new(),
+            store_requested: false,
+            hash: None,
+            hosts_silent_ms: 0,
+            identity: Identity::default(),
+            name: Name::cut(defaults::NAME),
+            store: StoreState::Absent,
+            sequence: 0,
+        }
+    }
+}
+
+impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
+    /// Tells the controller who it is. For the board to call before the first tick.
+    pub fn set_identity(&mut self, identity: Identity) {
+        self.extensions.identity = identity;
+    }
+
+    /// The arm that was stored (J-54): its settings and its name are in use from now on, and the UseDefault frames mean it; the
+    /// parameters stay missing. For the board to call before the first tick. False, and nothing is changed, when it is no arm that
+    /// this controller takes.
+    pub fn load_arm(&mut self, image: &[u8]) -> bool {
+        let Some(arm) = ArmImage::parse(image) else { return false };
+        let Ok(config) = settings::with_values(&self.config, arm.settings.iter()) else { return false };
+        if !takes(&arm, &config) {
+            return false;
+        }
+        self.extensions.stored.set(image);
+        self.extensions.name = arm.name;
+        self.use_settings(config);
+        true
+    }
+
+    /// The image of the stored arm, for the board to write when [`crate::Outputs::store`] says so; empty where there is none.
+    pub fn stored_arm(&self) -> &[u8] {
+        self.extensions.stored.bytes()
+    }
+
+    /// What has become of the stored arm, and its number: for the board to call when that changes.
+    pub fn set_store_state(&mut self, state: StoreState, sequence: u32) {
+        (self.extensions.store, self.extensions.sequence) = (state, sequence);
+    }
+
+    /// What an extension request returns, to be sent when the outputs of the last tick had [`crate::Outputs::answer_line`] set.
+    pub fn answer_frame(&self) -> &[u8] {
+        self.extensions.answers.frame()
+    }
+
+    /// One of the extension requests.
+    pub(crate) fn carry_out_extension(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
+        match command {
+            Command::GetInfo => self.get_info(line),
+            Command::GetSettings { first } => {
+                self.get_settings(line, first);
+                SliceOutcome::Done
+            }
+            Command::SetSettings(values) => self.set_settings(values).into(),
+            Command::SetName(name) if self.settable() => {
+                self.extensions.name = name;
+                SliceOutcome::Done
+            }
+            Command::GetArm { offset } => {
+                self.get_arm(line, offset);
+                SliceOutcome::Done
+            }
+            Command::StoreArm => self.store_arm(),
+            Command::Disable if self.state == ControllerState::HoldPos && self.motion.set.all_holding() => {
+                // J-53: with its parameters missing the controller goes to Init, without torque.
+                self.parameters.withdraw_all();
+                SliceOutcome::Done
+            }
+            Command::Jog(velocities) => self.jog(&velocities).into(),
+            _ => SliceOutcome::Refused(DataStatus::NotAllowed),
+        }
+    }
+
+    /// J-58: joint velocities in HoldPos, and neither beside a path that is paused nor during an upload.
+    fn jog(&mut self, velocities: &Floats<'_>) -> Result<(), DataStatus> {
+        let set = &self.motion.set;
+        let free = self.state == ControllerState::HoldPos
+            && !self.teaching
+            && self.trajectory != TrajectoryState::Pause
+            && self.trajectory != TrajectoryState::Execute
+            && !self.store.receiving()
+            && (set.jogging() || set.all_holding());
+        if !free {
+            return Err(DataStatus::NotAllowed);
+        }
+        let mut wanted = [0.0; JOINTS];
+        for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
+            let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
+            // Written so that NaN is refused.
+            if !(velocity.abs() <= joint.velocity_max) {
+                return Err(DataStatus::IncorrectValue);
+            }
+            *wanted = velocity;
+        }
+        if !set.jogging() {
+            if self.motion.law.yielding() {
+                // It is held somewhere else than it was commanded; it begins where it is.
+                self.motion.begin_at(self.nodes.positions());
+                self.motion.law.stand_firm();
+            }
+            self.motion.law.change_mode();
+        }
+        self.motion.set.jog(&wanted);
+        Ok(())
+    }
+
+    /// J-53: what belongs to the arm changes only while there is no torque.
+    fn settable(&self) -> bool {
+        matches!(self.state, ControllerState::Init | ControllerState::Error)
+    }
+
+    fn image(&self) -> ImageSource<'_> {
+        ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
+    }
+
+    fn get_info(&mut self, line: usize) -> SliceOutcome {
+        let hash = match self.extensions.hash {
+            Some(hash) => hash,
+            None => {
+                let (offset, hash) = match self.slice_progress {
+                    SliceProgress::Hash(offset, hash) => (offset, hash),
+                    _ => (0, Hash::new()),
+                };
+                let (offset, hash) = self.image().hash(offset, hash, IMAGE_PER_TICK);
+                if !self.image().hashed(offset) {
+                    return SliceOutcome::Unfinished(SliceProgress::Hash(offset, hash));
+                }
+                self.extensions.hash = Some(hash.value());
+                hash.value()
+            }
+        };
+        let info = self.info(hash);
+        self.extensions.answers.put(line, &Answer::Info(info));
+        SliceOutcome::Done
+    }
+
+    fn info(&self, hash: u64) -> Info {
+        let Extensions { identity, name, store, sequence, .. } = &self.extensions;
+        let mut capabilities = capability::SETTINGS | capability::SPEED | capability::JOG;
+        if *store != StoreState::Absent {
+            capabilities |= capability::STORE;
+        }
+        Info {
+            missing: self.parameters.missing(),
+            nodes_missing: self.nodes.init_word(&self.config),
+            boot_cause: identity.boot_cause,
+            boots: identity.boots,
+            uptime_ms: self.telemetry.tick,
+            lost_records: self.records.lost(),
+            hash,
+            capabilities,
+            defaults_stored: self.extensions.stored.is_there(),
+            store: *store,
+            sequence: *sequence,
+            arm: *name,
+            board: Name::cut(identity.board),
+            ..Info::default()
+        }
+        .with_firmware(identity.firmware, identity.revision)
+    }
+
+    fn get_settings(&mut self, line: usize, first: u16) {
+        let mut bytes = [[0; VALUE_LEN]; PAGE_VALUES];
+        let mut count = 0;
+        for (slot, value) in bytes.iter_mut().zip(settings::values(&self.config, first.into(), false)) {
+            *slot = value.emit();
+            count += 1;
+        }
+        let page = bytes.get(..count).unwrap_or(&[]);
+        if let Some(values) = Values::parse(page.as_flattened()) {
+            let total = settings::count(false) as u16;
+            self.extensions.answers.put(line, &Answer::Settings { first, total, values });
+        }
+    }
+
+    fn get_arm(&mut self, line: usize, offset: u16) {
+        let mut bytes = [0; PAGE_BYTES];
+        let (read, total) = (self.image().read(offset.into(), &mut bytes), self.image().len() as u16);
+        let bytes = bytes.get(..read).unwrap_or(&[]);
+        self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
+    }
+
+    /// All values or none (J-53).
+    fn set_settings(&mut self, values: Values<'_>) -> Result<(), DataStatus> {
+        let live = |value: SettingValue| {
+            settings::setting(value.setting).is_some_and(|setting| setting.live == Live::Always)
+        };
+        let all_live = values.iter().all(live);
+        if !all_live && !self.settable() {
+            return Err(DataStatus::NotAllowed);
+        }
+        let config =
+            settings::with_values(&self.config, values.iter()).map_err(|_| DataStatus::IncorrectValue)?;
+        if all_live {
+            self.set_speed(config.speed);
+            return Ok(());
+        }
+        if !self.parameters.fits(&config) {
+            return Err(DataStatus::IncorrectValue);
+        }
+        self.use_settings(config);
+        Ok(())
+    }
+
+    /// From now on these settings count, in a state without torque.
+    fn use_settings(&mut self, config: Config) {
+        self.nodes.use_settings(&config, &self.config);
+        self.config = config;
+        self.parameters.set_gravity(&self.config);
+        self.extensions.hash = None;
+    }
+
+    /// J-54: first the arm in use becomes the one that the UseDefault frames mean, then the board writes it.
+    fn store_arm(&mut self) -> SliceOutcome {
+        let offset = match self.slice_progress {
+            SliceProgress::Image(offset) => offset,
+            _ if !self.settable()
+                || self.parameters.missing() != 0
+                || matches!(self.extensions.store, StoreState::Absent | StoreState::Busy) =>
+            {
+                return SliceOutcome::Refused(DataStatus::NotAllowed);
+            }
+            _ => 0,
+        };
+        let Self { extensions, config, parameters, .. } = self;
+        let source = ImageSource { config, parameters, name: &extensions.name };
+        let next = extensions.stored.write(&source, offset, IMAGE_PER_TICK);
+        if next < source.len() && next > offset {
+            return SliceOutcome::Unfinished(SliceProgress::Image(next));
+        }
+        extensions.stored.finish(source.len());
+        extensions.store = StoreState::Busy;
+        extensions.store_requested = true;
+        SliceOutcome::Done
+    }
+
+    /// J-59: hosts that say nothing for too long; path time comes to rest, teaching ends. `done`: host events of this tick.
+    pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
+        self.extensions.answers.tick();
+        let heard = inputs.urgent.iter().any(|commands| !commands.is_empty())
+            || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));
+        let silent = &mut self.extensions.hosts_silent_ms;
+        *silent = if heard { 0 } else { silent.saturating_add(1) };
+        let limit = u32::from(self.config.host_timeout_ms);
+        if limit == 0 || *silent < limit {
+            return;
+        }
+        self.teaching = false;
+        self.motion.set.end_jog();
+        if self.trajectory == TrajectoryState::Execute && self.phase.leave().is_none() {
+            self.leave_path(jtc_wire::ExecCommand::Pause);
+        }
+    }
+}
+
+/// Whether gains, model and friction of an arm are such as these settings take.
+fn takes(arm: &ArmImage<'_>, config: &Config) -> bool {
+    let mut trial = ReceivedParameters::new(config);
+    let friction = match arm.friction {
+        FrictionImage::Polynomial(floats) => trial.take_polynomial(&floats, config).is_ok(),
+        FrictionImage::Table(floats) => {
+            let mut progress = SliceProgress::Begin;
+            // Twelve slices are all of it.
+            (0..16).any(|_| match trial.take_table(&floats, progress, config) {
+                SliceOutcome::Unfinished(next) => {
+                    progress = next;
+                    false
+                }
+                outcome => matches!(outcome, SliceOutcome::Done),
+            })
+        }
+    };
+    friction && trial.take_pid(&arm.pid, config).is_ok() && trial.take_model(&arm.model, None, config).is_ok()
+}
+
+#[cfg(test)]
+mod tests;

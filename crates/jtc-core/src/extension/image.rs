@@ -1,0 +1,162 @@
+//! The arm in use as an image: one arm as one thing, for reading it back, hashing and storing it (J-52, J-54).
+use jtc_wire::field::image as field;
+use jtc_wire::{ArmImage, Hash, IMAGE_MAX, NAME_LEN, Name, VALUE_LEN};
+
+use crate::config::Config;
+use crate::received::ReceivedParameters;
+use crate::settings;
+
+/// What an image is made of.
+pub(crate) struct ImageSource<'a> {
+    pub config: &'a Config,
+    pub parameters: &'a ReceivedParameters,
+    pub name: &'a Name,
+}
+
+impl ImageSource<'_> {
+    /// Where the settings begin.
+    fn settings(&self) -> usize {
+        let table = self.parameters.friction_is_table;
+        field::FRICTION + if table { field::TABLE_LEN } else { field::POLYNOMIAL_LEN }
+    }
+
+    /// Where the name begins: what is in front of it decides how the arm moves.
+    fn name(&self) -> usize {
+        self.settings() + VALUE_LEN * settings::count(true)
+    }
+
+    /// Bytes of the image.
+    pub fn len(&self) -> usize {
+        self.name() + NAME_LEN
+    }
+
+    /// Reads the image from byte `offset` on; returns how many bytes there were.
+    pub fn read(&self, offset: usize, out: &mut [u8]) -> usize {
+        let (settings, name) = (self.settings(), self.name());
+        let mut at = offset;
+        let mut values = settings::values(self.config, at.saturating_sub(settings) / VALUE_LEN, true);
+        let mut put = Output { out, filled: 0 };
+        while put.wants_more() && at < name {
+            at += if at < field::PID.start {
+                put.part(&self.head(), at)
+            } else if at < settings {
+                let first = at - field::PID.start;
+                put.part(&self.float(first / 4).to_be_bytes(), first % 4)
+            } else {
+                let Some(value) = values.next() else { break };
+                put.part(&value.emit(), (at - settings) % VALUE_LEN)
+            };
+        }
+        if at >= name {
+            put.part(self.name.as_bytes(), at - name);
+        }
+        put.filled
+    }
+
+    fn head(&self) -> [u8; 8] {
+        let [a, b, c, d] = field::MAGIC;
+        let [high, low] = (settings::count(true) as u16).to_be_bytes();
+        [a, b, c, d, field::VERSION, self.parameters.friction_is_table.into(), high, low]
+    }
+
+    /// Number `i` of gains, model and friction.
+    fn float(&self, i: usize) -> f32 {
+        const MODEL: usize = (field::MODEL.start - field::PID.start) / 4;
+        const FRICTION: usize = (field::FRICTION - field::PID.start) / 4;
+        match i {
+            0..MODEL => self.parameters.pid_float(i) as f32,
+            MODEL..FRICTION => self.parameters.model_float(i - MODEL) as f32,
+            _ => self.parameters.friction_float(i - FRICTION),
+        }
+    }
+
+    /// Hashes up to `count` bytes from `offset` on; `None` when that was all.
+    pub fn hash(&self, offset: usize, hash: Hash, count: usize) -> (usize, Hash) {
+        let mut bytes = [0; 256];
+        let count = count.min(self.name().saturating_sub(offset));
+        let slice = bytes.get_mut(..count).unwrap_or(&mut []);
+        let read = self.read(offset, slice);
+        (offset + read, hash.update(slice.get(..read).unwrap_or(&[])))
+    }
+
+    /// All that counts was hashed.
+    pub fn hashed(&self, offset: usize) -> bool {
+        offset >= self.name()
+    }
+}
+
+/// Bytes that are being written.
+struct Output<'a> {
+    out: &'a mut [u8],
+    filled: usize,
+}
+
+impl Output<'_> {
+    fn wants_more(&self) -> bool {
+        self.filled < self.out.len()
+    }
+
+    /// As much of `bytes` from `from` on as there is room for; returns how much.
+    fn part(&mut self, bytes: &[u8], from: usize) -> usize {
+        let room = self.out.get_mut(self.filled..).unwrap_or(&mut []);
+        let rest = bytes.get(from..).unwrap_or(&[]);
+        let count = room.len().min(rest.len());
+        for (to, byte) in room.iter_mut().zip(rest) {
+            *to = *byte;
+        }
+        self.filled += count;
+        count
+    }
+}
+
+/// The arm that the UseDefault frames mean, where there is one beside that which is built in: an image.
+#[derive(Clone, Debug)]
+pub(crate) struct StoredArm {
+    bytes: [u8; IMAGE_MAX],
+    len: usize,
+}
+
+impl StoredArm {
+    pub const fn new() -> Self {
+        Self { bytes: [0; IMAGE_MAX], len: 0 }
+    }
+
+    /// Its bytes.
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&[])
+    }
+
+    /// Its parts.
+    pub fn arm(&self) -> Option<ArmImage<'_>> {
+        ArmImage::parse(self.bytes())
+    }
+
+    /// There is one.
+    pub fn is_there(&self) -> bool {
+        self.len > 0
+    }
+
+    /// Takes another in its place; one that is too long leaves none.
+    pub fn set(&mut self, image: &[u8]) {
+        self.len = match self.bytes.get_mut(..image.len()) {
+            Some(place) => {
+                place.copy_from_slice(image);
+                image.len()
+            }
+            None => 0,
+        };
+    }
+
+    /// Takes a part of the arm in use; returns where the next part begins. Until all of it is here there is none.
+    pub fn write(&mut self, source: &ImageSource<'_>, offset: usize, count: usize) -> usize {
+        self.len = 0;
+        let end = (offset + count).min(IMAGE_MAX);
+        let read = self.bytes.get_mut(offset..end).map_or(0, |place| source.read(offset, place));
+        offset + read
+    }
+
+    /// All `len` bytes are here.
+    pub fn finish(&mut self, len: usize) {
+        self.len = len.min(IMAGE_MAX);
+    }
+}

@@ -1,0 +1,220 @@
+//! Jogging: commanded joint velocities, the only motion without a trajectory (J-58). Each joint follows its velocity along ramps of
+//! bounded acceleration and jerk, and slows down before the end of its range by itself. Without a new command all come to rest.
+use jtc_dynamics::sqrt;
+
+use crate::config::Config;
+use crate::limits::JointConfig;
+use crate::{DT, JOINTS};
+
+/// Ticks without a new command after which the joints come to rest.
+const LASTS_MS: u16 = 200;
+/// Highest acceleration, as a share of the joint's limit.
+const ACCELERATION: f64 = 0.2;
+/// Time in which the acceleration gets there, s.
+const RISE_S: f64 = 0.1;
+
+/// One joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct JointJog {
+    /// Commanded velocity, rad/s.
+    wanted: f64,
+    /// Of the set values, rad/s and rad/s².
+    velocity: f64,
+    acceleration: f64,
+}
+
+/// All joints, from the first command until they rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Jog {
+    joints: [JointJog; JOINTS],
+    /// Ticks since the last command.
+    silent_ms: u16,
+}
+
+impl Jog {
+    /// New velocities, rad/s.
+    pub fn command(&mut self, wanted: &[f64; JOINTS]) {
+        self.silent_ms = 0;
+        for (joint, wanted) in self.joints.iter_mut().zip(wanted) {
+            joint.wanted = *wanted;
+        }
+    }
+
+    /// The joints come to rest.
+    pub fn end(&mut self) {
+        self.command(&[0.0; JOINTS]);
+    }
+
+    /// Every joint rests, and is to.
+    pub fn rests(&self) -> bool {
+        let rests =
+            |joint: &JointJog| joint.wanted == 0.0 && joint.velocity == 0.0 && joint.acceleration == 0.0;
+        self.joints.iter().all(rests)
+    }
+
+    /// A tick: moves `position` (rad) on; returns velocities (rad/s) and accelerations (rad/s²).
+    pub fn step(&mut self, position: &mut [f64; JOINTS], config: &Config) -> ([f64; JOINTS], [f64; JOINTS]) {
+        self.silent_ms = self.silent_ms.saturating_add(1);
+        if self.silent_ms > LASTS_MS {
+            self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
+        }
+        for (j, (joint, position)) in self.joints.iter_mut().zip(position.iter_mut()).enumerate() {
+            joint.step(position, config.position_range(j), &config.joints[j]);
+        }
+        (self.joints.map(|joint| joint.velocity), self.joints.map(|joint| joint.acceleration))
+    }
+}
+
+impl JointJog {
+    fn step(&mut self, position: &mut f64, (low, high): (f64, f64), limits: &JointConfig) {
+        let most = ACCELERATION * limits.acceleration_max;
+        let wanted = self.wanted.max(-limits.velocity_max).min(limits.velocity_max);
+        // As wanted, as long as the joint could still stop inside its range from there.
+        let onward = self.toward(wanted, most);
+        let way = self.way(&onward) + onward.stopping_way(most);
+        let room = if way < 0.0 { low - *position } else { high - *position };
+        let next = if way.abs() < room.abs() && way * room >= 0.0 { onward } else { self.toward(0.0, most) };
+        // Never out of the range; from outside only back into it.
+        let reached = *position + self.way(&next);
+        let within = reached.max(low.min(*position)).min(high.max(*position));
+        *self = if within == reached { next } else { Self { velocity: 0.0, acceleration: 0.0, ..next } };
+        *position = within;
+    }
+
+    /// What it moves until it is in the state `next` of the next tick, rad.
+    fn way(&self, next: &Self) -> f64 {
+        0.5 * (self.velocity + next.velocity) * DT
+    }
+
+    /// A tick later, on the way to a velocity (rad/s), with at most `most` of acceleration (rad/s²).
+    fn toward(&self, target: f64, most: f64) -> Self {
+        let round = most / RISE_S * DT;
+        let left = target - self.velocity;
+        // The acceleration from which the rest of the way to that velocity just suffices to take it back.
+        let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * DT)) - 0.5);
+        let next =
+            flat.min(most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);
+        let arrives = next.abs() <= 1.5 * round && left.abs() <= (1.5 * round * DT).max(next.abs() * DT);
+        if arrives {
+            Self { velocity: target, acceleration: 0.0, ..*self }
+        } else {
+            Self { velocity: self.velocity + next * DT, acceleration: next, ..*self }
+        }
+    }
+
+    /// The way until it stands, rad, when it stops at once: the acceleration falls to `-most` as steadily as it may, stays there, and
+    /// rises to zero as steadily. A little more, for what the ticks make of it.
+    fn stopping_way(&self, most: f64) -> f64 {
+        let jerk = most / RISE_S;
+        let sign = if self.velocity == 0.0 { self.acceleration } else { self.velocity };
+        let (v, a) = if sign < 0.0 {
+            (-self.velocity, -self.acceleration)
+        } else {
+            (self.velocity, self.acceleration)
+        };
+        // From where its acceleration is zero: still to come while it gets faster, behind it while it brakes.
+        let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
+        let rest = if peak >= most * RISE_S {
+            0.5 * peak * (peak / most + RISE_S)
+        } else {
+            peak * sqrt(peak / jerk)
+        };
+        (1.01 * (rest + past).max(0.0) + 4.0 * v * DT + 1e-6).copysign(sign)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn config() -> Config {
+        Config::avena()
+    }
+
+    proptest! {
+        /// Whatever is commanded and when: within the range, the velocity and acceleration limits and the jerk, and at rest soon
+        /// after the last command.
+        #[test]
+        fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(
+            start in prop::array::uniform6(-1.0..1.0f64),
+            commands in prop::collection::vec((prop::array::uniform6(-1.0..1.0f64), 1u32..400), 1..20),
+        ) {
+            let config = config();
+            let (mut jog, mut position) = (Jog::default(), [0.0; JOINTS]);
+            for j in 0..JOINTS {
+                let (low, high) = config.position_range(j);
+                position[j] = 0.5 * (low + high) + 0.5 * start[j] * (high - low);
+            }
+            let mut last = ([0.0; JOINTS], [0.0; JOINTS]);
+            let mut check = |jog: &mut Jog| {
+                let before = position;
+                let (v, a) = jog.step(&mut position, &config);
+                for j in 0..JOINTS {
+                    let (limits, (low, high)) = (&config.joints[j], config.position_range(j));
+                    let most = ACCELERATION * limits.acceleration_max;
+                    assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
+                    assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
+                    let at_end = position[j] == low || position[j] == high;
+                    // What is left of a velocity at the very end of the range is next to nothing.
+                    let step = (v[j] - last.0[j]).abs();
+                    assert!(step <= most * DT + 1e-9 || (at_end && step < 0.005), "{} {}", v[j], last.0[j]);
+                    assert!((a[j] - last.1[j]).abs() <= 2.0 * most / RISE_S * DT + 1e-9 || v[j] == 0.0 || a[j] == 0.0);
+                    assert!((position[j] - before[j] - 0.5 * (v[j] + last.0[j]) * DT).abs() < 1e-12 || at_end);
+                }
+                last = (v, a);
+            };
+            for (share, ticks) in commands {
+                jog.command(&core::array::from_fn(|j| share[j] * config.joints[j].velocity_max));
+                for _ in 0..ticks {
+                    check(&mut jog);
+                }
+            }
+            for _ in 0..LASTS_MS {
+                check(&mut jog);
+            }
+            let mut ticks = 0;
+            while !jog.rests() {
+                check(&mut jog);
+                ticks += 1;
+                assert!(ticks < 1_200, "{jog:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn j58_a_joint_gets_to_its_velocity_and_to_the_end_of_its_range() {
+        let (config, mut jog, mut position) = (config(), Jog::default(), [0.0; JOINTS]);
+        let wanted = [0.5, -0.25, 1.5, -1.5, 0.01, 0.0];
+        for _ in 0..800 {
+            jog.command(&wanted);
+            jog.step(&mut position, &config);
+        }
+        assert_eq!(jog.joints.map(|joint| joint.velocity), wanted);
+        assert_eq!(position[5], 0.0);
+        for _ in 0..30_000 {
+            jog.command(&[1.0, -1.0, 1.5, -0.1, 0.5, 1.5]);
+            jog.step(&mut position, &config);
+        }
+        for (j, up) in [true, false, true, false, true, true].into_iter().enumerate() {
+            let (low, high) = config.position_range(j);
+            let end = if up { high } else { low };
+            assert!((position[j] - end).abs() < 1e-3, "joint {}: {} of {end}", j + 1, position[j]);
+        }
+    }
+
+    #[test]
+    fn j58_a_joint_outside_its_range_moves_back_only() {
+        let config = config();
+        let (_, high) = config.position_range(0);
+        for (wanted, moves) in [(0.5, false), (-0.5, true)] {
+            let (mut jog, mut position) = (Jog::default(), [high + 0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            for _ in 0..100 {
+                jog.command(&[wanted, 0.0, 0.0, 0.0, 0.0, 0.0]);
+                jog.step(&mut position, &config);
+            }
+            assert_eq!(position[0] < high + 0.1, moves);
+            assert!(position[0] <= high + 0.1);
+        }
+    }
+}

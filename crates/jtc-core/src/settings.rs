@@ -1,0 +1,203 @@
+//! Settings that a host reads and changes (J-53): a table, and how a list of values is applied whole or not at all.
+use jtc_wire::SettingValue;
+
+use crate::JOINTS;
+use crate::config::{Config, ConfigError};
+use crate::limits::JointConfig;
+
+mod table;
+
+pub use table::TABLE;
+
+/// When a setting may be changed beside Init and Error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Live {
+    /// Never. It is part of the arm: stored, and in its hash.
+    No,
+    /// In every state, also while the arm moves. It is no part of the arm.
+    Always,
+}
+
+/// Where a setting is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Place {
+    /// It is one of the arm.
+    Arm { get: fn(&Config) -> f64, set: fn(&mut Config, f64) },
+    /// Each joint has it.
+    Joint { get: fn(&JointConfig) -> f64, set: fn(&mut JointConfig, f64) },
+}
+
+/// A row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
+    /// Number on the wire.
+    pub number: u8,
+    /// Name in arm files, with its unit.
+    pub name: &'static str,
+    /// Unit; empty where it has none.
+    pub unit: &'static str,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+    /// Whole numbers only.
+    pub whole: bool,
+    /// When it may be changed.
+    pub live: Live,
+    /// What it is.
+    pub meaning: &'static str,
+    pub(crate) place: Place,
+}
+
+/// Why a value is not taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SettingError {
+    /// There is no such setting, or not of such a joint.
+    Unknown {
+        /// Number of the setting.
+        setting: u8,
+        /// Joint from 1, 0: none.
+        joint: u8,
+    },
+    /// Outside its range, no number, or no whole one.
+    Value {
+        /// Its row.
+        name: &'static str,
+        /// Joint from 1, 0: none.
+        joint: u8,
+        /// The value.
+        value: f64,
+        /// Lowest.
+        low: f64,
+        /// Highest.
+        high: f64,
+    },
+    /// The settings together are those of no arm.
+    Config(ConfigError),
+}
+
+impl core::fmt::Display for SettingError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Unknown { setting, joint: 0 } => write!(f, "there is no setting {setting} of the arm"),
+            Self::Unknown { setting, joint } => write!(f, "there is no setting {setting} of a joint {joint}"),
+            Self::Value { name, joint, value, low, high } => {
+                if joint > 0 {
+                    write!(f, "joint {joint}, ")?;
+                }
+                write!(f, "{name}: {value} is none of its values, {low} to {high}")
+            }
+            Self::Config(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for SettingError {}
+
+impl Setting {
+    /// Each joint has one.
+    pub const fn of_joint(&self) -> bool {
+        matches!(self.place, Place::Joint { .. })
+    }
+
+    /// It belongs to the arm: it is stored with it, and in its hash.
+    pub const fn of_arm(&self) -> bool {
+        matches!(self.live, Live::No)
+    }
+
+    /// Values that it has: one, or one for each joint.
+    const fn count(&self) -> usize {
+        if self.of_joint() { JOINTS } else { 1 }
+    }
+
+    /// The value in `config`; `joint` from 1, 0 for a setting of the arm. `None` where there is none.
+    pub fn get(&self, config: &Config, joint: u8) -> Option<f64> {
+        match self.place {
+            Place::Arm { get, .. } => (joint == 0).then(|| get(config)),
+            Place::Joint { get, .. } => {
+                usize::from(joint).checked_sub(1).and_then(|j| config.joints.get(j)).map(get)
+            }
+        }
+    }
+
+    /// Its values in `config`, from the one with this index on.
+    fn values_from(&self, config: &Config, first: usize) -> impl Iterator<Item = SettingValue> + use<'_> {
+        let (start, end) = if self.of_joint() { (1, JOINTS as u8) } else { (0, 0) };
+        let values = core::array::from_fn::<f64, JOINTS, _>(|j| {
+            self.get(config, if self.of_joint() { j as u8 + 1 } else { 0 }).unwrap_or(0.0)
+        });
+        (start..=end).zip(values).skip(first).map(|(joint, value)| SettingValue {
+            setting: self.number,
+            joint,
+            value,
+        })
+    }
+
+    /// Changes the value in `config`.
+    fn set(&self, config: &mut Config, joint: u8, value: f64) -> Result<(), SettingError> {
+        // Written so that NaN is refused; the cast is exact for every whole number in a range.
+        let taken = value >= self.low && value <= self.high && (!self.whole || value == value as i32 as f64);
+        if !taken {
+            let Self { name, low, high, .. } = *self;
+            return Err(SettingError::Value { name, joint, value, low, high });
+        }
+        match self.place {
+            Place::Arm { set, .. } if joint == 0 => set(config, value),
+            Place::Joint { set, .. }
+                if let Some(limits) =
+                    usize::from(joint).checked_sub(1).and_then(|j| config.joints.get_mut(j)) =>
+            {
+                set(limits, value);
+            }
+            _ => return Err(SettingError::Unknown { setting: self.number, joint }),
+        }
+        Ok(())
+    }
+}
+
+/// The row of a setting.
+pub fn setting(number: u8) -> Option<&'static Setting> {
+    TABLE.iter().find(|setting| setting.number == number)
+}
+
+/// The row of the setting of this name.
+pub fn named(name: &str) -> Option<&'static Setting> {
+    TABLE.iter().find(|setting| setting.name == name)
+}
+
+/// How many values the table has; `arm_only`: those that belong to the arm.
+pub fn count(arm_only: bool) -> usize {
+    TABLE.iter().filter(|setting| !arm_only || setting.of_arm()).map(Setting::count).sum()
+}
+
+/// The values of a configuration in the order of the table, from the one with index `first` on; `arm_only`: those that belong to the
+/// arm.
+pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<Item = SettingValue> {
+    let mut skip = first;
+    TABLE.iter().filter(move |setting| !arm_only || setting.of_arm()).flat_map(move |setting| {
+        let here = skip.min(setting.count());
+        skip -= here;
+        setting.values_from(config, here)
+    })
+}
+
+/// The configuration with these values in it.
+///
+/// # Errors
+/// The first value that is not taken, or what the configuration as a whole does wrong. Nothing is half changed: the configuration
+/// given is not touched.
+pub fn with_values(
+    config: &Config,
+    values: impl Iterator<Item = SettingValue>,
+) -> Result<Config, SettingError> {
+    let mut next = config.clone();
+    for SettingValue { setting: number, joint, value } in values {
+        let row = setting(number).ok_or(SettingError::Unknown { setting: number, joint })?;
+        row.set(&mut next, joint, value)?;
+    }
+    next.check().map_err(SettingError::Config)?;
+    Ok(next)
+}
+
+#[cfg(test)]
+mod tests;

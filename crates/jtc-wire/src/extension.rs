@@ -1,0 +1,250 @@
+//! The extensions of the protocol (J-50): identity, settings, the arm as one thing. Requests are types 0x40 to 0x4F; what one
+//! returns beside its record comes in a frame of type 0x50 to 0x5F, on the line of the request and only after one.
+use core::fmt;
+
+use crate::encode::{EncodeError, frame};
+use crate::frame::{FRAME_MIN, FrameRef, FrameType};
+
+mod image;
+mod info;
+
+pub use image::{ArmImage, FrictionImage, Hash, IMAGE_MAX, field as image_field};
+pub use info::{BootCause, INFO_LEN, Info, StoreState, capability};
+
+/// Version of the extensions that this crate speaks. Later ones only add.
+pub const EXTENSION_VERSION: u8 = 1;
+/// Longest frame that returns something (J-56).
+pub const ANSWER_MAX: usize = 256;
+/// Bytes of a [`SettingValue`].
+pub const VALUE_LEN: usize = 10;
+/// Most values in a SetSettings frame.
+pub const SET_VALUES_MAX: usize = 256;
+/// Bytes in front of what a Settings or an Arm frame carries: where it begins, and how much there is altogether.
+pub const PAGE_HEAD_LEN: usize = 4;
+/// Most values in a Settings frame.
+pub const PAGE_VALUES: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / VALUE_LEN;
+/// Most bytes of the arm image in an Arm frame.
+pub const PAGE_BYTES: usize = ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN;
+/// Bytes of a [`Name`].
+pub const NAME_LEN: usize = 32;
+
+/// The name of an arm: UTF-8 without control characters, filled up with zeros.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
+pub struct Name([u8; NAME_LEN]);
+
+impl Name {
+    /// A name; `None` when it has more than [`NAME_LEN`] bytes or control characters.
+    pub fn new(text: &str) -> Option<Self> {
+        let mut bytes = [0; NAME_LEN];
+        bytes.get_mut(..text.len())?.copy_from_slice(text.as_bytes());
+        (!text.chars().any(char::is_control)).then_some(Self(bytes))
+    }
+
+    /// As many whole characters of `text` as fit, without its control characters.
+    pub fn cut(text: &str) -> Self {
+        let (mut bytes, mut len) = ([0; NAME_LEN], 0);
+        for c in text.chars().filter(|c| !c.is_control()) {
+            let Some(place) = bytes.get_mut(len..len + c.len_utf8()) else { break };
+            c.encode_utf8(place);
+            len += c.len_utf8();
+        }
+        Self(bytes)
+    }
+
+    /// From the wire; `None` when it is no text, or something follows its end.
+    pub fn parse(bytes: &[u8]) -> Option<Self> {
+        let bytes: [u8; NAME_LEN] = bytes.try_into().ok()?;
+        let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
+        if bytes.get(end..)?.iter().any(|byte| *byte != 0) {
+            return None;
+        }
+        Self::new(core::str::from_utf8(bytes.get(..end)?).ok()?)
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
+        self.0.get(..end).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or_default()
+    }
+
+    /// As on the wire.
+    pub const fn as_bytes(&self) -> &[u8; NAME_LEN] {
+        &self.0
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+/// The value of a setting (J-53). Which setting a number means, its unit and its range, stands in the controller's table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettingValue {
+    /// Number of the setting.
+    pub setting: u8,
+    /// Joint from 1, base to wrist; 0 where the setting is not one of a joint.
+    pub joint: u8,
+    /// The value in the unit of the setting; of a switch 0 or 1.
+    pub value: f64,
+}
+
+impl SettingValue {
+    /// As on the wire: setting, joint, value.
+    pub fn emit(&self) -> [u8; VALUE_LEN] {
+        let [a, b, c, d, e, f, g, h] = self.value.to_be_bytes();
+        [self.setting, self.joint, a, b, c, d, e, f, g, h]
+    }
+
+    /// From the wire.
+    pub fn parse(bytes: &[u8; VALUE_LEN]) -> Self {
+        let [setting, joint, value @ ..] = *bytes;
+        Self { setting, joint, value: f64::from_be_bytes(value) }
+    }
+}
+
+/// A list of [`SettingValue`]s as on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Values<'a>(&'a [u8]);
+
+impl<'a> Values<'a> {
+    /// `None` when the bytes are no whole number of values.
+    pub fn parse(bytes: &'a [u8]) -> Option<Self> {
+        bytes.len().is_multiple_of(VALUE_LEN).then_some(Self(bytes))
+    }
+
+    /// All in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = SettingValue> + use<'a> {
+        self.0.as_chunks::<VALUE_LEN>().0.iter().map(SettingValue::parse)
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.0.len() / VALUE_LEN
+    }
+
+    /// There are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl fmt::Display for Values<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} values", self.len())?;
+        if f.alternate() {
+            for SettingValue { setting, joint, value } in self.iter() {
+                write!(f, "\n  setting {setting}")?;
+                if joint > 0 {
+                    write!(f, ", joint {joint}")?;
+                }
+                write!(f, " = {value}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a device returns to an extension request, beside the record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer<'a> {
+    /// To GetInfo.
+    Info(Info),
+    /// To GetSettings.
+    Settings {
+        /// How many values are before the first of these.
+        first: u16,
+        /// How many there are altogether.
+        total: u16,
+        /// These.
+        values: Values<'a>,
+    },
+    /// To GetArm: bytes of the arm image.
+    Arm {
+        /// Where they are.
+        offset: u16,
+        /// Length of the image.
+        total: u16,
+        /// These.
+        bytes: &'a [u8],
+    },
+}
+
+impl<'a> Answer<'a> {
+    /// `None` when the frame is none of these, or its body is none of a device.
+    pub fn parse(frame: FrameRef<'a>) -> Option<Self> {
+        let body = frame.body();
+        let page = || {
+            let ([a, b, c, d], rest) = body.split_first_chunk::<PAGE_HEAD_LEN>()?;
+            Some((u16::from_be_bytes([*a, *b]), u16::from_be_bytes([*c, *d]), rest))
+        };
+        match frame.frame_type {
+            FrameType::Info => Info::parse(body).map(Self::Info),
+            FrameType::Settings => {
+                let (first, total, rest) = page()?;
+                Some(Self::Settings { first, total, values: Values::parse(rest)? })
+            }
+            FrameType::Arm => {
+                let (offset, total, bytes) = page()?;
+                Some(Self::Arm { offset, total, bytes })
+            }
+            _ => None,
+        }
+    }
+
+    /// The type of its frame.
+    pub const fn frame_type(&self) -> FrameType {
+        match self {
+            Self::Info(_) => FrameType::Info,
+            Self::Settings { .. } => FrameType::Settings,
+            Self::Arm { .. } => FrameType::Arm,
+        }
+    }
+
+    /// Writes its frame; returns the length.
+    ///
+    /// # Errors
+    /// [`EncodeError::BufferTooShort`], also for more than a frame of [`ANSWER_MAX`] bytes carries.
+    pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
+        let page = |out: &mut [u8], from: u16, total: u16, bytes: &[u8]| {
+            let n = FRAME_MIN + PAGE_HEAD_LEN + bytes.len();
+            if n > ANSWER_MAX {
+                return Err(EncodeError::BufferTooShort { needed: n, given: ANSWER_MAX });
+            }
+            frame(out, self.frame_type(), n, |body| {
+                let (head, rest) = body.split_at_mut(PAGE_HEAD_LEN);
+                head[..2].copy_from_slice(&from.to_be_bytes());
+                head[2..].copy_from_slice(&total.to_be_bytes());
+                rest.copy_from_slice(bytes);
+                Ok(())
+            })
+        };
+        match *self {
+            Self::Info(info) => frame(out, FrameType::Info, FRAME_MIN + INFO_LEN, |body| {
+                body.copy_from_slice(&info.emit());
+                Ok(())
+            }),
+            Self::Settings { first, total, values } => page(out, first, total, values.0),
+            Self::Arm { offset, total, bytes } => page(out, offset, total, bytes),
+        }
+    }
+}
+
+impl fmt::Display for Answer<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Info(info) => info.fmt(f),
+            Self::Settings { first, total, values } => {
+                write!(f, "Settings: from {first} on of {total}, ")?;
+                values.fmt(f)
+            }
+            Self::Arm { offset, total, bytes } => {
+                write!(f, "Arm: {} bytes from {offset} on of {total}", bytes.len())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,125 @@
+//! The arm image: one arm as one thing (J-54), as it is stored, read back and hashed.
+use super::{NAME_LEN, Name, VALUE_LEN, Values};
+use crate::command::Floats;
+
+/// Where the parts are.
+pub mod field {
+    use core::ops::Range;
+
+    /// First bytes of an image.
+    pub const MAGIC: [u8; 4] = *b"JTCA";
+    /// Version of the layout.
+    pub const VERSION: u8 = 1;
+    /// Byte of the version.
+    pub const VERSION_AT: usize = 4;
+    /// Friction: 0 polynomial, 1 table.
+    pub const FRICTION_AT: usize = 5;
+    /// Number of settings, u16.
+    pub const SETTINGS: Range<usize> = 6..8;
+    /// The body of a PidParam frame.
+    pub const PID: Range<usize> = 8..128;
+    /// The body of an ArmModel frame.
+    pub const MODEL: Range<usize> = 128..660;
+    /// Here the body of a FrictionPolynomial frame of six coefficients, or of a FrictionTable frame, begins; then come the
+    /// settings, each as in a SetSettings frame, then the name.
+    pub const FRICTION: usize = 660;
+    /// Bytes of the polynomials.
+    pub const POLYNOMIAL_LEN: usize = 144;
+    /// Bytes of the tables.
+    pub const TABLE_LEN: usize = 10_560;
+}
+
+/// Longest image.
+pub const IMAGE_MAX: usize = 13 * 1024;
+
+/// Friction in an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrictionImage<'a> {
+    /// 6 × 6 coefficients, highest index first.
+    Polynomial(Floats<'a>),
+    /// 6 × (20 velocities, 20 temperatures, 400 torques).
+    Table(Floats<'a>),
+}
+
+/// The parts of an image. Lengths are right; numbers are not yet checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArmImage<'a> {
+    /// Gains, as in PidParam.
+    pub pid: Floats<'a>,
+    /// Kinematics and masses, as in ArmModel.
+    pub model: Floats<'a>,
+    /// Friction.
+    pub friction: FrictionImage<'a>,
+    /// Settings.
+    pub settings: Values<'a>,
+    /// Name of the arm.
+    pub name: Name,
+}
+
+impl<'a> ArmImage<'a> {
+    /// `None` when the bytes are no image of this version, or longer or shorter than one.
+    pub fn parse(bytes: &'a [u8]) -> Option<Self> {
+        let (magic, _) = bytes.split_first_chunk::<4>()?;
+        if *magic != field::MAGIC || *bytes.get(field::VERSION_AT)? != field::VERSION {
+            return None;
+        }
+        let table = match *bytes.get(field::FRICTION_AT)? {
+            0 => false,
+            1 => true,
+            _ => return None,
+        };
+        let count = u16::from_be_bytes(*bytes.get(field::SETTINGS)?.first_chunk()?);
+        let friction_len = if table { field::TABLE_LEN } else { field::POLYNOMIAL_LEN };
+        let (friction, rest) = bytes.get(field::FRICTION..)?.split_at_checked(friction_len)?;
+        let (settings, name) = rest.split_at_checked(VALUE_LEN * usize::from(count))?;
+        let friction = Floats::new(friction);
+        Some(Self {
+            pid: Floats::new(bytes.get(field::PID)?),
+            model: Floats::new(bytes.get(field::MODEL)?),
+            friction: if table {
+                FrictionImage::Table(friction)
+            } else {
+                FrictionImage::Polynomial(friction)
+            },
+            settings: Values::parse(settings)?,
+            name: Name::parse(name)?,
+        })
+    }
+}
+
+/// Hash of an arm image without its name: of all that decides how the arm moves (J-52). FNV-1a with 64 bits (RFC 9923), fed in any
+/// pieces. It tells arms apart that differ by accident, not by malice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hash(u64);
+
+impl Hash {
+    /// Of nothing.
+    pub const fn new() -> Self {
+        Self(0xCBF2_9CE4_8422_2325)
+    }
+
+    /// Of all so far and of `bytes`.
+    pub fn update(self, bytes: &[u8]) -> Self {
+        Self(
+            bytes
+                .iter()
+                .fold(self.0, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3)),
+        )
+    }
+
+    /// The number.
+    pub const fn value(self) -> u64 {
+        self.0
+    }
+
+    /// Of a whole image.
+    pub fn of_image(bytes: &[u8]) -> u64 {
+        Self::new().update(bytes.get(..bytes.len().saturating_sub(NAME_LEN)).unwrap_or(&[])).value()
+    }
+}
+
+impl Default for Hash {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,251 @@
+//! Who a device is, and what it runs (J-52).
+use core::fmt;
+
+use super::{EXTENSION_VERSION, NAME_LEN, Name};
+use crate::bits::missing_parameter;
+use crate::code::codes;
+use crate::words::{self, Bits};
+
+/// Bytes of an [`Info`] of this version; later versions are longer.
+pub const INFO_LEN: usize = 136;
+/// Bytes of the firmware's version, and of its revision.
+const SHORT_TEXT: usize = 16;
+
+/// Where the parts are, from the first byte of the body.
+mod field {
+    use core::ops::Range;
+
+    pub const VERSION: usize = 0;
+    pub const MISSING: usize = 1;
+    pub const NODES: usize = 2;
+    pub const BOOT_CAUSE: usize = 3;
+    pub const BOOTS: Range<usize> = 4..8;
+    pub const UPTIME: Range<usize> = 8..16;
+    pub const LOST: Range<usize> = 16..20;
+    pub const HASH: Range<usize> = 20..28;
+    pub const CAPABILITIES: Range<usize> = 28..32;
+    pub const STORED: usize = 32;
+    pub const STORE: usize = 33;
+    pub const SEQUENCE: Range<usize> = 34..38;
+    // Two bytes are zero.
+    pub const NAME: Range<usize> = 40..72;
+    pub const FIRMWARE: Range<usize> = 72..88;
+    pub const REVISION: Range<usize> = 88..104;
+    pub const BOARD: Range<usize> = 104..136;
+}
+
+/// What a device can do beyond version 1 of the extensions, one bit each.
+pub mod capability {
+    /// Settings, names and reading back the arm (J-53, J-54).
+    pub const SETTINGS: u32 = 1;
+    /// An arm can be stored (J-54).
+    pub const STORE: u32 = 1 << 1;
+    /// A speed override (J-57).
+    pub const SPEED: u32 = 1 << 2;
+    /// Jogging (J-58).
+    pub const JOG: u32 = 1 << 3;
+    /// Payload (J-60).
+    pub const PAYLOAD: u32 = 1 << 4;
+    /// Flight recorder (J-56).
+    pub const RECORDER: u32 = 1 << 5;
+}
+
+codes! {
+    /// Why a device started.
+    #[derive(Default)]
+    #[allow(missing_docs)]
+    BootCause {
+        #[default]
+        Unknown = 0, "unknown";
+        PowerOn = 1, "power-on";
+        Pin = 2, "reset pin";
+        Software = 3, "software";
+        Watchdog = 4, "watchdog";
+        HardFault = 5, "hard fault";
+        Panic = 6, "panic";
+    }
+}
+
+codes! {
+    /// What becomes of a stored arm (J-54).
+    #[derive(Default)]
+    #[allow(missing_docs)]
+    StoreState {
+        #[default]
+        Absent = 0, "no memory for it";
+        Empty = 1, "none stored";
+        Stored = 2, "stored";
+        Busy = 3, "being stored";
+        Failed = 4, "storing failed";
+    }
+}
+
+/// What GetInfo returns (J-52).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Info {
+    /// Version of the extensions.
+    pub version: u8,
+    /// Parameters missing: bits of [`crate::missing_parameter`].
+    pub missing: u8,
+    /// Nodes that are not ready: bits of [`crate::words::NODES`].
+    pub nodes_missing: u8,
+    /// Why it started last.
+    pub boot_cause: BootCause,
+    /// How often it has started, as far as it knows.
+    pub boots: u32,
+    /// Time since then, ms.
+    pub uptime_ms: u64,
+    /// Response records lost because too many waited (J-04).
+    pub lost_records: u32,
+    /// Hash of all that decides how the arm moves ([`super::Hash`]).
+    pub hash: u64,
+    /// Bits of [`capability`].
+    pub capabilities: u32,
+    /// The UseDefault frames mean a stored arm, not the one that is built in.
+    pub defaults_stored: bool,
+    /// The memory of the stored arm.
+    pub store: StoreState,
+    /// Number of the stored arm: each store counts up.
+    pub sequence: u32,
+    /// Name of the arm in use.
+    pub arm: Name,
+    /// Version of the firmware.
+    pub firmware: [u8; SHORT_TEXT],
+    /// Its git revision.
+    pub revision: [u8; SHORT_TEXT],
+    /// The board.
+    pub board: Name,
+}
+
+impl Default for Info {
+    fn default() -> Self {
+        Self {
+            version: EXTENSION_VERSION,
+            missing: 0,
+            nodes_missing: 0,
+            boot_cause: BootCause::Unknown,
+            boots: 0,
+            uptime_ms: 0,
+            lost_records: 0,
+            hash: 0,
+            capabilities: 0,
+            defaults_stored: false,
+            store: StoreState::Absent,
+            sequence: 0,
+            arm: Name::default(),
+            firmware: [0; SHORT_TEXT],
+            revision: [0; SHORT_TEXT],
+            board: Name::default(),
+        }
+    }
+}
+
+/// As much of a text as fits, filled up with zeros.
+pub(crate) fn short_text(text: &str) -> [u8; SHORT_TEXT] {
+    let mut bytes = [0; SHORT_TEXT];
+    for (to, from) in bytes.iter_mut().zip(text.bytes()) {
+        *to = from;
+    }
+    bytes
+}
+
+/// The text, as far as it is one.
+fn text(bytes: &[u8; SHORT_TEXT]) -> &str {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(SHORT_TEXT);
+    bytes.get(..end).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or("?")
+}
+
+impl Info {
+    /// Sets the version of the firmware and its git revision, cut to what fits.
+    pub fn with_firmware(mut self, version: &str, revision: &str) -> Self {
+        (self.firmware, self.revision) = (short_text(version), short_text(revision));
+        self
+    }
+
+    /// Version of the firmware.
+    pub fn firmware(&self) -> &str {
+        text(&self.firmware)
+    }
+
+    /// Git revision of the firmware.
+    pub fn revision(&self) -> &str {
+        text(&self.revision)
+    }
+
+    /// The body of its frame.
+    pub fn emit(&self) -> [u8; INFO_LEN] {
+        use field::*;
+        let mut b = [0; INFO_LEN];
+        b[VERSION] = self.version;
+        b[MISSING] = self.missing;
+        b[NODES] = self.nodes_missing;
+        b[BOOT_CAUSE] = self.boot_cause as u8;
+        b[BOOTS].copy_from_slice(&self.boots.to_be_bytes());
+        b[UPTIME].copy_from_slice(&self.uptime_ms.to_be_bytes());
+        b[LOST].copy_from_slice(&self.lost_records.to_be_bytes());
+        b[HASH].copy_from_slice(&self.hash.to_be_bytes());
+        b[CAPABILITIES].copy_from_slice(&self.capabilities.to_be_bytes());
+        b[STORED] = self.defaults_stored.into();
+        b[STORE] = self.store as u8;
+        b[SEQUENCE].copy_from_slice(&self.sequence.to_be_bytes());
+        b[NAME].copy_from_slice(self.arm.as_bytes());
+        b[FIRMWARE].copy_from_slice(&self.firmware);
+        b[REVISION].copy_from_slice(&self.revision);
+        b[BOARD].copy_from_slice(self.board.as_bytes());
+        b
+    }
+
+    /// From the body of its frame; what a later version adds is passed over, and a cause or a state that this version does not
+    /// know reads as not known. `None` when it is too short or a name is none.
+    pub fn parse(body: &[u8]) -> Option<Self> {
+        use field::*;
+        let (b, _) = body.split_first_chunk::<INFO_LEN>()?;
+        let word = |at: core::ops::Range<usize>| {
+            b.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u32::from_be_bytes(*bytes))
+        };
+        let long = |at: core::ops::Range<usize>| {
+            b.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u64::from_be_bytes(*bytes))
+        };
+        let short = |at: core::ops::Range<usize>| b.get(at).and_then(|bytes| bytes.first_chunk()).copied();
+        Some(Self {
+            version: b[VERSION],
+            missing: b[MISSING],
+            nodes_missing: b[NODES],
+            boot_cause: BootCause::from_byte(b[BOOT_CAUSE]).unwrap_or_default(),
+            boots: word(BOOTS),
+            uptime_ms: long(UPTIME),
+            lost_records: word(LOST),
+            hash: long(HASH),
+            capabilities: word(CAPABILITIES),
+            defaults_stored: b[STORED] != 0,
+            store: StoreState::from_byte(b[STORE]).unwrap_or_default(),
+            sequence: word(SEQUENCE),
+            arm: Name::parse(b.get(NAME)?)?,
+            firmware: short(FIRMWARE)?,
+            revision: short(REVISION)?,
+            board: Name::parse(b.get(BOARD)?)?,
+        })
+    }
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Info: extension {}, arm \"{}\", hash {:016x}", self.version, self.arm, self.hash)?;
+        write!(f, ", firmware {} ({}) on {}", self.firmware(), self.revision(), self.board)?;
+        let missing =
+            self.missing & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL);
+        if missing != 0 {
+            write!(f, "; missing: {}", Bits(missing.into(), &words::JTC_INIT))?;
+        }
+        if f.alternate() {
+            write!(f, "\n  boots: {}, the last by {}", self.boots, self.boot_cause)?;
+            write!(f, "\n  up for {} ms, {} records lost", self.uptime_ms, self.lost_records)?;
+            let stored = if self.defaults_stored { "stored" } else { "built in" };
+            write!(f, "\n  defaults: {stored}; memory: {}, number {}", self.store, self.sequence)?;
+            write!(f, "\n  capabilities: {:#x}", self.capabilities)?;
+        }
+        Ok(())
+    }
+}
+
+const _: () = assert!(field::BOARD.end == INFO_LEN && field::NAME.end - field::NAME.start == NAME_LEN);

@@ -1,0 +1,153 @@
+use proptest::prelude::*;
+use std::vec;
+use std::vec::Vec;
+
+use super::*;
+use crate::{Command, fixed, set_settings};
+
+fn info() -> Info {
+    Info {
+        missing: 3,
+        nodes_missing: 0x41,
+        boot_cause: BootCause::Watchdog,
+        boots: 77,
+        uptime_ms: 0x0102_0304_0506,
+        lost_records: 9,
+        hash: 0x0123_4567_89AB_CDEF,
+        capabilities: capability::SETTINGS | capability::STORE,
+        defaults_stored: true,
+        store: StoreState::Stored,
+        sequence: 5,
+        arm: Name::new("avena").unwrap(),
+        board: Name::new("nucleo-h745zi-q").unwrap(),
+        ..Info::default()
+    }
+    .with_firmware("0.1.0", "4334c10b6b9b1d2d")
+}
+
+#[test]
+fn j52_an_info_comes_back_as_it_was_sent() {
+    let mut out = [0; ANSWER_MAX];
+    let n = Answer::Info(info()).emit(&mut out).unwrap();
+    let frame = FrameRef::new_checked(&out[..n]).unwrap();
+    assert_eq!(Answer::parse(frame), Some(Answer::Info(info())));
+    assert_eq!((info().firmware(), info().revision()), ("0.1.0", "4334c10b6b9b1d2d"));
+    // What a later version adds is passed over; one that is too short is none.
+    let body = [&info().emit()[..], &[1, 2, 3]].concat();
+    assert_eq!(Info::parse(&body), Some(info()));
+    assert_eq!(Info::parse(&body[..INFO_LEN - 1]), None);
+}
+
+#[test]
+fn j54_names_are_text_that_fits() {
+    assert_eq!(Name::new("Arm 7, Ünit").unwrap().as_str(), "Arm 7, Ünit");
+    assert_eq!(Name::new("a\nb"), None);
+    assert_eq!(Name::new(&"x".repeat(33)), None);
+    assert_eq!(Name::new(&"x".repeat(32)).unwrap().as_str().len(), 32);
+    assert_eq!(Name::cut(&"ü".repeat(40)).as_str(), "ü".repeat(16));
+    assert_eq!(Name::cut("a\tb").as_str(), "ab");
+    let mut bytes = *Name::new("ab").unwrap().as_bytes();
+    bytes[5] = b'x';
+    assert_eq!(Name::parse(&bytes), None, "something behind the end");
+    assert_eq!(Name::parse(&[0xFF; 32]), None);
+    assert_eq!(Name::parse(&[b'a'; 31]), None);
+}
+
+#[test]
+fn j53_values_travel_whole() {
+    let values: Vec<_> = (0..SET_VALUES_MAX)
+        .map(|i| SettingValue { setting: i as u8, joint: (i % 7) as u8, value: 1.0 / (i + 1) as f64 })
+        .collect();
+    let mut out = vec![0; 6 + VALUE_LEN * SET_VALUES_MAX];
+    for count in [1, 2, 24, SET_VALUES_MAX] {
+        let n = set_settings(&mut out, values[..count].iter().copied()).unwrap();
+        let frame = FrameRef::new_checked(&out[..n]).unwrap();
+        let Ok(Command::SetSettings(read)) = Command::parse(frame) else { panic!("{count}") };
+        assert!(read.iter().eq(values[..count].iter().copied()));
+    }
+    let one_more = values.iter().chain(&values[..1]).copied();
+    assert!(matches!(set_settings(&mut out, one_more), Err(EncodeError::WrongCount { count: 257, .. })));
+    assert!(matches!(set_settings(&mut out, []), Err(EncodeError::WrongCount { count: 0, .. })));
+    let short = set_settings(&mut out[..15], values[..1].iter().copied());
+    assert_eq!(short, Err(EncodeError::BufferTooShort { needed: 16, given: 15 }));
+}
+
+/// Worked bytes of the page on the protocol.
+#[test]
+fn j50_requests_are_these_bytes() {
+    assert_eq!(fixed::GET_INFO[..4], [0x9B, 0x40, 0, 6]);
+    assert_eq!(fixed::get_settings(0x0102)[..6], [0x9B, 0x41, 0, 8, 1, 2]);
+    assert_eq!(fixed::get_arm(0x0304)[..6], [0x9B, 0x44, 0, 8, 3, 4]);
+    assert_eq!(fixed::STORE_ARM[..4], [0x9B, 0x45, 0, 6]);
+    assert_eq!(fixed::DISABLE[..4], [0x9B, 0x46, 0, 6]);
+    let value = SettingValue { setting: 3, joint: 6, value: -1.5 };
+    assert_eq!(value.emit(), [3, 6, 0xBF, 0xF8, 0, 0, 0, 0, 0, 0]);
+}
+
+/// The reference is the published test vector of FNV-1a, 64 bits.
+#[test]
+fn j52_the_hash_is_fnv_1a() {
+    assert_eq!(Hash::new().value(), 0xCBF2_9CE4_8422_2325);
+    assert_eq!(Hash::new().update(b"a").value(), 0xAF63_DC4C_8601_EC8C);
+    assert_eq!(Hash::new().update(b"foo").update(b"bar").value(), 0x8594_4171_F739_67E8);
+}
+
+/// An image with `settings` values.
+fn image_bytes(table: bool, settings: u16) -> Vec<u8> {
+    let mut bytes = b"JTCA".to_vec();
+    bytes.extend([1, table.into()]);
+    bytes.extend(settings.to_be_bytes());
+    bytes.resize(660 + if table { 10_560 } else { 144 } + 10 * usize::from(settings) + 32, 0);
+    bytes
+}
+
+#[test]
+fn j54_an_image_is_read_whole_or_not_at_all() {
+    for (table, settings) in [(false, 0), (false, 110), (true, 110)] {
+        let mut bytes = image_bytes(table, settings);
+        let read = ArmImage::parse(&bytes).unwrap();
+        assert_eq!(read.pid.len(), 30);
+        assert_eq!(read.model.len(), 133);
+        let friction = match read.friction {
+            FrictionImage::Polynomial(floats) => (false, floats.len()),
+            FrictionImage::Table(floats) => (true, floats.len()),
+        };
+        assert_eq!(friction, (table, if table { 2640 } else { 36 }));
+        assert_eq!(read.settings.len(), usize::from(settings));
+        assert!(bytes.len() <= IMAGE_MAX);
+        assert_eq!(ArmImage::parse(&bytes[..bytes.len() - 1]), None);
+        // The name decides nothing.
+        let hash = Hash::of_image(&bytes);
+        let at = bytes.len() - 32;
+        bytes[at] = b'x';
+        assert_eq!(Hash::of_image(&bytes), hash);
+        bytes[at - 1] ^= 1;
+        assert_ne!(Hash::of_image(&bytes), hash);
+        bytes.push(0);
+        assert_eq!(ArmImage::parse(&bytes), None);
+    }
+    for (at, byte) in [(0, b'X'), (4, 2), (5, 2), (7, 1)] {
+        let mut bytes = image_bytes(false, 0);
+        bytes[at] = byte;
+        assert_eq!(ArmImage::parse(&bytes), None, "byte {at}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn j50_no_body_makes_a_parser_panic(kind in 0x40u8..0x60, body in prop::collection::vec(any::<u8>(), 0..400)) {
+        let bytes = crate::fuzzing::sealed(kind, &body);
+        if let Some(frame) = FrameRef::new_checked(&bytes) {
+            if let Some(answer) = Answer::parse(frame) {
+                let mut out = [0; ANSWER_MAX];
+                // What it reads it writes again, but for what a later version may have added to an Info.
+                if let Ok(n) = answer.emit(&mut out) && !matches!(answer, Answer::Info(_)) {
+                    prop_assert_eq!(&out[..n], &bytes[..]);
+                }
+                let _ = std::format!("{answer} {answer:#}");
+            }
+            let _ = Command::parse(frame);
+        }
+        let _ = ArmImage::parse(&body);
+    }
+}

@@ -12,6 +12,10 @@ pub enum Key {
     Up,
     /// Arrow down.
     Down,
+    /// Arrow left.
+    Left,
+    /// Arrow right.
+    Right,
     /// A page back.
     PageUp,
     /// A page on.
@@ -49,6 +53,8 @@ fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
         let key = match &code[..=end] {
             b"A" => Some(Key::Up),
             b"B" => Some(Key::Down),
+            b"C" => Some(Key::Right),
+            b"D" => Some(Key::Left),
             b"H" | b"1~" | b"7~" => Some(Key::Home),
             b"F" | b"4~" | b"8~" => Some(Key::End),
             b"5~" => Some(Key::PageUp),

@@ -14,7 +14,7 @@ use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand};
 
 pub use arm::{ArmCommand, ImportArgs};
-pub use maintain::{ClearArgs, GripperArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
+pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
 pub use motion::{CheckArgs, RunArgs, TeachCommand, TrajCommand};
 pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
 pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
@@ -103,6 +103,12 @@ pub enum Command {
     /// One decoded status
     #[command(after_help = "Examples:\n  jtc status\n  jtc --json status | jq .joints[0].position_rad")]
     Status(LinkArgs),
+    /// Who the controller is: firmware, arm in use, what is missing, why it started last
+    #[command(
+        after_help = "The hash is that of all that decides how the arm moves: model, gains, friction, settings. On a device without\n\
+                            extensions only what a status tells is shown.\n\nExamples:\n  jtc info\n  jtc --json info | jq -r .hash"
+    )]
+    Info(LinkArgs),
     /// Live view of the controller and the joints
     #[command(
         after_help = "On a terminal of at least 40 columns and 12 rows; s stops a motion on its path, arrows, PageUp, PageDown, Home\n\
@@ -133,6 +139,26 @@ pub enum Command {
     /// Vacuum pump of the gripper
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
     Gripper(GripperArgs),
+    /// Torque off at rest, back to Init: the drives go limp, and the parameters have to be given again
+    #[command(
+        after_help = "An arm without holding brakes falls: support it first. On a terminal this is asked; --yes answers.\n\n\
+                            Examples:\n  jtc disable\n  jtc disable --yes"
+    )]
+    Disable {
+        /// Do not ask: the arm loses its torque
+        #[arg(long, env = "JTC_YES", value_parser = FalseyValueParser::new())]
+        yes: bool,
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+    /// Move single joints: with keys, or one for as long as the command lives
+    #[command(
+        after_help = "On a terminal: 1 to 6 select a joint, hold the left or right arrow to move it, up and down change the rate, q ends.\n\
+                            The arm comes to rest 0.2 s after the last key, or the last sign of life of this command. Joints stop before the\n\
+                            ends of their ranges. Only in HoldPos, not beside a paused path.\n\nExamples:\n  jtc jog\n  \
+                            jtc jog 3 0.1                  joint 3 at 0.1 rad/s until Ctrl-C\n  jtc jog 3 -5 --deg --duration 2"
+    )]
+    Jog(JogArgs),
     /// The whole way back to HoldPos, naming each step and whose numbers it uses; resumes no motion
     #[command(
         after_help = "--arm FILE gives friction, gains and arm model of that file to a controller that does not hold the arm, also\n\
@@ -196,6 +222,7 @@ impl Command {
         matches!(
             self,
             Command::Demo(_)
+                | Command::Jog(_)
                 | Command::Traj(TrajCommand::Run(_) | TrajCommand::Replay(_))
                 | Command::Teach(TeachCommand::Record { .. })
         )

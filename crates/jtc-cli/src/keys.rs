@@ -9,15 +9,20 @@ pub enum Wish {
     Stop,
     /// Space: pause, or go on after a pause.
     PauseOrResume,
-    /// `+` or `-`: another speed.
-    Speed,
+    /// `+`: faster.
+    Faster,
+    /// `-`: slower.
+    Slower,
 }
 
 /// What the keys do, for the person at the terminal.
 pub const HELP: &str = "keys: space pauses, s stops, Ctrl-C ends";
 
+/// The same where the controller can change the speed of a motion.
+pub const HELP_WITH_SPEED: &str = "keys: space pauses, s stops, + - speed, Ctrl-C ends";
+
 /// Why there is no other speed, and what to do.
-pub const NO_SPEED: &str = "the controller has no command to change the speed of a motion: s stops it, and `jtc traj run FILE \
+pub const NO_SPEED: &str = "this controller has no command to change the speed of a motion: s stops it, and `jtc traj run FILE \
                             --speed PCT` runs it at another";
 
 /// The strongest wish of keys pressed since the last look.
@@ -33,7 +38,8 @@ fn strongest(keys: &[Key]) -> Option<Wish> {
         Some(Wish::PauseOrResume)
     } else {
         // On many keyboards the same keys without shift.
-        pressed(&['+', '-', '=', '_']).then_some(Wish::Speed)
+        let faster = pressed(&['+', '=']).then_some(Wish::Faster);
+        faster.or_else(|| pressed(&['-', '_']).then_some(Wish::Slower))
     }
 }
 
@@ -46,7 +52,7 @@ mod tests {
         let of = |text: &str| strongest(&text.chars().map(Key::Char).collect::<Vec<_>>());
         assert_eq!(of("  s+ "), Some(Wish::Stop));
         assert_eq!(of("x+  "), Some(Wish::PauseOrResume));
-        assert_eq!(of("x-"), Some(Wish::Speed));
+        assert_eq!((of("x-"), of("x=")), (Some(Wish::Slower), Some(Wish::Faster)));
         assert_eq!(of("xq"), None);
         assert_eq!(strongest(&[Key::Down]), None);
     }

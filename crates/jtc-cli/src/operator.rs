@@ -9,7 +9,7 @@ use cli_kit::{ErrorKind, Failure, Keys, Output, Stop, draws_bars, exit::FAULT};
 use jtc_host::session::Flow;
 use jtc_wire::{Code, Status, TrajectoryState};
 
-use crate::keys::{HELP, NO_SPEED, Wish, wish};
+use crate::keys::{HELP, HELP_WITH_SPEED, NO_SPEED, Wish, wish};
 use crate::progress::Progress;
 use cli_kit::output_file;
 
@@ -29,6 +29,9 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
     FAULT
 }
 
+/// Speeds on the path that the keys go through, in percent.
+const SPEEDS: [u8; 10] = [5, 10, 20, 30, 40, 50, 60, 70, 85, 100];
+
 /// Wishes of the person, asked for at each status.
 pub struct Operator<'a> {
     /// Where words go.
@@ -42,6 +45,8 @@ pub struct Operator<'a> {
     stopping: bool,
     /// Trajectory state that was announced last.
     announced: Option<Code<TrajectoryState>>,
+    /// Speed override in percent, where the controller has one.
+    pub speed: Option<u8>,
 }
 
 impl<'a> Operator<'a> {
@@ -69,6 +74,7 @@ impl<'a> Operator<'a> {
             moving,
             stopping: false,
             announced: None,
+            speed: None,
         })
     }
 
@@ -89,16 +95,22 @@ impl<'a> Operator<'a> {
             // They stand below the bar.
             Ok(()) if !self.out.is_json() => {}
             Err(Some((columns, rows))) => self.out.note(format_args!(
-                "{HELP}: the progress bar needs {} columns and {} rows, the terminal has {columns} and {rows}",
-                LEAST.0, LEAST.1
+                "{}: the progress bar needs {} columns and {} rows, the terminal has {columns} and {rows}",
+                self.keys(),
+                LEAST.0,
+                LEAST.1
             )),
-            _ => self.out.note(HELP),
+            _ => self.out.note(self.keys()),
         }
     }
 
     /// The keys as they stand below a bar; empty where none count.
     pub fn keys(&self) -> &'static str {
-        if self.keys.is_some() { HELP } else { "" }
+        match (&self.keys, self.speed) {
+            (None, _) => "",
+            (_, None) => HELP,
+            (_, Some(_)) => HELP_WITH_SPEED,
+        }
     }
 
     /// From now on they do not.
@@ -130,11 +142,25 @@ impl<'a> Operator<'a> {
         match (wish, status.trajectory.known()) {
             (Some(Wish::PauseOrResume), Some(TrajectoryState::Execute)) => Flow::Pause,
             (Some(Wish::PauseOrResume), Some(TrajectoryState::Pause)) => Flow::Resume,
-            (Some(Wish::Speed), _) => {
-                self.out.note(NO_SPEED.replace('`', ""));
-                Flow::Continue
-            }
+            (Some(wish @ (Wish::Faster | Wish::Slower)), _) => self.another_speed(wish),
             _ => Flow::Continue,
         }
+    }
+
+    /// A step up or down.
+    fn another_speed(&mut self, wish: Wish) -> Flow {
+        let Some(speed) = &mut self.speed else {
+            self.out.note(NO_SPEED.replace('`', ""));
+            return Flow::Continue;
+        };
+        let next = SPEEDS.iter().copied();
+        let next = match wish {
+            Wish::Faster => next.clone().find(|next| *next > *speed),
+            _ => next.rev().find(|next| *next < *speed),
+        };
+        let Some(next) = next else { return Flow::Continue };
+        *speed = next;
+        self.out.note(format_args!("speed {next} %"));
+        Flow::Speed(next)
     }
 }

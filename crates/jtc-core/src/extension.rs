@@ -147,10 +147,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
             let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
             // Written so that NaN is refused.
-            if !(velocity.abs() <= joint.velocity_max) {
-                return Err(DataStatus::IncorrectValue);
-            }
-            *wanted = velocity;
+            let taken = velocity.abs() <= joint.velocity_max;
+            *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
         }
         if !set.jogging() {
             if self.motion.law.yielding() {

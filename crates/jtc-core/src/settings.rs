@@ -9,6 +9,9 @@ mod table;
 
 pub use table::TABLE;
 
+/// Number of the speed override (J-57).
+pub const SPEED: u8 = 128;
+
 /// When a setting may be changed beside Init and Error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Live {

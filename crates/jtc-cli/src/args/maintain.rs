@@ -1,4 +1,4 @@
-//! `jtc monitor`, `clear`, `reset`, `gripper`, `recover`: looking at a controller and leading it back.
+//! `jtc monitor`, `clear`, `reset`, `gripper`, `recover`, `jog`: looking at a controller and leading it back.
 
 use std::path::PathBuf;
 
@@ -80,4 +80,23 @@ pub struct RecoverArgs {
     pub defaults: bool,
     #[command(flatten)]
     pub accept: AcceptArgs,
+}
+
+/// Options of `jtc jog`.
+#[derive(Args, Debug)]
+pub struct JogArgs {
+    /// Joint, counted from 1; without it the keys of the terminal jog
+    #[arg(value_name = "JOINT", value_parser = clap::value_parser!(u8).range(1..=6), requires = "rate")]
+    pub joint: Option<u8>,
+    /// Velocity, rad/s
+    #[arg(value_name = "RATE", allow_negative_numbers = true)]
+    pub rate: Option<f64>,
+    /// The rate is in degrees a second
+    #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+    pub deg: bool,
+    /// End after so many seconds
+    #[arg(long, env = "JTC_DURATION", value_name = "S")]
+    pub duration: Option<f64>,
+    #[command(flatten)]
+    pub link: LinkArgs,
 }

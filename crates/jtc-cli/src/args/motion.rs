@@ -69,6 +69,18 @@ pub enum TrajCommand {
     /// Stop on the path and end the execution
     #[command(after_help = "Examples:\n  jtc traj stop")]
     Stop(LinkArgs),
+    /// Speed override: the speed on the path in percent, while it runs and of what runs later
+    #[command(
+        after_help = "The path stays the same; the motion gets to the new speed along a ramp. It needs a controller with\n\
+                            extensions (`jtc info`). Without a number the present one is shown.\n\nExamples:\n  jtc traj speed 30\n  jtc traj speed"
+    )]
+    Speed {
+        /// 5 to 100
+        #[arg(value_name = "PCT")]
+        percent: Option<f64>,
+        #[command(flatten)]
+        link: LinkArgs,
+    },
 }
 
 /// Options of `jtc traj run`.

@@ -8,7 +8,9 @@ mod dynamics;
 mod example;
 mod explain;
 mod help;
+mod info;
 mod job;
+mod jog;
 mod maintain;
 mod monitor;
 mod params;
@@ -34,6 +36,9 @@ pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
         Command::Ports => ports::ports(out),
         Command::Doctor(link) => doctor::doctor(&link, out),
         Command::Status(link) => status::status(&link, out),
+        Command::Info(link) => info::info(&link, out),
+        Command::Disable { yes, link } => info::disable(yes, &link, out),
+        Command::Jog(args) => jog::jog(&args, out),
         Command::Monitor(args) => monitor::monitor(&args, out),
         Command::Arm(command) => arm::arm(&command, out),
         Command::Params(command) => params::params(&command, out),

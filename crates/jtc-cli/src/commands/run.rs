@@ -59,6 +59,14 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
     let mut session = args.link.session()?;
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
+    let speed = session.speed()?;
+    if speed < 1.0 {
+        out.note(format!(
+            "note: the controller's speed override is {:.0} %: `jtc traj speed 100` ends it",
+            speed * 100.0
+        ));
+    }
+    operator.speed = session.has_extensions().then_some((speed * 100.0).round() as u8);
     let name = args.file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let source = session.port().name();
     let mut record = |phase: &str, start_unix_ns| {

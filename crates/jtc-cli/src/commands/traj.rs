@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::job::{Job, typed};
 use super::run;
-use crate::args::{CheckArgs, TrajCommand};
+use crate::args::{CheckArgs, LinkArgs, TrajCommand};
 use crate::progress::Progress;
 
 /// Does one of the family.
@@ -42,7 +42,25 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
         TrajCommand::Stop(link) => {
             send(|| link.session().map_err(may_be_moving), Session::stop, "stop", "stopping on the path", out)
         }
+        TrajCommand::Speed { percent, link } => speed(*percent, link, out),
     }
+}
+
+/// Shows or sets the speed override.
+fn speed(percent: Option<f64>, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    if let Some(percent) = percent
+        && !(5.0..=100.0).contains(&percent)
+    {
+        let message = format!("a speed override of {percent} % is outside 5..100; nothing was sent");
+        return Err(Failure::usage(message).hint("`jtc traj pause` brings the arm to rest on its path"));
+    }
+    let mut session = link.session()?;
+    if let Some(percent) = percent {
+        session.set_speed(percent / 100.0)?;
+    }
+    let speed = 100.0 * session.speed()?;
+    out.result(&json!({ "speed_percent": speed }), || format!("speed on the path: {} %", figure(speed, 1)));
+    Ok(())
 }
 
 fn send(

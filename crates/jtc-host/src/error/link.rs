@@ -35,6 +35,12 @@ pub enum LinkError {
         /// The last bad record for it, if one came.
         last: Option<Response>,
     },
+    /// The device has no extensions.
+    #[error("{}: this device has no extensions", words::request(*request))]
+    NoExtension {
+        /// The request.
+        request: FrameType,
+    },
     /// The controller refused a request.
     #[error("{}: {} (state {}, trajectory {})", words::request(*request), words::data_status(*code), state, trajectory)]
     Refused {
@@ -75,6 +81,11 @@ impl Diagnose for LinkError {
             Self::NotConfirmed { .. } => {
                 no_link("not-confirmed", "the line towards the controller loses bytes: `jtc doctor`".into())
             }
+            Self::NoExtension { .. } => Diagnosis::new(
+                ErrorKind::Device,
+                "no-extension",
+                "its firmware knows the protocol of existing devices only; `jtc info` tells what could be found out",
+            ),
             Self::Refused { request, code, state, trajectory } => {
                 let next = match request {
                     FrameType::TrajSetExecStatus => after_refused_execution(*code, *state, *trajectory),
@@ -89,7 +100,7 @@ impl Diagnose for LinkError {
 impl LinkError {
     /// The line or the port failed: whether the controller received the request is not known.
     pub(crate) fn is_loss(&self) -> bool {
-        !matches!(self, Self::Refused { .. })
+        !matches!(self, Self::Refused { .. } | Self::NoExtension { .. })
     }
 }
 

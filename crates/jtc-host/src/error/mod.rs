@@ -2,6 +2,7 @@
 //! type for all of them.
 
 mod check;
+mod extension;
 mod link;
 mod motion;
 mod parameters;
@@ -12,6 +13,7 @@ use host_kit::ErrorKind;
 pub use host_kit::{Diagnose, Diagnosis};
 
 pub use check::CheckError;
+pub use extension::ExtensionError;
 pub use link::LinkError;
 pub(crate) use link::accepted;
 pub use motion::MotionError;
@@ -45,6 +47,9 @@ pub enum Error {
     /// Of a check for a run.
     #[error(transparent)]
     Check(#[from] CheckError),
+    /// Of an arm as one thing.
+    #[error(transparent)]
+    Extension(#[from] ExtensionError),
     /// A file cannot be read or understood.
     #[error(transparent)]
     File(#[from] FileError),
@@ -77,6 +82,7 @@ impl Diagnose for Error {
             Self::Motion(e) => e.diagnosis(),
             Self::Parameters(e) => e.diagnosis(),
             Self::Check(e) => e.diagnosis(),
+            Self::Extension(e) => e.diagnosis(),
             Self::File(e) => e.diagnosis(),
             Self::Frame(_) => Diagnosis::new(
                 ErrorKind::Usage,

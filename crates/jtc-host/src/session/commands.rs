@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use jtc_wire::{ControllerState, ExecCommand, FrameType, NodeState, Status, TrajectoryState, fixed};
+use jtc_wire::{
+    ControllerState, DataStatus, ExecCommand, FrameType, NodeState, Status, TrajectoryState, fixed,
+};
 
 use super::{Session, not_allowed};
 use crate::check::CheckedTrajectory;
@@ -176,10 +178,19 @@ impl<P: Port> Session<P> {
 
     /// Without a confirmation it is not known whether the arm moves: [`MotionError::LinkLost`] states it.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
+        let stopping = command != ExecCommand::Execute;
+        // Nothing comes before a Stop or a Pause.
+        if !stopping {
+            self.introduce()?;
+        }
         let retries = self.statistics.retries;
-        let record = self
+        let mut record = self
             .request(&fixed::exec(command))
             .map_err(|e| self.link_lost(e, matches!(command, ExecCommand::Stop)))?;
+        if stopping && record.data == DataStatus::IncorrectValue {
+            // For want of an introduction: there is nothing to be wrong about a Stop but its time (J-51).
+            record.data = DataStatus::NotAllowed;
+        }
         if accepted(&record) {
             return Ok(());
         }

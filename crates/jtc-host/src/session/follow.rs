@@ -18,6 +18,8 @@ pub enum Flow {
     Pause,
     /// Go on after a pause (only while following).
     Resume,
+    /// Another speed on the path, in percent (only while following, and where the device can).
+    Speed(u8),
     /// Stop the motion and follow it to standstill (only while following).
     Stop,
     /// Leave at once; a motion goes on without us.
@@ -87,6 +89,11 @@ impl<P: Port> Session<P> {
                 Flow::Continue => {}
                 Flow::Pause if status.is_executing() => unless_ended(self.pause())?,
                 Flow::Resume if status.trajectory == TrajectoryState::Pause => self.go()?,
+                Flow::Speed(percent) => match self.set_speed(f64::from(percent) / 100.0) {
+                    // The motion goes on as it was.
+                    Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
+                    other => other?,
+                },
                 // Once accepted it needs no repetition: the controller slows down to standstill by itself.
                 Flow::Stop if !stopping => {
                     unless_ended(self.stop())?;

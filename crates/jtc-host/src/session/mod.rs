@@ -4,6 +4,7 @@
 //! queues them and gives each to the request that waits for it.
 
 mod commands;
+mod extension;
 mod follow;
 mod params;
 mod recover;
@@ -14,7 +15,10 @@ mod upload;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use jtc_wire::{DataStatus, FrameStatus, FrameType, Response, Status, StatusReceiver, TrajectoryState};
+use extension::Extensions;
+use jtc_wire::{
+    DataStatus, FrameStatus, FrameType, FromDevice, Response, Status, StatusReceiver, TrajectoryState,
+};
 
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
@@ -55,6 +59,9 @@ pub struct Session<P> {
     receiver: StatusReceiver,
     arrived: VecDeque<Status>,
     records: VecDeque<Response>,
+    /// What extension requests returned, as it arrived.
+    answers: VecDeque<Vec<u8>>,
+    extensions: Extensions,
     last: Option<Status>,
     statistics: LinkStatistics,
     start: Duration,
@@ -75,6 +82,8 @@ impl<P: Port> Session<P> {
             receiver: StatusReceiver::new(),
             arrived: VecDeque::new(),
             records: VecDeque::new(),
+            answers: VecDeque::new(),
+            extensions: Extensions::default(),
             last: None,
             statistics: LinkStatistics::default(),
             start,
@@ -193,8 +202,21 @@ impl<P: Port> Session<P> {
         self.statistics.bytes_received += n as u64;
         let before = self.arrived.len();
         let mut rest = &buffer[..n];
-        while let Some(status) = self.receiver.next(&mut rest) {
-            self.arrived.push_back(status);
+        while let Some(frame) = self.receiver.next_frame(&mut rest) {
+            match frame {
+                FromDevice::Status(status) => self.arrived.push_back(status),
+                FromDevice::Answer(answer) => {
+                    let mut bytes = vec![0; jtc_wire::ANSWER_MAX];
+                    // What was read is as short.
+                    let n = answer.emit(&mut bytes).unwrap_or(0);
+                    bytes.truncate(n);
+                    self.answers.push_back(bytes);
+                }
+            }
+        }
+        // Whoever does not look at them does not pile them up.
+        while self.answers.len() > 64 {
+            self.answers.pop_front();
         }
         let now = self.port.now();
         for status in self.arrived.iter().skip(before) {
@@ -243,6 +265,10 @@ impl<P: Port> Session<P> {
             self.write(frame)?;
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
+                // Once may be a damaged frame; twice it is a type that the device does not know.
+                Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
+                    break;
+                }
                 Some(record) => bad = Some(record),
                 None => {}
             }
@@ -273,6 +299,7 @@ impl<P: Port> Session<P> {
 
     /// Sends a command; an error when it is refused.
     fn command(&mut self, frame: &[u8]) -> Result<(), LinkError> {
+        self.introduce()?;
         let record = self.request(frame)?;
         if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
     }

@@ -188,6 +188,7 @@ impl<P: Port> Session<P> {
         progress: impl FnMut(&Progress) -> Flow,
     ) -> Result<UploadReport, Error> {
         self.uploaded = None;
+        self.introduce()?;
         let step_ms = checked.trajectory().step_ms;
         let report = self.send(checked.raw(), step_ms, checked.upload_options(), progress)?;
         self.uploaded = Some(checked.number());

@@ -1,0 +1,151 @@
+//! `jtc info`: who the controller is; `jtc disable`: torque off at rest.
+
+use std::time::Duration;
+
+use cli_kit::{Failure, Output};
+use jtc_host::words;
+use jtc_wire::{ControllerState, Info, Status, StoreState};
+use serde_json::{Value, json};
+
+use crate::args::LinkArgs;
+use crate::ask::confirm;
+
+/// Drives change their state within this time.
+const DISABLED: Duration = Duration::from_secs(5);
+
+/// Prints who the controller is.
+pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut session = link.session()?;
+    let info = session.info()?;
+    let status = session.fresh_status()?;
+    match info {
+        Some(info) => out.result(&as_json(&info), || as_text(&info)),
+        None => out.result(&without_extensions_json(&status), || without_extensions(&status)),
+    }
+    Ok(())
+}
+
+/// The hash as everybody writes it.
+pub fn hash(hash: u64) -> String {
+    format!("{hash:016x}")
+}
+
+fn as_json(info: &Info) -> Value {
+    json!({
+        "extension": info.version,
+        "firmware": info.firmware(),
+        "revision": info.revision(),
+        "board": info.board.as_str(),
+        "arm": info.arm.as_str(),
+        "hash": hash(info.hash),
+        "missing": words::missing_parameters(info.missing),
+        "nodes_missing": words::node_names(info.nodes_missing),
+        "boots": info.boots,
+        "boot_cause": info.boot_cause.name(),
+        "uptime_s": info.uptime_ms as f64 / 1000.0,
+        "lost_records": info.lost_records,
+        "defaults": if info.defaults_stored { "stored" } else { "built-in" },
+        "memory": info.store.name(),
+        "stored_number": (info.store == StoreState::Stored).then_some(info.sequence),
+    })
+}
+
+fn as_text(info: &Info) -> String {
+    let list = |names: Vec<String>| if names.is_empty() { "nothing".into() } else { names.join(", ") };
+    let missing = words::missing_parameters(info.missing).into_iter().map(str::to_owned).collect();
+    let revision = match info.revision() {
+        "" => String::new(),
+        revision => format!(" ({revision})"),
+    };
+    let memory = match info.store {
+        StoreState::Stored => format!("{}, number {}", info.store, info.sequence),
+        state => state.to_string(),
+    };
+    let defaults = if info.defaults_stored { "the stored arm" } else { "the built-in arm" };
+    format!(
+        "arm:       {}, hash {}\n\
+         missing:   {}; nodes: {}\n\
+         defaults:  {defaults}; memory: {memory}\n\
+         firmware:  {}{revision} on {}, extensions {}\n\
+         started:   {} times, the last by {}, {} ago\n\
+         records:   {} lost",
+        info.arm,
+        hash(info.hash),
+        list(missing),
+        list(words::node_names(info.nodes_missing)),
+        info.firmware(),
+        info.board,
+        info.version,
+        if info.boots == 1 { "once".into() } else { format!("{} times", info.boots) },
+        info.boot_cause,
+        span(info.uptime_ms / 1000),
+        info.lost_records,
+    )
+}
+
+/// A time as people say it.
+fn span(s: u64) -> String {
+    match s {
+        0..120 => format!("{s} s"),
+        120..7_200 => format!("{} min", s / 60),
+        7_200..172_800 => format!("{} h", s / 3600),
+        _ => format!("{} days", s / 86_400),
+    }
+}
+
+fn without_extensions_json(s: &Status) -> Value {
+    json!({
+        "extension": null,
+        "firmware": null,
+        "revision": null,
+        "board": null,
+        "arm": null,
+        "hash": null,
+        "missing": words::missing_parameters(s.jtc_init),
+        "nodes_missing": words::node_names(s.node_init),
+        "boots": null,
+        "boot_cause": null,
+        "uptime_s": null,
+        "lost_records": null,
+    })
+}
+
+fn without_extensions(s: &Status) -> String {
+    let missing = words::missing_parameters(s.jtc_init);
+    let missing = if missing.is_empty() { "nothing".into() } else { missing.join(", ") };
+    format!(
+        "a controller without extensions: it does not tell its firmware, its arm or its limits\n\
+         state:     {}\n\
+         missing:   {missing}\n\
+         next: jtc status; limits, gravity and rotor inertia are those built into it",
+        s.state
+    )
+}
+
+/// Takes the torque off an arm that is held at rest.
+pub fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let mut session = link.session()?;
+    if !yes {
+        confirm("the arm loses its torque: without holding brakes it falls", "--yes")?;
+    }
+    session.disable()?;
+    let status = session.wait_for("Init without torque", DISABLED, |s| {
+        let limp = s.joints.iter().all(|joint| joint.state != jtc_wire::NodeState::ENABLED);
+        s.state == ControllerState::Error || (s.state == ControllerState::Init && limp)
+    })?;
+    out.result(&json!({ "disabled": true, "status": super::status::as_json(&status) }), || {
+        format!("torque off; state {}\nnext: jtc recover --arm FILE", status.state)
+    });
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_told_in_its_unit() {
+        let spans = [0, 119, 120, 7_199, 7_200, 172_799, 172_800].map(span);
+        assert_eq!(spans, ["0 s", "119 s", "2 min", "119 min", "2 h", "47 h", "2 days"]);
+    }
+}

@@ -1,0 +1,229 @@
+//! `jtc jog`: single joints, with keys or at a given rate.
+
+use std::time::Duration;
+
+use cli_kit::{ErrorKind, Failure, Key, Keys, Output, Stop};
+use jtc_host::port::SerialPort;
+use jtc_host::{Error, LinkError, Session};
+use jtc_wire::{JOINTS, Joint, Status};
+use serde_json::json;
+
+use crate::args::JogArgs;
+
+/// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
+const AGAIN: Duration = Duration::from_millis(50);
+/// How long a key counts. A terminal repeats a key that is held after half a second, and then faster than this.
+const HELD: Duration = Duration::from_millis(150);
+/// Rates of the keys, rad/s.
+const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+/// An arm comes to rest within this time.
+const REST: Duration = Duration::from_secs(3);
+
+/// Jogs until the keys, the time or a signal ends it; the arm rests then.
+pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
+    let rate = args.rate.map(|rate| if args.deg { rate.to_radians() } else { rate });
+    if let Some(rate) = rate
+        && !rate.is_finite()
+    {
+        return Err(Failure::usage(format!("{rate} is no rate; nothing was sent")));
+    }
+    let stop = Stop::listen()?;
+    let mut session = args.link.session()?;
+    let begin = session.fresh_status()?;
+    let end = args.duration.map(|s| session.now() + Duration::from_secs_f64(s.clamp(0.0, 86_400.0)));
+    let over = |session: &Session<SerialPort>| stop.asked() || end.is_some_and(|end| session.now() >= end);
+    let jogged = match (args.joint.and_then(|joint| Joint::from_number(joint.into())), rate) {
+        (Some(joint), Some(rate)) => one(&mut session, joint, rate, over),
+        _ => with_keys(&mut session, out, over),
+    };
+    // Whatever ended it: the arm comes to rest now, and not only when the controller has waited.
+    let rested = rest(&mut session);
+    jogged?;
+    let now = rested?;
+    let value = json!({
+        "from_rad": begin.positions(),
+        "to_rad": now.positions(),
+    });
+    out.result(&value, || moved(&begin, &now));
+    Ok(())
+}
+
+fn moved(from: &Status, to: &Status) -> String {
+    let ways = Joint::ALL.into_iter().zip(from.positions().into_iter().zip(to.positions()));
+    let moved: Vec<String> = ways
+        .filter(|(_, (from, to))| (to - from).abs() > 1e-3)
+        .map(|(joint, (from, to))| {
+            format!("{joint}: {from:.3} to {to:.3} rad ({:.1}°)", (to - from).to_degrees())
+        })
+        .collect();
+    if moved.is_empty() { "nothing moved".into() } else { moved.join("\n") }
+}
+
+fn one(
+    session: &mut Session<SerialPort>,
+    joint: Joint,
+    rate: f64,
+    over: impl Fn(&Session<SerialPort>) -> bool,
+) -> Result<(), Failure> {
+    let mut velocity = [0.0; JOINTS];
+    velocity[joint.index()] = rate;
+    while !over(session) {
+        session.jog(&velocity).map_err(refused)?;
+        wait(session, AGAIN)?;
+    }
+    Ok(())
+}
+
+/// Statuses are taken meanwhile.
+fn wait(session: &mut Session<SerialPort>, time: Duration) -> Result<(), Failure> {
+    let end = session.now() + time;
+    while session.now() < end {
+        session.poll(end.saturating_sub(session.now()))?;
+    }
+    Ok(())
+}
+
+/// Which joint the keys move, how fast, and until when.
+struct Held {
+    joint: Joint,
+    rate: usize,
+    /// Direction, and when its key was seen last.
+    moving: Option<(f64, Duration)>,
+}
+
+impl Held {
+    /// A key was pressed; false when it ends everything.
+    fn press(&mut self, key: Key, now: Duration) -> bool {
+        match key {
+            Key::Char('q' | 'Q') | Key::Escape => return false,
+            Key::Char(c @ '1'..='6') => {
+                let number = c.to_digit(10).unwrap_or(1) as usize;
+                (self.joint, self.moving) = (Joint::from_number(number).unwrap_or(self.joint), None);
+            }
+            Key::Right | Key::Char('l' | 'd') => self.moving = Some((1.0, now)),
+            Key::Left | Key::Char('h' | 'a') => self.moving = Some((-1.0, now)),
+            Key::Up | Key::Char('+' | '=') => self.rate = (self.rate + 1).min(RATES.len() - 1),
+            Key::Down | Key::Char('-' | '_') => self.rate = self.rate.saturating_sub(1),
+            // Any other key is a hand that looks for the one that stops.
+            _ => self.moving = None,
+        }
+        true
+    }
+
+    /// What is wanted now.
+    fn velocity(&mut self, now: Duration) -> [f64; JOINTS] {
+        self.moving = self.moving.filter(|(_, pressed)| now < *pressed + HELD);
+        let mut velocity = [0.0; JOINTS];
+        velocity[self.joint.index()] = self.moving.map_or(0.0, |(direction, _)| direction * RATES[self.rate]);
+        velocity
+    }
+}
+
+fn with_keys(
+    session: &mut Session<SerialPort>,
+    out: &Output,
+    over: impl Fn(&Session<SerialPort>) -> bool,
+) -> Result<(), Failure> {
+    let Some(mut keys) = Keys::listen() else {
+        return Err(Failure::usage("without a terminal there are no keys; nothing was sent").hint(
+            "`jtc jog JOINT RATE` moves one joint for as long as the command lives, as `jtc jog 3 0.1`",
+        ));
+    };
+    out.note("1..6 joint, hold ← or → to move it, ↑ ↓ rate, q ends");
+    let mut held = Held { joint: Joint::ALL[0], rate: 2, moving: None };
+    let (mut shown, mut moved) = (String::new(), false);
+    while !over(session) && !keys.gone() {
+        let now = session.now();
+        if !keys.pressed().into_iter().all(|key| held.press(key, now)) {
+            return Ok(());
+        }
+        let velocity = held.velocity(now);
+        let moves = velocity != [0.0; JOINTS];
+        if moves || moved {
+            session.jog(&velocity).map_err(refused)?;
+        }
+        moved = moves;
+        let at = session.last().map_or(0.0, |s| s.positions()[held.joint.index()]);
+        let line = format!(
+            "{}  {at:+.3} rad ({:+.1}°)  rate {} rad/s",
+            held.joint,
+            at.to_degrees(),
+            RATES[held.rate]
+        );
+        if line != shown && !out.is_json() {
+            eprint!("\r\x1b[K{line}");
+            shown = line;
+        }
+        wait(session, Duration::from_millis(20))?;
+    }
+    Ok(())
+}
+
+/// Jogging is refused for reasons of its own.
+fn refused(error: Error) -> Failure {
+    let failure = Failure::of(&error);
+    match &error {
+        Error::Link(LinkError::Refused { state, trajectory, code, .. }) => {
+            let next = match code {
+                jtc_wire::DataStatus::IncorrectValue => {
+                    "the rate is above the joint's velocity limit: `jtc arm show`"
+                }
+                _ if *state != jtc_wire::ControllerState::HoldPos => {
+                    "joints are jogged in HoldPos: `jtc recover`"
+                }
+                _ if *trajectory == jtc_wire::TrajectoryState::Pause => {
+                    "a trajectory is paused: `jtc traj stop` first"
+                }
+                _ => "the arm is not held at rest yet, or a trajectory is being uploaded: `jtc status`",
+            };
+            failure.hint(next)
+        }
+        _ => failure,
+    }
+}
+
+/// Every joint stands.
+fn rest(session: &mut Session<SerialPort>) -> Result<Status, Failure> {
+    eprint!("{}", if std::io::IsTerminal::is_terminal(&std::io::stderr()) { "\r\x1b[K" } else { "" });
+    // Refused where nothing is jogged any more, which is just as well.
+    match session.jog(&[0.0; JOINTS]) {
+        Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
+        Err(error) => return Err(Failure::of(&error)),
+    }
+    let end = session.now() + REST;
+    loop {
+        let status = session.next_status()?;
+        if status.joints.iter().all(|joint| joint.velocity.abs() < 0.02) {
+            return Ok(status);
+        }
+        if session.now() > end {
+            return Err(Failure::new(ErrorKind::Fault, "still-moving", "the arm still moves")
+                .hint("press the emergency stop; `jtc status` shows the joints"));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j58_a_key_counts_for_a_moment_and_its_joint_only() {
+        let ms = Duration::from_millis;
+        let mut held = Held { joint: Joint::ALL[0], rate: 3, moving: None };
+        assert!(held.press(Key::Char('3'), ms(0)) && held.press(Key::Right, ms(10)));
+        assert_eq!(held.velocity(ms(20)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
+        assert_eq!(held.velocity(ms(159)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
+        assert_eq!(held.velocity(ms(160)), [0.0; JOINTS]);
+        // Another key stops, and so does another joint.
+        for key in [Key::Char('x'), Key::Char('4'), Key::Home] {
+            held.press(Key::Left, ms(200));
+            assert_ne!(held.velocity(ms(201)), [0.0; JOINTS]);
+            held.press(key, ms(202));
+            assert_eq!(held.velocity(ms(203)), [0.0; JOINTS], "{key:?}");
+        }
+        (0..9).for_each(|_| assert!(held.press(Key::Up, ms(0))));
+        assert_eq!(RATES[held.rate], 0.5);
+        assert!(!held.press(Key::Char('q'), ms(0)) && !held.press(Key::Escape, ms(0)));
+    }
+}

@@ -1,0 +1,266 @@
+//! What goes beyond the protocol of existing devices: identity, settings, the arm as one thing, jogging (J-50 to J-58).
+
+use std::time::Duration;
+
+use jtc_core::settings;
+use jtc_wire::{
+    Answer, FrameRef, FrameStatus, FrameType, Info, JOINTS, Name, SET_VALUES_MAX, SettingValue, StoreState,
+    fixed, floats, set_settings,
+};
+
+use super::Session;
+use crate::error::{Error, ExtensionError, LinkError};
+use crate::port::Port;
+
+/// A device tells everything to a host that asked within the last 10 s (J-51): asked again in time.
+const ASK_AGAIN: Duration = Duration::from_secs(5);
+/// Longest that a device may take to store an arm: erasing a sector of flash does.
+const STORING: Duration = Duration::from_secs(30);
+
+/// What is known of the device's extensions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum Extensions {
+    /// Nobody has asked yet.
+    #[default]
+    Unknown,
+    /// It has none.
+    None,
+    /// It has some; asked at this time of the port.
+    Asked(Duration),
+}
+
+impl<P: Port> Session<P> {
+    /// Who the device is; `None` when it has no extensions.
+    ///
+    /// # Errors
+    ///
+    /// Those of the line.
+    pub fn info(&mut self) -> Result<Option<Info>, LinkError> {
+        let info = self.ask(&fixed::GET_INFO, |answer| match answer {
+            Answer::Info(info) => Some(info),
+            _ => None,
+        });
+        match info {
+            Ok(info) => Ok(Some(info)),
+            Err(LinkError::NoExtension { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Asks the device who it is where that was not done of late: only then it tells each reason of a refusal (J-51).
+    pub(super) fn introduce(&mut self) -> Result<(), LinkError> {
+        let due = match self.extensions {
+            Extensions::Unknown => true,
+            Extensions::None => false,
+            Extensions::Asked(at) => self.port.now().saturating_sub(at) > ASK_AGAIN,
+        };
+        if !due {
+            return Ok(());
+        }
+        match self.info() {
+            // Statuses come: the command itself is worth a try.
+            Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. }) => {
+                self.extensions = Extensions::Asked(self.port.now());
+                Ok(())
+            }
+            asked => asked.map(drop),
+        }
+    }
+
+    /// Sends an extension request; an error when it is refused or not known.
+    fn extension(&mut self, frame: &[u8]) -> Result<(), LinkError> {
+        let request = frame.get(1).copied().and_then(FrameType::from_byte).unwrap_or(FrameType::GetInfo);
+        if self.extensions == Extensions::None {
+            return Err(LinkError::NoExtension { request });
+        }
+        let record = match self.request(frame) {
+            // An existing device finds no such type (J-50).
+            Err(LinkError::NotConfirmed { last: Some(last), .. })
+                if last.status == FrameStatus::IncorrectFrameType =>
+            {
+                self.extensions = Extensions::None;
+                return Err(LinkError::NoExtension { request });
+            }
+            record => record?,
+        };
+        self.extensions = Extensions::Asked(self.port.now());
+        if crate::error::accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
+    }
+
+    /// Sends an extension request and waits for what it returns.
+    fn ask<T>(&mut self, frame: &[u8], take: impl Fn(Answer<'_>) -> Option<T>) -> Result<T, LinkError> {
+        for _ in 0..self.timeouts.tries {
+            self.answers.clear();
+            self.extension(frame)?;
+            // It follows the record.
+            let end = self.port.now() + self.confirmation_time(jtc_wire::ANSWER_MAX);
+            loop {
+                while let Some(bytes) = self.answers.pop_front() {
+                    let answer = FrameRef::new_checked(&bytes).and_then(Answer::parse);
+                    if let Some(found) = answer.and_then(&take) {
+                        return Ok(found);
+                    }
+                }
+                let now = self.port.now();
+                if now >= end {
+                    break;
+                }
+                self.read(end - now)?;
+            }
+        }
+        let request = frame.get(1).copied().and_then(FrameType::from_byte).unwrap_or(FrameType::GetInfo);
+        Err(LinkError::NotConfirmed { request, tries: self.timeouts.tries, last: None })
+    }
+
+    /// Every setting as the device has it, in the order of its table.
+    ///
+    /// # Errors
+    ///
+    /// [`LinkError::NoExtension`], and those of the line.
+    pub fn settings(&mut self) -> Result<Vec<SettingValue>, LinkError> {
+        let mut all = Vec::new();
+        loop {
+            let from = all.len() as u16;
+            let (page, total) = self.ask(&fixed::get_settings(from), |answer| match answer {
+                Answer::Settings { first, total, values } if first == from => {
+                    Some((values.iter().collect::<Vec<_>>(), usize::from(total)))
+                }
+                _ => None,
+            })?;
+            let done = page.is_empty();
+            all.extend(page);
+            if done || all.len() >= total {
+                return Ok(all);
+            }
+        }
+    }
+
+    /// Changes settings, all of them or none.
+    ///
+    /// # Errors
+    ///
+    /// [`LinkError::Refused`]: a value out of range, or a state that does not allow it; [`LinkError::NoExtension`], and those of the
+    /// line.
+    pub fn set_settings(&mut self, values: &[SettingValue]) -> Result<(), Error> {
+        let mut frame = vec![0; 6 + jtc_wire::VALUE_LEN * values.len().min(SET_VALUES_MAX)];
+        let n = set_settings(&mut frame, values.iter().copied())?;
+        Ok(self.extension(&frame[..n])?)
+    }
+
+    /// The device has extensions, as far as it was asked.
+    pub fn has_extensions(&self) -> bool {
+        matches!(self.extensions, Extensions::Asked(_))
+    }
+
+    /// The speed override: path seconds per second (J-57); 1 where the device has none.
+    ///
+    /// # Errors
+    ///
+    /// Those of the line.
+    pub fn speed(&mut self) -> Result<f64, LinkError> {
+        // What belongs to no arm is at the end of the table.
+        let first = settings::count(true) as u16;
+        let speed = self.ask(&fixed::get_settings(first), |answer| match answer {
+            Answer::Settings { values, .. } => Some(
+                values.iter().find(|value| value.setting == settings::SPEED).map_or(1.0, |value| value.value),
+            ),
+            _ => None,
+        });
+        match speed {
+            Err(LinkError::NoExtension { .. }) => Ok(1.0),
+            speed => speed,
+        }
+    }
+
+    /// Sets the speed override, 0.05 to 1: a motion gets there along a ramp, and later ones run at it, too (J-57).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::set_settings`].
+    pub fn set_speed(&mut self, speed: f64) -> Result<(), Error> {
+        self.set_settings(&[SettingValue { setting: settings::SPEED, joint: 0, value: speed }])
+    }
+
+    /// Names the arm that the device controls.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::set_settings`].
+    pub fn set_name(&mut self, name: &Name) -> Result<(), LinkError> {
+        self.extension(&fixed::set_name(name))
+    }
+
+    /// The arm in use as one thing: a [`jtc_wire::ArmImage`].
+    ///
+    /// # Errors
+    ///
+    /// [`ExtensionError::Changed`] when the arm changed meanwhile; those of [`Session::settings`].
+    pub fn arm_image(&mut self) -> Result<Vec<u8>, Error> {
+        let info = self.info()?.ok_or(LinkError::NoExtension { request: FrameType::GetArm })?;
+        let mut image = Vec::new();
+        loop {
+            let from = image.len() as u16;
+            let (page, total) = self.ask(&fixed::get_arm(from), |answer| match answer {
+                Answer::Arm { offset, total, bytes } if offset == from => {
+                    Some((bytes.to_vec(), usize::from(total)))
+                }
+                _ => None,
+            })?;
+            let done = page.is_empty();
+            image.extend(page);
+            if done || image.len() >= total {
+                break;
+            }
+        }
+        let whole = jtc_wire::ArmImage::parse(&image).is_some();
+        if whole && jtc_wire::Hash::of_image(&image) == info.hash {
+            Ok(image)
+        } else {
+            Err(ExtensionError::Changed.into())
+        }
+    }
+
+    /// Keeps the arm in use over a loss of power, and waits until it is kept; returns its number.
+    ///
+    /// # Errors
+    ///
+    /// [`ExtensionError::NotStored`] when the memory failed; those of [`Session::set_settings`].
+    pub fn store_arm(&mut self) -> Result<u32, Error> {
+        self.extension(&fixed::STORE_ARM)?;
+        let end = self.port.now() + STORING;
+        loop {
+            let info = self.info()?.ok_or(LinkError::NoExtension { request: FrameType::StoreArm })?;
+            match info.store {
+                StoreState::Stored => return Ok(info.sequence),
+                StoreState::Busy if self.port.now() < end => {
+                    let until = self.port.now() + Duration::from_millis(200);
+                    while self.port.now() < until {
+                        self.read(until.saturating_sub(self.port.now()))?;
+                    }
+                }
+                state => return Err(ExtensionError::NotStored { state }.into()),
+            }
+        }
+    }
+
+    /// Torque off at rest, back to Init; the parameters have to be given again (J-53).
+    ///
+    /// # Errors
+    ///
+    /// [`LinkError::Refused`] when the arm is not held at rest; [`LinkError::NoExtension`], and those of the line.
+    pub fn disable(&mut self) -> Result<(), LinkError> {
+        self.extension(&fixed::DISABLE)
+    }
+
+    /// Joint velocities, rad/s, base to wrist: **the arm moves**, for 200 ms, unless this is called again before (J-58).
+    ///
+    /// # Errors
+    ///
+    /// [`LinkError::Refused`] outside HoldPos, beside a paused path or during an upload, or for a velocity beyond its limit;
+    /// [`LinkError::NoExtension`], and those of the line.
+    pub fn jog(&mut self, velocity: &[f64; JOINTS]) -> Result<(), Error> {
+        let mut frame = [0; 30];
+        floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
+        Ok(self.extension(&frame)?)
+    }
+}

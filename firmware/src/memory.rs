@@ -6,7 +6,7 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 use embassy_stm32::pac;
 use jtc_core::POINTS_MAX;
-use jtc_wire::{EventBatch, FRAME_MAX, RawPoint, STATUS_LEN};
+use jtc_wire::{ANSWER_MAX, EventBatch, FRAME_MAX, RawPoint};
 
 use crate::uart::RING;
 
@@ -47,7 +47,7 @@ static BATCH: Place<EventBatch> = Place::new();
 static RINGS: Place<[[u8; RING]; 2]> = Place::new();
 /// What the lines' DMA reads; not cached.
 #[unsafe(link_section = ".sram1")]
-static STATUSES: Place<[[u8; STATUS_LEN]; 2]> = Place::new();
+static STATUSES: Place<[[u8; ANSWER_MAX]; 2]> = Place::new();
 /// Where frames are put together, a buffer for each line.
 #[unsafe(link_section = ".sram2")]
 static RECEIVE: Place<[[u8; FRAME_MAX]; 2]> = Place::new();
@@ -58,8 +58,8 @@ pub struct Memory {
     pub points: &'static mut [RawPoint],
     /// DMA rings of the lines.
     pub rings: [&'static mut [u8; RING]; 2],
-    /// DMA buffers of the statuses.
-    pub statuses: [&'static mut [u8; STATUS_LEN]; 2],
+    /// DMA buffers of what is sent.
+    pub statuses: [&'static mut [u8; ANSWER_MAX]; 2],
     /// Receive buffers of the lines.
     pub receive: [&'static mut [u8; FRAME_MAX]; 2],
     /// The slot between links and tick.

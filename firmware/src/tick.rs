@@ -175,6 +175,9 @@ impl Tick {
         if outputs.status {
             send(&mut self.lines, outputs.record_line, self.controller.status_frame());
         }
+        if let Some(line) = outputs.answer_line.and_then(|line| self.lines.get_mut(line)) {
+            line.send(self.controller.answer_frame());
+        }
         let telemetry = self.controller.telemetry();
         let (state, errors) = (telemetry.state, telemetry.errors);
         self.flight.complete(&outputs, telemetry);

@@ -18,7 +18,7 @@ use embassy_stm32::peripherals::{USART2, USART3};
 use embassy_stm32::{Peri, interrupt, pac, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use jtc_wire::STATUS_LEN;
+use jtc_wire::ANSWER_MAX;
 use openjtc_firmware::clock::Baud;
 
 use crate::clocks;
@@ -130,7 +130,7 @@ impl Stream {
 pub fn open(
     line: Line,
     ring: &'static mut [u8; RING],
-    status: &'static mut [u8; STATUS_LEN],
+    status: &'static mut [u8; ANSWER_MAX],
     rate: u32,
 ) -> (Receiver, Lookahead, Transmitter) {
     let usart = line.usart;
@@ -272,23 +272,25 @@ impl Receiver {
 pub struct Transmitter {
     stream: Stream,
     /// Read by DMA while the stream runs.
-    buffer: &'static mut [u8; STATUS_LEN],
+    buffer: &'static mut [u8; ANSWER_MAX],
 }
 
 // SAFETY: registers can be used from any context, and the buffer belongs to this alone.
 unsafe impl Send for Transmitter {}
 
 impl Transmitter {
-    /// The last status has left the buffer.
+    /// The last frame has left the buffer.
     pub fn is_free(&self) -> bool {
         !self.stream.running()
     }
 
-    /// Sends a status; nothing is sent while the last one still is.
-    pub fn send(&mut self, status: &[u8; STATUS_LEN]) {
-        if self.is_free() {
-            *self.buffer = *status;
-            self.stream.start(STATUS_LEN);
+    /// Sends a frame; nothing is sent while the last one still is, and none that is longer than the buffer.
+    pub fn send(&mut self, frame: &[u8]) {
+        if self.is_free()
+            && let Some(place) = self.buffer.get_mut(..frame.len())
+        {
+            place.copy_from_slice(frame);
+            self.stream.start(frame.len());
         }
     }
 }

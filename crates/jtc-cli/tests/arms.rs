@@ -112,11 +112,93 @@ fn an_arm_file_is_made_from_a_robot_description() {
     assert!(!std::path::Path::new(toml).exists());
 
     let output = jtc(&["--json", "arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(0);
-    assert_eq!(output.json()["missing"], serde_json::json!(["friction", "PID gains"]));
+    assert_eq!(output.json()["missing"], serde_json::json!([]));
     assert_eq!(output.json()["warnings"][0]["place"], "joint grip");
+    assert_eq!(output.json()["warnings"][0]["change"], "left_out");
+    let proposed = output.json()["proposed"].clone();
+    let of = |name: &str| proposed.as_array().unwrap().iter().filter(|v| v["name"] == name).count();
+    assert_eq!((of("pid.kp"), of("rotor_inertia_kg_m2"), of("torque_max_nm")), (6, 6, 0), "{proposed}");
     let read = jtc_host::arm::Arm::load(std::path::Path::new(toml)).unwrap();
     assert_eq!((read.model, read.joint_names), (arm.model, arm.joint_names));
     jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(4);
     let output = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
     assert!(output.err.contains("is no robot description"), "{}", output.err);
+
+    // What was changed and proposed is in the text as well, and the file passes its check with warnings.
+    let output = jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml, "--force"]).ends(0);
+    for words in [
+        "left out: ",
+        "joint grip: revolute: is held at 0",
+        "proposed: in no URDF",
+        "pid.kp",
+        "next: jtc arm check",
+    ] {
+        assert!(output.out.contains(words), "{words}: {}", output.out);
+    }
+    let output = jtc(&["--json", "arm", "check", toml]).ends(0);
+    let value = output.json();
+    assert_eq!((value["ok"].as_bool(), value["holding"].as_array().map(Vec::len)), (Some(true), Some(6)));
+    let codes: Vec<&str> =
+        value["findings"].as_array().unwrap().iter().filter_map(|f| f["code"].as_str()).collect();
+    assert!(codes.contains(&"proposed") && codes.contains(&"holding"), "{codes:?}");
+}
+
+/// J-06, J-35: what a controller would refuse is refused by the check, with joint, value, limit and what to do.
+#[test]
+fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("arm.toml");
+    let text = include_str!("../../../arms/avena.toml")
+        .replacen("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 1.6", 1)
+        .replacen("mass_kg = 7.5", "mass_kg = -7.5", 1)
+        .replacen("torque_max_nm = 180.0", "torque_max_nm = -180.0", 1);
+    std::fs::write(&path, text).unwrap();
+    let path = path.to_str().unwrap();
+    let output = jtc(&["--json", "arm", "check", path]).ends(4);
+    let value = output.json();
+    let problems: Vec<_> =
+        value["findings"].as_array().unwrap().iter().filter(|f| f["severity"] == "problem").collect();
+    assert_eq!((value["ok"].as_bool(), problems.len()), (Some(false), 3), "{value}");
+    let speed = problems.iter().find(|f| f["name"] == "velocity_max_rad_s").unwrap();
+    assert_eq!((speed["joint"].as_u64(), speed["limit"].as_f64()), (Some(1), Some(1.8)));
+    assert!(problems.iter().all(|f| f["next"].as_str().is_some_and(|next| !next.is_empty())), "{value}");
+    let output = jtc(&["arm", "check", path]).ends(4);
+    assert!(
+        output.out.contains("✗ joint 2, torque_max_nm: -180") && output.out.contains("refused: "),
+        "{}",
+        output.out
+    );
+    // Unreadable is another thing.
+    jtc(&["arm", "check", "nowhere.toml"]).ends(2);
+    jtc(&["arm", "check", "Cargo.toml"]).ends(2);
+}
+
+#[test]
+fn an_arm_is_shown_with_units_ranges_and_sources() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("arm.toml");
+    let text = include_str!("../../../arms/avena.toml")
+        .replacen("velocity_max_rad_s = 1.5\n", "", 1)
+        .replacen("torque_max_nm = 180.0\n", "torque_max_nm = 180.0\nproposed = [\"torque_max_nm\"]\n", 1);
+    std::fs::write(&path, text).unwrap();
+    let path = path.to_str().unwrap();
+    let output = jtc(&["arm", "show", path]).ends(0);
+    let row = |name: &str| output.out.lines().find(|l| l.starts_with(name)).expect("a row").to_owned();
+    let torque = row("torque_max_nm");
+    for word in ["80 ", "180*", "N·m", "0..360", "file, proposed"] {
+        assert!(torque.contains(word), "{word}: {torque}");
+    }
+    assert!(row("velocity_max_rad_s").contains("1.5d") && row("position_min_rad").contains("±2.9905"));
+    assert!(output.out.contains("0.8437") && output.out.contains("* proposed"));
+    let deg = jtc(&["arm", "show", path, "--deg"]).ends(0);
+    assert!(deg.out.contains("±171.34") && deg.out.contains("roll °"), "{}", deg.out);
+    let value = jtc(&["--json", "arm", "show", path, "--deg"]).ends(0).json();
+    let values = value["values"].as_array().unwrap();
+    let one =
+        |name: &str, joint: u64| values.iter().find(|v| v["name"] == name && v["joint"] == joint).unwrap();
+    let speed = one("velocity_max_rad_s", 1);
+    assert_eq!((speed["unit"].as_str(), speed["from"].as_str()), (Some("°/s"), Some("default")));
+    assert!((speed["value"].as_f64().unwrap() - 85.943_669).abs() < 1e-5);
+    assert_eq!(one("torque_max_nm", 2)["from"], "proposed");
+    assert_eq!(one("pid.kp", 2)["value"].as_f64(), Some(8000.0));
 }

@@ -167,6 +167,29 @@ impl fmt::Display for ModelError {
 
 impl core::error::Error for ModelError {}
 
+impl ModelError {
+    /// Index of the joint origin or the link that it is about, 0..7.
+    pub const fn index(&self) -> usize {
+        match *self {
+            Self::NotFinite { index, .. } | Self::AngleTooLarge { index, .. } => index,
+            Self::MassNegative { link, .. }
+            | Self::MassZero { link }
+            | Self::InertiaNegative { link, .. }
+            | Self::InertiaTriangle { link, .. } => link,
+        }
+    }
+
+    /// Whether it is about a joint origin, else about a link.
+    pub const fn is_of_joint(&self) -> bool {
+        match self {
+            Self::NotFinite { field, .. } | Self::AngleTooLarge { field, .. } => {
+                matches!(field, Field::JointXyz(_) | Field::JointRpy(_))
+            }
+            _ => false,
+        }
+    }
+}
+
 /// Largest angle of a model, rad: far beyond a meaningful angle, and below [`crate::SIN_COS_MAX`].
 const ANGLE_MAX: f64 = 1.0e6;
 /// Tolerance of the inertia limits, relative to the largest moment: models are rounded to f32.

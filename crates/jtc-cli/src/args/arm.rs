@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand};
 
 use super::ForceArgs;
@@ -13,12 +14,33 @@ pub enum ArmCommand {
     #[command(
         after_help = "The arm is six revolute or continuous joints in a chain. Where more joints move (a gripper,\n\
                       a seventh axis, a second arm), --joints or --tip selects the six; the others are\n\
-                      held at 0. Gains and friction are in no URDF: they are to be added to the file.\n\nExamples:\n  \
+                      held at 0. Rotor inertia, gains, acceleration limit and more are in no URDF: starting\n\
+                      values are proposed by rules that are written into the file, and marked there.\n\nExamples:\n  \
                       jtc arm import ur5.urdf -o ur5.toml\n  \
                       jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
                       jtc arm import two-arms.urdf --tip left_tool0 -o left.toml"
     )]
     Import(ImportArgs),
+    /// Whether an arm is physical, complete, held by its drives and taken by the controller
+    #[command(
+        after_help = "Exit code 4: the controller would refuse it. 0: it would not; warnings may be there, among\n\
+                      them what is only proposed and poses in which gravity is more than a drive can hold.\n\nExamples:\n  \
+                      jtc arm check ur5.toml\n  jtc --json arm check ur5.toml | jq .findings[].what"
+    )]
+    Check {
+        /// Arm file (TOML) or robot description (URDF)
+        file: PathBuf,
+    },
+    /// All numbers of an arm, with unit, range, default and where each comes from
+    #[command(after_help = "Examples:\n  jtc arm show ur5.toml\n  jtc arm show ur5.toml --deg\n  \
+                            jtc --json arm show ur5.toml | jq '.values[] | select(.from == \"proposed\")'")]
+    Show {
+        /// Arm file (TOML) or robot description (URDF)
+        file: PathBuf,
+        /// Angles in degrees
+        #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
+        deg: bool,
+    },
 }
 
 /// Options of `jtc arm import`.

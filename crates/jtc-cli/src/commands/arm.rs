@@ -1,38 +1,59 @@
 //! `jtc arm`: arm files.
 
-use cli_kit::{Failure, Output};
-use jtc_host::arm::{Arm, ArmChoice};
+mod import;
+mod show;
+
+use std::path::Path;
+
+use cli_kit::{ErrorKind, Failure, Output};
+use jtc_host::arm::{Arm, ArmFinding};
+use jtc_host::doctor::Finding;
 use serde_json::json;
 
-use crate::args::{ArmCommand, ImportArgs};
-use cli_kit::OutputFile;
+use crate::args::ArmCommand;
 
 /// Does one of the family.
 pub fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
     match command {
-        ArmCommand::Import(args) => import(args, out),
+        ArmCommand::Import(args) => import::import(args, out),
+        ArmCommand::Check { file } => check(file, out),
+        ArmCommand::Show { file, deg } => show::show(file, *deg, out),
     }
 }
 
-fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
-    let choice = ArmChoice { joints: args.joints.clone(), tip: args.tip.clone() };
-    let arm = Arm::import(&args.urdf, &choice)?;
-    let file = OutputFile::open(&args.out, args.force.force, &[&args.urdf])?;
-    let name = file.name();
-    file.write(arm.to_toml())?;
-    let missing: Vec<&str> = arm.parameter_set().missing();
+fn check(file: &Path, out: &Output) -> Result<(), Failure> {
+    let arm = Arm::load_unchecked(file)?;
+    let checked = arm.check();
+    let refused = checked.is_refused();
+    let name = file.display();
     let value = json!({
-        "file": name, "arm": arm.name, "joints": arm.joint_names, "warnings": arm.warnings, "missing": missing,
+        "file": name.to_string(),
+        "arm": arm.name,
+        "ok": !refused,
+        "findings": checked.findings,
+        "holding": checked.holding,
     });
     out.result(&value, || {
-        let mut text = format!("{name}: arm {}, joints {}\n", arm.name, arm.joint_names.join(", "));
-        for warning in &arm.warnings {
-            text += &format!("  {warning}\n");
-        }
-        if !missing.is_empty() {
-            text += &format!("not in a URDF, to be added to the file: {}\n", missing.join(", "));
-        }
-        text + &format!("look at it: jtc params show {name}")
+        format!("{name}: arm {}\n{}", arm.name, as_text(&checked.findings))
+            + if refused {
+                "refused: a controller does not take this arm"
+            } else {
+                "a controller takes this arm"
+            }
     });
-    Ok(())
+    if refused { Err(Failure::printed(ErrorKind::Refused)) } else { Ok(()) }
+}
+
+/// A line for each finding; what is to be done stands once behind those that it is the same for.
+fn as_text(findings: &[ArmFinding]) -> String {
+    let mut text = String::new();
+    for (i, f) in findings.iter().enumerate() {
+        let Finding { severity, what, why, next } = &f.finding;
+        text += &format!("{} {what}{}{why}\n", severity.mark(), if why.is_empty() { "" } else { ": " });
+        let same = findings.get(i + 1).is_some_and(|after| &after.finding.next == next);
+        if !next.is_empty() && !same {
+            text += &format!("    next: {}\n", next.replace('`', ""));
+        }
+    }
+    text
 }

@@ -7,7 +7,7 @@ use jtc_dynamics::ArmModel;
 use jtc_wire::Joint;
 
 use super::csv::{self, Table};
-use super::{Arm, ParameterSet, Warning, is_xml};
+use super::{Arm, Change, ParameterSet, Warning, is_xml};
 use crate::file::{FileError, read_text};
 
 /// Which friction compensation to take where a file has both.
@@ -96,7 +96,7 @@ impl ParameterFile {
     }
 
     fn warn(&mut self, place: String, problem: impl Into<String>) {
-        self.warnings.push(Warning { place, problem: problem.into() });
+        self.warnings.push(Warning::new(Change::Files, place, problem));
     }
 
     fn file(&mut self, path: &Path, joints: &mut JointTables) -> Result<(), FileError> {

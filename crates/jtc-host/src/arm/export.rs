@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 
 use jtc_core::JOINTS;
 use jtc_dynamics::Origin;
+use jtc_wire::Joint;
 
-use super::Arm;
 use super::toml_form::FORMAT;
+use super::{Arm, RULES, Rule};
 
 fn list(values: &[f64]) -> String {
     // `{:?}` keeps a fraction, which makes a float of it in TOML.
@@ -28,14 +29,34 @@ fn escaped(text: &str) -> String {
 }
 
 impl Arm {
+    /// The list of those numbers of a joint, or of the arm, that are proposals.
+    fn write_marks(&self, out: &mut String, joint: Option<Joint>) {
+        let marked = self.sources.marked(joint);
+        if !marked.is_empty() {
+            let names: Vec<String> = marked.into_iter().map(quoted).collect();
+            let _ =
+                writeln!(out, "proposed = [{}] # nobody has measured or looked these up", names.join(", "));
+        }
+    }
+
     /// As an arm file.
     pub fn to_toml(&self) -> String {
         let mut out = format!("format = {FORMAT}\nname = {}\n", quoted(&self.name));
         if let Some(g) = &self.gravity {
             let _ = writeln!(out, "gravity_m_s2 = {}", list(g));
         }
+        self.write_marks(&mut out, None);
+        if self.sources.proposed().next().is_some() {
+            out += "\n# What `proposed` names are starting values, made by these rules. Put in what was measured or looked up, and take the\n\
+                    # name out of the list; `jtc arm check` names what is left.\n";
+            for Rule { name, rule } in RULES {
+                if self.sources.proposed().any(|(_, key)| key == name) {
+                    let _ = writeln!(out, "#   {name}: {rule}");
+                }
+            }
+        }
         for (i, origin) in self.model.joints.iter().enumerate() {
-            let name = self.joint_names.get(i).map_or("flange", String::as_str);
+            let name = self.joint_names.get(i).unwrap_or(&self.flange_name);
             let _ = writeln!(out, "\n[[joint]]\nname = {}", quoted(name));
             let _ =
                 writeln!(out, "origin_xyz_m = {}\norigin_rpy_rad = {}", list(&origin.xyz), list(&origin.rpy));
@@ -66,9 +87,15 @@ impl Arm {
             if let Some(c) = self.polynomial.map(|p| p[i]) {
                 let _ = writeln!(out, "friction_polynomial = {} # c0..c5, ascending", list(&c));
             }
+            self.write_marks(&mut out, Joint::from_index(i));
         }
         for (i, link) in self.model.links.iter().enumerate() {
-            let _ = writeln!(out, "\n[[link]]\nname = \"link_{i}\"\nmass_kg = {:?}", link.mass);
+            let _ = writeln!(
+                out,
+                "\n[[link]]\nname = {}\nmass_kg = {:?}",
+                quoted(&self.link_names[i]),
+                link.mass
+            );
             let _ = writeln!(
                 out,
                 "com_xyz_m = {}\ncom_rpy_rad = {}",

@@ -1,53 +1,49 @@
 //! Arms: kinematics, masses, limits, gains and friction of one arm, from the files that people have.
 
+mod check;
 mod collect;
 mod csv;
 mod device;
 mod export;
 mod parameters;
+mod propose;
+mod source;
+mod statics;
 #[cfg(test)]
 mod tests;
 mod toml_form;
 #[cfg(feature = "urdf")]
 mod urdf;
+mod values;
+mod warning;
 
 use std::path::Path;
 
 use jtc_core::{Config, Friction, JOINTS, JointConfig, Parameters, PidGains, TableOf};
-use jtc_dynamics::ArmModel;
+use jtc_dynamics::{ArmModel, ModelError};
 
+pub use check::{ArmFinding, Checked};
 pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
 pub use parameters::{Beyond, ParameterError, ParameterSet};
+pub use propose::{RULES, Rule};
+pub use source::{Key, Source, Sources};
+pub use values::ArmValue;
+pub use warning::{Change, Warning};
 
 use crate::file::{FileError, Place, read_text};
 
 #[cfg(not(feature = "urdf"))]
 mod urdf {
-    use super::{Arm, ArmChoice, FileError};
+    use super::{ArmChoice, Described, FileError};
 
-    pub(super) fn read(_: &str, _: &ArmChoice) -> Result<Arm, FileError> {
+    pub(super) fn read(_: &str, _: &ArmChoice) -> Result<Described, FileError> {
         Err(FileError::form("a robot description; built without URDF (feature `urdf` of jtc-host)"))
     }
 }
 
 /// The default arm's file, as delivered.
 pub const AVENA_TOML: &str = include_str!("../../../../arms/avena.toml");
-
-/// Something in a file that could not be carried over, or was filled in.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Warning {
-    /// Joint, link or key.
-    pub place: String,
-    /// What is the matter and what was done.
-    pub problem: String,
-}
-
-impl std::fmt::Display for Warning {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.place, self.problem)
-    }
-}
 
 /// The part of a robot description that is the arm, where it holds more than one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -58,6 +54,15 @@ pub struct ArmChoice {
     pub tip: Option<String>,
 }
 
+/// The arm of a robot description, and what else that says which an arm has a place for.
+struct Described {
+    arm: Arm,
+    /// Acceleration of gravity in the base frame, m/s²: z of the description points upwards.
+    gravity: [f64; 3],
+    /// Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint.
+    friction: [[f64; 2]; JOINTS],
+}
+
 /// One arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
@@ -65,6 +70,10 @@ pub struct Arm {
     pub name: String,
     /// Names of the six joints, base to wrist.
     pub joint_names: [String; JOINTS],
+    /// Names of the base and the six links.
+    pub link_names: [String; JOINTS + 1],
+    /// Name of the fixed joint that carries the flange.
+    pub flange_name: String,
     /// Kinematics and masses.
     pub model: ArmModel,
     /// Limits and rotor inertia, base to wrist.
@@ -81,6 +90,8 @@ pub struct Arm {
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
     /// What was not carried over or filled in.
     pub warnings: Vec<Warning>,
+    /// Where the numbers come from.
+    pub sources: Sources,
 }
 
 impl Arm {
@@ -124,21 +135,42 @@ impl Arm {
     ///
     /// A text that is no URDF, or in which `choice` does not name six revolute joints in a row.
     pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
-        urdf::read(text, choice)
+        urdf::read(text, choice).map(|described| described.arm)
     }
 
-    /// From a URDF file, of which `choice` selects the arm.
+    /// From a URDF file, of which `choice` selects the arm; what such a file lacks is proposed by [`RULES`] and marked.
     ///
     /// # Errors
     ///
     /// A file that cannot be read, is no URDF, leaves open which six joints are the arm, or is no arm of these drives.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
         let text = read_text(path)?;
-        let arm = if is_xml(&text) {
-            Self::from_urdf_with(&text, choice).and_then(Self::checked)
-        } else {
-            Err(FileError::form("is no robot description: a URDF is XML and begins with <"))
-        };
+        Self::import_text(&text, choice).map_err(|e| e.in_file(path))
+    }
+
+    /// As [`import`](Self::import), from the text of the file.
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn import_text(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
+        if !is_xml(text) {
+            return Err(FileError::form("is no robot description: a URDF is XML and begins with <"));
+        }
+        let Described { arm, gravity, friction } = urdf::read(text, choice)?;
+        let mut arm = arm.checked()?;
+        arm.propose(gravity, &friction);
+        Ok(arm)
+    }
+
+    /// From a TOML or URDF file whose numbers may be wrong: [`Arm::check`] finds those.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read or is of no known form, with the place.
+    pub fn load_unchecked(path: &Path) -> Result<Self, FileError> {
+        let text = read_text(path)?;
+        let arm = if is_xml(&text) { Self::from_urdf(&text) } else { toml_form::read(&text) };
         arm.map_err(|e| e.in_file(path))
     }
 
@@ -154,12 +186,20 @@ impl Arm {
     ///
     /// The first number of the model or of the limits that is none.
     pub fn is_physical(&self) -> Result<(), FileError> {
-        self.model.check().map_err(|e| FileError::at(Place::name("arm model"), e.to_string()))?;
+        self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
         // J-35, J-43: limits that the drives cannot keep, or would stop at by themselves.
         self.config().check().map_err(|e| {
             let name = self.joint_names.get(e.joint() - 1).map_or("", String::as_str);
             FileError::at(Place::name(format!("joint {name}")), e.to_string())
         })
+    }
+
+    /// What a fault of the model is in, by its name in the file.
+    fn name_of_part(&self, error: &ModelError) -> String {
+        let part = if error.is_of_joint() { &self.joint_names[..] } else { &self.link_names[..] };
+        let kind = if error.is_of_joint() { "joint" } else { "link" };
+        let name = part.get(error.index()).unwrap_or(&self.flange_name);
+        format!("arm model, {kind} {name}")
     }
 
     /// Settings of a controller for this arm; what the file does not give is as for the default arm, but a rotor inertia that is

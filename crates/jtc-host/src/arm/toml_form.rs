@@ -1,15 +1,21 @@
 //! The TOML form of an arm.
 
-use jtc_core::settings::{self, Setting};
 use jtc_core::{JOINTS, JointConfig, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
+use jtc_wire::Joint;
 use serde::{Deserialize, Serialize};
 
-use super::{Arm, Warning};
+use super::source::{ARM_KEYS, JOINT_KEYS};
+use super::{Arm, Change, Source, Sources, Warning};
 use crate::file::{FileError, Place, short};
 
 /// Format of the arm files that are read. Files without it are older and mean the same.
 pub(super) const FORMAT: i64 = 2;
+
+/// What counts where a file does not give a limit, rad/s, rad/s² and rad.
+pub(super) const VELOCITY_DEFAULT: f64 = 1.5;
+pub(super) const ACCELERATION_DEFAULT: f64 = 12.56637;
+pub(super) const POSITION_ERROR_DEFAULT: f64 = 0.09;
 
 /// The keys that decide how the rest is read.
 #[derive(Deserialize)]
@@ -24,6 +30,8 @@ struct ArmForm {
     name: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     gravity_m_s2: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    proposed: Vec<String>,
     joint: Vec<JointForm>,
     link: Vec<LinkForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -47,6 +55,8 @@ struct JointForm {
     torque_gain: Option<f64>,
     pid: Option<PidForm>,
     friction_polynomial: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    proposed: Vec<String>,
 }
 
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -85,74 +95,102 @@ impl Arm {
     ///
     /// The first key or number that is missing, unknown or of the wrong form, with its line.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
-        let wrong = |e: toml::de::Error| {
-            let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());
-            FileError::at(Place { line, ..Place::default() }, e.message().to_owned())
-        };
-        let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-        if !text.lines().any(|line| line.contains('=') || line.starts_with('[')) {
-            let problem = format!("neither TOML nor URDF: no arm file (it begins with \"{}\")", short(first));
-            return Err(FileError::form(problem));
-        }
-        // Before the keys, which another format may have others of.
-        if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
-            && format.as_integer() != Some(FORMAT)
-        {
-            let problem =
-                format!("format = {format} is none that this program reads; it reads `format = {FORMAT}`");
-            return Err(FileError::at(Place::name("format"), problem));
-        }
-        let form: ArmForm = toml::from_str(text).map_err(wrong)?;
-        let (joints, flange) = match form.joint.split_last_chunk::<1>() {
-            Some((joints, [flange])) if joints.len() == JOINTS => (joints, flange),
-            _ => {
-                let n = form.joint.len();
-                return Err(FileError::form(format!(
-                    "{n} [[joint]] entries, not 7 (six joints and the fixed flange)"
-                )));
+        let arm = read(text)?;
+        match arm.limit_faults().into_iter().next() {
+            None => Ok(arm),
+            Some((joint, fault)) => {
+                let name = &arm.joint_names[joint.index()];
+                Err(FileError::at(Place::name(format!("joint {name}, {}", fault.key)), fault.problem))
             }
-        };
-        if form.link.len() != 7 {
+        }
+    }
+}
+
+/// The arm of a text; its numbers may be wrong.
+pub(super) fn read(text: &str) -> Result<Arm, FileError> {
+    let wrong = |e: toml::de::Error| {
+        let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());
+        FileError::at(Place { line, ..Place::default() }, e.message().to_owned())
+    };
+    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    if !text.lines().any(|line| line.contains('=') || line.starts_with('[')) {
+        let problem = format!("neither TOML nor URDF: no arm file (it begins with \"{}\")", short(first));
+        return Err(FileError::form(problem));
+    }
+    // Before the keys, which another format may have others of.
+    if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
+        && format.as_integer() != Some(FORMAT)
+    {
+        let problem =
+            format!("format = {format} is none that this program reads; it reads `format = {FORMAT}`");
+        return Err(FileError::at(Place::name("format"), problem));
+    }
+    let form: ArmForm = toml::from_str(text).map_err(wrong)?;
+    let (joints, flange) = match form.joint.split_last_chunk::<1>() {
+        Some((joints, [flange])) if joints.len() == JOINTS => (joints, flange),
+        _ => {
+            let n = form.joint.len();
             return Err(FileError::form(format!(
-                "{} [[link]] entries, not 7 (base and six links)",
-                form.link.len()
+                "{n} [[joint]] entries, not 7 (six joints and the fixed flange)"
             )));
         }
-        if let Some(v) = form.gravity_m_s2.iter().flatten().find(|v| !v.is_finite()) {
-            return Err(FileError::at(Place::name("gravity_m_s2"), format!("{v} is not finite")));
-        }
-        let mut warnings = Vec::new();
-        let mut limits = [JointConfig {
-            position_min: 0.0,
-            position_max: 0.0,
-            velocity_max: 0.0,
-            acceleration_max: 0.0,
-            torque_max: 0.0,
-            position_error_max: 0.0,
-            rotor_inertia: 0.0,
-            torque_gain: 1.0,
-        }; JOINTS];
-        for (limit, joint) in limits.iter_mut().zip(joints) {
-            *limit = joint.limits(&mut warnings)?;
-        }
-        let origin = |j: &JointForm| Origin { xyz: j.origin_xyz_m, rpy: j.origin_rpy_rad };
-        let model = ArmModel {
-            joints: std::array::from_fn(|i| if i < JOINTS { origin(&joints[i]) } else { origin(flange) }),
-            links: std::array::from_fn(|i| form.link[i].link()),
-        };
-        Ok(Arm {
-            joint_names: std::array::from_fn(|i| joints[i].name.clone()),
-            pid: all_or_none(joints, "pid", |j| Ok(j.pid.map(PidForm::gains)))?,
-            polynomial: all_or_none(joints, "friction_polynomial", JointForm::polynomial)?,
-            table: tables(&form.friction_table)?,
-            name: form.name,
-            model,
-            joints: limits,
-            rotors_given: std::array::from_fn(|i| joints[i].rotor_inertia_kg_m2.is_some()),
-            gravity: form.gravity_m_s2,
-            warnings,
-        })
+    };
+    if form.link.len() != 7 {
+        return Err(FileError::form(format!(
+            "{} [[link]] entries, not 7 (base and six links)",
+            form.link.len()
+        )));
     }
+    if let Some(v) = form.gravity_m_s2.iter().flatten().find(|v| !v.is_finite()) {
+        return Err(FileError::at(Place::name("gravity_m_s2"), format!("{v} is not finite")));
+    }
+    let mut warnings = Vec::new();
+    let mut limits = [JointConfig {
+        position_min: 0.0,
+        position_max: 0.0,
+        velocity_max: 0.0,
+        acceleration_max: 0.0,
+        torque_max: 0.0,
+        position_error_max: 0.0,
+        rotor_inertia: 0.0,
+        torque_gain: 1.0,
+    }; JOINTS];
+    let mut sources = Sources::default();
+    mark(&mut sources, None, &form.proposed)?;
+    for (number, (limit, joint)) in Joint::ALL.into_iter().zip(limits.iter_mut().zip(joints)) {
+        *limit = joint.limits(number, &mut warnings, &mut sources)?;
+        mark(&mut sources, Some((number, joint)), &joint.proposed)?;
+    }
+    let proposed = sources.proposed().count();
+    if proposed > 0 {
+        let problem = format!(
+            "{proposed} {} of this file are starting values that nobody has measured or looked up; `jtc arm check` lists them",
+            if proposed == 1 { "number" } else { "numbers" }
+        );
+        warnings.push(Warning::new(Change::Proposed, "proposed", problem));
+    }
+    let origin = |j: &JointForm| Origin { xyz: j.origin_xyz_m, rpy: j.origin_rpy_rad };
+    let model = ArmModel {
+        joints: std::array::from_fn(|i| if i < JOINTS { origin(&joints[i]) } else { origin(flange) }),
+        links: std::array::from_fn(|i| form.link[i].link()),
+    };
+    Ok(Arm {
+        joint_names: std::array::from_fn(|i| joints[i].name.clone()),
+        pid: all_or_none(joints, "pid", |j| Ok(j.pid.map(PidForm::gains)))?,
+        polynomial: all_or_none(joints, "friction_polynomial", JointForm::polynomial)?,
+        table: tables(&form.friction_table)?,
+        link_names: std::array::from_fn(|i| {
+            Some(&form.link[i].name).filter(|n| !n.is_empty()).cloned().unwrap_or_else(|| format!("link_{i}"))
+        }),
+        flange_name: flange.name.clone(),
+        name: form.name,
+        model,
+        joints: limits,
+        rotors_given: std::array::from_fn(|i| joints[i].rotor_inertia_kg_m2.is_some()),
+        gravity: form.gravity_m_s2,
+        warnings,
+        sources,
+    })
 }
 
 /// A part that all six joints have, or none.
@@ -179,63 +217,79 @@ fn all_or_none<T>(
     }
 }
 
+/// Takes over which numbers a list of the file marks as proposed: those of the arm, or of a joint.
+fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]) -> Result<(), FileError> {
+    let number = of.map(|(number, _)| number);
+    let keys: &[&'static str] = if of.is_some() { &JOINT_KEYS } else { &ARM_KEYS };
+    for name in names {
+        let place =
+            Place::name(of.map_or("proposed".into(), |(_, joint)| format!("joint {}, proposed", joint.name)));
+        let Some(key) = keys.iter().find(|key| *key == name) else {
+            let problem = format!(
+                "\"{}\" is no number that can be proposed; there are {}",
+                short(name),
+                keys.join(", ")
+            );
+            return Err(FileError::at(place, problem));
+        };
+        let absent = of.is_some_and(|(_, joint)| !joint.has(key));
+        if absent || sources.of((number, key)) == Source::Default {
+            return Err(FileError::at(place, format!("{key} is listed and not given")));
+        }
+        sources.propose((number, key));
+    }
+    Ok(())
+}
+
 impl JointForm {
-    fn limits(&self, warnings: &mut Vec<Warning>) -> Result<JointConfig, FileError> {
-        let place = |key: &str| Place::name(format!("joint {}, {key}", self.name));
-        let need = |key: &str, v: Option<f64>| v.ok_or_else(|| FileError::at(place(key), "missing"));
-        let mut or = |key: &str, v: Option<f64>, default: f64| {
+    /// Whether it has a number that no default stands for.
+    fn has(&self, key: &str) -> bool {
+        match key {
+            "rotor_inertia_kg_m2" => self.rotor_inertia_kg_m2.is_some(),
+            "pid" => self.pid.is_some(),
+            "friction_polynomial" => self.friction_polynomial.is_some(),
+            _ => true,
+        }
+    }
+
+    fn limits(
+        &self,
+        number: Joint,
+        warnings: &mut Vec<Warning>,
+        sources: &mut Sources,
+    ) -> Result<JointConfig, FileError> {
+        let need = |key: &str, v: Option<f64>| {
+            v.ok_or_else(|| FileError::at(Place::name(format!("joint {}, {key}", self.name)), "missing"))
+        };
+        if self.torque_gain.is_none() {
+            sources.fill_in((Some(number), "torque_gain"));
+        }
+        let mut or = |key: &'static str, v: Option<f64>, default: f64| {
             v.unwrap_or_else(|| {
                 let problem = format!("{key} not given: {default} is used");
-                warnings.push(Warning { place: format!("joint {}", self.name), problem });
+                warnings.push(Warning::new(Change::LimitAssumed, format!("joint {}", self.name), problem));
+                sources.fill_in((Some(number), key));
                 default
             })
         };
-        let config = JointConfig {
+        Ok(JointConfig {
             position_min: need("position_min_rad", self.position_min_rad)?,
             position_max: need("position_max_rad", self.position_max_rad)?,
-            velocity_max: or("velocity_max_rad_s", self.velocity_max_rad_s, 1.5),
-            acceleration_max: or("acceleration_max_rad_s2", self.acceleration_max_rad_s2, 12.56637),
+            velocity_max: or("velocity_max_rad_s", self.velocity_max_rad_s, VELOCITY_DEFAULT),
+            acceleration_max: or(
+                "acceleration_max_rad_s2",
+                self.acceleration_max_rad_s2,
+                ACCELERATION_DEFAULT,
+            ),
             torque_max: need("torque_max_nm", self.torque_max_nm)?,
-            position_error_max: or("position_error_max_rad", self.position_error_max_rad, 0.09),
+            position_error_max: or(
+                "position_error_max_rad",
+                self.position_error_max_rad,
+                POSITION_ERROR_DEFAULT,
+            ),
             rotor_inertia: self.rotor_inertia_kg_m2.unwrap_or(0.0),
             torque_gain: self.torque_gain.unwrap_or(1.0),
-        };
-        let positive = [
-            ("velocity_max_rad_s", config.velocity_max),
-            ("acceleration_max_rad_s2", config.acceleration_max),
-            ("torque_max_nm", config.torque_max),
-            ("position_error_max_rad", config.position_error_max),
-        ];
-        for (key, v) in positive {
-            if !(v > 0.0 && v.is_finite()) {
-                return Err(FileError::at(place(key), format!("{v} is not a positive number")));
-            }
-        }
-        if !config.position_min.is_finite() || !config.position_max.is_finite() {
-            let (min, max) = (config.position_min, config.position_max);
-            return Err(FileError::at(place("position_min_rad"), format!("{min}..{max} is not finite")));
-        }
-        if config.position_min >= config.position_max {
-            let (min, max) = (config.position_min, config.position_max);
-            return Err(FileError::at(
-                place("position_min_rad"),
-                format!("{min} is not below position_max_rad {max}"),
-            ));
-        }
-        if !(config.rotor_inertia >= 0.0 && config.rotor_inertia.is_finite()) {
-            let v = config.rotor_inertia;
-            return Err(FileError::at(
-                place("rotor_inertia_kg_m2"),
-                format!("{v} is negative or not finite"),
-            ));
-        }
-        if let Some(Setting { low, high, .. }) = settings::named("torque_gain")
-            && !(*low..=*high).contains(&config.torque_gain)
-        {
-            let problem = format!("{} is outside {low}..{high}", config.torque_gain);
-            return Err(FileError::at(place("torque_gain"), problem));
-        }
-        Ok(config)
+        })
     }
 
     fn polynomial(&self) -> Result<Option<[f64; 6]>, FileError> {

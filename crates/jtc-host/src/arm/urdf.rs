@@ -5,18 +5,20 @@
 
 mod choice;
 mod frames;
+mod limits;
+#[cfg(test)]
+mod tests;
+mod text;
 
-use jtc_core::{Config, JOINTS, JointConfig};
+use jtc_core::JOINTS;
 use jtc_dynamics::{ArmModel, Link, Origin};
 use urdf_rs::{Joint, JointType, Robot};
 
 use self::choice::{about, choose};
 use self::frames::{Body, Frame};
-use super::{Arm, ArmChoice, Warning};
+use self::limits::short;
+use super::{Arm, ArmChoice, Change, Described, Sources, Warning};
 use crate::file::FileError;
-
-/// Deeper nesting than any description of an arm has.
-const DEPTH_MAX: usize = 32;
 
 /// The chain of joints with what hangs on it.
 struct Chain<'a> {
@@ -25,23 +27,35 @@ struct Chain<'a> {
     /// From the last link to the flange.
     flange: Vec<&'a Joint>,
     warnings: Vec<Warning>,
+    sources: Sources,
 }
 
+/// Standard gravity as arm files have it, m/s², downwards in a description whose z points upwards.
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+
 /// The arm of a description; `choice` selects its joints.
-pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Arm, FileError> {
-    let depth = depth(text);
-    if depth > DEPTH_MAX {
-        return Err(FileError::form(format!("XML nested {depth} deep is no description of an arm")));
-    }
-    let robot = urdf_rs::read_from_string(text).map_err(|e| FileError::form(format!("URDF: {e}")))?;
+pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileError> {
+    text::check_depth(text)?;
+    let text = text::with_velocities(text);
+    let robot = urdf_rs::read_from_string(&text).map_err(|e| text::locate(&text, &e.to_string()))?;
+    only_once(&robot)?;
     let mut chain = Chain::of(&robot, choice)?;
     let model = chain.model()?;
-    let limits = chain.limits()?;
-    Ok(Arm {
+    let joints = chain.limits()?;
+    let mut link_names = vec![chain.rotary[0].parent.link.clone()];
+    link_names.extend(chain.rotary.map(|j| j.child.link.clone()));
+    let gravity = chain.gravity();
+    let friction = chain.rotary.map(|j| {
+        let given = j.dynamics.as_ref().map_or([0.0; 2], |d| [d.friction, d.damping]);
+        given.map(|v| if v > 0.0 && v.is_finite() { v } else { 0.0 })
+    });
+    let arm = Arm {
         name: robot.name.clone(),
         joint_names: chain.rotary.map(|j| j.name.clone()),
+        link_names: link_names.try_into().unwrap_or_default(),
+        flange_name: chain.flange.last().map_or_else(|| "flange".to_owned(), |j| j.name.clone()),
         model,
-        joints: limits,
+        joints,
         // The form has no place for it.
         rotors_given: [false; JOINTS],
         gravity: None,
@@ -49,39 +63,50 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Arm, FileError> {
         polynomial: None,
         table: None,
         warnings: chain.warnings,
-    })
+        sources: chain.sources,
+    };
+    Ok(Described { arm, gravity, friction })
 }
 
-/// Deepest nesting of elements; the reader descends by recursion.
-fn depth(text: &str) -> usize {
-    let (mut now, mut most) = (0usize, 0);
-    for (i, _) in text.match_indices('<') {
-        match text.as_bytes().get(i + 1) {
-            Some(b'/') => now = now.saturating_sub(1),
-            Some(b'!' | b'?') | None => {}
-            Some(_) => {
-                let end = text[i..].find('>').map_or(text.len(), |e| i + e);
-                if !text[..end].ends_with('/') {
-                    now += 1;
-                }
-                most = most.max(now);
-            }
-        }
+/// No two joints or links share a name, and no link has two parents: which of them is meant is not guessed.
+fn only_once(robot: &Robot) -> Result<(), FileError> {
+    fn twice(mut names: Vec<&str>) -> Option<&str> {
+        names.sort_unstable();
+        names.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
     }
-    most
+    if let Some(name) = twice(robot.joints.iter().map(|j| j.name.as_str()).collect()) {
+        return Err(FileError::form(format!("two joints are named {name}: rename one of them")));
+    }
+    if let Some(name) = twice(robot.links.iter().map(|l| l.name.as_str()).collect()) {
+        return Err(FileError::form(format!("two links are named {name}: rename one of them")));
+    }
+    if let Some(name) = twice(robot.joints.iter().map(|j| j.child.link.as_str()).collect()) {
+        let parents: Vec<&str> =
+            robot.joints.iter().filter(|j| j.child.link == name).map(|j| j.name.as_str()).collect();
+        return Err(FileError::form(format!(
+            "link {name} is the child of joints {}: only one may carry it",
+            parents.join(" and ")
+        )));
+    }
+    Ok(())
 }
 
 impl<'a> Chain<'a> {
     fn of(robot: &'a Robot, choice: &ArmChoice) -> Result<Self, FileError> {
         let rotary = choose(robot, choice)?;
-        let mut chain = Self { robot, rotary, flange: Vec::new(), warnings: Vec::new() };
+        let (warnings, sources) = (Vec::new(), Sources::default());
+        let mut chain = Self { robot, rotary, flange: Vec::new(), warnings, sources };
         chain.find_flange(choice.tip.as_deref());
         for joint in &robot.joints {
             if joint.joint_type != JointType::Fixed && chain.rigid(joint) {
                 let kind = format!("{:?}", joint.joint_type).to_lowercase();
-                chain.warn(format!("joint {}", joint.name), format!("{kind}: is held at 0, none of the six"));
+                let follows =
+                    joint.mimic.as_ref().map_or(String::new(), |m| format!(", follows {}", m.joint));
+                let problem = format!("{kind}{follows}: is held at 0, none of the six");
+                chain.warn(Change::LeftOut, format!("joint {}", joint.name), problem);
             }
         }
+        chain.doubt_gripper(choice);
         Ok(chain)
     }
 
@@ -90,8 +115,30 @@ impl<'a> Chain<'a> {
         !self.rotary.iter().any(|r| r.name == joint.name)
     }
 
-    fn warn(&mut self, place: impl Into<String>, problem: impl Into<String>) {
-        self.warnings.push(Warning { place: place.into(), problem: problem.into() });
+    fn warn(&mut self, change: Change, place: impl Into<String>, problem: impl Into<String>) {
+        self.warnings.push(Warning::new(change, place, problem));
+    }
+
+    /// Five axes and a gripper are six joints as well.
+    fn doubt_gripper(&mut self, choice: &ArmChoice) {
+        let last = self.rotary[JOINTS - 1];
+        let words = format!("{} {}", last.name, last.child.link).to_lowercase();
+        if choice.joints.is_none() && ["gripper", "jaw", "finger"].iter().any(|w| words.contains(w)) {
+            let problem = "by its name moves a gripper: it is driven as the sixth axis, for the description has no other";
+            self.warn(Change::Doubtful, format!("joint {}", last.name), problem);
+        }
+    }
+
+    /// Acceleration of gravity in the base frame, m/s².
+    fn gravity(&self) -> [f64; 3] {
+        let mut frame = Frame::IDENTITY;
+        let mut at = &self.rotary[0].parent.link;
+        while let Some(joint) = self.robot.joints.iter().find(|j| &j.child.link == at) {
+            frame = Frame::of(&origin(&joint.origin)).then(&frame);
+            at = &joint.parent.link;
+        }
+        // Rounding of a quarter turn is no tilt.
+        frame.inverse().direction(&GRAVITY).map(|v| if v.abs() < 1e-9 { 0.0 } else { v })
     }
 
     /// What leads from the last link to the flange: the way to `tip`, or else the fixed joint behind it; of several the one whose
@@ -111,8 +158,10 @@ impl<'a> Chain<'a> {
         let flange = behind.iter().find(named).or(behind.first()).copied();
         self.flange = flange.into_iter().collect();
         match flange {
-            None => self
-                .warn(format!("link {last}"), "no fixed flange joint behind it: the flange is its own frame"),
+            None => {
+                let problem = "no fixed flange joint behind it: the flange is its own frame";
+                self.warn(Change::Flange, format!("link {last}"), problem);
+            }
             Some(flange) if behind.len() > 1 => {
                 let others: Vec<&str> =
                     behind.iter().filter(|j| j.name != flange.name).map(|j| j.name.as_str()).collect();
@@ -120,7 +169,7 @@ impl<'a> Chain<'a> {
                     "is taken as the flange, not {}; `jtc arm import` takes another with --tip",
                     others.join(", ")
                 );
-                self.warn(format!("joint {}", flange.name), problem);
+                self.warn(Change::Flange, format!("joint {}", flange.name), problem);
             }
             Some(_) => {}
         }
@@ -153,7 +202,8 @@ impl<'a> Chain<'a> {
             let from = if i == 0 { &base } else { &self.rotary[i - 1].child.link };
             let fixed = self.rigid_path(from, &joint.parent.link).unwrap_or_default();
             for f in fixed.iter().filter(|f| f.joint_type == JointType::Fixed) {
-                self.warn(format!("joint {}", f.name), "is fixed: merged into the joint behind it");
+                let problem = format!("is fixed: merged into joint {}, which it carries", joint.name);
+                self.warn(Change::Merged, format!("joint {}", f.name), problem);
             }
             let axis = joint.axis.xyz.0;
             let next = Frame::turning_z_to(axis).ok_or_else(|| {
@@ -171,10 +221,10 @@ impl<'a> Chain<'a> {
             };
             if !next.is_identity() {
                 let problem = format!(
-                    "axis {} {} {} is not +z: the frame of link {} is turned, positions and torques keep their sign",
-                    axis[0], axis[1], axis[2], joint.child.link
+                    "axis {} {} {} is not +z: the frame of its link is turned, positions and torques keep their sign",
+                    axis[0], axis[1], axis[2]
                 );
-                self.warn(format!("joint {}", joint.name), problem);
+                self.warn(Change::AxisTurned, format!("joint {}", joint.name), problem);
             }
             turn = next;
             model.links[i + 1] = self.link(&joint.child.link, &turn)?;
@@ -199,9 +249,10 @@ impl<'a> Chain<'a> {
                 let problem = format!(
                     "its offset (xyz {:?} rpy {:?}) is not carried: positions count from link {base}; gravity is a setting \
                      of the controller",
-                    o.xyz, o.rpy
+                    o.xyz.map(short),
+                    o.rpy.map(short)
                 );
-                self.warn(format!("joint {}", joint.name), problem);
+                self.warn(Change::Base, format!("joint {}", joint.name), problem);
             }
             at = joint.parent.link.clone();
         }
@@ -223,7 +274,8 @@ impl<'a> Chain<'a> {
                 mass: inertial.mass.value,
             };
             if at != name && own.mass != 0.0 {
-                self.warn(format!("link {at}"), format!("{} kg: made part of link {name}", own.mass));
+                let problem = format!("{} kg: made part of link {name}", own.mass);
+                self.warn(Change::Merged, format!("link {at}"), problem);
             }
             if at == name || own.mass != 0.0 {
                 bodies.push((own, frame.clone()));
@@ -245,86 +297,6 @@ impl<'a> Chain<'a> {
             whole.add(&Body::of(link).seen_from(&turn.inverse().then(frame)));
         }
         Ok(whole.link())
-    }
-
-    fn limits(&mut self) -> Result<[JointConfig; JOINTS], FileError> {
-        let default = super::Arm::avena().joints;
-        let mut all = default;
-        for (i, joint) in self.rotary.into_iter().enumerate() {
-            let place = format!("joint {}", joint.name);
-            let (to, limit) = (&mut all[i], &joint.limit);
-            to.rotor_inertia = 0.0;
-            if joint.joint_type == JointType::Continuous
-                || limit.lower == 0.0 && limit.upper == 0.0
-                || !limit.lower.is_finite()
-                || !limit.upper.is_finite()
-            {
-                if joint.joint_type == JointType::Continuous {
-                    // As far as the drives go; whether the mechanism has a stop is not given.
-                    (to.position_min, to.position_max) = (-jtc_core::WORKING_AREA, jtc_core::WORKING_AREA);
-                }
-                let problem =
-                    format!("no position limits: {}..{} rad are used", to.position_min, to.position_max);
-                self.warn(&place, problem);
-            } else if limit.lower >= limit.upper {
-                return Err(about(
-                    joint,
-                    format!("lower limit {} is not below upper {}", limit.lower, limit.upper),
-                ));
-            } else {
-                (to.position_min, to.position_max) = (limit.lower, limit.upper);
-            }
-            let positive = |v: f64| v > 0.0 && v.is_finite();
-            if positive(limit.velocity) {
-                to.velocity_max = limit.velocity;
-            } else {
-                let used = to.velocity_max;
-                self.warn(&place, format!("velocity limit {}: {used} rad/s is used", limit.velocity));
-            }
-            if positive(limit.effort) {
-                to.torque_max = limit.effort;
-            } else {
-                let used = to.torque_max;
-                self.warn(&place, format!("effort limit {}: {used} N·m is used", limit.effort));
-            }
-            if positive(limit.acceleration) {
-                to.acceleration_max = limit.acceleration;
-            }
-            if joint.dynamics.is_some() {
-                self.warn(&place, "damping and friction are not carried: friction is a parameter of its own");
-            }
-            if joint.safety_controller.is_some() {
-                self.warn(&place, "safety_controller is not carried");
-            }
-        }
-        self.narrow_to_drives(&mut all);
-        Ok(all)
-    }
-
-    /// A description gives the limits of the mechanism. Its drives may do less, and the controller refuses limits beyond that
-    /// (J-35, J-43).
-    fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) {
-        let drives = Config::avena();
-        let area = jtc_core::WORKING_AREA;
-        let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
-        for (revolute, to) in self.rotary.into_iter().zip(joints) {
-            let place = format!("joint {}", revolute.name);
-            if to.position_min < -area || to.position_max > area {
-                let (min, max) = (to.position_min, to.position_max);
-                (to.position_min, to.position_max) = (min.clamp(-area, area), max.clamp(-area, area));
-                let used = format!("{}..{} rad are used", to.position_min, to.position_max);
-                let problem = format!("position limits {min}..{max} leave the drives' working area: {used}");
-                self.warn(&place, problem);
-            }
-            if to.velocity_max > fastest {
-                let problem = format!(
-                    "velocity limit {}: {fastest} rad/s is used, above {} rad/s the drives trip",
-                    to.velocity_max, drives.drive_speed_trip
-                );
-                to.velocity_max = fastest;
-                self.warn(&place, problem);
-            }
-        }
     }
 }
 

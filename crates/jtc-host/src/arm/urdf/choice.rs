@@ -23,7 +23,10 @@ pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Jo
     let six = six.filter(|six| six.iter().all(|j| rotary(j)) && first_branch(robot, six).is_none());
     let Some(six) = six else { return Err(not_six(robot, &candidates, choice)) };
     if let Some(joint) = six.iter().find(|j| j.mimic.is_some()) {
-        return Err(about(joint, "follows another joint (mimic): it is none of the six that are driven"));
+        return Err(unfit_joint(
+            joint,
+            "follows another joint (mimic): it is none of the six that are driven",
+        ));
     }
     if let Some(tip) = &choice.tip
         && !way_to(robot, tip)?.iter().any(|j| j.name == six[JOINTS - 1].name)
@@ -87,9 +90,10 @@ fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError>
     Ok(way)
 }
 
-/// Those that are not fixed, the ones nearer to the root first.
+/// Those that are not fixed and follow no other joint, the ones nearer to the root first.
 fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
-    let mut joints: Vec<&Joint> = joints.into_iter().filter(|j| j.joint_type != JointType::Fixed).collect();
+    let driven = |j: &&Joint| j.joint_type != JointType::Fixed && j.mimic.is_none();
+    let mut joints: Vec<&Joint> = joints.into_iter().filter(driven).collect();
     joints.sort_by_key(|j| way_down(robot, &j.parent.link).count());
     joints
 }

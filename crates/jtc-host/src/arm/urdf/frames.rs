@@ -73,6 +73,11 @@ impl Frame {
         Self { rotation, position }
     }
 
+    /// A direction of this frame, seen from its parent.
+    pub fn direction(&self, direction: &[f64; 3]) -> [f64; 3] {
+        applied(&self.rotation, direction)
+    }
+
     /// A rotation that takes z to `axis`; `None` when the axis has no direction.
     pub fn turning_z_to(axis: [f64; 3]) -> Option<Self> {
         let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();

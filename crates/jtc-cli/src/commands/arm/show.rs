@@ -1,0 +1,185 @@
+//! `jtc arm show`: all numbers of an arm.
+
+use std::path::Path;
+
+use cli_kit::{Failure, Output, table};
+use jtc_host::arm::{Arm, ArmValue, Source};
+use jtc_wire::Joint;
+use serde_json::json;
+
+/// Degrees in a radian.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
+pub(super) fn show(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
+    let arm = Arm::load_unchecked(file)?;
+    let mut values = arm.values();
+    if deg {
+        values.iter_mut().for_each(in_degrees);
+    }
+    let name = file.display();
+    let value = json!({
+        "file": name.to_string(), "arm": arm.name, "joints": arm.joint_names, "links": arm.link_names,
+        "flange": arm.flange_name, "friction_table": arm.table.is_some(), "warnings": arm.warnings, "values": values,
+    });
+    out.result(&value, || {
+        let numbered = Joint::ALL.iter().zip(&arm.joint_names).map(|(j, name)| format!("{} {name}", j.number()));
+        let joints: Vec<String> = numbered.collect();
+        let mut text = format!("{name}: arm {}\njoints: {}\n", arm.name, joints.join(", "));
+        text += &gravity(&values);
+        text += &format!("\n{}", by_joint(&values));
+        let marks = [(Source::Proposed, "* proposed, nobody has measured or looked it up"), (Source::Default, "d not in the file, the default counts")];
+        for (source, words) in marks {
+            if values.iter().any(|v| v.joint.is_some() && v.from == source) {
+                text += &format!("{words}\n");
+            }
+        }
+        if arm.table.is_some() {
+            text += "friction tables are in the file, too; the polynomial counts unless --friction table asks for them\n";
+        }
+        let unit = |name: &str| values.iter().find(|v| v.name == name).map_or("", |v| v.unit);
+        text += &format!("\n{}", frames(&values, &arm, unit("origin_rpy_rad.roll")));
+        text += &format!("\n{}", links(&values, &arm, unit("com_rpy_rad.roll")));
+        text + &format!("\nin no arm file, the controller has them of its own\n{}", of_controller(&values))
+    });
+    Ok(())
+}
+
+/// The same number in degrees, if it is an angle or its rate.
+fn in_degrees(v: &mut ArmValue) {
+    let unit = match v.unit {
+        "rad" => "°",
+        "rad/s" => "°/s",
+        "rad/s²" => "°/s²",
+        _ => return,
+    };
+    v.unit = unit;
+    for number in [&mut v.value, &mut v.min, &mut v.max, &mut v.default].into_iter().flatten() {
+        *number *= DEGREES;
+    }
+}
+
+/// As a person reads it: five significant digits, no zeros behind them.
+pub(super) fn number(value: f64) -> String {
+    // Rounding of turned frames is no number that anybody gave.
+    if value.abs() < 1e-11 {
+        return "0".into();
+    }
+    let magnitude = value.abs().log10().floor();
+    if !(-4.0..7.0).contains(&magnitude) {
+        return format!("{value:.3e}");
+    }
+    let digits = (4 - magnitude as i32).clamp(0, 8) as usize;
+    let text = format!("{value:.digits$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".into() } else { text.to_owned() }
+}
+
+fn opt(value: Option<f64>) -> String {
+    value.map_or("-".into(), number)
+}
+
+fn range(v: &ArmValue) -> String {
+    match (v.min, v.max) {
+        (Some(a), Some(b)) if a == -b => format!("±{}", number(b)),
+        (Some(a), Some(b)) => format!("{}..{}", number(a), number(b)),
+        (Some(a), None) => format!("{}..", number(a)),
+        _ => "any".into(),
+    }
+}
+
+fn gravity(values: &[ArmValue]) -> String {
+    let all: Vec<&ArmValue> = values.iter().filter(|v| v.name.starts_with("gravity")).collect();
+    let numbers =
+        |get: fn(&ArmValue) -> Option<f64>| all.iter().map(|v| opt(get(v))).collect::<Vec<_>>().join(" ");
+    let from = all.first().map_or("", |v| v.from.name());
+    let (own, default) = (numbers(|v| v.value), numbers(|v| v.default));
+    format!("gravity: {own} m/s² in the frame of the base, default {default}, from: {from}\n")
+}
+
+/// A row for each number of the joints.
+fn by_joint(values: &[ArmValue]) -> String {
+    let of_joints = |v: &&ArmValue| v.joint.is_some() && v.link.is_none();
+    let mut names: Vec<&str> = Vec::new();
+    values.iter().filter(of_joints).for_each(|v| {
+        if !names.contains(&v.name) {
+            names.push(v.name);
+        }
+    });
+    let row = |name: &&str| {
+        let all: Vec<&ArmValue> = values.iter().filter(of_joints).filter(|v| v.name == *name).collect();
+        let mark = |v: &ArmValue| match v.from {
+            Source::Proposed => "*",
+            Source::Default => "d",
+            _ => " ",
+        };
+        let mut cells = vec![(*name).to_owned()];
+        cells.extend(all.iter().map(|v| format!("{}{}", opt(v.value), mark(v))));
+        cells.extend([all[0].unit.to_owned(), range(all[0]), opt(all[0].default), source(&all)]);
+        cells
+    };
+    let rows: Vec<Vec<String>> = names.iter().map(row).collect();
+    table(&["", ">1 ", ">2 ", ">3 ", ">4 ", ">5 ", ">6 ", "unit", "range", ">default", "from"], &rows)
+}
+
+/// Where the numbers of a row come from.
+fn source(all: &[&ArmValue]) -> String {
+    let mut sources: Vec<&str> = all.iter().map(|v| v.from.name()).collect();
+    sources.dedup();
+    sources.sort_unstable();
+    sources.dedup();
+    sources.join(", ")
+}
+
+/// Settings of the controller that are of no joint.
+fn of_controller(values: &[ArmValue]) -> String {
+    let own = |v: &&ArmValue| v.joint.is_none() && v.link.is_none() && !v.name.starts_with("gravity");
+    let row = |v: &ArmValue| {
+        vec![
+            v.name.to_owned(),
+            opt(v.value),
+            v.unit.to_owned(),
+            range(v),
+            opt(v.default),
+            v.from.name().to_owned(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = values.iter().filter(own).map(row).collect();
+    table(&["", ">value", "unit", "range", ">default", "from"], &rows)
+}
+
+fn frames(values: &[ArmValue], arm: &Arm, angle: &str) -> String {
+    let row = |i: usize| {
+        let (number, name) = match arm.joint_names.get(i) {
+            Some(name) => ((i + 1).to_string(), name),
+            None => ("flange".to_owned(), &arm.flange_name),
+        };
+        let cells = values.iter().filter(|v| v.name.starts_with("origin_") && v.link == Some(i + 1));
+        [vec![format!("{number} {name}")], cells.map(|v| opt(v.value)).collect()].concat()
+    };
+    let rows: Vec<Vec<String>> = (0..7).map(row).collect();
+    let angles = ["roll", "pitch", "yaw"].map(|name| format!(">{name} {angle}"));
+    let [roll, pitch, yaw] = &angles;
+    table(&["frame of joint", ">x m", ">y m", ">z m", roll, pitch, yaw], &rows)
+}
+
+fn links(values: &[ArmValue], arm: &Arm, angle: &str) -> String {
+    let cells = |i: usize, parts: [&str; 2]| -> Vec<String> {
+        let of = |v: &&ArmValue| v.link == Some(i) && parts.iter().any(|part| v.name.starts_with(part));
+        values.iter().filter(of).map(|v| opt(v.value)).collect()
+    };
+    let rows = |parts: [&str; 2]| -> Vec<Vec<String>> {
+        let named = arm.link_names.iter().enumerate();
+        named.map(|(i, name)| [vec![format!("{i} {name}")], cells(i, parts)].concat()).collect()
+    };
+    let angles = ["roll", "pitch", "yaw"].map(|name| format!(">{name} {angle}"));
+    let [roll, pitch, yaw] = &angles;
+    let masses = table(
+        &["link, centre of mass", ">kg", ">x m", ">y m", ">z m", roll, pitch, yaw],
+        &rows(["mass_kg", "com_"]),
+    );
+    let inertia = table(
+        &["link, inertia kg·m²", ">ixx", ">ixy", ">ixz", ">iyy", ">iyz", ">izz"],
+        &rows(["inertia_", "inertia_"]),
+    );
+    format!("{masses}\n{inertia}")
+}

@@ -1,0 +1,355 @@
+//! Whether an arm is physical, complete, held by its drives and within what the controller takes: all that is wrong, not only the
+//! first.
+
+mod limits;
+mod moving;
+
+use host_kit::{Finding, Severity};
+use jtc_core::settings;
+use jtc_core::{Config, ConfigError, Friction, JOINTS, OutOfBounds};
+use jtc_dynamics::{ArmModel, Link, ModelError};
+use jtc_wire::Joint;
+use serde::Serialize;
+
+use super::source::JOINT_KEYS;
+use super::{Arm, Source};
+
+/// One thing that was found out about an arm.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArmFinding {
+    /// What it is about: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `unit` or `proposed`.
+    pub code: &'static str,
+    /// How bad it is (a problem: the controller refuses it), what it is, its cause and what to do.
+    #[serde(flatten)]
+    pub finding: Finding,
+    /// The joint, where it is about one.
+    pub joint: Option<Joint>,
+    /// Key in the arm file, where it is about one.
+    pub name: Option<&'static str>,
+    /// The value, in `unit`.
+    pub value: Option<f64>,
+    /// What it is measured by, in `unit`.
+    pub limit: Option<f64>,
+    /// Of both.
+    pub unit: Option<&'static str>,
+    /// The pose in which it is so, rad.
+    pub pose_rad: Option<[f64; JOINTS]>,
+}
+
+impl ArmFinding {
+    fn new(severity: Severity, code: &'static str, what: impl Into<String>) -> Self {
+        let finding = Finding { severity, what: what.into(), why: String::new(), next: String::new() };
+        let (joint, name, value, limit, unit, pose_rad) = (None, None, None, None, None, None);
+        Self { code, finding, joint, name, value, limit, unit, pose_rad }
+    }
+
+    fn because(mut self, why: impl Into<String>) -> Self {
+        self.finding.why = why.into();
+        self
+    }
+
+    fn next(mut self, next: impl Into<String>) -> Self {
+        self.finding.next = next.into();
+        self
+    }
+
+    fn of(mut self, joint: Joint, name: &'static str) -> Self {
+        (self.joint, self.name) = (Some(joint), Some(name));
+        self
+    }
+
+    fn measured(mut self, value: f64, limit: f64, unit: &'static str) -> Self {
+        (self.value, self.limit, self.unit) = (Some(value), Some(limit), Some(unit));
+        self
+    }
+}
+
+/// What gravity asks of a joint in its worst pose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Holding {
+    /// The joint.
+    pub joint: Joint,
+    /// The greatest gravity torque over all positions, N·m, without sign.
+    pub torque_nm: f64,
+    /// The joint's torque limit, N·m.
+    pub limit_nm: f64,
+    /// A pose in which gravity asks for it, rad.
+    pub pose_rad: [f64; JOINTS],
+}
+
+/// The outcome of the check of an arm.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Checked {
+    /// All findings, the worst first.
+    pub findings: Vec<ArmFinding>,
+    /// Joint by joint; empty where the numbers allow no such question.
+    pub holding: Vec<Holding>,
+}
+
+impl Checked {
+    /// A controller would refuse this arm.
+    pub fn is_refused(&self) -> bool {
+        self.findings.iter().any(|f| f.finding.severity == Severity::Problem)
+    }
+}
+
+impl Arm {
+    /// All that a person should know before a controller is given this arm.
+    pub fn check(&self) -> Checked {
+        let mut findings = Vec::new();
+        self.find_limits(&mut findings);
+        self.find_model(&mut findings);
+        let faulty: Vec<Joint> = findings.iter().filter_map(|f: &ArmFinding| f.joint).collect();
+        let sound = findings.iter().all(|f| f.finding.severity != Severity::Problem);
+        self.find_settings(&faulty, &mut findings);
+        self.find_drives(&faulty, &mut findings);
+        self.find_bounds(&faulty, &mut findings);
+        self.find_missing(&mut findings);
+        let holding = if sound { self.find_holding(&mut findings) } else { Vec::new() };
+        // Where rotors are unknown, so is what the gains move.
+        if sound && self.rotors_given == [true; JOINTS] {
+            self.find_gains(&mut findings);
+        }
+        self.find_proposed(&mut findings);
+        findings.sort_by_key(|f| f.finding.severity);
+        Checked { findings, holding }
+    }
+
+    /// `joint 2 (shoulder)`, or the number alone where it is the name.
+    fn titled(&self, joint: Joint) -> String {
+        let name = &self.joint_names[joint.index()];
+        if name.replace('_', " ") == joint.to_string() {
+            joint.to_string()
+        } else {
+            format!("{joint} ({name})")
+        }
+    }
+
+    fn find_limits(&self, findings: &mut Vec<ArmFinding>) {
+        for (joint, fault) in self.limit_faults() {
+            let what = format!("{}, {}: {}", self.titled(joint), fault.key, fault.problem);
+            let mut found = ArmFinding::new(Severity::Problem, "limit", what).of(joint, fault.key);
+            found.value = Some(fault.value);
+            findings.push(found.because("a wrong sign or a slip").next("correct it in the file"));
+        }
+    }
+
+    fn find_model(&self, findings: &mut Vec<ArmFinding>) {
+        // Each joint and link by itself, the others being good ones: the check ends at the first fault.
+        let good = Arm::avena().model;
+        for index in 0..=JOINTS {
+            let mut joint = ArmModel { links: good.links, ..good };
+            joint.joints[index] = self.model.joints[index];
+            let mut link = ArmModel { joints: good.joints, ..good };
+            link.links[index] = self.model.links[index];
+            let errors = [joint.check(), link.check()].into_iter().filter_map(Result::err);
+            findings.extend(errors.map(|error| self.unphysical(&error)));
+        }
+        if !findings.iter().any(|f| f.code == "physical") {
+            let mass: f64 = self.model.links[1..].iter().map(|l: &Link| l.mass).sum();
+            let what = format!("masses and inertias are those of bodies; {mass:.3} kg move");
+            findings.push(ArmFinding::new(Severity::Good, "physical", what));
+        }
+    }
+
+    fn unphysical(&self, error: &ModelError) -> ArmFinding {
+        let bodiless =
+            "no body has such moments: inertia not about the centre of mass, in another unit, or made up";
+        let (why, value, limit) = match *error {
+            ModelError::MassZero { .. } => ("a frame without a body, or a mass that was left out", 0.0, None),
+            ModelError::MassNegative { mass, .. } => ("a wrong sign", mass, Some(0.0)),
+            ModelError::InertiaNegative { moment, .. } => (bodiless, moment, Some(0.0)),
+            ModelError::InertiaTriangle { moment, limit, .. } => (bodiless, moment, Some(limit)),
+            ModelError::AngleTooLarge { value, limit, .. } => ("a slip, or degrees", value, Some(limit)),
+            ModelError::NotFinite { value, .. } => ("a slip", value, None),
+            _ => ("a slip", f64::NAN, None),
+        };
+        // By its name instead of its number.
+        let text = error.to_string();
+        let problem = text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem);
+        let what = format!("{}: {problem}", self.name_of_part(error).trim_start_matches("arm model, "));
+        let found = ArmFinding::new(Severity::Problem, "physical", what).because(why);
+        let joint = error.is_of_joint().then(|| Joint::from_index(error.index())).flatten();
+        ArmFinding { joint, value: Some(value), limit, ..found.next("correct it in the file") }
+    }
+
+    fn find_drives(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
+        let good = Config::avena();
+        for joint in Joint::ALL.into_iter().filter(|joint| !faulty.contains(joint)) {
+            let mut config = good.clone();
+            config.joints[joint.index()] = self.joints[joint.index()];
+            let Err(error) = config.check() else { continue };
+            let (name, value, limit, unit) = match error {
+                ConfigError::Position { value, limit, .. } => {
+                    let key = if value < 0.0 { "position_min_rad" } else { "position_max_rad" };
+                    (key, value, limit, "rad")
+                }
+                ConfigError::TorqueScale { value, limit, .. } => ("torque_max_nm", value, limit, "N·m"),
+                ConfigError::SpeedScale { value, limit, .. }
+                | ConfigError::SpeedTrip { value, limit, .. } => {
+                    ("velocity_max_rad_s", value, limit, "rad/s")
+                }
+                _ => continue,
+            };
+            let most = match name {
+                "velocity_max_rad_s" => {
+                    config.drive_speed_trip.min(config.velocity_full_scale) / config.overspeed_factor
+                }
+                "torque_max_nm" => limit / self.joints[joint.index()].torque_gain,
+                _ => limit,
+            };
+            let what = error.to_string().replacen(&joint.to_string(), &self.titled(joint), 1);
+            findings.push(
+                ArmFinding::new(Severity::Problem, "drives", what)
+                    .of(joint, name)
+                    .measured(value, limit, unit)
+                    .because("the mechanism may do more than its drives")
+                    .next(format!("{name} of {most} {unit} at most, without sign")),
+            );
+        }
+    }
+
+    /// Limits outside the range of their setting (J-53).
+    fn find_settings(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
+        let config = self.config();
+        for joint in Joint::ALL.into_iter().filter(|joint| !faulty.contains(joint)) {
+            for setting in settings::TABLE.iter().filter(|setting| setting.of_joint()) {
+                let Some(value) = setting.get(&config, joint.number()) else { continue };
+                let (low, high) = (setting.low, setting.high);
+                if !(low..=high).contains(&value) {
+                    let what =
+                        format!("{}, {}: {value} is outside {low}..{high}", self.titled(joint), setting.name);
+                    let limit = if value < low { low } else { high };
+                    findings.push(
+                        ArmFinding::new(Severity::Problem, "bounds", what)
+                            .of(joint, setting.name)
+                            .measured(value, limit, setting.unit)
+                            .because("a slip, or a number in another unit")
+                            .next("correct it in the file"),
+                    );
+                }
+            }
+        }
+    }
+
+    /// Gains, friction and masses; friction is measured by the limits, so joints whose limits are `faulty` are left out.
+    fn find_bounds(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
+        let (set, bounds) = (self.parameter_set(), self.config().parameter_bounds);
+        let beyond = |joint: Option<Joint>, name, e: OutOfBounds| {
+            let about = super::Beyond { joint, bounds: e }.to_string();
+            let what = joint.map_or(about.clone(), |j| about.replacen(&j.to_string(), &self.titled(j), 1));
+            let limit = if e.value < e.low { e.low } else { e.high };
+            let mut found = ArmFinding::new(Severity::Problem, "bounds", what)
+                .because("no arm of these drives has that")
+                .next(format!("correct {name} in the file"));
+            (found.joint, found.name) = (joint, Some(name));
+            (found.value, found.limit) = (Some(e.value), Some(limit));
+            found
+        };
+        let joints = Joint::ALL.into_iter().zip(&self.joints);
+        for (joint, config) in joints.filter(|(joint, _)| !faulty.contains(joint)) {
+            let j = joint.index();
+            let gains = self.pid.map_or(Ok(()), |pid| bounds.check_gains(&pid[j], config));
+            findings.extend(gains.err().map(|e| beyond(Some(joint), "pid", e)));
+            let (key, friction) = match &set.friction {
+                Some(Friction::Polynomial(c)) => {
+                    ("friction_polynomial", bounds.check_polynomial(&c[j], config))
+                }
+                Some(Friction::Table(t)) => ("friction_table", bounds.check_table(&t[j], config)),
+                None => ("friction_polynomial", Ok(())),
+            };
+            findings.extend(friction.err().map(|e| beyond(Some(joint), key, e)));
+        }
+        for (link, name) in self.model.links.iter().zip(&self.link_names) {
+            let alone = ArmModel { links: [*link; JOINTS + 1], ..self.model };
+            let found = alone.check().is_ok().then(|| bounds.check_masses(&alone).err()).flatten();
+            findings.extend(found.map(|e| {
+                let mut found = beyond(None, "link", e);
+                found.finding.what = format!("link {name}: {}", found.finding.what);
+                found
+            }));
+        }
+        let only_numbers = super::ParameterSet { model: None, ..set };
+        // What gains have already been found for is not said twice.
+        if let Err(error) = only_numbers.check()
+            && !findings.iter().any(|f| f.code == "bounds")
+        {
+            let found = ArmFinding::new(Severity::Problem, "bounds", error.to_string());
+            findings.push(found.next("correct it in the file"));
+        }
+    }
+
+    fn find_missing(&self, findings: &mut Vec<ArmFinding>) {
+        for part in self.parameter_set().missing() {
+            findings.push(
+                ArmFinding::new(Severity::Problem, "missing", format!("{part}: not in the file"))
+                    .because("a controller does not leave Init without")
+                    .next("jtc arm import proposes some for a robot description; else add them to the file"),
+            );
+        }
+        let not_given =
+            [(self.gravity.is_none(), "gravity_m_s2", "the controller's own, straight down, counts")];
+        for (_, name, why) in not_given.into_iter().filter(|(lacks, ..)| *lacks) {
+            let mut found = ArmFinding::new(Severity::Warning, "missing", format!("{name}: not in the file"));
+            found.name = Some(name);
+            findings.push(found.because(why).next("add it as the arm is mounted, in the frame of its base"));
+        }
+        let rotors: Vec<Joint> = Joint::ALL.into_iter().filter(|j| !self.rotors_given[j.index()]).collect();
+        if !rotors.is_empty() {
+            let name = "rotor_inertia_kg_m2";
+            let what = format!("{name}: not in the file for {}", numbers(&rotors));
+            let mut found = ArmFinding::new(Severity::Warning, "missing", what);
+            found.name = Some(name);
+            let next = "motor's rotor inertia times gear ratio squared";
+            findings
+                .push(found.because("0 counts, and a geared rotor is mostly more than its link").next(next));
+        }
+        self.find_keys(findings, Source::Default, |name, joints| {
+            let what = format!("{name}: not in the file for {joints}, a default counts");
+            ArmFinding::new(Severity::Warning, "default", what)
+                .next("jtc arm show shows it; add it to the file")
+        });
+    }
+
+    /// A finding for each key of joints that comes from `source`.
+    fn find_keys(
+        &self,
+        findings: &mut Vec<ArmFinding>,
+        source: Source,
+        found: impl Fn(&'static str, String) -> ArmFinding,
+    ) {
+        for name in JOINT_KEYS {
+            let of = |joint: &Joint| self.sources.of((Some(*joint), name)) == source;
+            let joints: Vec<Joint> = Joint::ALL.into_iter().filter(of).collect();
+            if !joints.is_empty() {
+                findings.push(ArmFinding { name: Some(name), ..found(name, numbers(&joints)) });
+            }
+        }
+    }
+
+    fn find_proposed(&self, findings: &mut Vec<ArmFinding>) {
+        let next = "measure it or look it up, then take its name out of `proposed`";
+        if self.sources.of((None, "gravity_m_s2")) == Source::Proposed {
+            let what = "gravity_m_s2: proposed, nobody has said how the arm is mounted";
+            let found = ArmFinding::new(Severity::Warning, "proposed", what).next(next);
+            findings.push(ArmFinding { name: Some("gravity_m_s2"), ..found });
+        }
+        self.find_keys(findings, Source::Proposed, |name, joints| {
+            let what = format!("{name}: proposed for {joints}, nobody has measured or looked it up");
+            ArmFinding::new(Severity::Warning, "proposed", what).next(next)
+        });
+    }
+}
+
+/// `joint 3`, `joints 1, 2, 4`, `all joints`.
+fn numbers(joints: &[Joint]) -> String {
+    let each: Vec<String> = joints.iter().map(|j| j.number().to_string()).collect();
+    match joints {
+        [one] => one.to_string(),
+        _ if joints.len() == JOINTS => "all joints".to_owned(),
+        _ => format!("joints {}", each.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests;

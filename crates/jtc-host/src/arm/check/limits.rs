@@ -1,0 +1,50 @@
+//! Limits of joints that are no limits.
+
+use jtc_core::settings::{self, Setting};
+use jtc_wire::Joint;
+
+use crate::arm::Arm;
+
+/// What is wrong with a limit.
+pub(in crate::arm) struct LimitFault {
+    pub key: &'static str,
+    pub value: f64,
+    pub problem: String,
+}
+
+impl Arm {
+    /// Limits without meaning, joint by joint.
+    pub(in crate::arm) fn limit_faults(&self) -> Vec<(Joint, LimitFault)> {
+        let mut all = Vec::new();
+        for (joint, limits) in Joint::ALL.into_iter().zip(&self.joints) {
+            let mut fault = |key, value, problem| all.push((joint, LimitFault { key, value, problem }));
+            for (key, v) in [
+                ("velocity_max_rad_s", limits.velocity_max),
+                ("acceleration_max_rad_s2", limits.acceleration_max),
+                ("torque_max_nm", limits.torque_max),
+                ("position_error_max_rad", limits.position_error_max),
+            ] {
+                if !(v > 0.0 && v.is_finite()) {
+                    fault(key, v, format!("{v} is not a positive number"));
+                }
+            }
+            let (min, max) = (limits.position_min, limits.position_max);
+            if !min.is_finite() || !max.is_finite() {
+                fault("position_min_rad", min, format!("{min}..{max} is not finite"));
+            } else if min >= max {
+                fault("position_min_rad", min, format!("{min} is not below position_max_rad {max}"));
+            }
+            let rotor = limits.rotor_inertia;
+            if !(rotor >= 0.0 && rotor.is_finite()) {
+                fault("rotor_inertia_kg_m2", rotor, format!("{rotor} is negative or not finite"));
+            }
+            let gain = limits.torque_gain;
+            if let Some(Setting { low, high, .. }) = settings::named("torque_gain")
+                && !(*low..=*high).contains(&gain)
+            {
+                fault("torque_gain", gain, format!("{gain} is outside {low}..{high}"));
+            }
+        }
+        all
+    }
+}

@@ -1,0 +1,132 @@
+//! Whether the drives hold an arm in every pose, and whether its gains suit what they move.
+
+use host_kit::Severity;
+use jtc_core::JOINTS;
+use jtc_wire::Joint;
+
+use super::{ArmFinding, Holding};
+use crate::arm::Arm;
+use crate::arm::statics::{Inertia, Worst, inertia, worst_gravity};
+
+/// Share of the torque limit above which gravity leaves little for motion.
+const LITTLE_LEFT: f64 = 0.8;
+/// Torque limits so many times above what gravity asks of any joint are suspected to be in another unit.
+const FAR_ABOVE: f64 = 15.0;
+/// Kd over inertia, 1/s, from which the age of the derivative makes a joint oscillate: it is taken over 5 ms, of positions that
+/// are 2 ms old.
+const DERIVATIVE_MAX: f64 = 250.0;
+
+impl Arm {
+    pub(super) fn find_holding(&self, findings: &mut Vec<ArmFinding>) -> Vec<Holding> {
+        let config = self.config();
+        let worst = worst_gravity(&self.model, config.gravity, &self.ranges());
+        let holding: Vec<Holding> = Joint::ALL
+            .into_iter()
+            .zip(worst.iter().zip(&self.joints))
+            .map(|(joint, (w, limits))| {
+                let Worst { torque: torque_nm, pose: pose_rad } = *w;
+                Holding { joint, torque_nm, limit_nm: limits.torque_max, pose_rad }
+            })
+            .collect();
+        for h in holding.iter().filter(|h| h.torque_nm > LITTLE_LEFT * h.limit_nm) {
+            let share = 100.0 * h.torque_nm / h.limit_nm;
+            let what = format!(
+                "{}: gravity asks for {:.1} N·m of {} N·m ({share:.0} %) at q = {}",
+                self.titled(h.joint),
+                h.torque_nm,
+                h.limit_nm,
+                pose(&h.pose_rad)
+            );
+            let (why, next) = if share > 100.0 {
+                (
+                    "the drive cannot hold the arm there",
+                    "a narrower position range, a torque limit that the drive has, or a lighter arm",
+                )
+            } else {
+                (
+                    "little is left to move with",
+                    "slow motions there; jtc traj check counts the torque of each",
+                )
+            };
+            let mut found = ArmFinding::new(Severity::Warning, "holding", what).because(why).next(next);
+            found.pose_rad = Some(h.pose_rad);
+            findings.push(found.of(h.joint, "torque_max_nm").measured(h.torque_nm, h.limit_nm, "N·m"));
+        }
+        let share = |h: &Holding| h.torque_nm / h.limit_nm;
+        if let Some(most) = holding.iter().max_by(|a, b| share(a).total_cmp(&share(b)))
+            && share(most) <= LITTLE_LEFT
+        {
+            let what = format!(
+                "the drives hold the arm in every pose; {} the most, {:.1} N·m of {} N·m ({:.0} %)",
+                self.titled(most.joint),
+                most.torque_nm,
+                most.limit_nm,
+                100.0 * share(most)
+            );
+            findings.push(ArmFinding::new(Severity::Good, "holding", what));
+        }
+        self.find_unit(&holding, findings);
+        holding
+    }
+
+    /// Torque limits far beyond what the arm weighs: kg·cm, say, or a number to fill a field.
+    fn find_unit(&self, holding: &[Holding], findings: &mut Vec<ArmFinding>) {
+        let most = |of: fn(&Holding) -> f64| holding.iter().map(of).fold(0.0, f64::max);
+        let (torque, limit) = (most(|h| h.torque_nm), most(|h| h.limit_nm));
+        if torque > 0.0 && limit > FAR_ABOVE * torque {
+            let what =
+                format!("torque limits up to {limit} N·m, where gravity asks for {torque:.2} N·m at most");
+            let mut found = ArmFinding::new(Severity::Warning, "unit", what)
+                .because(
+                    "limits in another unit than N·m (10 kg·cm are 1 N·m), or a number to fill the field",
+                )
+                .next("torque_max_nm from the data sheet of the drives: it is what protects arm and people");
+            found.name = Some("torque_max_nm");
+            findings.push(found.measured(limit, torque, "N·m"));
+        }
+    }
+
+    pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) {
+        let Some(pid) = &self.pid else { return };
+        let inertia = inertia(&self.model, &self.joints.map(|j| j.rotor_inertia), &self.ranges());
+        for (joint, (gains, Inertia { least, most })) in Joint::ALL.into_iter().zip(pid.iter().zip(inertia)) {
+            let rate = gains.kd / least;
+            let mut warn = |what: String, value, limit, unit, why: &str, next: &str| {
+                let what = format!("{}: {what}", self.titled(joint));
+                let found = ArmFinding::new(Severity::Warning, "gains", what).because(why).next(next);
+                findings.push(found.of(joint, "pid").measured(value, limit, unit));
+            };
+            if rate > DERIVATIVE_MAX {
+                let what = format!(
+                    "Kd {} N·m·s/rad on {least:.4} kg·m² is {rate:.0}/s, more than {DERIVATIVE_MAX}/s",
+                    gains.kd
+                );
+                let why = "the derivative is some 5 ms late, and such a joint oscillates";
+                warn(
+                    what,
+                    rate,
+                    DERIVATIVE_MAX,
+                    "1/s",
+                    why,
+                    "a smaller Kd, or the rotor inertia, if that is missing",
+                );
+            }
+            // Routh: Ki·J < Kp·Kd. Friction damps beyond that.
+            let (swing, damped) = (gains.ki * most, gains.kp * gains.kd);
+            if swing > damped && gains.ki > 0.0 {
+                let what = format!(
+                    "Ki {} is more than Kp·Kd/J, {:.0}, with J = {most:.3} kg·m²",
+                    gains.ki,
+                    damped / most
+                );
+                let why = "without friction the integral swings the joint up";
+                warn(what, gains.ki, damped / most, "N·m/(rad·s)", why, "a smaller Ki or a larger Kd");
+            }
+        }
+    }
+}
+
+fn pose(q: &[f64; JOINTS]) -> String {
+    let each = q.map(|v| format!("{:.2}", if v.abs() < 0.005 { 0.0 } else { v }));
+    format!("({}) rad", each.join(", "))
+}

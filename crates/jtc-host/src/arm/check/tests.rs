@@ -1,0 +1,126 @@
+//! Each finding is made by what it is about, and by nothing else.
+
+use super::*;
+use crate::arm::AVENA_TOML;
+use crate::arm::toml_form;
+
+fn of(from: &str, to: &str) -> Arm {
+    assert!(AVENA_TOML.contains(from), "{from}");
+    toml_form::read(&AVENA_TOML.replacen(from, to, 1)).unwrap()
+}
+
+/// Findings that are not good, as code, severity and joint.
+fn found(arm: &Arm) -> Vec<(&'static str, Severity, Option<u8>)> {
+    let bad = arm.check().findings.into_iter().filter(|f| f.finding.severity != Severity::Good);
+    bad.map(|f| (f.code, f.finding.severity, f.joint.map(Joint::number))).collect()
+}
+
+#[test]
+fn the_delivered_arm_has_nothing_wrong() {
+    let checked = Arm::avena().check();
+    assert!(checked.findings.iter().all(|f| f.finding.severity == Severity::Good), "{:?}", checked.findings);
+    assert_eq!((checked.holding.len(), checked.is_refused()), (JOINTS, false));
+}
+
+#[test]
+fn j06_j35_j43_what_a_controller_refuses_is_a_problem_of_its_joint() {
+    use Severity::Problem;
+    for (from, to, expected) in [
+        ("torque_max_nm = 80.0", "torque_max_nm = -80.0", ("limit", Some(1))),
+        ("velocity_max_rad_s = 1.5", "velocity_max_rad_s = nan", ("limit", Some(1))),
+        ("position_min_rad = -2.9\n", "position_min_rad = 2.95\n", ("limit", Some(3))),
+        ("rotor_inertia_kg_m2 = 0.7", "rotor_inertia_kg_m2 = -0.7", ("limit", Some(1))),
+        ("position_max_rad = 2.9\n", "position_max_rad = 3.05\n", ("drives", Some(3))),
+        ("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 1.51", ("drives", Some(1))),
+        ("mass_kg = 7.5", "mass_kg = -7.5", ("physical", None)),
+        ("mass_kg = 7.5", "mass_kg = 0.0", ("physical", None)),
+        ("mass_kg = 7.5", "mass_kg = 75.0", ("bounds", None)),
+        ("inertia_kg_m2 = [0.8437,", "inertia_kg_m2 = [8.437,", ("physical", None)),
+        ("kp = 8000.0", "kp = 80000.0", ("bounds", Some(1))),
+        ("int_min_rad_s = -100.0", "int_min_rad_s = 1000.1", ("bounds", Some(2))),
+        ("friction_polynomial = [5.9", "friction_polynomial = [559.0", ("bounds", Some(3))),
+    ] {
+        let arm = of(from, to);
+        let all = found(&arm);
+        assert!(all.contains(&(expected.0, Problem, expected.1)), "{to}: {all:?}");
+        assert!(arm.check().is_refused(), "{to}");
+        let problems: Vec<_> = all.iter().filter(|f| f.1 == Problem).collect();
+        assert!(problems.iter().all(|f| f.2 == expected.1), "{to}: {problems:?}");
+    }
+}
+
+#[test]
+fn all_that_is_wrong_is_found_at_once() {
+    let text = AVENA_TOML
+        .replace("mass_kg = 1.96", "mass_kg = -1.96")
+        .replace("torque_max_nm = 40.0", "torque_max_nm = 0.0")
+        .replace("kd = 80.0", "kd = 800.0");
+    let all = found(&toml_form::read(&text).unwrap());
+    let count = |code: &str| all.iter().filter(|f| f.0 == code).count();
+    assert_eq!((count("physical"), count("limit"), count("bounds")), (2, 2, 3), "{all:?}");
+}
+
+#[test]
+fn what_is_missing_is_said_and_only_what_no_controller_starts_without_is_refused() {
+    let lacking = |key: &str| {
+        let lines = AVENA_TOML.lines().filter(|l| !l.starts_with(key));
+        let arm = toml_form::read(&lines.map(|l| format!("{l}\n")).collect::<String>()).unwrap();
+        (found(&arm), arm.check().is_refused())
+    };
+    use Severity::{Problem, Warning};
+    assert_eq!(lacking("pid"), (vec![("missing", Problem, None)], true));
+    assert_eq!(lacking("gravity"), (vec![("missing", Warning, None)], false));
+    assert_eq!(lacking("rotor"), (vec![("missing", Warning, None)], false));
+    assert_eq!(lacking("velocity_max"), (vec![("default", Warning, None)], false));
+    // The table is friction as well.
+    assert_eq!(lacking("friction_polynomial"), (vec![], false));
+}
+
+#[test]
+fn an_arm_that_its_drives_cannot_hold_is_named_with_joint_pose_and_share() {
+    let arm = of("torque_max_nm = 180.0", "torque_max_nm = 100.0");
+    let checked = arm.check();
+    assert!(!checked.is_refused(), "the controller takes it");
+    let f = checked.findings.iter().find(|f| f.code == "holding").unwrap();
+    assert_eq!((f.joint.map(Joint::number), f.limit), (Some(2), Some(100.0)));
+    let dynamics = jtc_dynamics::Dynamics::new(&arm.model, arm.config().gravity);
+    let there = dynamics.gravity_torque(&f.pose_rad.unwrap())[1].abs();
+    assert!((there - f.value.unwrap()).abs() < 1e-3 && there > 100.0, "{there} {f:?}");
+    assert!(f.finding.what.contains("N·m of 100 N·m (132 %) at q = ("), "{}", f.finding.what);
+    let tight = found(&of("torque_max_nm = 180.0", "torque_max_nm = 150.0"));
+    assert_eq!(tight, [("holding", Severity::Warning, Some(2))]);
+    // Where positions are limited, gravity may ask for less.
+    let narrow = of("torque_max_nm = 180.0", "torque_max_nm = 100.0");
+    let mut narrow = Arm { ..narrow };
+    (narrow.joints[1].position_min, narrow.joints[1].position_max) = (-0.3, 0.3);
+    (narrow.joints[2].position_min, narrow.joints[2].position_max) = (-0.3, 0.3);
+    assert!(!found(&narrow).iter().any(|f| f.0 == "holding"), "{:?}", narrow.check());
+}
+
+#[test]
+fn torque_limits_in_another_unit_are_suspected() {
+    let mut arm = Arm::avena();
+    for link in &mut arm.model.links {
+        link.mass *= 0.01;
+        link.inertia = link.inertia.map(|i| i * 0.01);
+    }
+    assert!(found(&arm).contains(&("unit", Severity::Warning, None)));
+}
+
+#[test]
+fn j41_gains_that_swing_up_are_warned_of() {
+    let mut arm = Arm::avena();
+    let pid = arm.pid.as_mut().unwrap();
+    pid[3].kd = 400.0;
+    pid[4].kd = 1.0;
+    assert_eq!(found(&arm), [("gains", Severity::Warning, Some(4)), ("gains", Severity::Warning, Some(5))]);
+}
+
+#[test]
+fn proposals_are_found_with_their_joints() {
+    let marked = of("torque_max_nm = 80.0\n", "torque_max_nm = 80.0\nproposed = [\"torque_max_nm\"]\n");
+    let checked = marked.check();
+    let f = checked.findings.iter().find(|f| f.code == "proposed").unwrap();
+    assert_eq!((f.name, checked.is_refused()), (Some("torque_max_nm"), false));
+    assert!(f.finding.what.contains("proposed for joint 1,"), "{}", f.finding.what);
+}

@@ -1,0 +1,139 @@
+//! The text of a robot description before it is understood: how deep it nests, where its elements are, and what its reader would
+//! refuse without saying where.
+
+use std::borrow::Cow;
+
+use crate::file::{FileError, Place};
+
+/// Deeper nesting than any description of an arm has.
+const DEPTH_MAX: usize = 32;
+
+/// A tag of the text: where it begins and ends, and how deep its element is (that of the whole description is 0).
+struct Tag<'a> {
+    text: &'a str,
+    begin: usize,
+    end: usize,
+    depth: usize,
+    closes: bool,
+    empty: bool,
+}
+
+/// The tags of a text, comments and declarations left out.
+fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
+    let (mut at, mut depth) = (0, 0usize);
+    std::iter::from_fn(move || {
+        loop {
+            let begin = at + text.get(at..)?.find('<')?;
+            let rest = &text[begin..];
+            if let Some((_, end)) =
+                [("<!--", "-->"), ("<![CDATA[", "]]>")].iter().find(|(b, _)| rest.starts_with(b))
+            {
+                at = rest.find(end).map_or(text.len(), |e| begin + e + 3);
+                continue;
+            }
+            at = rest.find('>').map_or(text.len(), |e| begin + e + 1);
+            if rest.starts_with("<!") || rest.starts_with("<?") {
+                continue;
+            }
+            let tag = &text[begin..at];
+            let (closes, empty) = (tag.starts_with("</"), tag.ends_with("/>"));
+            if closes {
+                depth = depth.saturating_sub(1);
+            }
+            let own = depth;
+            if !closes && !empty {
+                depth += 1;
+            }
+            return Some(Tag { text: tag, begin, end: at, depth: own, closes, empty });
+        }
+    })
+}
+
+/// Refuses what nests too deep: the reader descends by recursion.
+pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
+    let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
+    if deepest > DEPTH_MAX {
+        return Err(FileError::form(format!("XML nested {deepest} deep is no description of an arm")));
+    }
+    Ok(())
+}
+
+/// The text with a velocity limit of 0, which is none, in each limit that has none: the reader insists on one.
+pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
+    let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !tag.text.contains("velocity");
+    let places: Vec<usize> = tags(text).filter(lacks).map(|tag| tag.begin + "<limit".len()).collect();
+    if places.is_empty() {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 16 * places.len());
+    let mut from = 0;
+    for place in places {
+        out += &text[from..place];
+        out += " velocity=\"0\"";
+        from = place;
+    }
+    Cow::Owned(out + &text[from..])
+}
+
+/// The error of the reader about a text, at the element that it is about: the reader says what, not where.
+pub(super) fn locate(text: &str, what: &str) -> FileError {
+    let what = what.trim_start_matches("custom: ").replace("float literal", "number");
+    let mut open = None;
+    for tag in tags(text).filter(|tag| tag.depth == 1) {
+        let begin = if tag.closes { open.take() } else { Some((tag.begin, name(&tag))) };
+        let Some((begin, name)) = begin else { continue };
+        if !tag.closes && !tag.empty {
+            open = Some((begin, name));
+            continue;
+        }
+        let alone = format!("<robot name=\"_\">{}</robot>", &text[begin..tag.end]);
+        if urdf_rs::read_from_string(&alone).is_err() {
+            let line = 1 + text[..begin].matches('\n').count();
+            return FileError::at(Place::line(line).named(name), what);
+        }
+    }
+    let whole = if what == "No elements found" { "it breaks off or holds no element" } else { &what };
+    FileError::form(format!("no URDF: {whole}"))
+}
+
+/// What an element is called: its kind and its name.
+fn name(tag: &Tag) -> String {
+    let kind = tag.text.trim_start_matches('<').split([' ', '\n', '\t', '\r', '>', '/']).next().unwrap_or("");
+    let name = tag.text.split("name=").nth(1).and_then(|rest| rest.split(['"', '\'']).nth(1));
+    name.map_or_else(|| kind.to_owned(), |name| format!("{kind} {name}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tags_know_their_depth_and_comments_are_none() {
+        let text = "<?xml?><robot><!-- <link> --><link name=\"a\"><mass/></link><joint/></robot>";
+        let depths: Vec<_> = tags(text).map(|t| (t.text.to_owned(), t.depth)).collect();
+        let expected = [
+            ("<robot>", 0),
+            ("<link name=\"a\">", 1),
+            ("<mass/>", 2),
+            ("</link>", 1),
+            ("<joint/>", 1),
+            ("</robot>", 0),
+        ];
+        assert_eq!(depths, expected.map(|(text, depth)| (text.to_owned(), depth)));
+    }
+
+    #[test]
+    fn only_limits_without_a_velocity_get_one() {
+        let text = "<limit lower=\"1\"/><limit velocity=\"2\"/>";
+        let expected = "<limit velocity=\"0\" lower=\"1\"/><limit velocity=\"2\"/>";
+        assert_eq!(with_velocities(text), expected);
+        assert!(matches!(with_velocities(expected), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn texts_that_break_off_have_tags_all_the_same() {
+        for text in ["", "<", "<a", "<!--", "<a><", "</a></b>", "<a b='", "ü<ü>"] {
+            assert!(tags(text).count() <= 2, "{text}");
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Every number of an arm with its unit, its range, its default and where it comes from.
+
+use jtc_core::settings::{self, Setting};
+use jtc_core::{Config, ParameterBounds, PidGains, WORKING_AREA};
+use jtc_wire::Joint;
+use serde::Serialize;
+
+use super::toml_form::{ACCELERATION_DEFAULT, POSITION_ERROR_DEFAULT, VELOCITY_DEFAULT};
+use super::{Arm, Source};
+
+/// A number of an arm.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArmValue {
+    /// Its key in an arm file; of a number in a table or list with the part behind a dot, as in `pid.kp` and `com_xyz_m.x`.
+    pub name: &'static str,
+    /// The joint, for what is of one; the flange has none.
+    pub joint: Option<Joint>,
+    /// The link, 0 for the base, for what is of one; origins of joints are of the link that they carry, that of the flange of 7.
+    pub link: Option<usize>,
+    /// The number; nothing where it is missing.
+    pub value: Option<f64>,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The least that a controller takes, where that is bounded.
+    pub min: Option<f64>,
+    /// The most that a controller takes, where that is bounded.
+    pub max: Option<f64>,
+    /// What counts where the file does not give it.
+    pub default: Option<f64>,
+    /// Where it comes from.
+    pub from: Source,
+}
+
+/// What is known of a number whatever the arm.
+struct Kind {
+    name: &'static str,
+    unit: &'static str,
+    min: Option<f64>,
+    max: Option<f64>,
+    default: Option<f64>,
+}
+
+const fn kind(name: &'static str, unit: &'static str, min: Option<f64>, max: Option<f64>) -> Kind {
+    Kind { name, unit, min, max, default: None }
+}
+
+const XYZ: [&str; 3] = ["origin_xyz_m.x", "origin_xyz_m.y", "origin_xyz_m.z"];
+const RPY: [&str; 3] = ["origin_rpy_rad.roll", "origin_rpy_rad.pitch", "origin_rpy_rad.yaw"];
+const COM: [&str; 3] = ["com_xyz_m.x", "com_xyz_m.y", "com_xyz_m.z"];
+const COM_RPY: [&str; 3] = ["com_rpy_rad.roll", "com_rpy_rad.pitch", "com_rpy_rad.yaw"];
+const INERTIA: [&str; 6] = [
+    "inertia_kg_m2.ixx",
+    "inertia_kg_m2.ixy",
+    "inertia_kg_m2.ixz",
+    "inertia_kg_m2.iyy",
+    "inertia_kg_m2.iyz",
+    "inertia_kg_m2.izz",
+];
+const GRAVITY: [&str; 3] = ["gravity_m_s2.x", "gravity_m_s2.y", "gravity_m_s2.z"];
+const FRICTION: [(&str, &str); 6] = [
+    ("friction_polynomial.c0", "N·m"),
+    ("friction_polynomial.c1", "N·m·s/rad"),
+    ("friction_polynomial.c2", "N·m·s²/rad²"),
+    ("friction_polynomial.c3", "N·m·s³/rad³"),
+    ("friction_polynomial.c4", "1/K"),
+    ("friction_polynomial.c5", "°C"),
+];
+
+/// Numbers of one thing: what each is, and where it stands there.
+type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
+
+/// A setting of each joint or of the controller: its range is that of the table, and what the drives can do of it.
+fn setting(row: &Setting, drives: &Config) -> Kind {
+    let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
+    let (low, high) = match row.name {
+        "position_min_rad" | "position_max_rad" => (-WORKING_AREA, WORKING_AREA),
+        "velocity_max_rad_s" => (row.low, fastest),
+        _ => (row.low, row.high),
+    };
+    let default = match row.name {
+        "velocity_max_rad_s" => Some(VELOCITY_DEFAULT),
+        "acceleration_max_rad_s2" => Some(ACCELERATION_DEFAULT),
+        "position_error_max_rad" => Some(POSITION_ERROR_DEFAULT),
+        "rotor_inertia_kg_m2" => Some(0.0),
+        "torque_gain" => Some(1.0),
+        // An arm file has to give them.
+        _ if row.of_joint() => None,
+        _ => row.get(drives, 0),
+    };
+    Kind { default, ..kind(row.name, row.unit, Some(low), Some(high)) }
+}
+
+fn gains(bounds: &ParameterBounds) -> Numbers<PidGains, 5> {
+    let (none, least, most) = (Some(0.0), Some(-bounds.integral_max), Some(bounds.integral_max));
+    [
+        (kind("pid.kp", "N·m/rad", none, Some(bounds.kp_max)), |g| g.kp),
+        (kind("pid.ki", "N·m/(rad·s)", none, Some(bounds.ki_max)), |g| g.ki),
+        (kind("pid.kd", "N·m·s/rad", none, Some(bounds.kd_max)), |g| g.kd),
+        (kind("pid.int_min_rad_s", "rad·s", least, most), |g| g.int_min),
+        (kind("pid.int_max_rad_s", "rad·s", least, most), |g| g.int_max),
+    ]
+}
+
+/// A number of no joint and no link.
+fn value(kind: Kind, value: Option<f64>, from: Source) -> ArmValue {
+    let Kind { name, unit, min, max, default } = kind;
+    ArmValue { name, joint: None, link: None, value, unit, min, max, default, from }
+}
+
+/// Numbers of a list, which the file gives.
+fn listed(
+    names: &[&'static str],
+    unit: &'static str,
+    values: &[f64],
+    link: usize,
+    bound: Option<f64>,
+) -> Vec<ArmValue> {
+    let one = |(name, v): (&&'static str, &f64)| ArmValue {
+        link: Some(link),
+        ..value(kind(name, unit, bound.map(|b| -b), bound), Some(*v), Source::File)
+    };
+    names.iter().zip(values).map(one).collect()
+}
+
+impl Arm {
+    /// Every number of the arm but friction tables, which are too many to look at: gravity, the joints' numbers, then frames and
+    /// links, and the settings that the controller has of its own.
+    pub fn values(&self) -> Vec<ArmValue> {
+        let (drives, config) = (Config::avena(), self.config());
+        let gravity = self.gravity.map_or(Source::Default, |_| self.sources.of((None, "gravity_m_s2")));
+        let mut all: Vec<ArmValue> = (0..3)
+            .map(|i| {
+                let default = Some(drives.gravity[i]);
+                let kind = Kind { default, ..kind(GRAVITY[i], "m/s²", None, None) };
+                value(kind, self.gravity.map(|g| g[i]).or(default), gravity)
+            })
+            .collect();
+        for joint in Joint::ALL {
+            let j = joint.index();
+            let mut add = |v: ArmValue| all.push(ArmValue { joint: Some(joint), ..v });
+            for row in settings::TABLE.iter().filter(|row| row.of_joint()) {
+                let absent = row.name == "rotor_inertia_kg_m2" && !self.rotors_given[j];
+                let from = if absent { Source::Default } else { self.sources.of((Some(joint), row.name)) };
+                add(value(setting(row, &drives), row.get(&config, joint.number()), from));
+            }
+            let source =
+                |key, lacks: bool| if lacks { Source::Missing } else { self.sources.of((Some(joint), key)) };
+            for (kind, get) in gains(&drives.parameter_bounds) {
+                let gains = self.pid.map(|pid| get(&pid[j]));
+                add(value(kind, gains, source("pid", gains.is_none())));
+            }
+            for (i, (name, unit)) in FRICTION.into_iter().enumerate() {
+                let c = self.polynomial.map(|c| c[j][i]);
+                add(value(kind(name, unit, None, None), c, source("friction_polynomial", c.is_none())));
+            }
+        }
+        for (i, origin) in self.model.joints.iter().enumerate() {
+            let numbers =
+                [listed(&XYZ, "m", &origin.xyz, i + 1, None), listed(&RPY, "rad", &origin.rpy, i + 1, None)];
+            all.extend(numbers.concat().into_iter().map(|v| ArmValue { joint: Joint::from_index(i), ..v }));
+        }
+        let bounds = drives.parameter_bounds;
+        for (i, link) in self.model.links.iter().enumerate() {
+            let mass = kind("mass_kg", "kg", Some(0.0), Some(bounds.link_mass_max));
+            all.push(ArmValue { link: Some(i), ..value(mass, Some(link.mass), Source::File) });
+            all.extend(listed(&COM, "m", &link.origin.xyz, i, None));
+            all.extend(listed(&COM_RPY, "rad", &link.origin.rpy, i, None));
+            all.extend(listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max)));
+        }
+        // Settings of the controller, which it has of its own; gravity stands above.
+        let of_controller =
+            |row: &&Setting| !row.of_joint() && row.of_arm() && !row.name.starts_with("gravity");
+        for row in settings::TABLE.iter().filter(of_controller) {
+            all.push(value(setting(row, &drives), row.get(&config, 0), Source::Default));
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::AVENA_TOML;
+
+    #[test]
+    fn each_number_knows_its_unit_range_default_and_source() {
+        let text = AVENA_TOML.replacen("velocity_max_rad_s = 1.5\n", "", 1).replacen(
+            "torque_max_nm = 80.0\n",
+            "torque_max_nm = 80.0\nproposed = [\"torque_max_nm\", \"pid\"]\n",
+            1,
+        );
+        let arm = Arm::parse(&text).unwrap();
+        let all = arm.values();
+        let of = |name: &str, joint: usize| {
+            all.iter().find(|v| v.name == name && v.joint == Joint::from_number(joint)).unwrap().clone()
+        };
+        let v = of("velocity_max_rad_s", 1);
+        assert_eq!((v.value, v.default, v.from, v.unit), (Some(1.5), Some(1.5), Source::Default, "rad/s"));
+        assert_eq!((v.min, v.max.map(|m| (m * 1e9).round() / 1e9)), (Some(0.01), Some(1.5)));
+        assert_eq!(of("velocity_max_rad_s", 2).from, Source::File);
+        assert_eq!(
+            (of("torque_max_nm", 1).from, of("torque_max_nm", 2).from),
+            (Source::Proposed, Source::File)
+        );
+        assert_eq!((of("pid.kd", 1).from, of("pid.kd", 1).value), (Source::Proposed, Some(80.0)));
+        assert_eq!(of("friction_polynomial.c0", 3).value, arm.polynomial.map(|c| c[2][0]));
+        // 3 of gravity, 19 of each joint, 6 of each frame, 13 of each link, and those of the controller.
+        let own = settings::count(true) - 6 * 8 - 3;
+        assert_eq!(all.len(), 3 + 6 * 19 + 7 * 6 + 7 * 13 + own);
+        let missing = Arm { pid: None, ..arm }.values();
+        let kp = missing.iter().find(|v| v.name == "pid.kp").unwrap();
+        assert_eq!((kp.value, kp.from), (None, Source::Missing));
+    }
+}

@@ -1,0 +1,39 @@
+"""Robot descriptions of other people: the URDF files of the package example-robot-data, without its 400 MB of meshes.
+
+They are kept beside the packages of the virtual environment, and downloaded once.
+"""
+
+import hashlib
+import pathlib
+import subprocess
+import sys
+import tempfile
+import zipfile
+
+LIST = pathlib.Path(__file__).resolve().parent.parent / "requirements-robots.txt"
+
+
+def folder():
+    """The folder with the descriptions, one folder a robot; made when it is not there yet."""
+    kept = pathlib.Path(sys.prefix) / f"robots-{hashlib.sha256(LIST.read_bytes()).hexdigest()[:16]}"
+    stamp = kept / "complete"
+    if stamp.exists():
+        return kept
+    with tempfile.TemporaryDirectory() as scratch:
+        pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+        subprocess.run([*pip, "--only-binary", ":all:", "--dest", scratch, "--requirement", LIST], check=True)
+        for wheel in pathlib.Path(scratch).glob("*.whl"):
+            with zipfile.ZipFile(wheel) as files:
+                unpack(files, kept)
+    stamp.touch()
+    return kept
+
+
+def unpack(files, kept):
+    """The descriptions, and the licences that they come with."""
+    for name in files.namelist():
+        robot = name.partition("/robots/")[2]
+        if robot and ".." not in robot and (robot.endswith(".urdf") or robot.endswith("LICENSE")):
+            path = kept / robot
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(files.read(name))

@@ -32,6 +32,12 @@ pub fn write(dir: &Path) {
     let arm = jtc_host::arm::AVENA_TOML;
     save("old.toml", &arm.replace("format = 2\n", "format = 1\n"));
     save("slower.toml", &arm.replacen("velocity_max_rad_s = 1.5", "velocity_max_rad_s = 1.2", 1));
+    save(
+        "wrong.toml",
+        &arm.replacen("mass_kg = 7.5", "mass_kg = -7.5", 1).replacen("= 1.5\n", "= 3.15\n", 1),
+    );
+    save("weak.toml", &arm.replacen("torque_max_nm = 180.0", "torque_max_nm = 120.0", 1));
+    save("word.urdf", &urdf(6, "revolute", "").replacen("effort=\"50\"", "effort=\"strong\"", 1));
     save("seven.urdf", &urdf(7, "revolute", ""));
     save("continuous.urdf", &urdf(6, "continuous", ""));
     let gripper = "<link name=\"finger\"/><joint name=\"grip\" type=\"prismatic\"><parent link=\"link6\"/><child \

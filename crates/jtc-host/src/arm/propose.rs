@@ -71,9 +71,10 @@ fn rounded(value: f64, digits: i32) -> f64 {
 }
 
 impl Arm {
-    /// Lowest and highest position of each joint.
+    /// Lowest and highest position of each joint, at most a turn away from zero.
     pub(super) fn ranges(&self) -> Ranges {
-        self.joints.map(|j| (j.position_min, j.position_max))
+        use std::f64::consts::TAU;
+        self.joints.map(|j| (j.position_min.clamp(-TAU, TAU), j.position_max.clamp(-TAU, TAU)))
     }
 
     /// Fills in what the description lacks, and marks it. `gravity` in the base frame, m/s²; `friction`: Coulomb (N·m) and viscous
@@ -183,6 +184,18 @@ mod tests {
             [(12.56637, 3, 12.5), (0.001239, 2, 0.0012), (1234.9, 3, 1230.0), (0.15, 2, 0.15), (0.0, 3, 0.0)]
         {
             assert_eq!(rounded(value, digits), expected);
+        }
+    }
+
+    /// The page about arms has them word by word.
+    #[test]
+    fn the_rules_are_those_of_the_page() {
+        let page = include_str!("../../../../docs/arm.md");
+        for Rule { name, rule } in RULES {
+            assert!(
+                page.contains(&format!("| `{name}` | {rule} |")),
+                "docs/arm.md lacks: | `{name}` | {rule} |"
+            );
         }
     }
 

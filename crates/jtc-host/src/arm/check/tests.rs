@@ -1,5 +1,7 @@
 //! Each finding is made by what it is about, and by nothing else.
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::arm::AVENA_TOML;
 use crate::arm::toml_form;
@@ -123,4 +125,33 @@ fn proposals_are_found_with_their_joints() {
     let f = checked.findings.iter().find(|f| f.code == "proposed").unwrap();
     assert_eq!((f.name, checked.is_refused()), (Some("torque_max_nm"), false));
     assert!(f.finding.what.contains("proposed for joint 1,"), "{}", f.finding.what);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever a number is: it is found wrong or is none, and no check fails on it.
+    #[test]
+    fn no_number_is_too_odd_for_the_check(place in 0..11usize, joint in 0..JOINTS, value in prop::num::f64::ANY) {
+        let mut arm = Arm::avena();
+        let (limits, link) = (&mut arm.joints[joint], &mut arm.model.links[joint]);
+        match place {
+            0 => limits.position_min = value,
+            1 => limits.position_max = value,
+            2 => limits.velocity_max = value,
+            3 => limits.torque_max = value,
+            4 => limits.rotor_inertia = value,
+            5 => link.mass = value,
+            6 => link.inertia[3] = value,
+            7 => link.origin.xyz[1] = value,
+            8 => arm.pid.as_mut().unwrap()[joint].kd = value,
+            9 => arm.polynomial.as_mut().unwrap()[joint][1] = value,
+            _ => arm.model.joints[joint].rpy[0] = value,
+        }
+        let checked = arm.check();
+        prop_assert!(!checked.findings.is_empty());
+        if !value.is_finite() {
+            prop_assert!(checked.is_refused(), "{checked:?}");
+        }
+    }
 }

@@ -294,7 +294,7 @@ fn what_cannot_be_read_is_named_with_its_place() {
     };
     let twice = format!("{LIMIT}{LIMIT}");
     for (from, to, place, problem) in [
-        ("velocity=\"1.2\"", "velocity=\"fast\"", ", line 9, joint a1", "invalid number"),
+        ("velocity=\"1.2\"", "velocity=\"fast\"", ", line 9, joint a1", "velocity is \"fast\", not a number"),
         (LIMIT, twice.as_str(), ", line 9, joint a1", "duplicate field `limit`"),
         ("<mass value=\"1\"/>", "<mass/>", ", line 6, link b1", "missing field `value`"),
         (

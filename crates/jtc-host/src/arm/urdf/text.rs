@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use crate::file::{FileError, Place};
+use crate::file::{FileError, Place, short};
 
 /// Deeper nesting than any description of an arm has.
 const DEPTH_MAX: usize = 32;
@@ -89,11 +89,45 @@ pub(super) fn locate(text: &str, what: &str) -> FileError {
         let alone = format!("<robot name=\"_\">{}</robot>", &text[begin..tag.end]);
         if urdf_rs::read_from_string(&alone).is_err() {
             let line = 1 + text[..begin].matches('\n').count();
-            return FileError::at(Place::line(line).named(name), what);
+            let slip = if what == "invalid number" { no_number(&text[begin..tag.end]) } else { None };
+            return FileError::at(Place::line(line).named(name), slip.unwrap_or(what));
         }
     }
     let whole = if what == "No elements found" { "it breaks off or holds no element" } else { &what };
     FileError::form(format!("no URDF: {whole}"))
+}
+
+/// The first attribute of an element that should be a number and is none.
+fn no_number(element: &str) -> Option<String> {
+    const NUMBERS: [&str; 16] = [
+        "value",
+        "lower",
+        "upper",
+        "effort",
+        "velocity",
+        "acceleration",
+        "damping",
+        "friction",
+        "xyz",
+        "rpy",
+        "ixx",
+        "ixy",
+        "ixz",
+        "iyy",
+        "iyz",
+        "izz",
+    ];
+    NUMBERS.iter().find_map(|key| {
+        let head = format!(" {key}=");
+        element.match_indices(&head).find_map(|(at, _)| {
+            let rest = &element[at + head.len()..];
+            let quote = rest.chars().next()?;
+            let value = rest[quote.len_utf8()..].split(quote).next()?;
+            let bad =
+                value.split_whitespace().any(|word| word.parse::<f64>().is_err()) || value.trim().is_empty();
+            bad.then(|| format!("{key} is \"{}\", not a number", short(value)))
+        })
+    })
 }
 
 /// What an element is called: its kind and its name.

@@ -1,13 +1,43 @@
 //! What of an arm file a controller does not use: listed, and refused where it matters.
 
 use cli_kit::{ErrorKind, Failure, Output};
+use jtc_core::Config;
 use jtc_host::arm::{Arm, Difference, NOT_CARRIED};
 use serde_json::json;
 
 /// Returns the settings of `arm` that the controller uses otherwise; where there are any, they must have been accepted. They are
 /// listed either way.
-pub fn accept(arm: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
-    let differences = arm.device_differences();
+pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
+    let differences = arm.device_differences(device);
+    let hint = format!(
+        "a controller with extensions takes the whole arm by `jtc arm push FILE`; for others no frame carries {NOT_CARRIED}. Where \
+         the controller's values are safe for this arm, add --accept-device-limits"
+    );
+    let message = |count: &str| {
+        format!(
+            "{}: {count} of this arm cannot be given to the controller, which uses its own; nothing was sent",
+            arm.name
+        )
+    };
+    listed(differences, accepted, ("device-limits", message, &hint), out)
+}
+
+/// The same for all numbers of an arm that a controller `has` (J-55).
+pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
+    let hint = "`jtc arm push FILE` gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has; where it is safe \
+                to use that, leave --arm out or add --accept-device-limits";
+    let message =
+        |count: &str| format!("{}: the controller has another arm, {}: {count} differ", arm.name, has.name);
+    listed(arm.differences(has), accepted, ("other-arm", message, hint), out)
+}
+
+/// Lists differences; an error, with its code, message and hint, where there are any that nobody has accepted.
+fn listed(
+    differences: Vec<Difference>,
+    accepted: bool,
+    (code, message, hint): (&'static str, impl Fn(&str) -> String, &str),
+    out: &Output,
+) -> Result<Vec<Difference>, Failure> {
     if differences.is_empty() {
         return Ok(differences);
     }
@@ -17,17 +47,11 @@ pub fn accept(arm: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>
         }
         return Ok(differences);
     }
-    let message = format!(
-        "{}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent",
-        arm.name,
-        if differences.len() == 1 { "1 value".to_owned() } else { format!("{} values", differences.len()) }
-    );
-    let hint = format!(
-        "no frame carries {NOT_CARRIED}. Build the firmware for this arm, or, where the controller's values are safe for it, add \
-         --accept-device-limits"
-    );
+    let count =
+        if differences.len() == 1 { "1 value".to_owned() } else { format!("{} values", differences.len()) };
+    let message = message(&count);
     if out.is_json() {
-        let error = Failure::new(ErrorKind::Refused, "device-limits", &message).hint(&hint).to_json();
+        let error = Failure::new(ErrorKind::Refused, code, &message).hint(hint).to_json();
         out.result(&json!({ "outcome": "refused", "differences": differences, "error": error }), String::new);
     }
     out.note(format!("jtc: {message}"));

@@ -121,7 +121,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 SliceOutcome::Done
             }
             Command::StoreArm => self.store_arm(),
-            Command::Disable if self.state == ControllerState::HoldPos && self.motion.set.all_holding() => {
+            Command::Disable if self.state == ControllerState::HoldPos && self.at_rest() => {
                 // J-53: with its parameters missing the controller goes to Init, without torque.
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
@@ -160,6 +160,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         self.motion.set.jog(&wanted);
         Ok(())
+    }
+
+    /// The arm stands, and is to; whether its drives are enabled already does not matter.
+    fn at_rest(&self) -> bool {
+        !self.motion.set.coming_to_rest() && self.motion.set.moving(&self.nodes) == [false; JOINTS]
     }
 
     /// J-53: what belongs to the arm changes only while there is no torque.
@@ -273,7 +278,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let offset = match self.slice_progress {
             SliceProgress::Image(offset) => offset,
             _ if !self.settable()
-                || self.parameters.missing() != 0
+                || !self.parameters.all_given()
                 || matches!(self.extensions.store, StoreState::Absent | StoreState::Busy) =>
             {
                 return SliceOutcome::Refused(DataStatus::NotAllowed);

@@ -24,6 +24,8 @@ const NO_TABLE: TableOf<f32> =
 pub(crate) struct ReceivedParameters {
     /// One bit each ([`missing_parameter`]).
     received: u8,
+    /// The same since the start, whatever was withdrawn since.
+    given: u8,
     /// What `dynamics` was made of.
     model: ArmModel,
     pub dynamics: Dynamics,
@@ -41,6 +43,7 @@ impl ReceivedParameters {
     pub fn new(config: &Config) -> Self {
         Self {
             received: 0,
+            given: 0,
             model: defaults::MODEL,
             dynamics: Dynamics::new(&defaults::MODEL, config.gravity),
             pid: defaults::PID,
@@ -54,6 +57,16 @@ impl ReceivedParameters {
     /// The byte of the status: 1 = missing.
     pub fn missing(&self) -> u8 {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
+    }
+
+    /// Each of them was received since the start: none of the numbers is a built-in one that nobody asked for.
+    pub fn all_given(&self) -> bool {
+        self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
+    }
+
+    fn receive(&mut self, part: u8) {
+        self.received |= part;
+        self.given |= part;
     }
 
     /// The friction tables, unless polynomials are in use.
@@ -119,7 +132,7 @@ impl ReceivedParameters {
             config.parameter_bounds.check_gains(gains, joint)?;
         }
         self.pid = gains;
-        self.received |= missing_parameter::PID;
+        self.receive(missing_parameter::PID);
         Ok(())
     }
 
@@ -155,7 +168,7 @@ impl ReceivedParameters {
             return Err(DataStatus::IncorrectValue);
         }
         (self.model, self.dynamics) = (*model, dynamics);
-        self.received |= missing_parameter::MODEL;
+        self.receive(missing_parameter::MODEL);
         Ok(())
     }
 
@@ -233,7 +246,7 @@ impl ReceivedParameters {
     fn friction_received(&mut self, table: bool) {
         self.friction_is_table = table;
         self.friction_is_new = true;
-        self.received |= missing_parameter::FRICTION;
+        self.receive(missing_parameter::FRICTION);
     }
 }
 

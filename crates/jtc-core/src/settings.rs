@@ -3,7 +3,6 @@ use jtc_wire::SettingValue;
 
 use crate::JOINTS;
 use crate::config::{Config, ConfigError};
-use crate::limits::JointConfig;
 
 mod table;
 
@@ -21,13 +20,17 @@ pub enum Live {
     Always,
 }
 
-/// Where a setting is.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Place {
-    /// It is one of the arm.
-    Arm { get: fn(&Config) -> f64, set: fn(&mut Config, f64) },
-    /// Each joint has it.
-    Joint { get: fn(&JointConfig) -> f64, set: fn(&mut JointConfig, f64) },
+/// What a setting is, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A number of each joint.
+    Joint,
+    /// A number of the arm.
+    Number,
+    /// A whole number of the arm.
+    Whole,
+    /// A switch of the arm, 0 or 1.
+    Switch,
 }
 
 /// A row of the table.
@@ -49,7 +52,7 @@ pub struct Setting {
     pub live: Live,
     /// What it is.
     pub meaning: &'static str,
-    pub(crate) place: Place,
+    pub(crate) kind: Kind,
 }
 
 /// Why a value is not taken.
@@ -100,7 +103,7 @@ impl core::error::Error for SettingError {}
 impl Setting {
     /// Each joint has one.
     pub const fn of_joint(&self) -> bool {
-        matches!(self.place, Place::Joint { .. })
+        matches!(self.kind, Kind::Joint)
     }
 
     /// It belongs to the arm: it is stored with it, and in its hash.
@@ -115,12 +118,12 @@ impl Setting {
 
     /// The value in `config`; `joint` from 1, 0 for a setting of the arm. `None` where there is none.
     pub fn get(&self, config: &Config, joint: u8) -> Option<f64> {
-        match self.place {
-            Place::Arm { get, .. } => (joint == 0).then(|| get(config)),
-            Place::Joint { get, .. } => {
-                usize::from(joint).checked_sub(1).and_then(|j| config.joints.get(j)).map(get)
-            }
-        }
+        table::get(config, self.number, self.index(joint)?)
+    }
+
+    /// The index of a joint from 1, 0 for a setting of the arm; `None` where it is not a setting of that.
+    fn index(&self, joint: u8) -> Option<usize> {
+        if self.of_joint() { usize::from(joint).checked_sub(1) } else { (joint == 0).then_some(0) }
     }
 
     /// Its values in `config`, from the one with this index on.
@@ -144,17 +147,8 @@ impl Setting {
             let Self { name, low, high, .. } = *self;
             return Err(SettingError::Value { name, joint, value, low, high });
         }
-        match self.place {
-            Place::Arm { set, .. } if joint == 0 => set(config, value),
-            Place::Joint { set, .. }
-                if let Some(limits) =
-                    usize::from(joint).checked_sub(1).and_then(|j| config.joints.get_mut(j)) =>
-            {
-                set(limits, value);
-            }
-            _ => return Err(SettingError::Unknown { setting: self.number, joint }),
-        }
-        Ok(())
+        let written = self.index(joint).is_some_and(|index| table::set(config, self.number, index, value));
+        written.then_some(()).ok_or(SettingError::Unknown { setting: self.number, joint })
     }
 }
 
@@ -184,6 +178,15 @@ pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<It
     })
 }
 
+/// Puts one value into a configuration, whose whole is not checked by that.
+///
+/// # Errors
+/// A value that is not taken.
+pub fn apply(config: &mut Config, value: SettingValue) -> Result<(), SettingError> {
+    let SettingValue { setting: number, joint, value } = value;
+    setting(number).ok_or(SettingError::Unknown { setting: number, joint })?.set(config, joint, value)
+}
+
 /// The configuration with these values in it.
 ///
 /// # Errors
@@ -194,9 +197,8 @@ pub fn with_values(
     values: impl Iterator<Item = SettingValue>,
 ) -> Result<Config, SettingError> {
     let mut next = config.clone();
-    for SettingValue { setting: number, joint, value } in values {
-        let row = setting(number).ok_or(SettingError::Unknown { setting: number, joint })?;
-        row.set(&mut next, joint, value)?;
+    for value in values {
+        apply(&mut next, value)?;
     }
     next.check().map_err(SettingError::Config)?;
     Ok(next)

@@ -32,7 +32,8 @@ fn page() -> String {
             (false, Live::Always) => "; *live*: in every state, also in motion",
             (false, Live::No) => "",
         };
-        let _ = writeln!(page, "| {number} | `{name}` | {low} to {high}{unit} | {default} | {meaning}{kind} |");
+        let _ =
+            writeln!(page, "| {number} | `{name}` | {low} to {high}{unit} | {default} | {meaning}{kind} |");
     }
     page
 }
@@ -44,5 +45,8 @@ fn j53_the_page_of_settings_says_what_the_table_does() {
         std::fs::write(file, page()).expect("docs/settings.md can be written");
     }
     let now = std::fs::read_to_string(file).unwrap_or_default();
-    assert!(now == page(), "docs/settings.md is old: UPDATE_DOCS=1 cargo test -p jtc-core --test settings_page");
+    assert!(
+        now == page(),
+        "docs/settings.md is old: UPDATE_DOCS=1 cargo test -p jtc-core --test settings_page"
+    );
 }

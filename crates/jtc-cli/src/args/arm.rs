@@ -1,11 +1,11 @@
-//! `jtc arm`: arm files.
+//! `jtc arm`: arm files, and the arm of a controller.
 
 use std::path::PathBuf;
 
 use clap::builder::FalseyValueParser;
 use clap::{Args, Subcommand};
 
-use super::ForceArgs;
+use super::{AcceptArgs, ForceArgs, LinkArgs};
 
 /// `jtc arm …`
 #[derive(Debug, Subcommand)]
@@ -31,15 +31,58 @@ pub enum ArmCommand {
         /// Arm file (TOML) or robot description (URDF)
         file: PathBuf,
     },
-    /// All numbers of an arm, with unit, range, default and where each comes from
+    /// All numbers of an arm, with unit, range, default and where each comes from; without a file, of the controller's arm
     #[command(after_help = "Examples:\n  jtc arm show ur5.toml\n  jtc arm show ur5.toml --deg\n  \
                             jtc --json arm show ur5.toml | jq '.values[] | select(.from == \"proposed\")'")]
     Show {
-        /// Arm file (TOML) or robot description (URDF)
-        file: PathBuf,
+        /// Arm file (TOML) or robot description (URDF); without it the controller is asked
+        file: Option<PathBuf>,
         /// Angles in degrees
         #[arg(long, env = "JTC_DEG", value_parser = FalseyValueParser::new())]
         deg: bool,
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+    /// Give the controller the whole arm: settings, gains, friction, model and name; read it back and compare
+    #[command(
+        after_help = "Settings change while the controller is in Init or Error only: `jtc disable` takes the torque off.\n\
+                      --store keeps the arm over a loss of power; the controller is then in Init, and `jtc params use-defaults` or\n\
+                      `jtc recover --defaults` puts the stored arm in use.\n\
+                      A controller without extensions takes friction, gains and model only; where its own limits, gravity or\n\
+                      rotor inertia differ, nothing is sent unless --accept-device-limits is given.\n\nExamples:\n  \
+                      jtc arm push my-arm.toml\n  jtc arm push my-arm.toml --store"
+    )]
+    Push {
+        /// Arm file (TOML) or robot description (URDF)
+        file: PathBuf,
+        /// Keep it over a loss of power
+        #[arg(long, env = "JTC_STORE", value_parser = FalseyValueParser::new())]
+        store: bool,
+        #[command(flatten)]
+        accept: AcceptArgs,
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+    /// The controller's arm as a file
+    #[command(after_help = "Examples:\n  jtc arm pull -o board.toml")]
+    Pull {
+        /// Arm file to write
+        #[arg(short, long, env = "JTC_OUT", value_name = "FILE")]
+        out: PathBuf,
+        #[command(flatten)]
+        force: ForceArgs,
+        #[command(flatten)]
+        link: LinkArgs,
+    },
+    /// What of an arm file differs from the controller's arm; exit code 4 if anything does
+    #[command(
+        after_help = "Examples:\n  jtc arm diff my-arm.toml\n  jtc --json arm diff my-arm.toml | jq .differences"
+    )]
+    Diff {
+        /// Arm file (TOML) or robot description (URDF)
+        file: PathBuf,
+        #[command(flatten)]
+        link: LinkArgs,
     },
 }
 

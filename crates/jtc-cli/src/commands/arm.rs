@@ -1,5 +1,6 @@
-//! `jtc arm`: arm files.
+//! `jtc arm`: arm files, and the arm of a controller.
 
+mod device;
 mod import;
 mod show;
 
@@ -17,7 +18,15 @@ pub fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
     match command {
         ArmCommand::Import(args) => import::import(args, out),
         ArmCommand::Check { file } => check(file, out),
-        ArmCommand::Show { file, deg } => show::show(file, *deg, out),
+        ArmCommand::Show { file: Some(file), deg, .. } => {
+            show::show(&Arm::load_unchecked(file)?, &file.display().to_string(), *deg, out)
+        }
+        ArmCommand::Show { file: None, deg, link } => {
+            show::show(&link.session()?.device_arm()?, "the controller", *deg, out)
+        }
+        ArmCommand::Push { file, store, accept, link } => device::push(file, *store, *accept, link, out),
+        ArmCommand::Pull { out: file, force, link } => device::pull(file, *force, link, out),
+        ArmCommand::Diff { file, link } => device::diff(file, link, out),
     }
 }
 

@@ -37,6 +37,8 @@ pub struct Job {
     pub arm: Arm,
     /// Limits and settings that count.
     pub config: Config,
+    /// Those of the controller, once it was asked.
+    pub device: Config,
     /// File and arm, as they are typed.
     pub words: String,
     /// Percent of the file's own speed.
@@ -64,7 +66,7 @@ impl Job {
         let config = arm.config();
         let arm_words = args.arm.as_deref().map_or(String::new(), |path| format!(" --arm {}", typed(path)));
         let words = typed(file) + if args.deg { " --deg" } else { "" } + &arm_words;
-        Ok(Self { loaded, trajectory, arm, config, words, speed: args.speed })
+        Ok(Self { loaded, trajectory, arm, config, device: Config::avena(), words, speed: args.speed })
     }
 
     /// What helps after a verdict, with the names that the person typed and the [passing speed](Self::passing_speed).

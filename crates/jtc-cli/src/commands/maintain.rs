@@ -64,10 +64,6 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
         None => ParameterSource::None,
     };
     source.check()?;
-    let differences = match &arm {
-        Some(arm) => limits::accept(arm, args.accept.accept_device_limits, out)?,
-        None => Vec::new(),
-    };
     let its_out = *out;
     let stop = Stop::listen_with(move || {
         ended_at_once(
@@ -78,6 +74,10 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     })?;
     let mut session = args.link.session()?;
     progress.watch(&mut session);
+    let differences = match &arm {
+        Some(arm) => limits::accept(arm, &session.device_config()?, args.accept.accept_device_limits, out)?,
+        None => Vec::new(),
+    };
     let mut steps = Vec::new();
     let done = session.recover_until(
         source,

@@ -36,11 +36,11 @@ fn push(
     let progress = Progress::begin(out)?;
     let read = load(files, out)?;
     let set = read.parameter_set(choice);
+    let mut session = link.session()?;
     let differences = match &read.arm {
-        Some(arm) => limits::accept(arm, accept.accept_device_limits, out)?,
+        Some(arm) => limits::accept(arm, &session.device_config()?, accept.accept_device_limits, out)?,
         None => Vec::new(),
     };
-    let mut session = link.session()?;
     progress.watch(&mut session);
     let mut pushed = Vec::new();
     let done = session.push(&set, |p| {

@@ -37,14 +37,40 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
         Format::of(path)?; // a wrong ending is reported before anything moves
     }
     let mut job = Job::load(&args.file, &args.check, out)?;
-    limits::accept(&job.arm, args.accept.accept_device_limits, out)?;
-    // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
-    job.config = job.arm.config_on_device();
     job.note_what_is_left_out(out);
-    perform(args, &job, &progress, out).map_err(|failure| job.named(failure))
+    perform(args, &mut job, &progress, out).map_err(|failure| job.named(failure))
 }
 
-fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Result<(), Failure> {
+/// The arm of the controller and that of the job are one (J-55): the controller's own where none was named, else a refusal. From
+/// then on its settings count.
+fn match_device(
+    session: &mut Session<SerialPort>,
+    job: &mut Job,
+    args: &RunArgs,
+    out: &Output,
+) -> Result<(), Failure> {
+    let accepted = args.accept.accept_device_limits;
+    job.device = session.device_config()?;
+    match session.info()? {
+        None => drop(limits::accept(&job.arm, &job.device, accepted, out)?),
+        Some(info) if job.arm.hash().ok().flatten() == Some(info.hash) => {}
+        Some(info) => {
+            let has = session.device_arm()?;
+            if args.check.arm.is_none() {
+                let name = if has.name == job.arm.name { "as it is set" } else { info.arm.as_str() };
+                out.note(format!("note: checked for the arm of the controller, {name}"));
+                job.arm = has;
+            } else {
+                limits::same_arm(&job.arm, &has, accepted, out)?;
+            }
+        }
+    }
+    // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
+    job.config = job.arm.config_on_device(&job.device);
+    Ok(())
+}
+
+fn perform(args: &RunArgs, job: &mut Job, progress: &Progress, out: &Output) -> Result<(), Failure> {
     let options = UploadOptions { points_per_segment: args.points_per_segment, number: 0 };
     let verdict = job.verdict(&job.trajectory, None, options);
     if !verdict.is_ok() {
@@ -59,6 +85,8 @@ fn perform(args: &RunArgs, job: &Job, progress: &Progress, out: &Output) -> Resu
     let mut session = args.link.session()?;
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
+    match_device(&mut session, job, args, out)?;
+    let job = &*job;
     let speed = session.speed()?;
     if speed < 1.0 {
         out.note(format!(
@@ -279,7 +307,8 @@ impl Job {
         args: &RunArgs,
         upload: UploadOptions,
     ) -> Result<CheckedTrajectory, CheckError> {
-        let options = CheckOptions { upload, accept_device_limits: args.accept.accept_device_limits };
+        let accept_device_limits = args.accept.accept_device_limits;
+        let options = CheckOptions { upload, accept_device_limits, device: self.device.clone() };
         CheckedTrajectory::check(trajectory, &self.arm, &status.positions(), &options)
     }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use cli_kit::{ErrorKind, Failure, Output, figure, table};
+use jtc_core::Config;
 use jtc_host::check::Verdict;
 use jtc_host::port::SerialPort;
 use jtc_host::session::UploadOptions;
@@ -90,10 +91,10 @@ fn may_be_moving(failure: Failure) -> Failure {
 
 fn check(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
     let job = Job::load(file, args, out)?;
-    let differences = job.arm.device_differences();
+    let differences = job.arm.device_differences(&Config::avena());
     if !differences.is_empty() {
         out.note(format!(
-            "note: {} settings of this arm are in no frame, and the controller has others built in; `jtc traj run` lists them",
+            "note: {} settings of this arm are in no frame, and controllers without extensions have others built in; `jtc traj run` lists them",
             differences.len()
         ));
     }

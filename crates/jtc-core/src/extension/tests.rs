@@ -305,22 +305,21 @@ fn j53_settings_that_the_parameters_contradict_are_refused() {
 
 #[test]
 fn j53_disable_is_for_an_arm_that_is_held_at_rest() {
-    for (state, holding, taken) in [
-        (ControllerState::HoldPos, true, true),
-        (ControllerState::HoldPos, false, false),
-        (ControllerState::Operate, true, false),
-        (ControllerState::Teaching, true, false),
-        (ControllerState::Init, true, false),
-        (ControllerState::Error, true, false),
+    for (state, speed, taken) in [
+        (ControllerState::HoldPos, 0.0, true),
+        (ControllerState::HoldPos, 0.019, true),
+        (ControllerState::HoldPos, 0.1, false),
+        (ControllerState::Operate, 0.0, false),
+        (ControllerState::Teaching, 0.0, false),
+        (ControllerState::Init, 0.0, false),
+        (ControllerState::Error, 0.0, false),
     ] {
         let mut bench = Bench::new();
         bench.use_defaults();
         bench.force(state);
-        if holding {
-            bench.controller.motion.set.hold_for_test();
-        }
+        bench.controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0, 0.0, speed, 0.0, 0.0, 0.0]);
         let expected = if taken { DataStatus::NoError } else { DataStatus::NotAllowed };
-        assert_eq!(bench.at_once(Command::Disable), expected, "{state:?} {holding}");
+        assert_eq!(bench.at_once(Command::Disable), expected, "{state:?} {speed}");
         let all = missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL;
         assert_eq!(bench.controller.parameters.missing(), if taken { all } else { 0 });
         if taken {
@@ -328,6 +327,12 @@ fn j53_disable_is_for_an_arm_that_is_held_at_rest() {
             assert_eq!(bench.controller.state, ControllerState::Init);
         }
     }
+    // What is jogged is not at rest.
+    let mut bench = Bench::new();
+    bench.use_defaults();
+    bench.force(ControllerState::HoldPos);
+    bench.controller.motion.set.jog(&[0.1; JOINTS]);
+    assert_eq!(bench.at_once(Command::Disable), DataStatus::NotAllowed);
 }
 
 /// An arm that is not the one built in, as a stored image.
@@ -368,8 +373,10 @@ fn j54_a_stored_arm_is_what_the_defaults_mean_after_the_next_start() {
 fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     let mut bench = Bench::new();
     bench.info(0);
-    assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "parameters are missing");
+    assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "nobody gave parameters");
     bench.use_defaults();
+    // They may have been withdrawn since, as Disable does.
+    bench.controller.parameters.withdraw_all();
     for state in [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching] {
         bench.controller.state = state;
         assert_eq!(bench.at_once(Command::StoreArm), DataStatus::NotAllowed, "{state:?}");

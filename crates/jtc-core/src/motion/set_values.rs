@@ -59,6 +59,11 @@ impl SetValues {
         self.jog.is_some()
     }
 
+    /// A joint is jogged or decelerates.
+    pub fn coming_to_rest(&self) -> bool {
+        self.jog.is_some() || self.deceleration.iter().any(Option::is_some)
+    }
+
     /// Begin to hold where the arm is, coming to rest first if it moves.
     pub fn hold_measured(&mut self, nodes: &Nodes, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());

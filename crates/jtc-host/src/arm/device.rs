@@ -17,7 +17,7 @@ const SAME: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Difference {
     /// Its key in an arm file.
-    pub name: &'static str,
+    pub name: String,
     /// None for what concerns the whole arm.
     pub joint: Option<Joint>,
     /// The value of the arm file.
@@ -62,14 +62,14 @@ pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
 impl Arm {
-    /// The settings of this arm that a controller uses otherwise: gravity first, then joint by joint. Empty: the controller's
-    /// built-in settings are those of this arm.
-    pub fn device_differences(&self) -> Vec<Difference> {
-        let (own, device) = (self.config(), Config::avena());
+    /// The settings of this arm that a controller with the settings `device` uses otherwise: gravity first, then joint by joint.
+    /// Empty: the controller's settings are those of this arm.
+    pub fn device_differences(&self, device: &Config) -> Vec<Difference> {
+        let own = self.config();
         let mut all = Vec::new();
-        let mut compare = |name, joint, file: f64, device: f64, unit| {
+        let mut compare = |name: &str, joint, file: f64, device: f64, unit| {
             if (file - device).abs() > SAME * file.abs().max(device.abs()) {
-                all.push(Difference { name, joint, file, device, unit });
+                all.push(Difference { name: String::from(name), joint, file, device, unit });
             }
         };
         for (name, (file, device)) in
@@ -95,10 +95,10 @@ impl Arm {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Settings to check a motion against that a controller with its built-in settings is to execute: of each limit the tighter
+    /// Settings to check a motion against that a controller with the settings `device` is to execute: of each limit the tighter
     /// one, and the gravity and rotor inertia that the controller computes with.
-    pub fn config_on_device(&self) -> Config {
-        let (mut config, device) = (self.config(), Config::avena());
+    pub fn config_on_device(&self, device: &Config) -> Config {
+        let mut config = self.config();
         config.gravity = device.gravity;
         for (own, device) in config.joints.iter_mut().zip(&device.joints) {
             *own = JointConfig {
@@ -123,13 +123,15 @@ mod tests {
     #[test]
     fn j55_each_value_that_the_controller_does_not_use_is_listed() {
         let mut arm = Arm::avena();
-        assert!(arm.device_differences().is_empty());
+        assert!(arm.device_differences(&Config::avena()).is_empty());
         arm.gravity = Some([0.0, 0.0, 9.81]);
         arm.joints[1].velocity_max = 3.15;
         arm.joints[4].rotor_inertia = 0.0;
-        let all = arm.device_differences();
-        let seen: Vec<_> =
-            all.iter().map(|d| (d.name, d.joint.map(Joint::number), d.file, d.device, d.unit)).collect();
+        let all = arm.device_differences(&Config::avena());
+        let seen: Vec<_> = all
+            .iter()
+            .map(|d| (d.name.as_str(), d.joint.map(Joint::number), d.file, d.device, d.unit))
+            .collect();
         assert_eq!(
             seen,
             [
@@ -148,25 +150,29 @@ mod tests {
     #[test]
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
-        assert!(arm.device_differences().is_empty());
+        assert!(arm.device_differences(&Config::avena()).is_empty());
     }
 
     /// A URDF has no place for rotor inertia: that is not 0, and not a difference.
     #[test]
     fn j55_a_rotor_inertia_that_no_file_gives_is_no_difference() {
         let urdf = Arm::parse(&Arm::avena().to_urdf()).unwrap();
-        let names: Vec<_> = urdf.device_differences().iter().map(|d| d.name).collect();
-        assert!(!names.contains(&"rotor_inertia_kg_m2"), "{names:?}");
+        let names: Vec<_> =
+            urdf.device_differences(&Config::avena()).iter().map(|d| d.name.clone()).collect();
+        assert!(!names.contains(&"rotor_inertia_kg_m2".to_owned()), "{names:?}");
         assert_eq!(urdf.settings_not_given(), ["gravity", "rotor inertia"]);
         // What is checked for a controller counts the rotors that it computes with.
-        assert_eq!(urdf.config_on_device().joints[3].rotor_inertia, Config::avena().joints[3].rotor_inertia);
+        assert_eq!(
+            urdf.config_on_device(&Config::avena()).joints[3].rotor_inertia,
+            Config::avena().joints[3].rotor_inertia
+        );
         // An arm file that is made of it gives none either; one with 0 does.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);
         let given =
             Arm::avena().to_toml().replacen("rotor_inertia_kg_m2 = 0.7", "rotor_inertia_kg_m2 = 0.0", 1);
-        assert_eq!(Arm::parse(&given).unwrap().device_differences().len(), 1);
+        assert_eq!(Arm::parse(&given).unwrap().device_differences(&Config::avena()).len(), 1);
     }
 
     #[test]
@@ -175,7 +181,7 @@ mod tests {
         arm.joints[0].velocity_max = 3.0;
         arm.joints[1].velocity_max = 0.5;
         arm.joints[2].position_min = -1.0;
-        let config = arm.config_on_device();
+        let config = arm.config_on_device(&Config::avena());
         assert_eq!(config.joints[0].velocity_max, 1.5);
         assert_eq!(config.joints[1].velocity_max, 0.5);
         assert_eq!(config.joints[2].position_min, -1.0);

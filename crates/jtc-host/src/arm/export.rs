@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use jtc_core::JOINTS;
+use jtc_core::settings;
 use jtc_dynamics::Origin;
 use jtc_wire::Joint;
 
@@ -103,6 +104,17 @@ impl Arm {
                 list(&link.origin.rpy)
             );
             let _ = writeln!(out, "inertia_kg_m2 = {} # ixx, ixy, ixz, iyy, iyz, izz", list(&link.inertia));
+        }
+        if !self.others.is_empty() {
+            out += "\n[settings]\n";
+        }
+        for value in &self.others {
+            let Some(row) = settings::setting(value.setting) else { continue };
+            let _ = match (row.whole, row.high == 1.0) {
+                (true, true) => writeln!(out, "{} = {}", row.name, value.value != 0.0),
+                (true, false) => writeln!(out, "{} = {:.0}", row.name, value.value),
+                _ => writeln!(out, "{} = {:?}", row.name, value.value),
+            };
         }
         let Some(tables) = &self.table else { return out };
         let one = tables.iter().all(|t| *t == tables[0]);

@@ -5,6 +5,7 @@ mod collect;
 mod csv;
 mod device;
 mod export;
+mod image;
 mod parameters;
 mod propose;
 mod source;
@@ -19,12 +20,15 @@ mod warning;
 
 use std::path::Path;
 
+use jtc_core::settings::{self, Setting};
 use jtc_core::{Config, Friction, JOINTS, JointConfig, Parameters, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, ModelError};
+use jtc_wire::SettingValue;
 
 pub use check::{ArmFinding, Checked};
 pub use collect::{FrictionChoice, ParameterFile};
 pub use device::{Difference, NOT_CARRIED};
+pub use image::ImageError;
 pub use parameters::{Beyond, ParameterError, ParameterSet};
 pub use propose::{RULES, Rule};
 pub use source::{Key, Source, Sources};
@@ -82,6 +86,8 @@ pub struct Arm {
     pub rotors_given: [bool; JOINTS],
     /// Acceleration of gravity in the base frame, m/s²; `None`: the device's setting.
     pub gravity: Option<[f64; 3]>,
+    /// Settings of the controller that the file gives in its `[settings]`.
+    pub others: Vec<SettingValue>,
     /// Gains.
     pub pid: Option<[PidGains; JOINTS]>,
     /// Friction polynomial, c0..c5 ascending.
@@ -206,7 +212,13 @@ impl Arm {
     /// not given is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
-        Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default }
+        let mut config =
+            Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default };
+        for value in &self.others {
+            // One that is out of range, which no file brings here, stays as it is by default.
+            let _ = settings::apply(&mut config, *value);
+        }
+        config
     }
 
     /// Friction compensation: the polynomial, else the table.
@@ -229,6 +241,33 @@ impl Arm {
             friction: self.friction().unwrap_or(default.friction),
         }
     }
+}
+
+impl Arm {
+    /// An arm of which nothing is given, with names like those that files have.
+    fn nameless() -> Self {
+        Self {
+            name: String::new(),
+            joint_names: std::array::from_fn(|i| format!("joint_{}", i + 1)),
+            link_names: std::array::from_fn(|i| format!("link_{i}")),
+            flange_name: "flange".into(),
+            model: ArmModel::default(),
+            joints: Config::avena().joints,
+            rotors_given: [false; JOINTS],
+            gravity: None,
+            others: Vec::new(),
+            pid: None,
+            polynomial: None,
+            table: None,
+            warnings: Vec::new(),
+            sources: Sources::default(),
+        }
+    }
+}
+
+/// A setting of the controller that has no key of its own in an arm file: it stands in `[settings]`.
+fn has_no_key(setting: &Setting) -> bool {
+    setting.of_arm() && !setting.of_joint() && !setting.name.starts_with("gravity_")
 }
 
 /// The text is XML, as a robot description is; a byte order mark may stand before it.

@@ -1,8 +1,11 @@
 //! The TOML form of an arm.
 
-use jtc_core::{JOINTS, JointConfig, PidGains, TableOf};
+use std::collections::BTreeMap;
+
+use jtc_core::settings;
+use jtc_core::{Config, JOINTS, JointConfig, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
-use jtc_wire::Joint;
+use jtc_wire::{Joint, SettingValue};
 use serde::{Deserialize, Serialize};
 
 use super::source::{ARM_KEYS, JOINT_KEYS};
@@ -36,6 +39,8 @@ struct ArmForm {
     link: Vec<LinkForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     friction_table: Vec<TableForm>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    settings: BTreeMap<String, toml::Value>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -188,9 +193,39 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         joints: limits,
         rotors_given: std::array::from_fn(|i| joints[i].rotor_inertia_kg_m2.is_some()),
         gravity: form.gravity_m_s2,
+        others: others(&form.settings)?,
         warnings,
         sources,
     })
+}
+
+/// The settings of the controller that a file gives.
+fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, FileError> {
+    let mut all = Vec::new();
+    for (name, value) in given {
+        let wrong = |problem: String| FileError::at(Place::name(format!("settings, {name}")), problem);
+        let Some(row) = settings::named(name).filter(|row| super::has_no_key(row)) else {
+            let problem = match settings::named(name) {
+                Some(row) if row.of_joint() => "stands in [[joint]], for each joint",
+                Some(row) if row.of_arm() => "stands above as gravity_m_s2",
+                Some(_) => "belongs to no arm; it is commanded while the arm is in use",
+                None => "is no setting of a controller; docs/settings.md lists them",
+            };
+            return Err(wrong(problem.into()));
+        };
+        let number = match value {
+            toml::Value::Boolean(on) => Some(f64::from(u8::from(*on))),
+            toml::Value::Integer(i) => Some(*i as f64),
+            toml::Value::Float(f) => Some(*f),
+            _ => None,
+        };
+        let number = number.ok_or_else(|| wrong(format!("{value} is no number")))?;
+        let value = SettingValue { setting: row.number, joint: 0, value: number };
+        settings::apply(&mut Config::avena(), value).map_err(|e| wrong(e.to_string()))?;
+        all.push(value);
+    }
+    all.sort_by_key(|value| value.setting);
+    Ok(all)
 }
 
 /// A part that all six joints have, or none.

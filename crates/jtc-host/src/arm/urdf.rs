@@ -59,6 +59,7 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
         // The form has no place for it.
         rotors_given: [false; JOINTS],
         gravity: None,
+        others: Vec::new(),
         pid: None,
         polynomial: None,
         table: None,

@@ -171,7 +171,9 @@ impl Arm {
         let of_controller =
             |row: &&Setting| !row.of_joint() && row.of_arm() && !row.name.starts_with("gravity");
         for row in settings::TABLE.iter().filter(of_controller) {
-            all.push(value(setting(row, &drives), row.get(&config, 0), Source::Default));
+            let given = self.others.iter().any(|other| other.setting == row.number);
+            let from = if given { Source::File } else { Source::Default };
+            all.push(value(setting(row, &drives), row.get(&config, 0), from));
         }
         all
     }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use jtc_core::JOINTS;
+use jtc_core::{Config, JOINTS};
 use jtc_wire::RawPoint;
 
 use super::{Checker, Verdict};
@@ -16,13 +16,16 @@ use crate::trajectory::{Trajectory, UploadOptions};
 static PASSED: AtomicU64 = AtomicU64::new(1);
 
 /// How a trajectory is checked for a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {
     /// Segments that it will be sent in; their number is part of the check.
     pub upload: UploadOptions,
-    /// The values of the arm file that no frame carries (limits, gravity, rotor inertia) may differ from those that are built into
+    /// The values of the arm file that no frame carries (limits, gravity, rotor inertia) may differ from those of
     /// the controller, and those of the controller are safe for this arm. Without it such an arm is refused (J-55).
     pub accept_device_limits: bool,
+    /// Settings of the controller: by default those that are built in, and what [`Session::device_config`](crate::Session::device_config)
+    /// tells of one with extensions.
+    pub device: Config,
 }
 
 /// A trajectory that may be run: it passed the check against an arm, from the pose in which the arm stood.
@@ -95,11 +98,11 @@ impl CheckedTrajectory {
     ) -> Result<Self, CheckError> {
         // The fields of an arm are public: numbers that make the dynamics senseless would pass for any torque.
         arm.is_physical()?;
-        let differences = arm.device_differences();
+        let differences = arm.device_differences(&options.device);
         if !differences.is_empty() && !options.accept_device_limits {
             return Err(CheckError::DeviceLimits { arm: arm.name.clone(), differences });
         }
-        let (config, friction) = (arm.config_on_device(), arm.friction());
+        let (config, friction) = (arm.config_on_device(&options.device), arm.friction());
         let checker = Checker {
             model: Some(&arm.model),
             friction: friction.as_ref(),

@@ -3,6 +3,8 @@
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_wire::StoreState;
 
+use crate::arm::Difference;
+
 /// Why an arm could not be read from a device or kept by it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -10,12 +12,43 @@ pub enum ExtensionError {
     /// What was read is not one arm.
     #[error("the arm of the device changed while it was read")]
     Changed,
+    /// What the device has is no arm that this program knows.
+    #[error("the arm of the device: {why}")]
+    NoArm {
+        /// What is wrong with it.
+        why: String,
+    },
+    /// An arm of which parts are missing.
+    #[error("{arm}: no {} in the file", missing.join(", no "))]
+    Incomplete {
+        /// Name of the arm.
+        arm: String,
+        /// What a controller needs, and the file does not give.
+        missing: Vec<&'static str>,
+    },
+    /// The device has another arm than the file gives (J-55).
+    #[error("the controller has another arm than {arm}: {}", listed(differences))]
+    Differs {
+        /// Name of the arm of the file.
+        arm: String,
+        /// Every value that differs.
+        differences: Vec<Difference>,
+    },
     /// The memory of the device does not have it.
     #[error("the arm was not stored: {state}")]
     NotStored {
         /// What the device reports of its memory.
         state: StoreState,
     },
+}
+
+/// The first of them; the others are counted.
+fn listed(differences: &[Difference]) -> String {
+    match differences {
+        [] => "it tells of no difference".into(),
+        [one] => one.to_string(),
+        [one, rest @ ..] => format!("{one}, and {} more", rest.len()),
+    }
 }
 
 impl Diagnose for ExtensionError {
@@ -25,6 +58,21 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Device,
                 "arm-changed",
                 "is another host giving it an arm? Try again",
+            ),
+            Self::NoArm { .. } => Diagnosis::new(
+                ErrorKind::Device,
+                "no-arm",
+                "its firmware is of another version: `jtc info`; `jtc arm push FILE` gives it an arm",
+            ),
+            Self::Incomplete { .. } => Diagnosis::new(
+                ErrorKind::Usage,
+                "incomplete-arm",
+                "`jtc arm check FILE` names what is missing; nothing was sent",
+            ),
+            Self::Differs { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "other-arm",
+                "`jtc arm diff FILE` lists every value; `jtc arm push FILE` gives the controller this arm",
             ),
             Self::NotStored { .. } => Diagnosis::new(
                 ErrorKind::Device,

@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use jtc_core::settings;
+use jtc_core::{Config, settings};
 use jtc_wire::{
     Answer, FrameRef, FrameStatus, FrameType, Info, JOINTS, Name, SET_VALUES_MAX, SettingValue, StoreState,
     fixed, floats, set_settings,
 };
 
-use super::Session;
+use super::{PushReport, Session};
+use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
@@ -131,6 +132,64 @@ impl<P: Port> Session<P> {
             all.extend(page);
             if done || all.len() >= total {
                 return Ok(all);
+            }
+        }
+    }
+
+    /// The settings that the device computes with; those that are built in where it has no extensions.
+    ///
+    /// # Errors
+    ///
+    /// Those of the line, and [`ExtensionError::NoArm`] for settings of no arm.
+    pub fn device_config(&mut self) -> Result<Config, Error> {
+        if self.info()?.is_none() {
+            return Ok(Config::avena());
+        }
+        let values = self.settings()?;
+        // Those of a later version that this one does not know are left out.
+        let known = values.into_iter().filter(|value| settings::setting(value.setting).is_some());
+        let config = settings::with_values(&Config::avena(), known);
+        Ok(config.map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
+    }
+
+    /// The arm that the device has in use.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Session::arm_image`], and [`ExtensionError::NoArm`] when it is none.
+    pub fn device_arm(&mut self) -> Result<Arm, Error> {
+        let image = self.arm_image()?;
+        Ok(Arm::from_image(&image).map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
+    }
+
+    /// Gives the device the whole arm: settings and name where they differ, then friction, gains and model; reads it back and
+    /// compares. The device has to be in Init or Error where settings differ.
+    ///
+    /// # Errors
+    ///
+    /// [`ExtensionError::Incomplete`] for an arm without gains or friction, [`ExtensionError::Differs`] when what is read back is
+    /// another one; those of [`Session::set_settings`] and [`Session::push`].
+    pub fn push_arm(&mut self, arm: &Arm, done: impl FnMut(&PushReport)) -> Result<Vec<PushReport>, Error> {
+        let set = arm.parameter_set();
+        let Some(hash) = arm.hash()? else {
+            return Err(ExtensionError::Incomplete { arm: arm.name.clone(), missing: set.missing() }.into());
+        };
+        let now = self.settings()?;
+        let settings: Vec<SettingValue> =
+            arm.settings().into_iter().filter(|own| !now.contains(own)).collect();
+        if !settings.is_empty() {
+            self.set_settings(&settings)?;
+        }
+        let name = Name::cut(&arm.name);
+        if self.info()?.is_some_and(|info| info.arm != name) {
+            self.set_name(&name)?;
+        }
+        let pushed = self.push(&set, done)?;
+        match self.info()? {
+            Some(info) if info.hash == hash => Ok(pushed),
+            _ => {
+                let differences = arm.differences(&self.device_arm()?);
+                Err(ExtensionError::Differs { arm: arm.name.clone(), differences }.into())
             }
         }
     }

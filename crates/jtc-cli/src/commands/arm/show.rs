@@ -1,7 +1,5 @@
 //! `jtc arm show`: all numbers of an arm.
 
-use std::path::Path;
-
 use cli_kit::{Failure, Output, table};
 use jtc_host::arm::{Arm, ArmValue, Source};
 use jtc_wire::Joint;
@@ -10,15 +8,14 @@ use serde_json::json;
 /// Degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-pub(super) fn show(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
-    let arm = Arm::load_unchecked(file)?;
+/// `name`: the file, or whose arm it is.
+pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(), Failure> {
     let mut values = arm.values();
     if deg {
         values.iter_mut().for_each(in_degrees);
     }
-    let name = file.display();
     let value = json!({
-        "file": name.to_string(), "arm": arm.name, "joints": arm.joint_names, "links": arm.link_names,
+        "file": name, "arm": arm.name, "joints": arm.joint_names, "links": arm.link_names,
         "flange": arm.flange_name, "friction_table": arm.table.is_some(), "warnings": arm.warnings, "values": values,
     });
     out.result(&value, || {
@@ -37,9 +34,9 @@ pub(super) fn show(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> 
             text += "friction tables are in the file, too; the polynomial counts unless --friction table asks for them\n";
         }
         let unit = |name: &str| values.iter().find(|v| v.name == name).map_or("", |v| v.unit);
-        text += &format!("\n{}", frames(&values, &arm, unit("origin_rpy_rad.roll")));
-        text += &format!("\n{}", links(&values, &arm, unit("com_rpy_rad.roll")));
-        text + &format!("\nin no arm file, the controller has them of its own\n{}", of_controller(&values))
+        text += &format!("\n{}", frames(&values, arm, unit("origin_rpy_rad.roll")));
+        text += &format!("\n{}", links(&values, arm, unit("com_rpy_rad.roll")));
+        text + &format!("\nsettings of the controller; an arm file may give them in [settings]\n{}", of_controller(&values))
     });
     Ok(())
 }

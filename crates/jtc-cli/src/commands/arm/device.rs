@@ -1,0 +1,173 @@
+//! `jtc arm push`, `pull`, `diff`: the arm of a controller.
+
+use std::path::Path;
+use std::time::Duration;
+
+use cli_kit::{ErrorKind, Failure, Output, OutputFile, table};
+use jtc_core::Config;
+use jtc_host::arm::{Arm, Difference};
+use jtc_host::port::SerialPort;
+use jtc_host::session::PushReport;
+use jtc_host::{Error, LinkError, Session};
+use jtc_wire::ControllerState;
+use serde_json::json;
+
+use super::super::info::hash;
+use crate::args::{AcceptArgs, ForceArgs, LinkArgs};
+use crate::limits;
+
+/// A controller leaves Init, or goes back there, within this time.
+const CHANGE: Duration = Duration::from_secs(5);
+
+/// Gives the controller the whole arm.
+pub(super) fn push(
+    file: &Path,
+    store: bool,
+    accept: AcceptArgs,
+    link: &LinkArgs,
+    out: &Output,
+) -> Result<(), Failure> {
+    let arm = Arm::load(file)?;
+    for warning in &arm.warnings {
+        out.note(format!("note: {warning}"));
+    }
+    let set = arm.parameter_set();
+    if !set.missing().is_empty() {
+        let message =
+            format!("{}: the file gives no {}; nothing was sent", arm.name, set.missing().join(", no "));
+        return Err(Failure::usage(message)
+            .hint("`jtc arm import` proposes starting values for a URDF, `jtc arm check FILE` names what is missing"));
+    }
+    set.check()?;
+    let mut session = link.session()?;
+    if session.info()?.is_none() {
+        return without_extensions(&mut session, &arm, store, accept, out);
+    }
+    let pushed = session.push_arm(&arm, |p| out.note(told(p))).map_err(|e| refused(e, &arm))?;
+    let stored = if store { Some(keep(&mut session, out)?) } else { None };
+    let now = arm.hash().ok().flatten().unwrap_or_default();
+    let value = json!({
+        "arm": arm.name, "hash": hash(now), "parts": pushed, "stored_number": stored, "differences": [],
+    });
+    out.result(&value, || {
+        let line = format!("the controller has arm {}, hash {}: read back, nothing differs", arm.name, hash(now));
+        match stored {
+            None => format!("{line}\nnext: jtc arm push --store keeps it over a loss of power"),
+            Some(number) => format!(
+                "{line}\nstored, number {number}; the controller is in Init\nnext: jtc recover --defaults puts the stored arm in use"
+            ),
+        }
+    });
+    Ok(())
+}
+
+fn told(p: &PushReport) -> String {
+    format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
+}
+
+/// Settings are refused outside Init and Error.
+fn refused(error: Error, arm: &Arm) -> Failure {
+    let failure = Failure::of(&error);
+    match error {
+        Error::Link(LinkError::Refused { request: jtc_wire::FrameType::SetSettings, code, .. }) => match code {
+            jtc_wire::DataStatus::NotAllowed => failure.hint(
+                "settings change without torque only: `jtc disable` (an arm without brakes falls), then push again; nothing was changed",
+            ),
+            _ => failure.hint("`jtc arm check FILE` names the value; nothing was changed"),
+        },
+        Error::Extension(_) => failure,
+        _ => Failure { message: format!("{}: {}", arm.name, failure.message), ..failure },
+    }
+}
+
+/// Keeps what was pushed. With all it needs the controller has left Init: it goes back there first.
+fn keep(session: &mut Session<SerialPort>, out: &Output) -> Result<u32, Failure> {
+    let state = session.fresh_status()?.state;
+    if state == ControllerState::Init {
+        // It may be about to leave.
+        let _ =
+            session.wait_for("HoldPos", Duration::from_millis(300), |s| s.state == ControllerState::HoldPos);
+    }
+    if session.fresh_status()?.state == ControllerState::HoldPos {
+        session.disable()?;
+        session
+            .wait_for("Init", CHANGE, |s| s.state.is_in(&[ControllerState::Init, ControllerState::Error]))?;
+    }
+    out.note("storing");
+    Ok(session.store_arm()?)
+}
+
+/// A device that takes friction, gains and model only.
+fn without_extensions(
+    session: &mut Session<SerialPort>,
+    arm: &Arm,
+    store: bool,
+    accept: AcceptArgs,
+    out: &Output,
+) -> Result<(), Failure> {
+    if store {
+        let message = "this controller has no extensions: it keeps no arm; nothing was sent";
+        return Err(Failure::new(ErrorKind::Refused, "no-extension", message).hint("push without --store"));
+    }
+    let differences = limits::accept(arm, &Config::avena(), accept.accept_device_limits, out)?;
+    let pushed = session.push(&arm.parameter_set(), |p| out.note(told(p)))?;
+    let value = json!({
+        "arm": arm.name, "hash": null, "parts": pushed, "stored_number": null, "differences": differences,
+    });
+    out.result(&value, || {
+        format!("friction, gains and model of {} sent; this controller cannot be read back", arm.name)
+    });
+    Ok(())
+}
+
+/// Writes the controller's arm to a file.
+pub(super) fn pull(file: &Path, force: ForceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let target = OutputFile::open(file, force.force, &[])?;
+    let arm = link.session()?.device_arm()?;
+    let name = target.name();
+    target.write(arm.to_toml())?;
+    let now = hash(arm.hash().ok().flatten().unwrap_or_default());
+    out.result(&json!({ "file": name, "arm": arm.name, "hash": now }), || {
+        format!("{name}: arm {}, hash {now}\nnext: jtc arm show {name}", arm.name)
+    });
+    Ok(())
+}
+
+/// Lists what differs.
+pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+    let arm = Arm::load(file)?;
+    let mut session = link.session()?;
+    let (differences, known) = match session.info()? {
+        Some(_) => (arm.differences(&session.device_arm()?), true),
+        None => (arm.device_differences(&Config::avena()), false),
+    };
+    let equal = differences.is_empty();
+    out.result(&json!({ "equal": equal, "differences": differences, "complete": known }), || {
+        let mut text = if equal {
+            format!("nothing differs: the controller has arm {}", arm.name)
+        } else {
+            format!("{} differ\n{}", count(&differences), as_table(&differences))
+        };
+        if !known {
+            text += "\nthis controller has no extensions: compared with the settings that its kind is known to have; friction, \
+                     gains and model cannot be read";
+        }
+        text.trim_end().to_owned()
+    });
+    if equal { Ok(()) } else { Err(Failure::printed(ErrorKind::Refused)) }
+}
+
+fn count(differences: &[Difference]) -> String {
+    if differences.len() == 1 { "1 value".into() } else { format!("{} values", differences.len()) }
+}
+
+fn as_table(differences: &[Difference]) -> String {
+    let rows: Vec<Vec<String>> = differences
+        .iter()
+        .map(|d| {
+            let joint = d.joint.map_or(String::new(), |joint| joint.to_string());
+            vec![joint, d.name.clone(), d.file.to_string(), d.device.to_string(), d.unit.to_owned()]
+        })
+        .collect();
+    table(&["", "value", ">file", ">controller", ""], &rows)
+}

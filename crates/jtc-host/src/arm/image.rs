@@ -1,0 +1,338 @@
+//! An arm as a controller with extensions has it: one image (J-54), its hash (J-52), and what of it differs from a file (J-55).
+
+use jtc_core::settings::{self, SettingError};
+use jtc_core::{Config, Friction, JOINTS, PidGains, TableOf};
+use jtc_dynamics::{ArmModel, Link, Origin};
+use jtc_wire::field::{frame, image};
+use jtc_wire::{ArmImage, EncodeError, Floats, FrictionImage, Hash, Joint, Name, SettingValue};
+
+use super::{Arm, Difference};
+
+/// Why an image is not that of an arm.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The bytes are no image of a version that is known.
+    #[error("no arm image that this program reads")]
+    Form,
+    /// A setting is out of range, or they contradict each other.
+    #[error("{0}")]
+    Setting(SettingError),
+}
+
+/// The order in which a frame of the model has the numbers of a frame.
+const ORIGIN: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
+const LINK: [&str; 13] =
+    ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
+const PID: [(&str, &str); 5] = [
+    ("pid.kp", "N·m/rad"),
+    ("pid.ki", "N·m/(rad·s)"),
+    ("pid.kd", "N·m·s/rad"),
+    ("pid.int_min_rad_s", "rad·s"),
+    ("pid.int_max_rad_s", "rad·s"),
+];
+
+impl Arm {
+    /// The values of the settings that a controller of this arm has, in the order of its table. What the file does not give is as
+    /// in the built-in arm.
+    pub fn settings(&self) -> Vec<SettingValue> {
+        settings::values(&self.config(), 0, true).collect()
+    }
+
+    /// The image that a controller has which uses this arm; `None` when gains or friction are missing.
+    ///
+    /// # Errors
+    ///
+    /// A number that no frame carries.
+    pub fn image(&self) -> Result<Option<Vec<u8>>, EncodeError> {
+        let (Some(pid), Some(friction)) = (&self.pid, self.friction()) else { return Ok(None) };
+        let settings = self.settings();
+        let mut bytes = image::MAGIC.to_vec();
+        bytes.extend([image::VERSION, matches!(friction, Friction::Table(_)).into()]);
+        bytes.extend((settings.len() as u16).to_be_bytes());
+        let parts = [
+            crate::frame::pid(pid)?,
+            crate::frame::arm_model(&self.model)?,
+            crate::frame::friction(&friction)?,
+        ];
+        for part in parts {
+            bytes.extend(&part[frame::body(part.len())]);
+        }
+        settings.iter().for_each(|value| bytes.extend(value.emit()));
+        bytes.extend(Name::cut(&self.name).as_bytes());
+        Ok(Some(bytes))
+    }
+
+    /// The hash that a controller has which uses this arm; `None` when gains or friction are missing.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Arm::image`].
+    pub fn hash(&self) -> Result<Option<u64>, EncodeError> {
+        Ok(self.image()?.map(|image| Hash::of_image(&image)))
+    }
+
+    /// The arm that a controller has.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no image, and settings of no arm.
+    pub fn from_image(bytes: &[u8]) -> Result<Self, ImageError> {
+        let image = ArmImage::parse(bytes).ok_or(ImageError::Form)?;
+        let config =
+            settings::with_values(&Config::avena(), image.settings.iter()).map_err(ImageError::Setting)?;
+        let (polynomial, table) = match image.friction {
+            FrictionImage::Polynomial(floats) => (Some(polynomials(&floats)), None),
+            FrictionImage::Table(floats) => (None, Some(Box::new(tables(&floats)))),
+        };
+        Ok(Self {
+            name: image.name.to_string(),
+            joints: config.joints,
+            rotors_given: [true; JOINTS],
+            gravity: Some(config.gravity),
+            others: others(&config),
+            pid: Some(gains(&image.pid)),
+            model: model(&image.model),
+            polynomial,
+            table,
+            ..Self::nameless()
+        })
+    }
+
+    /// What of this arm differs from that of a controller, value by value; of what the file does not give, nothing.
+    pub fn differences(&self, device: &Self) -> Vec<Difference> {
+        let mut all = Vec::new();
+        let mut compare = |name: String, joint, file: f64, device: f64, unit| {
+            // The wire carries 32 bits of gains, friction and model.
+            if file as f32 != device as f32 {
+                all.push(Difference { name, joint, file, device, unit });
+            }
+        };
+        let device_config = device.config();
+        for value in self.settings() {
+            let joint = Joint::from_number(value.joint.into());
+            let Some(row) = settings::setting(value.setting) else { continue };
+            let given = match row.name {
+                "rotor_inertia_kg_m2" => joint.is_none_or(|joint| self.rotors_given[joint.index()]),
+                name if name.starts_with("gravity_") => self.gravity.is_some(),
+                _ => true,
+            };
+            if let (true, Some(has)) = (given, row.get(&device_config, value.joint)) {
+                compare(row.name.to_owned(), joint, value.value, has, row.unit);
+            }
+        }
+        if let (Some(own), Some(has)) = (&self.pid, &device.pid) {
+            for (joint, (own, has)) in Joint::ALL.into_iter().zip(own.iter().zip(has)) {
+                let numbers = |g: &PidGains| [g.kp, g.ki, g.kd, g.int_min, g.int_max];
+                for ((name, unit), (own, has)) in PID.iter().zip(numbers(own).into_iter().zip(numbers(has))) {
+                    compare((*name).to_owned(), Some(joint), own, has, unit);
+                }
+            }
+        }
+        for (name, own, has) in model_numbers(&self.model, &device.model) {
+            compare(name, None, own, has, "");
+        }
+        self.compare_friction(device, &mut compare);
+        all
+    }
+
+    fn compare_friction(
+        &self,
+        device: &Self,
+        compare: &mut impl FnMut(String, Option<Joint>, f64, f64, &'static str),
+    ) {
+        let has = device.friction();
+        // A file may have both: what counts is the one that the device uses.
+        let own = match has {
+            Some(Friction::Table(_)) => self.table.as_ref().map(|t| Friction::Table(**t)).or(self.friction()),
+            _ => self.friction(),
+        };
+        match (own, has) {
+            (Some(Friction::Polynomial(own)), Some(Friction::Polynomial(has))) => {
+                for (joint, (own, has)) in Joint::ALL.into_iter().zip(own.iter().zip(&has)) {
+                    for (i, (own, has)) in own.iter().zip(has).enumerate() {
+                        compare(format!("friction_polynomial.c{i}"), Some(joint), *own, *has, "");
+                    }
+                }
+            }
+            (Some(Friction::Table(own)), Some(Friction::Table(has))) => {
+                for (joint, (own, has)) in Joint::ALL.into_iter().zip(own.iter().zip(&has)) {
+                    let numbers = |t: &TableOf<f32>| {
+                        let torque = t.torque.into_iter().flatten();
+                        t.velocity.into_iter().chain(t.temperature).chain(torque).collect::<Vec<_>>()
+                    };
+                    // One of 440 stands for all.
+                    let pairs = numbers(own).into_iter().zip(numbers(has));
+                    if let Some((own, has)) = pairs.clone().find(|(own, has)| own != has) {
+                        let count = pairs.filter(|(own, has)| own != has).count();
+                        let name = format!("friction_table ({count} numbers, the first)");
+                        compare(name, Some(joint), own.into(), has.into(), "");
+                    }
+                }
+            }
+            // One is a polynomial and the other is not.
+            (Some(own), Some(has)) => {
+                let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
+                compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The settings that are not those of the built-in arm and have no key of their own in an arm file.
+fn others(config: &Config) -> Vec<SettingValue> {
+    let built_in = Config::avena();
+    let built_in = settings::values(&built_in, 0, true);
+    settings::values(config, 0, true)
+        .zip(built_in)
+        .filter(|(own, built_in)| {
+            own != built_in && settings::setting(own.setting).is_some_and(super::has_no_key)
+        })
+        .map(|(own, _)| own)
+        .collect()
+}
+
+fn at(floats: &Floats<'_>, i: usize) -> f64 {
+    floats.get(i).unwrap_or(f32::NAN).into()
+}
+
+fn gains(floats: &Floats<'_>) -> [PidGains; JOINTS] {
+    std::array::from_fn(|j| {
+        let at = |i| at(floats, 5 * j + i);
+        PidGains { kp: at(0), ki: at(1), kd: at(2), int_min: at(3), int_max: at(4) }
+    })
+}
+
+fn model(floats: &Floats<'_>) -> ArmModel {
+    let take = |from: usize| std::array::from_fn(|i| at(floats, from + i));
+    let origin = |from: usize| Origin { xyz: take(from), rpy: take(from + 3) };
+    ArmModel {
+        joints: std::array::from_fn(|i| origin(6 * i)),
+        links: std::array::from_fn(|i| {
+            let from = 42 + 13 * i;
+            let inertia = std::array::from_fn(|i| at(floats, from + 6 + i));
+            Link { origin: origin(from), inertia, mass: at(floats, from + 12) }
+        }),
+    }
+}
+
+fn polynomials(floats: &Floats<'_>) -> [[f64; 6]; JOINTS] {
+    std::array::from_fn(|j| std::array::from_fn(|i| at(floats, 6 * j + 5 - i)))
+}
+
+fn tables(floats: &Floats<'_>) -> [TableOf<f32>; JOINTS] {
+    let at = |i: usize| floats.get(i).unwrap_or(f32::NAN);
+    std::array::from_fn(|j| {
+        let from = 440 * j;
+        TableOf {
+            velocity: std::array::from_fn(|i| at(from + i)),
+            temperature: std::array::from_fn(|i| at(from + 20 + i)),
+            torque: std::array::from_fn(|v| std::array::from_fn(|t| at(from + 40 + 20 * v + t))),
+        }
+    })
+}
+
+/// Every number of two models, with its name.
+fn model_numbers(own: &ArmModel, has: &ArmModel) -> Vec<(String, f64, f64)> {
+    let origin = |o: &Origin| [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]];
+    let link = |l: &Link| {
+        let mut numbers = [0.0; 13];
+        numbers[..6].copy_from_slice(&origin(&l.origin));
+        numbers[6..12].copy_from_slice(&l.inertia);
+        numbers[12] = l.mass;
+        numbers
+    };
+    let mut all = Vec::new();
+    for (i, (own, has)) in own.joints.iter().zip(&has.joints).enumerate() {
+        let part =
+            if i < JOINTS { format!("origin of joint {}", i + 1) } else { "origin of the flange".into() };
+        for ((name, own), has) in ORIGIN.iter().zip(origin(own)).zip(origin(has)) {
+            all.push((format!("{part}, {name}"), own, has));
+        }
+    }
+    for (i, (own, has)) in own.links.iter().zip(&has.links).enumerate() {
+        for ((name, own), has) in LINK.iter().zip(link(own)).zip(link(has)) {
+            all.push((format!("link {i}, {name}"), own, has));
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn j54_an_arm_comes_back_from_its_image() {
+        let mut arm = Arm::avena();
+        arm.joints[3].torque_gain = 1.3;
+        let image = arm.image().unwrap().expect("it is complete");
+        let again = Arm::from_image(&image).unwrap();
+        assert!(arm.differences(&again).is_empty(), "{:?}", arm.differences(&again));
+        assert_eq!(again.image().unwrap().as_deref(), Some(&image[..]));
+        assert_eq!(again.name, "avena");
+        // Also through its file.
+        let file = Arm::from_toml(&again.to_toml()).unwrap();
+        assert_eq!(file.image().unwrap().as_deref(), Some(&image[..]));
+        let table = Arm { polynomial: None, ..arm.clone() };
+        let image = table.image().unwrap().expect("it is complete");
+        assert_eq!(Arm::from_image(&image).unwrap().image().unwrap(), Some(image));
+        assert_eq!(Arm { pid: None, ..arm }.image(), Ok(None));
+    }
+
+    /// Settings that have no key of a joint are in a table of the file.
+    #[test]
+    fn j53_settings_of_the_controller_travel_with_the_file() {
+        let text =
+            Arm::avena().to_toml() + "\n[settings]\nramp_ms = 300\ngripper = false\nkp_max = 60000.0\n";
+        let arm = Arm::from_toml(&text).unwrap();
+        let config = arm.config();
+        assert_eq!((config.ramp_ms, config.gripper, config.parameter_bounds.kp_max), (300, false, 60_000.0));
+        let image = arm.image().unwrap().expect("it is complete");
+        let again = Arm::from_image(&image).unwrap();
+        assert_eq!(again.config(), config);
+        assert_eq!(Arm::from_toml(&again.to_toml()).unwrap().config(), config);
+        assert_eq!(Arm::avena().differences(&again).len(), 3);
+        for (wrong, named) in [
+            ("ramp_ms = 3", "20 to 5000"),
+            ("ramp = 300", "ramp"),
+            ("gripper = 0.5", "gripper"),
+            ("speed = 0.5", "speed"),
+            ("torque_max_nm = 5.0", "torque_max_nm"),
+            ("ramp_ms = \"long\"", "ramp_ms"),
+        ] {
+            let text = format!("{}\n[settings]\n{wrong}\n", Arm::avena().to_toml());
+            let error = Arm::from_toml(&text).unwrap_err().to_string();
+            assert!(error.contains(named), "{wrong}: {error}");
+        }
+    }
+
+    #[test]
+    fn j55_every_number_that_differs_is_named() {
+        let arm = Arm::avena();
+        let mut other = arm.clone();
+        other.gravity = Some([0.0, 0.1, -9.81]);
+        other.joints[2].velocity_max = 1.0;
+        other.model.links[4].mass += 0.5;
+        other.model.joints[6].xyz[1] += 0.01;
+        other.pid.as_mut().unwrap()[5].kd += 1.0;
+        other.polynomial.as_mut().unwrap()[1][2] += 1.0;
+        let names: Vec<_> =
+            arm.differences(&other).iter().map(|d| (d.name.clone(), d.joint.map(Joint::number))).collect();
+        let expected = [
+            ("velocity_max_rad_s", Some(3)),
+            ("gravity_y_m_s2", None),
+            ("pid.kd", Some(6)),
+            ("origin of the flange, y", None),
+            ("link 4, mass", None),
+            ("friction_polynomial.c2", Some(2)),
+        ];
+        assert_eq!(names, expected.map(|(name, joint)| (name.to_owned(), joint)));
+        // What a file does not give differs from nothing.
+        let open = Arm { gravity: None, pid: None, polynomial: None, table: None, ..arm.clone() };
+        other.joints[2] = arm.joints[2];
+        other.model = arm.model;
+        assert!(open.differences(&other).is_empty());
+    }
+}

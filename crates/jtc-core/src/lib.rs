@@ -32,6 +32,7 @@ mod received;
 mod report;
 mod response_queue;
 pub mod settings;
+pub mod slots;
 mod states;
 mod store;
 mod teach;

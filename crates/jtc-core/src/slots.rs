@@ -1,0 +1,251 @@
+//! Two slots of flash that keep one image over any loss of power (J-54).
+//!
+//! An image, here a stored arm, is bytes of any meaning. It is written to the slot that does not hold the newest one, so what
+//! was there before stays whole until the new one is. A slot is a header of one flash word and the image behind it, filled up
+//! to whole words:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 0..4 | `JTCA` |
+//! | 4..6 | version of this form, 1 |
+//! | 6..8 | 0 |
+//! | 8..12 | bytes of the image |
+//! | 12..16 | sequence number: the newer image has the higher one, modulo 2³² |
+//! | 16..28 | 0 |
+//! | 28..32 | CRC-32 (ISO-HDLC) of bytes 0..28 and of all words behind them |
+//! | 32.. | the image; the rest of its last word is 0xFF |
+//!
+//! The header is written last: a slot whose writing was cut off has none. A word that was being programmed, and a sector that was
+//! being erased, may hold anything; the CRC tells. All numbers are little-endian.
+//!
+//! There is no hardware here: [`Storing`] says what to do next, whoever has the flash does it. A flash word can be programmed
+//! once after it was erased, and [`Storing`] asks for no more.
+use core::cmp::Ordering;
+
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+
+/// Bytes of an image at most.
+pub const IMAGE_MAX: usize = 12 * 1024;
+/// Bytes that the flash of the STM32H7 programs at once.
+pub const WORD: usize = 32;
+/// Slots.
+pub const SLOTS: usize = 2;
+
+/// What is programmed at once.
+pub type Word = [u8; WORD];
+
+const MAGIC: [u8; 4] = *b"JTCA";
+const VERSION: u16 = 1;
+/// What erased flash holds, and what follows an image in its last word.
+const ERASED: u8 = 0xFF;
+
+static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+const _: () = assert!(IMAGE_MAX.is_multiple_of(WORD), "a buffer of IMAGE_MAX takes whole words");
+
+/// The first word of a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    length: u32,
+    sequence: u32,
+    crc: u32,
+}
+
+impl Header {
+    /// Of this image; `None` when it is longer than [`IMAGE_MAX`].
+    pub fn new(image: &[u8], sequence: u32) -> Option<Self> {
+        let length = u32::try_from(image.len()).ok().filter(|_| image.len() <= IMAGE_MAX)?;
+        let header = Self { length, sequence, crc: 0 };
+        let mut digest = CRC.digest();
+        digest.update(&header.checked_bytes());
+        let words = image.chunks(WORD).map(padded);
+        words.for_each(|word| digest.update(&word));
+        Some(Self { crc: digest.finalize(), ..header })
+    }
+
+    /// What a word says if it is a header; whether its slot is whole is for [`Header::accepts`] to say.
+    pub fn parse(word: &Word) -> Option<Self> {
+        let field = |at: usize| Some(u32::from_le_bytes(*word.get(at..)?.first_chunk()?));
+        let header = Self { length: field(8)?, sequence: field(12)?, crc: field(28)? };
+        (header.length as usize <= IMAGE_MAX && header.emit() == *word).then_some(header)
+    }
+
+    /// Its bytes.
+    pub fn emit(&self) -> Word {
+        let mut word = [0; WORD];
+        let fields = self.checked_bytes().into_iter().chain(self.crc.to_le_bytes());
+        word.iter_mut().zip(fields).for_each(|(to, from)| *to = from);
+        word
+    }
+
+    /// What stands before the CRC.
+    fn checked_bytes(&self) -> [u8; 28] {
+        let mut bytes = [0; 28];
+        let [version, length, sequence] =
+            [u32::from(VERSION), self.length, self.sequence].map(u32::to_le_bytes);
+        let fields = [MAGIC, version, length, sequence];
+        bytes.iter_mut().zip(fields.iter().flatten()).for_each(|(to, from)| *to = *from);
+        bytes
+    }
+
+    /// Bytes of the image.
+    pub fn length(&self) -> usize {
+        self.length as usize
+    }
+
+    /// Sequence number.
+    pub fn sequence(&self) -> u32 {
+        self.sequence
+    }
+
+    /// Words of the slot, this one among them.
+    pub fn words(&self) -> usize {
+        1 + self.length().div_ceil(WORD)
+    }
+
+    /// The image if `rest`, which begins with all words behind the header, is what the header was made for.
+    pub fn accepts<'a>(&self, rest: &'a [u8]) -> Option<&'a [u8]> {
+        let words = rest.get(..(self.words() - 1) * WORD)?;
+        let mut digest = CRC.digest();
+        digest.update(&self.checked_bytes());
+        digest.update(words);
+        words.get(..self.length()).filter(|_| digest.finalize() == self.crc)
+    }
+}
+
+/// A word of an image, its last one filled up.
+fn padded(bytes: &[u8]) -> Word {
+    let mut word = [ERASED; WORD];
+    word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+    word
+}
+
+/// Whether an image is newer than another by their sequence numbers, which begin again behind 2³² − 1.
+pub fn newer(a: u32, b: u32) -> bool {
+    (a.wrapping_sub(b).cast_signed()).cmp(&0) == Ordering::Greater
+}
+
+/// What is in the slots: the sequence number of each that is whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Slots([Option<u32>; SLOTS]);
+
+impl Slots {
+    /// As they were found.
+    pub const fn new(found: [Option<u32>; SLOTS]) -> Self {
+        Self(found)
+    }
+
+    /// The slot of the newest image, with its sequence number; `None` when no slot is whole.
+    pub fn current(&self) -> Option<(usize, u32)> {
+        match self.0 {
+            [Some(a), Some(b)] if newer(b, a) => Some((1, b)),
+            [Some(a), _] => Some((0, a)),
+            [None, Some(b)] => Some((1, b)),
+            [None, None] => None,
+        }
+    }
+
+    /// Where the next image goes, and its sequence number: never to the slot of the newest.
+    pub fn next(&self) -> (usize, u32) {
+        self.current().map_or((0, 1), |(slot, sequence)| (1 - slot, sequence.wrapping_add(1)))
+    }
+
+    fn set(&mut self, slot: usize, sequence: Option<u32>) {
+        if let Some(known) = self.0.get_mut(slot) {
+            *known = sequence;
+        }
+    }
+}
+
+/// What has to be done with the flash next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Erase the slot.
+    Erase {
+        /// Slot.
+        slot: usize,
+    },
+    /// Program a word, read it again and compare.
+    Program {
+        /// Slot.
+        slot: usize,
+        /// Word in it; 0 is the header.
+        word: usize,
+        /// What it is to hold.
+        bytes: Word,
+    },
+    /// Nothing: the image is stored, and found from now on.
+    Stored,
+}
+
+/// One image on its way into its slot.
+///
+/// ```
+/// use jtc_core::slots::{Action, Header, Slots, Storing, WORD};
+/// let image = b"an arm";
+/// let mut slots = Slots::default();
+/// let mut flash = [[0xFF; WORD]; 2];
+/// let mut storing = Storing::begin(&mut slots, image).unwrap();
+/// loop {
+///     match storing.action(image) {
+///         Action::Erase { .. } => flash.fill([0xFF; WORD]),
+///         Action::Program { word, bytes, .. } => flash[word] = bytes,
+///         Action::Stored => break,
+///     }
+///     storing.done();
+/// }
+/// storing.finish(&mut slots);
+/// assert_eq!(slots.current(), Some((0, 1)));
+/// let header = Header::parse(&flash[0]).unwrap();
+/// assert_eq!(header.accepts(&flash[1]), Some(&image[..]));
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Storing {
+    slot: usize,
+    header: Header,
+    /// Actions that are done: the erasure, then a word each.
+    done: usize,
+}
+
+impl Storing {
+    /// Begins to store an image; `None` when it is longer than [`IMAGE_MAX`]. From here on what its slot held counts as lost.
+    pub fn begin(slots: &mut Slots, image: &[u8]) -> Option<Self> {
+        let (slot, sequence) = slots.next();
+        let header = Header::new(image, sequence)?;
+        slots.set(slot, None);
+        Some(Self { slot, header, done: 0 })
+    }
+
+    /// What to do now; `image` is the one it began with.
+    pub fn action(&self, image: &[u8]) -> Action {
+        let slot = self.slot;
+        let Some(before) = self.done.checked_sub(1) else { return Action::Erase { slot } };
+        let words = self.header.words();
+        // The words of the image, and when all of them are there, the header.
+        match before + 1 {
+            word if word < words => {
+                let at = before * WORD;
+                Action::Program { slot, word, bytes: padded(image.get(at..).unwrap_or(&[])) }
+            }
+            word if word == words => Action::Program { slot, word: 0, bytes: self.header.emit() },
+            _ => Action::Stored,
+        }
+    }
+
+    /// The action of this moment is done, a word was read again and is right.
+    pub fn done(&mut self) {
+        self.done = self.done.saturating_add(1).min(self.header.words() + 1);
+    }
+
+    /// Slot, and the sequence number that it gets.
+    pub fn target(&self) -> (usize, u32) {
+        (self.slot, self.header.sequence)
+    }
+
+    /// Everything is done; without effect when it is not.
+    pub fn finish(&self, slots: &mut Slots) {
+        if self.done > self.header.words() {
+            slots.set(self.slot, Some(self.header.sequence));
+        }
+    }
+}
